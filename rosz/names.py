@@ -1,0 +1,144 @@
+"""Graph resource names by ROS 1's rules (ROS wiki, Names).
+
+A name is *global* (``/a/b``), *relative* (``a/b``), *private* (``~a``) or *base* (``a``). Resolution
+is against the full name of a node: its namespace for relative names, the name itself for private ones.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from rosz.errors import InvalidName
+
+__all__ = (
+    "anonymous",
+    "basename",
+    "canonical",
+    "check",
+    "check_base",
+    "is_global",
+    "is_private",
+    "is_valid",
+    "join",
+    "namespace",
+    "resolve",
+)
+
+_VALID = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*", re.ASCII)
+_BASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+_BAD_CHARACTER = re.compile(r"[^A-Za-z0-9_/]", re.ASCII)
+
+
+def is_valid(name: str) -> bool:
+    """Tell whether a text is a legal graph resource name; the empty one is."""
+    return not name or (_VALID.fullmatch(name) is not None and "//" not in name)
+
+
+def check(name: str) -> str:
+    """Return the name if it is legal.
+
+    Raises:
+        InvalidName: It is not; the message names the first offending character.
+    """
+    if is_valid(name):
+        return name
+    if "//" in name:
+        raise InvalidName(name, "it has an empty part ('//')")
+    if not re.match(r"[~/A-Za-z]", name):
+        raise InvalidName(name, f"it starts with '{name[0]}'; expected a letter, '/' or '~'")
+    bad = _BAD_CHARACTER.search(name, 1)
+    assert bad is not None  # the three ways to be illegal are an empty part, a start, a character
+    raise InvalidName(
+        name, f"character '{bad[0]}' at position {bad.start() + 1}; expected letters, digits, '_' or '/'"
+    )
+
+
+def check_base(name: str) -> str:
+    """Return the name if it is a legal base name: no slash, no tilde, not empty.
+
+    Raises:
+        InvalidName: It is not.
+    """
+    if _BASE.fullmatch(name):
+        return name
+    if not name:
+        raise InvalidName(name, "it is empty")
+    if "/" in name:
+        raise InvalidName(name, "it contains '/'; expected a base name without a namespace")
+    check(name)
+    raise InvalidName(name, "expected a letter first, then letters, digits or '_'")
+
+
+def is_global(name: str) -> bool:
+    """Tell whether a name starts at the root."""
+    return name.startswith("/")
+
+
+def is_private(name: str) -> bool:
+    """Tell whether a name is private to its node (``~name``)."""
+    return name.startswith("~")
+
+
+def canonical(name: str) -> str:
+    """Drop repeated and trailing slashes; the root stays ``/``."""
+    if not name or name == "/":
+        return name
+    parts = [part for part in name.split("/") if part]
+    return ("/" if name.startswith("/") else "") + "/".join(parts)
+
+
+def namespace(name: str) -> str:
+    """Return the namespace that a global name lies in, with its trailing slash.
+
+    ``/a/b`` gives ``/a/``, ``/a`` and ``/`` give ``/``.
+    """
+    if not name.startswith("/"):
+        return namespace("/" + name) if name else "/"
+    return name.rstrip("/").rpartition("/")[0] + "/"
+
+
+def basename(name: str) -> str:
+    """Return the last part of a name."""
+    return name.rstrip("/").rpartition("/")[2]
+
+
+def join(ns: str, name: str) -> str:
+    """Put a name into a namespace; a global or private name stays as it is."""
+    if is_global(name) or is_private(name):
+        return name
+    if not ns:
+        return name
+    return canonical(f"{ns}/{name}")
+
+
+def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> str:
+    """Resolve a name as a node sees it, then apply the node's remappings.
+
+    Args:
+        name: Any legal name; the empty one means the node's namespace.
+        node: Full name of the node.
+        remaps: Resolved name to resolved name.
+
+    Returns:
+        A global name.
+
+    Raises:
+        InvalidName: ``name`` is not legal.
+    """
+    check(name)
+    if not name:
+        return namespace(node)
+    if is_global(name):
+        resolved = canonical(name)
+    elif is_private(name):
+        resolved = canonical(f"{node}/{name[1:]}")
+    else:
+        resolved = canonical(namespace(node) + name)
+    return remaps.get(resolved, resolved) if remaps else resolved
+
+
+def anonymous(base: str, host: str, pid: int, milliseconds: int) -> str:
+    """Make a base name unique to a process and a moment, in the form ROS 1 uses."""
+    suffix = re.sub(r"[^A-Za-z0-9_]", "_", host)
+    return f"{base}_{suffix}_{pid}_{milliseconds}"
