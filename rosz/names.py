@@ -1,7 +1,8 @@
 """Graph resource names by ROS 1's rules (ROS wiki, Names).
 
-A name is *global* (``/a/b``), *relative* (``a/b``), *private* (``~a``) or *base* (``a``). Resolution
-is against the full name of a node: its namespace for relative names, the name itself for private ones.
+A name is *global* (``/a/b``), *relative* (``a/b``), *private* (``~a``) or *base* (``a``).
+Resolution is against the full name of a node: its namespace for relative names, the name itself for
+private ones.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ __all__ = (
 
 _VALID = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*", re.ASCII)
 _BASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
-_BAD_CHARACTER = re.compile(r"[^A-Za-z0-9_/]", re.ASCII)
+_PART = re.compile(r"[A-Za-z0-9_/]", re.ASCII)
 
 
 def is_valid(name: str) -> bool:
@@ -47,10 +48,9 @@ def check(name: str) -> str:
         raise InvalidName(name, "it has an empty part ('//')")
     if not re.match(r"[~/A-Za-z]", name):
         raise InvalidName(name, f"it starts with '{name[0]}'; expected a letter, '/' or '~'")
-    bad = _BAD_CHARACTER.search(name, 1)
-    assert bad is not None  # the three ways to be illegal are an empty part, a start, a character
+    place, bad = next((i, c) for i, c in enumerate(name[1:], 2) if not _PART.fullmatch(c))
     raise InvalidName(
-        name, f"character '{bad[0]}' at position {bad.start() + 1}; expected letters, digits, '_' or '/'"
+        name, f"character '{bad}' at position {place}; expected letters, digits, '_' or '/'"
     )
 
 

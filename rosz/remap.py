@@ -50,7 +50,9 @@ class Arguments(msgspec.Struct, frozen=True):
         Raises:
             InvalidName: A side is not a legal name.
         """
-        return {names.resolve(old, node): names.resolve(new, node) for old, new in self.remaps.items()}
+        return {
+            names.resolve(old, node): names.resolve(new, node) for old, new in self.remaps.items()
+        }
 
 
 def parse(argv: Sequence[str]) -> Arguments:

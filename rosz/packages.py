@@ -1,0 +1,175 @@
+"""ROS packages on disk: folders with a package.xml (REP 127, REP 149).
+
+The index looks in the folders that it is given, in order, and the first package of a name wins, as
+``rospack`` has it. Nothing is read before it is asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+
+import msgspec
+
+from rosz.errors import ExecutableNotFound, NotFoundError, PackageError, PackageNotFound, near_miss
+
+__all__ = ("Package", "PackageIndex")
+
+MANIFEST = "package.xml"
+_IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"})
+_NO_CODE = frozenset({"__pycache__", "node_modules"})
+
+
+class Package(msgspec.Struct, frozen=True):
+    """One package.
+
+    Attributes:
+        name: Its name by its package.xml.
+        path: Its folder.
+    """
+
+    name: str
+    path: Path
+
+    def _folders(self) -> list[Path]:
+        """List where files may be: the folder itself, and ``lib/<name>`` of an install space."""
+        prefix = self.path.parent.parent
+        installed = prefix / "lib" / self.name
+        return [installed, self.path] if self.path.parent.name == "share" else [self.path]
+
+    def _files(self) -> Iterator[Path]:
+        for top in self._folders():
+            for folder, names, files in os.walk(top):
+                names[:] = sorted(n for n in names if not n.startswith(".") and n not in _NO_CODE)
+                for file in sorted(files):
+                    yield Path(folder, file)
+
+    def executables(self) -> list[str]:
+        """Return the names of all files of the package that may be executed, sorted."""
+        return sorted({file.name for file in self._files() if _is_executable(file)})
+
+    def executable(self, name: str) -> Path:
+        """Find an executable file by its name anywhere in the package, as rosrun does.
+
+        Raises:
+            ExecutableNotFound: There is none, or it lacks the executable bit.
+        """
+        found = [file for file in self._files() if file.name == name]
+        for file in found:
+            if _is_executable(file):
+                return file
+        if found:
+            raise ExecutableNotFound(
+                f"'{found[0]}' of package '{self.name}' is not executable; run: chmod +x {found[0]}"
+            )
+        known = self.executables()
+        listing = f"; it has {', '.join(known[:8])}" if known else "; it has no executables"
+        raise ExecutableNotFound(
+            f"package '{self.name}' ({self.path}) has no executable '{name}'"
+            f"{near_miss(name, known) or listing}"
+        )
+
+    def file(self, name: str) -> Path:
+        """Find a file by its name anywhere in the package, as ``roslaunch PKG FILE`` does.
+
+        Raises:
+            NotFoundError: There is none.
+        """
+        direct = self.path / name
+        if direct.is_file():
+            return direct
+        for file in self._files():
+            if file.name == name:
+                return file
+        kin = [file.name for file in self._files() if file.suffix == Path(name).suffix]
+        raise NotFoundError(
+            f"package '{self.name}' ({self.path}) has no file '{name}'{near_miss(name, kin)}"
+        )
+
+
+class PackageIndex:
+    """The packages found in a list of folders.
+
+    Args:
+        roots: Folders that are packages or hold some at any depth; earlier ones win.
+    """
+
+    def __init__(self, roots: Sequence[Path]) -> None:
+        self.roots = tuple(roots)
+
+    @cached_property
+    def _known(self) -> dict[str, Package]:
+        known: dict[str, Package] = {}
+        for root in self.roots:
+            for folder in _crawl(root):
+                package = Package(_name_in(folder / MANIFEST), folder)
+                known.setdefault(package.name, package)
+        return known
+
+    def find(self, name: str) -> Package:
+        """Return the package of that name.
+
+        Raises:
+            PackageNotFound: It is in none of the folders.
+            PackageError: A package.xml on the way cannot be read.
+        """
+        if "_known" not in self.__dict__:
+            quick = self._beside(name)
+            if quick is not None:
+                return quick
+        if name in self._known:
+            return self._known[name]
+        raise PackageNotFound(name, self._known, [str(root) for root in self.roots])
+
+    def _beside(self, name: str) -> Package | None:
+        """Find a package in a folder of its own name right in the first root, without a crawl."""
+        if not name or "/" in name or not self.roots:
+            return None
+        folder = self.roots[0] / name
+        manifest = folder / MANIFEST
+        if manifest.is_file() and _name_in(manifest) == name:
+            return Package(name, folder)
+        return None
+
+    def names(self) -> list[str]:
+        """Return the names of all packages, sorted."""
+        return sorted(self._known)
+
+    def packages(self) -> list[Package]:
+        """Return all packages, sorted by name."""
+        return [self._known[name] for name in self.names()]
+
+
+def _is_executable(file: Path) -> bool:
+    return file.is_file() and os.access(file, os.X_OK)
+
+
+def _crawl(root: Path) -> Iterator[Path]:
+    """Walk to the folders that hold a package.xml; a package holds no further ones."""
+    for folder, names, files in os.walk(root, followlinks=True):
+        if MANIFEST in files:
+            names.clear()
+            if not _IGNORE_MARKERS & set(files):
+                yield Path(folder)
+        elif _IGNORE_MARKERS & set(files):
+            names.clear()
+        names[:] = sorted(n for n in names if not n.startswith(".") and n not in _NO_CODE)
+
+
+def _name_in(manifest: Path) -> str:
+    try:
+        root = ET.parse(manifest).getroot()  # noqa: S314  # expat bounds entities
+    except ET.ParseError as error:
+        line, column = error.position
+        raise PackageError(
+            f"not well-formed XML: {error.msg}", str(manifest), line, column + 1
+        ) from error
+    except OSError as error:
+        raise PackageError(f"cannot be read: {error.strerror}", str(manifest)) from error
+    name = (root.findtext("name") or "").strip()
+    if root.tag != "package" or not name:
+        raise PackageError("expected <package> with a <name> in it", str(manifest))
+    return name

@@ -1,0 +1,19 @@
+"""The network edge: sessions, and all that is declared on them. Nothing else imports zenoh."""
+
+from rosz.session.config import SessionConfig
+from rosz.session.samples import Query, Reply, Sample
+from rosz.session.session import Closable, RawPublisher, Session, Target
+from rosz.session.stamp import HybridClock, Stamp
+
+__all__ = (
+    "Closable",
+    "HybridClock",
+    "Query",
+    "RawPublisher",
+    "Reply",
+    "Sample",
+    "Session",
+    "SessionConfig",
+    "Stamp",
+    "Target",
+)

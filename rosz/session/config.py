@@ -1,0 +1,154 @@
+"""How a session is opened: rosz's settings as a Zenoh configuration.
+
+A *peer* listens on an ephemeral loopback port, tries to hold the rendezvous as well, and keeps
+trying to connect there, so whoever comes first is the meeting point and anyone can follow it. A
+*client* hangs on one router or peer. Neither listens beyond the machine unless told to, and
+multicast is off unless asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import msgspec
+
+from rosz.environment import Environment
+from rosz.errors import UsageError
+
+__all__ = ("SessionConfig", "zenoh_settings")
+
+_RETRY_FIRST_MS = 100
+_RETRY_LONGEST_MS = 1000
+_LEASE_MS = 60_000
+_EPHEMERAL = "tcp/127.0.0.1:0"
+
+
+class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
+    """What a session is to be.
+
+    Attributes:
+        mode: ``peer``, ``client`` or ``router``.
+        rendezvous: Endpoint where the sessions of this machine meet.
+        connect: Further endpoints to connect to.
+        listen: Further endpoints to listen on.
+        hold_rendezvous: Whether a peer may become the meeting point; short-lived ones should not.
+        must_connect: Whether opening fails, after ``open_timeout``, when nobody answers.
+        open_timeout: Seconds, for ``must_connect``.
+        multicast: Whether to look for others on the local network.
+        shared_memory: Payloads of at least so many bytes go by shared memory; 0 is off.
+        config_file: Zenoh configuration file to start from.
+        override: ``path/to/key=json;…`` applied last.
+    """
+
+    mode: Literal["peer", "client", "router"] = "peer"
+    rendezvous: str
+    connect: tuple[str, ...] = ()
+    listen: tuple[str, ...] = ()
+    hold_rendezvous: bool = True
+    must_connect: bool = False
+    open_timeout: float = 2.0
+    multicast: bool = False
+    shared_memory: int = 0
+    config_file: str = ""
+    override: str = ""
+
+    @classmethod
+    def node(cls, env: Environment) -> SessionConfig:
+        """Return what a node's session is by the environment."""
+        client = env.mode == "client"
+        return cls(
+            mode=env.mode,
+            rendezvous=env.rendezvous,
+            connect=env.connect,
+            listen=() if client else env.listen,
+            multicast=env.multicast,
+            shared_memory=env.shared_memory,
+            config_file=env.zenoh_config,
+            override=env.zenoh_override,
+        )
+
+    @classmethod
+    def command(cls, env: Environment, timeout: float = 1.0) -> SessionConfig:
+        """Return what a command's session is: a client of whoever is at the rendezvous.
+
+        Args:
+            env: The settings of the process.
+            timeout: Seconds to wait for somebody to be there.
+        """
+        return cls(
+            mode="client",
+            rendezvous=env.rendezvous,
+            connect=env.connect,
+            must_connect=True,
+            open_timeout=timeout,
+            multicast=env.multicast,
+            config_file=env.zenoh_config,
+            override=env.zenoh_override,
+        )
+
+
+def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
+    """Return the Zenoh configuration, as nested dictionaries."""
+    connect = [config.rendezvous, *config.connect]
+    listen = list(config.listen)
+    if config.mode == "router":
+        connect = list(config.connect)
+        listen = [config.rendezvous, *listen]
+    elif config.mode == "peer":
+        held = [config.rendezvous] if config.hold_rendezvous else []
+        listen = [*held, _EPHEMERAL, *listen]
+    must_listen = config.mode == "router"
+    return {
+        "mode": config.mode,
+        "connect": {
+            "endpoints": connect,
+            "exit_on_failure": config.must_connect,
+            "timeout_ms": int(config.open_timeout * 1000) if config.must_connect else 0,
+            "retry": {
+                "period_init_ms": _RETRY_FIRST_MS,
+                "period_max_ms": _RETRY_LONGEST_MS,
+                "period_increase_factor": 2,
+            },
+        },
+        "listen": {"endpoints": listen, "exit_on_failure": must_listen, "timeout_ms": 0},
+        "open": {
+            "return_conditions": {
+                "connect_scouted": config.must_connect,
+                "declares": config.must_connect,
+            }
+        },
+        "scouting": {
+            "multicast": {"enabled": config.multicast},
+            "gossip": {"enabled": True},
+        },
+        "timestamping": {"enabled": True},
+        "transport": {
+            "shared_memory": _shared_memory(config.shared_memory),
+            "link": {"tx": {"lease": _LEASE_MS, "keep_alive": 4}},
+        },
+    }
+
+
+def overrides(text: str) -> Mapping[str, str]:
+    """Read ``ZENOH_CONFIG_OVERRIDE``: key path to JSON text.
+
+    Raises:
+        UsageError: A part is not ``path=json``.
+    """
+    found: dict[str, str] = {}
+    for part in filter(None, (piece.strip() for piece in text.split(";"))):
+        key, separator, value = part.partition("=")
+        if not separator:
+            raise UsageError(f"ZENOH_CONFIG_OVERRIDE has '{part}'; expected 'path/to/key=json'")
+        found[key.strip()] = value.strip()
+    return found
+
+
+def _shared_memory(threshold: int) -> dict[str, Any]:
+    if not threshold:
+        return {"enabled": False}
+    return {
+        "enabled": True,
+        "transport_optimization": {"enabled": True, "message_size_threshold": threshold},
+    }

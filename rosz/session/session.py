@@ -1,0 +1,456 @@
+"""The Zenoh session: the one door to the network.
+
+Callbacks given here run on Zenoh's threads. They must be short, must not block, and must not call
+back into the session; whoever needs more hands over to a thread of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
+
+import zenoh
+import zenoh.ext
+
+from rosz.errors import ClosedError, TransportError, WaitTimeout
+from rosz.session.config import SessionConfig, overrides, zenoh_settings
+from rosz.session.samples import Query, Reply, Sample, to_timestamp
+from rosz.session.stamp import HybridClock, Stamp
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+__all__ = ("Closable", "RawPublisher", "Session", "Target")
+
+Target = Literal["all", "all_complete", "best"]
+
+_TARGETS = {
+    "all": zenoh.QueryTarget.ALL,
+    "all_complete": zenoh.QueryTarget.ALL_COMPLETE,
+    "best": zenoh.QueryTarget.BEST_MATCHING,
+}
+_HEARTBEAT_SECONDS = 0.5
+_REPLY_MARGIN = 1.0
+"""Seconds given to Zenoh's own query timeout to report before a wait ends by itself."""
+
+
+class Closable(Protocol):
+    """Something declared on the session."""
+
+    def close(self) -> None:
+        """Undeclare it; again is no error."""
+
+
+@contextmanager
+def _mapped(what: str) -> Iterator[None]:
+    """Turn Zenoh's errors into ours, naming what was attempted."""
+    try:
+        yield
+    except zenoh.ZError as error:
+        text = str(error).partition(" at ")[0].strip()
+        if "closed" in text.lower():
+            raise ClosedError(f"cannot {what}: the session is closed") from error
+        raise TransportError(f"cannot {what}: {text}") from error
+
+
+def _direct(callback: Callable[[Any], None]) -> Any:
+    """Have a callback run right on Zenoh's thread instead of a Python thread per declaration."""
+    return zenoh.handlers.Callback(callback, indirect=False)
+
+
+class _Declared:
+    """One declaration, undeclared at most once."""
+
+    def __init__(self, what: str, entity: Any) -> None:
+        self._what = what
+        self._entity: Any = entity
+
+    def close(self) -> None:
+        """Undeclare it; again is no error."""
+        entity, self._entity = self._entity, None
+        if entity is not None:
+            with _mapped(f"undeclare {self._what}"):
+                entity.undeclare()
+
+
+class RawPublisher(_Declared):
+    """A declared publisher of bytes."""
+
+    def __init__(self, key: str, entity: Any) -> None:
+        super().__init__(f"publisher '{key}'", entity)
+        self.key = key
+        self._put = entity.put
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Send one sample.
+
+        Raises:
+            ClosedError: The publisher or the session is closed.
+            TransportError: It cannot be sent.
+        """
+        if self._entity is None:
+            raise ClosedError(f"cannot publish on '{self.key}': the publisher is closed")
+        try:
+            self._put(payload, attachment=attachment)
+        except zenoh.ZError:
+            with _mapped(f"publish on '{self.key}'"):
+                raise
+
+
+class Session:
+    """One connection to the network.
+
+    Args:
+        raw: The open Zenoh session.
+    """
+
+    def __init__(self, raw: zenoh.Session) -> None:
+        self._raw = raw
+        self._closing = threading.Lock()
+        self.zid = str(raw.zid())
+        self.clock = HybridClock(self.zid)
+
+    @classmethod
+    def open(cls, config: SessionConfig) -> Session:
+        """Open a session.
+
+        Raises:
+            TransportError: Nobody answers where one must, an endpoint is occupied or malformed, or
+                a configuration value is refused.
+            UsageError: The override text is malformed.
+        """
+        with _mapped("read the Zenoh configuration"):
+            if config.config_file:
+                settings = zenoh.Config.from_file(config.config_file)
+            else:
+                settings = zenoh.Config.from_json5(json.dumps(zenoh_settings(config)))
+            for path, text in overrides(config.override).items():
+                settings.insert_json5(path, text)
+        where = ", ".join(settings_endpoints(config))
+        with _mapped(f"open a session ({where})"):
+            return cls(zenoh.open(settings))
+
+    def stamp(self) -> Stamp:
+        """Return a new stamp, later than all that this session gave or was shown."""
+        return self.clock.now()
+
+    def put(
+        self,
+        key: str,
+        payload: bytes,
+        *,
+        attachment: bytes | None = None,
+        stamp: Stamp | None = None,
+    ) -> None:
+        """Write a value; waits for a slow link rather than drop it.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        with _mapped(f"write '{key}'"):
+            self._raw.put(
+                key,
+                payload,
+                attachment=attachment,
+                timestamp=None if stamp is None else to_timestamp(stamp),
+                congestion_control=zenoh.CongestionControl.BLOCK,
+            )
+
+    def delete(
+        self, key: str, *, attachment: bytes | None = None, stamp: Stamp | None = None
+    ) -> None:
+        """Delete a value; waits for a slow link rather than drop the deletion.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        with _mapped(f"delete '{key}'"):
+            self._raw.delete(
+                key,
+                attachment=attachment,
+                timestamp=None if stamp is None else to_timestamp(stamp),
+                congestion_control=zenoh.CongestionControl.BLOCK,
+            )
+
+    def publisher(
+        self,
+        key: str,
+        *,
+        reliable: bool = True,
+        block: bool = False,
+        cache: int = 0,
+        express: bool = False,
+    ) -> RawPublisher:
+        """Declare a publisher.
+
+        Args:
+            key: Key expression.
+            reliable: Which kind of link to prefer.
+            block: Whether a full link makes ``put`` wait instead of dropping the sample.
+            cache: Samples kept for late joiners (transient local); 0 for none.
+            express: Whether to send each sample at once rather than in batches.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        congestion = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
+        reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
+        with _mapped(f"publish on '{key}'"):
+            if not cache:
+                plain = self._raw.declare_publisher(
+                    key, congestion_control=congestion, reliability=reliability, express=express
+                )
+                return RawPublisher(key, plain)
+            keeping = zenoh.ext.declare_advanced_publisher(
+                self._raw,
+                key,
+                congestion_control=congestion,
+                reliability=reliability,
+                express=express,
+                cache=zenoh.ext.CacheConfig(cache),
+                publisher_detection=True,
+                sample_miss_detection=zenoh.ext.MissDetectionConfig(
+                    heartbeat=None, sporadic_heartbeat=_HEARTBEAT_SECONDS
+                )
+                if reliable
+                else None,
+            )
+            return RawPublisher(key, keeping)
+
+    def subscriber(
+        self,
+        key: str,
+        callback: Callable[[Sample], None],
+        *,
+        history: int = 0,
+        recover: bool = False,
+        remote_only: bool = False,
+    ) -> Closable:
+        """Declare a subscriber.
+
+        Args:
+            key: Key expression.
+            callback: Gets every sample, on a Zenoh thread.
+            history: Samples per publisher to ask the caches of transient-local publishers for.
+            recover: Whether to notice and fetch samples that were missed.
+            remote_only: Whether to leave out what this very session publishes.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        origin = zenoh.Locality.REMOTE if remote_only else None
+        handler = _direct(lambda raw: callback(Sample(raw)))
+        with _mapped(f"subscribe to '{key}'"):
+            if not history:
+                entity: Any = self._raw.declare_subscriber(key, handler, allowed_origin=origin)
+            else:
+                entity = zenoh.ext.declare_advanced_subscriber(
+                    self._raw,
+                    key,
+                    handler,
+                    allowed_origin=origin,
+                    history=zenoh.ext.HistoryConfig(
+                        detect_late_publishers=True, max_samples=history
+                    ),
+                    recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
+                    if recover
+                    else None,
+                    subscriber_detection=True,
+                )
+        return _Declared(f"subscriber '{key}'", entity)
+
+    def queryable(
+        self, key: str, callback: Callable[[Query], None], *, complete: bool = False
+    ) -> Closable:
+        """Declare that questions on a key are answered here.
+
+        Args:
+            key: Key expression.
+            callback: Gets every query, on a Zenoh thread, and must see to its closing.
+            complete: Whether the answers here are all there are; ROS 2 clients ask only such.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        with _mapped(f"serve '{key}'"):
+            entity = self._raw.declare_queryable(
+                key, _direct(lambda raw: callback(Query(raw))), complete=complete
+            )
+        return _Declared(f"queryable '{key}'", entity)
+
+    def get_async(
+        self,
+        key: str,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+        *,
+        timeout: float,
+        payload: bytes | None = None,
+        attachment: bytes | None = None,
+        parameters: str = "",
+        target: Target = "all",
+        any_key: bool = False,
+    ) -> None:
+        """Ask, and have the answers delivered on a Zenoh thread.
+
+        Args:
+            key: Key expression to ask for.
+            on_reply: Gets each answer.
+            on_done: Called after the last answer, or when the time is over.
+            timeout: Seconds after which whoever has not answered is given up.
+            payload: Sent along with the question.
+            attachment: Sent beside the payload.
+            parameters: What follows the ``?`` of the selector.
+            target: Who is asked.
+            any_key: Whether answers may be for keys outside the one asked for.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        handler: Any = zenoh.handlers.Callback(
+            lambda raw: on_reply(Reply(raw)), on_done, indirect=False
+        )
+        with _mapped(f"ask '{key}'"):
+            self._raw.get(
+                f"{key}?{parameters}" if parameters else key,
+                handler,
+                target=_TARGETS[target],
+                consolidation=zenoh.ConsolidationMode.NONE,
+                accept_replies=zenoh.ReplyKeyExpr.ANY if any_key else None,
+                timeout=timeout,
+                payload=payload,
+                attachment=attachment,
+            )
+
+    def get(
+        self,
+        key: str,
+        *,
+        timeout: float,
+        payload: bytes | None = None,
+        attachment: bytes | None = None,
+        parameters: str = "",
+        target: Target = "all",
+        any_key: bool = False,
+    ) -> list[Reply]:
+        """Ask, and wait for all answers; the arguments are those of `get_async`.
+
+        Returns:
+            The answers, possibly none; one that is not ``ok`` with payload ``Timeout`` stands for
+            somebody who did not answer in time.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+            WaitTimeout: Zenoh itself did not report back.
+        """
+        replies: list[Reply] = []
+        done = threading.Event()
+        self.get_async(
+            key,
+            replies.append,
+            done.set,
+            timeout=timeout,
+            payload=payload,
+            attachment=attachment,
+            parameters=parameters,
+            target=target,
+            any_key=any_key,
+        )
+        if not done.wait(timeout + _REPLY_MARGIN):
+            raise WaitTimeout(f"end of answers on '{key}'", timeout + _REPLY_MARGIN)
+        return replies
+
+    def token(self, key: str) -> Closable:
+        """Declare a liveliness token: it is seen by others until closed or the link dies.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        with _mapped(f"declare token '{key}'"):
+            return _Declared(f"token '{key}'", self._raw.liveliness().declare_token(key))
+
+    def tokens(self, key: str, callback: Callable[[str, bool], None]) -> Closable:
+        """Watch liveliness tokens, those that exist already first.
+
+        Args:
+            key: Key expression that the tokens match.
+            callback: Gets a token's key and whether it is alive, on a Zenoh thread.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+
+        def deliver(raw: zenoh.Sample) -> None:
+            callback(str(raw.key_expr), raw.kind == zenoh.SampleKind.PUT)
+
+        with _mapped(f"watch tokens '{key}'"):
+            entity = self._raw.liveliness().declare_subscriber(key, _direct(deliver), history=True)
+        return _Declared(f"watch of tokens '{key}'", entity)
+
+    def live_tokens(self, key: str, timeout: float) -> list[str]:
+        """Return the keys of all liveliness tokens that match, sorted.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+            WaitTimeout: Zenoh itself did not report back.
+        """
+        found: set[str] = set()
+        done = threading.Event()
+
+        def collect(raw: zenoh.Reply) -> None:
+            sample = raw.ok
+            if sample is not None:
+                found.add(str(sample.key_expr))
+
+        with _mapped(f"look for tokens '{key}'"):
+            self._raw.liveliness().get(
+                key, zenoh.handlers.Callback(collect, done.set, indirect=False), timeout=timeout
+            )
+        if not done.wait(timeout + _REPLY_MARGIN):
+            raise WaitTimeout(f"end of tokens '{key}'", timeout + _REPLY_MARGIN)
+        return sorted(found)
+
+    def peers(self) -> list[str]:
+        """Return the ids of the sessions and routers that this one is linked to."""
+        info = self._raw.info
+        return sorted(str(zid) for zid in (*info.peers_zid(), *info.routers_zid()))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the session has been closed."""
+        return bool(self._raw.is_closed())
+
+    def close(self) -> None:
+        """Close the session and all that is declared on it; again is no error."""
+        with self._closing:
+            if not self._raw.is_closed():
+                self._raw.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def settings_endpoints(config: SessionConfig) -> list[str]:
+    """Return all endpoints that opening a session involves."""
+    return list(dict.fromkeys((config.rendezvous, *config.connect, *config.listen)))

@@ -1,0 +1,27 @@
+"""The text and bytes that rosz shares with ROS 2's rmw_zenoh; pure."""
+
+from rosz.wire.attachment import Attachment, pack, unpack
+from rosz.wire.gid import gid
+from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, endpoint_key, own_key, ros_type
+from rosz.wire.qos import format_qos, parse_qos
+from rosz.wire.tokens import Kind, Token, format_token, parse_token, tokens_key
+
+__all__ = (
+    "NO_HASH",
+    "OWN_SPACE",
+    "Attachment",
+    "Kind",
+    "Token",
+    "dds_type",
+    "endpoint_key",
+    "format_qos",
+    "format_token",
+    "gid",
+    "own_key",
+    "pack",
+    "parse_qos",
+    "parse_token",
+    "ros_type",
+    "tokens_key",
+    "unpack",
+)

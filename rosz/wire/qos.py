@@ -1,0 +1,116 @@
+"""The QoS chunk of a liveliness token (rmw_zenoh).
+
+``<reliability>:<durability>:<history>,<depth>:<deadline>:<lifespan>:<liveliness>,<lease>`` with
+durations as ``seconds,nanoseconds``; a value that is the default is left empty.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from rosz.errors import DecodeError
+from rosz.qos import FOREVER, QoS
+
+__all__ = ("format_qos", "parse_qos")
+
+_DEFAULT_DEPTH = 42
+_SECOND = 1_000_000_000
+_FOREVER = divmod(FOREVER, _SECOND)
+_RELIABLE, _BEST_EFFORT = 1, 2
+_TRANSIENT_LOCAL, _VOLATILE = 1, 2
+_KEEP_LAST, _KEEP_ALL = 1, 2
+_AUTOMATIC, _MANUAL_BY_TOPIC = 1, 3
+_FIELDS_PER_PART = (1, 1, 2, 2, 2, 3)
+
+
+def format_qos(qos: QoS) -> str:
+    """Return the chunk, with every default left out."""
+    lease = _duration(qos.lease)
+    return ":".join(
+        (
+            "" if qos.reliable else str(_BEST_EFFORT),
+            str(_TRANSIENT_LOCAL) if qos.latched else "",
+            ("" if qos.history == "keep_last" else str(_KEEP_ALL))
+            + ","
+            + ("" if qos.depth in {0, _DEFAULT_DEPTH} else str(qos.depth)),
+            _duration(qos.deadline),
+            _duration(qos.lifespan),
+            ("" if qos.liveliness == "automatic" else str(_MANUAL_BY_TOPIC)) + "," + lease,
+        )
+    )
+
+
+def parse_qos(chunk: str) -> QoS:
+    """Read the chunk; values that stand for "the system's choice" become the defaults.
+
+    Raises:
+        DecodeError: It has another form, or a number that means nothing.
+    """
+    parts = [part.split(",") for part in chunk.split(":")]
+    if tuple(map(len, parts)) != _FIELDS_PER_PART:
+        raise DecodeError(
+            "QoS chunk", 0, f"'{chunk}', expected the form 'r:d:h,n:s,ns:s,ns:l,s,ns'"
+        )
+    (rel,), (dur,), (hist, depth), deadline, lifespan, (live, *lease) = parts
+    try:
+        return QoS(
+            depth=_number(depth, _DEFAULT_DEPTH),
+            reliability=_RELIABILITY[_number(rel, _RELIABLE)],
+            durability=_DURABILITY[_number(dur, _VOLATILE)],
+            history=_HISTORY[_number(hist, _KEEP_LAST)],
+            deadline=_nanoseconds(deadline),
+            lifespan=_nanoseconds(lifespan),
+            liveliness=_LIVELINESS[_number(live, _AUTOMATIC)],
+            lease=_nanoseconds(lease),
+        )
+    except (ValueError, KeyError) as error:
+        raise DecodeError(
+            "QoS chunk", 0, f"'{chunk}' has a value that is not known: {error}"
+        ) from error
+
+
+# 0 is the system's default, 3 unknown, 4 and 5 best available: who sends them means the default.
+_RELIABILITY: dict[int, Literal["reliable", "best_effort"]] = {
+    0: "reliable",
+    _RELIABLE: "reliable",
+    _BEST_EFFORT: "best_effort",
+    3: "reliable",
+    4: "reliable",
+}
+_DURABILITY: dict[int, Literal["volatile", "transient_local"]] = {
+    0: "volatile",
+    _TRANSIENT_LOCAL: "transient_local",
+    _VOLATILE: "volatile",
+    3: "volatile",
+    4: "volatile",
+}
+_HISTORY: dict[int, Literal["keep_last", "keep_all"]] = {
+    0: "keep_last",
+    _KEEP_LAST: "keep_last",
+    _KEEP_ALL: "keep_all",
+    3: "keep_last",
+}
+_LIVELINESS: dict[int, Literal["automatic", "manual_by_topic"]] = {
+    0: "automatic",
+    _AUTOMATIC: "automatic",
+    _MANUAL_BY_TOPIC: "manual_by_topic",
+    4: "automatic",
+    5: "automatic",
+}
+
+
+def _number(text: str, default: int) -> int:
+    return int(text) if text else default
+
+
+def _duration(nanoseconds: int) -> str:
+    seconds, rest = _FOREVER if nanoseconds == 0 else divmod(nanoseconds, _SECOND)
+    return ",".join(
+        "" if value == forever else str(value)
+        for value, forever in zip((seconds, rest), _FOREVER, strict=True)
+    )
+
+
+def _nanoseconds(fields: list[str]) -> int:
+    seconds, rest = (_number(text, forever) for text, forever in zip(fields, _FOREVER, strict=True))
+    return seconds * _SECOND + rest
