@@ -1,0 +1,80 @@
+"""A set of liveliness tokens, and the questions that people ask of it; pure."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+
+from rosz.wire import Kind, Token
+
+__all__ = ("View",)
+
+
+class View:
+    """The nodes and endpoints of one domain at one moment.
+
+    Args:
+        tokens: The tokens that are alive; several may describe one node.
+    """
+
+    def __init__(self, tokens: Iterable[Token]) -> None:
+        self.tokens = tuple(tokens)
+
+    def nodes(self) -> list[str]:
+        """Return the full names of all nodes, sorted; two nodes of one name appear twice."""
+        # An endpoint's token alone makes its node known: tokens may arrive in any order.
+        found = {(t.zid, t.node_id, t.node_name) for t in self.tokens}
+        return sorted(name for _, _, name in found)
+
+    def sessions_of(self, node: str) -> list[tuple[str, int]]:
+        """Return session id and node number of every node of that full name."""
+        return sorted({(t.zid, t.node_id) for t in self.tokens if t.node_name == node})
+
+    def endpoints(self, *kinds: Kind, name: str | None = None) -> list[Token]:
+        """Return endpoints of some kinds, sorted by name, node and number.
+
+        Args:
+            kinds: What to return; every kind of endpoint when none is given.
+            name: Only those of this topic or service.
+        """
+        return sorted(
+            (
+                t
+                for t in self.tokens
+                if t.qos is not None
+                and (not kinds or t.kind in kinds)
+                and (name is None or t.name == name)
+            ),
+            key=lambda t: (t.name, t.node_name, t.zid, t.entity_id),
+        )
+
+    def publishers(self, topic: str) -> list[Token]:
+        """Return the publishers of a topic."""
+        return self.endpoints(Kind.PUBLISHER, name=topic)
+
+    def subscriptions(self, topic: str) -> list[Token]:
+        """Return the subscriptions of a topic."""
+        return self.endpoints(Kind.SUBSCRIPTION, name=topic)
+
+    def servers(self, service: str) -> list[Token]:
+        """Return who serves a service."""
+        return self.endpoints(Kind.SERVICE, name=service)
+
+    def clients(self, service: str) -> list[Token]:
+        """Return the clients of a service."""
+        return self.endpoints(Kind.CLIENT, name=service)
+
+    def topics(self) -> dict[str, list[str]]:
+        """Return every topic with the names of its types, both sorted."""
+        return self._types(Kind.PUBLISHER, Kind.SUBSCRIPTION)
+
+    def services(self) -> dict[str, list[str]]:
+        """Return every service that is served, with the names of its types, both sorted."""
+        return self._types(Kind.SERVICE)
+
+    def _types(self, *kinds: Kind) -> dict[str, list[str]]:
+        found: defaultdict[str, set[str]] = defaultdict(set)
+        for token in self.tokens:
+            if token.kind in kinds:
+                found[token.name].add(token.type_name)
+        return {name: sorted(found[name]) for name in sorted(found)}
