@@ -1,6 +1,6 @@
 """Who is alive on a domain, read from liveliness tokens: no daemon, no polling."""
 
-from rosz.graph.graph import Graph, GraphListener
+from rosz.graph.graph import Graph, GraphListener, ProcessListener
 from rosz.graph.view import View
 
-__all__ = ("Graph", "GraphListener", "View")
+__all__ = ("Graph", "GraphListener", "ProcessListener", "View")

@@ -11,19 +11,30 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, DecodeError, WaitTimeout, near_miss
 from rosz.graph.view import View
-from rosz.wire import Token, parse_token, tokens_key
+from rosz.wire import (
+    OWN_SPACE,
+    ProcessToken,
+    Token,
+    parse_process,
+    parse_token,
+    processes_key,
+    tokens_key,
+)
 
 if TYPE_CHECKING:
     from rosz.session import Session
 
-__all__ = ("Graph", "GraphListener")
+__all__ = ("Graph", "GraphListener", "ProcessListener")
 
 GraphListener = Callable[[Token, bool], None]
 """Gets a token, and whether it appeared (true) or went (false)."""
+
+ProcessListener = Callable[[ProcessToken, bool], None]
+"""Gets a rosz node as a process, and whether it appeared (true) or went (false)."""
 
 _log = logging.getLogger("rosz.graph")
 
@@ -40,20 +51,28 @@ class Graph:
         self.domain = domain
         self._session = session
         self._tokens: dict[str, Token] = {}
+        self._processes: dict[str, ProcessToken] = {}
         self._changed = threading.Condition()
         self._listeners: dict[int, GraphListener] = {}
+        self._process_listeners: dict[int, ProcessListener] = {}
         self._events: SimpleQueue[tuple[str, bool] | Callable[[], None] | None] = SimpleQueue()
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="rosz-graph", daemon=True)
         self._thread.start()
-        self._watch = session.tokens(
-            tokens_key(domain), lambda key, alive: self._events.put((key, alive))
-        )
+        self._watches = [
+            session.tokens(key, lambda key, alive: self._events.put((key, alive)))
+            for key in (tokens_key(domain), processes_key(domain))
+        ]
 
     def view(self) -> View:
         """Return what is known at this moment."""
         with self._changed:
             return View(self._tokens.values())
+
+    def processes(self) -> list[ProcessToken]:
+        """Return the rosz nodes with their processes, sorted by name; ROS 2 tells none."""
+        with self._changed:
+            return sorted(self._processes.values(), key=lambda process: process.node)
 
     def refresh(self, timeout: float = 2.0) -> View:
         """Ask the network for all tokens, and return them with what is known already.
@@ -65,8 +84,9 @@ class Graph:
             ClosedError: The session is closed.
             WaitTimeout: No end of answers.
         """
-        for key in self._session.live_tokens(tokens_key(self.domain), timeout):
-            self._events.put((key, True))
+        for space in (tokens_key(self.domain), processes_key(self.domain)):
+            for key in self._session.live_tokens(space, timeout):
+                self._events.put((key, True))
         self._drain(timeout)
         return self.view()
 
@@ -94,7 +114,7 @@ class Graph:
         def begin() -> None:
             if history:
                 for token in list(self._tokens.values()):
-                    self._tell(listener, token, alive=True)
+                    _tell(listener, token, token.node_name, alive=True)
             self._listeners[key] = listener
 
         if threading.current_thread() is self._thread:
@@ -105,6 +125,26 @@ class Graph:
 
     def _forget(self, key: int) -> None:
         self._listeners.pop(key, None)
+        self._process_listeners.pop(key, None)
+
+    def listen_to_processes(self, listener: ProcessListener) -> Callable[[], None]:
+        """Have rosz nodes told as they come and go, those that are alive first.
+
+        Args:
+            listener: Gets each on the graph's thread; what it raises is logged.
+
+        Returns:
+            A function that ends it.
+        """
+        key = id(listener)
+
+        def begin() -> None:
+            for process in list(self._processes.values()):
+                _tell(listener, process, process.node, alive=True)
+            self._process_listeners[key] = listener
+
+        self._events.put(begin)
+        return lambda: self._events.put(lambda: self._forget(key))
 
     def wait_for(
         self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
@@ -209,28 +249,28 @@ class Graph:
                 event()
 
     def _apply(self, key: str, alive: bool) -> None:
-        if alive == (key in self._tokens):
+        ours = key.startswith(OWN_SPACE)
+        known: dict[str, Any] = self._processes if ours else self._tokens
+        if alive == (key in known):
             return
         if alive:
             try:
-                token = parse_token(key)
+                token: Token | ProcessToken = parse_process(key) if ours else parse_token(key)
             except DecodeError as error:
                 _log.warning("ignoring a foreign liveliness token: %s", error)
                 return
         with self._changed:
             if alive:
-                self._tokens[key] = token
+                known[key] = token
             else:
-                token = self._tokens.pop(key)
+                token = known.pop(key)
             self._changed.notify_all()
-        for listener in list(self._listeners.values()):
-            self._tell(listener, token, alive=alive)
-
-    def _tell(self, listener: GraphListener, token: Token, *, alive: bool) -> None:
-        try:
-            listener(token, alive)
-        except Exception:
-            _log.exception("a graph listener failed on node '%s'", token.node_name)
+        if isinstance(token, ProcessToken):
+            for tell in list(self._process_listeners.values()):
+                _tell(tell, token, token.node, alive=alive)
+        else:
+            for listener in list(self._listeners.values()):
+                _tell(listener, token, token.node_name, alive=alive)
 
     def close(self) -> None:
         """Stop following; waiters are woken with `ClosedError`. Again is no error."""
@@ -239,5 +279,13 @@ class Graph:
                 return
             self._closed = True
             self._changed.notify_all()
-        self._watch.close()
+        for watch in self._watches:
+            watch.close()
         self._events.put(None)
+
+
+def _tell(listener: Callable[[Any, bool], None], token: object, node: str, *, alive: bool) -> None:
+    try:
+        listener(token, alive)
+    except Exception:  # noqa: BLE001  # the callback boundary
+        _log.exception("a graph listener failed on node '%s'", node)

@@ -3,6 +3,7 @@
 from rosz.wire.attachment import Attachment, pack, unpack
 from rosz.wire.gid import gid
 from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, endpoint_key, own_key, ros_type
+from rosz.wire.processes import ProcessToken, format_process, parse_process, processes_key
 from rosz.wire.qos import format_qos, parse_qos
 from rosz.wire.tokens import Kind, Token, format_token, parse_token, tokens_key
 
@@ -11,16 +12,20 @@ __all__ = (
     "OWN_SPACE",
     "Attachment",
     "Kind",
+    "ProcessToken",
     "Token",
     "dds_type",
     "endpoint_key",
+    "format_process",
     "format_qos",
     "format_token",
     "gid",
     "own_key",
     "pack",
+    "parse_process",
     "parse_qos",
     "parse_token",
+    "processes_key",
     "ros_type",
     "tokens_key",
     "unpack",

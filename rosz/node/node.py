@@ -1,0 +1,395 @@
+"""Nodes: what a program is to the rest of the network."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Self, TypeVar
+
+from rosz import names
+from rosz.errors import UsageError
+from rosz.node import control, signals
+from rosz.node.client import Client
+from rosz.node.context import Context
+from rosz.node.endpoint import Endpoint, Withdrawal
+from rosz.node.log import NodeLog
+from rosz.node.publisher import Publisher
+from rosz.node.rate import Rate
+from rosz.node.service import Service
+from rosz.node.subscription import Subscription
+from rosz.node.timer import Timer, TimerEvent
+from rosz.qos import DEFAULT, SERVICES, QoS
+from rosz.wire import Kind, Token, format_process, format_token
+from rosz.wire.processes import ProcessToken
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from rosz.message import Message
+    from rosz.message import Service as ServiceType
+    from rosz.params.api import Params
+    from rosz.session import Closable
+
+__all__ = ("Node",)
+
+M = TypeVar("M", bound="Message")
+P = TypeVar("P", bound="Closable")
+_SECOND = 1_000_000_000
+
+
+class Node:
+    """A named part of the system: publishers, subscriptions, services, timers, parameters, a log.
+
+    Args:
+        name: Base name; ``__name:=`` on the command line overrides it.
+        namespace: Namespace; ``ROS_NAMESPACE`` when not given, and ``__ns:=`` overrides both.
+        anonymous: Whether to make the name unique to this process and moment.
+        context: What it shares with other nodes of the process; one of its own when not given,
+            which is then shut down with the node.
+        argv: Command line without the program name; that of the process when not given. Ignored
+            with a ``context``, which has read one already.
+        handle_signals: Whether Ctrl-C and SIGTERM shut the node down; by default when it has its
+            own context. Only the main thread of a program can have that.
+
+    Raises:
+        InvalidName: The name or namespace is not legal.
+        TransportError: The session cannot be opened.
+        UsageError: The environment has a value that means nothing.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        namespace: str | None = None,
+        anonymous: bool = False,
+        context: Context | None = None,
+        argv: Sequence[str] | None = None,
+        handle_signals: bool | None = None,
+    ) -> None:
+        self._owns_context = context is None
+        if anonymous:
+            milliseconds = time.time_ns() // 1_000_000
+            name = names.anonymous(name, socket.gethostname(), os.getpid(), milliseconds)
+        names.check_base(name)
+        self.context = context or Context(argv=sys.argv[1:] if argv is None else argv)
+        try:
+            self._begin(name, namespace)
+        except BaseException:
+            if self._owns_context:
+                self.context.close()
+            raise
+        if self._owns_context if handle_signals is None else handle_signals:
+            signals.install(self.context)
+
+    def _begin(self, name: str, namespace: str | None) -> None:
+        context = self.context
+        arguments = context.arguments
+        default = context.environment.namespace if namespace is None else namespace
+        self.name = arguments.node_name(name, default)
+        self.namespace = names.namespace(self.name).rstrip("/") or "/"
+        self.base_name = names.basename(self.name)
+        self.remaps = arguments.resolved_remaps(self.name)
+        self.node_id = context.next_id()
+        self._parts: list[Closable] = []
+        self._lock = threading.RLock()
+        self._hooks: list[Callable[[str], None]] = []
+        self._closed = threading.Event()
+        self._withdraw = context.on_shutdown(self._end)
+        self.log = NodeLog(
+            self.name,
+            clock=context.clock,
+            log_dir=context.environment.log_dir,
+            file_name=arguments.special.get("__log", ""),
+        )
+        self._set_initial_params()
+        self._announce()
+        control.attach(self)
+
+    def _set_initial_params(self) -> None:
+        import yaml
+
+        for name, text in self.context.arguments.params.items():
+            try:
+                self.params[f"~{name}"] = yaml.safe_load(text)
+            except yaml.YAMLError as error:
+                raise UsageError(f"argument '_{name}:={text}' is no YAML value: {error}") from error
+
+    def _announce(self) -> None:
+        context = self.context
+        token = Token(
+            context.domain,
+            context.session.zid,
+            self.node_id,
+            self.node_id,
+            Kind.NODE,
+            self.namespace,
+            self.base_name,
+        )
+        self.process = ProcessToken(
+            context.domain,
+            context.session.zid,
+            self.node_id,
+            context.session.stamp().time,
+            os.getpid(),
+            socket.gethostname(),
+            self.name,
+        )
+        for key in (format_token(token), format_process(self.process)):
+            self._parts.append(context.session.token(key))
+
+    @cached_property
+    def params(self) -> Params:
+        """The parameter store as this node sees it; the process becomes a replica on first use."""
+        from rosz.params.api import Params
+
+        return Params(self.context.params, self.name, self.remaps)
+
+    def resolve(self, name: str) -> str:
+        """Return the global name that a name means here, remappings applied.
+
+        Raises:
+            InvalidName: It is not legal.
+        """
+        return names.resolve(name, self.name, self.remaps)
+
+    def publisher(
+        self,
+        topic: str,
+        message_type: type[M],
+        *,
+        queue_size: int = 10,
+        latch: bool = False,
+        qos: QoS | None = None,
+    ) -> Publisher[M]:
+        """Declare that this node publishes on a topic.
+
+        Args:
+            topic: Name; resolved and remapped.
+            message_type: What is published.
+            queue_size: Depth of the queue that others are told of; with ``latch`` one sample is
+                kept whatever it is.
+            latch: Whether late joiners get the last message.
+            qos: Instead of both, when given.
+
+        Raises:
+            InvalidName: The name is not legal.
+            ClosedError: The node is closed.
+        """
+        if qos is None:
+            qos = QoS(depth=1, durability="transient_local") if latch else _queue(queue_size)
+        return self.keep(Publisher(self, self.resolve(topic), message_type, qos))
+
+    def subscription(
+        self,
+        topic: str,
+        message_type: type[M],
+        callback: Callable[..., Any] | None = None,
+        *,
+        queue_size: int = 10,
+        qos: QoS | None = None,
+        raw: bool = False,
+        with_info: bool = False,
+    ) -> Subscription[M]:
+        """Declare that this node listens to a topic.
+
+        Args:
+            topic: Name; resolved and remapped.
+            message_type: What is expected.
+            callback: Gets each message, on a thread of the subscription, one at a time. Without
+                one, iterate over the subscription or call its ``get``.
+            queue_size: The newest so many samples wait for their turn; older ones are dropped.
+            qos: Instead of ``queue_size``, when given.
+            raw: Whether to pass the encoded bytes on.
+            with_info: Whether the callback also gets a `MessageInfo`.
+
+        Raises:
+            InvalidName: The name is not legal.
+            ClosedError: The node is closed.
+        """
+        return self.keep(
+            Subscription(
+                self,
+                self.resolve(topic),
+                message_type,
+                callback,
+                qos or _queue(queue_size),
+                raw=raw,
+                with_info=with_info,
+            )
+        )
+
+    def service(
+        self,
+        name: str,
+        service_type: type[ServiceType],
+        handler: Callable[[Any], Any],
+        *,
+        qos: QoS = SERVICES,
+        threads: int = 16,
+    ) -> Service:
+        """Serve a service.
+
+        Args:
+            name: Name; resolved and remapped.
+            service_type: Its type.
+            handler: Gets a request, on a thread of a pool, and returns the response: an instance,
+                a list or dictionary of its fields, or its only value. What it raises is logged,
+                and told to the caller.
+            qos: What others are told.
+            threads: Most calls handled at one time.
+
+        Raises:
+            InvalidName: The name is not legal.
+            ClosedError: The node is closed.
+        """
+        return self.keep(Service(self, self.resolve(name), service_type, handler, qos, threads))
+
+    def client(
+        self,
+        name: str,
+        service_type: type[ServiceType],
+        *,
+        timeout: float = 60.0,
+        qos: QoS = SERVICES,
+    ) -> Client:
+        """Make a caller of a service.
+
+        Args:
+            name: Name; resolved and remapped.
+            service_type: Its type.
+            timeout: Seconds that a call waits at most, unless it says otherwise.
+            qos: What others are told.
+
+        Raises:
+            InvalidName: The name is not legal.
+            ClosedError: The node is closed.
+        """
+        return self.keep(Client(self, self.resolve(name), service_type, qos, timeout))
+
+    def timer(
+        self, period: float, callback: Callable[[TimerEvent], Any], *, oneshot: bool = False
+    ) -> Timer:
+        """Have a function called every so often.
+
+        Args:
+            period: Seconds, in ROS time.
+            callback: Gets a `TimerEvent`, on a thread of the timer; what it raises is logged.
+            oneshot: Whether to call it only once.
+        """
+        return self.keep(
+            Timer(
+                round(period * _SECOND),
+                callback,
+                self.context.clock,
+                oneshot=oneshot,
+                name=f"rosz-timer{self.name}",
+                on_error=lambda error: self.log.error("a timer callback failed", exc_info=error),
+            )
+        )
+
+    def rate(self, hz: float) -> Rate:
+        """Return a pace-maker: iterate over it, or call its ``sleep``.
+
+        Args:
+            hz: Times per second, in ROS time.
+        """
+        self.context.cooperative = True
+        return Rate(hz, self.context.clock)
+
+    def now(self) -> int:
+        """Return the time in nanoseconds: simulated where ``use_sim_time`` is set, else wall."""
+        return self.context.clock.now()
+
+    def sleep(self, seconds: float) -> bool:
+        """Sleep, in ROS time.
+
+        Returns:
+            Whether the time was slept through; false when the node was shut down meanwhile.
+        """
+        self.context.cooperative = True
+        return self.context.clock.sleep(round(seconds * _SECOND))
+
+    def spin(self) -> None:
+        """Wait until the node is shut down; callbacks run on threads of their own meanwhile."""
+        self.context.cooperative = True
+        self._closed.wait()
+
+    @property
+    def is_shutdown(self) -> bool:
+        """Whether the node has been closed or its context shut down."""
+        self.context.cooperative = True
+        return self._closed.is_set() or self.context.is_shutdown
+
+    def on_shutdown(self, hook: Callable[[str], None]) -> None:
+        """Have a function called with the reason when the node ends, before its parts close."""
+        with self._lock:
+            self._hooks.append(hook)
+
+    def listen(self, listener: Callable[[Token, bool], None]) -> Closable:
+        """Follow the graph; see `rosz.graph.Graph.listen`."""
+        return Withdrawal(self.context.graph.listen(listener))
+
+    def keep(self, part: P) -> P:
+        """Have something closed when the node ends, before what was declared earlier."""
+        with self._lock:
+            self._parts.append(part)
+        return part
+
+    def forget(self, part: Endpoint) -> None:
+        """Take note that a part has been closed by itself."""
+        with self._lock:
+            if part in self._parts:
+                self._parts.remove(part)
+
+    def shutdown(self, reason: str = "") -> None:
+        """End the node, and its context where it owns that; again is no error."""
+        self._end(reason)
+        if self._owns_context:
+            self.context.shutdown(reason)
+
+    def close(self) -> None:
+        """End the node; the same as `shutdown` without a reason."""
+        self.shutdown()
+
+    def _end(self, reason: str) -> None:
+        with self._lock:
+            if self._closed.is_set():
+                return
+            self._closed.set()
+            hooks, parts = self._hooks[::-1], self._parts[::-1]
+        self._withdraw()
+        for hook in hooks:
+            try:
+                hook(reason)
+            except Exception:  # the callback boundary
+                self.log.exception("a shutdown hook failed")
+        for part in parts:
+            part.close()
+        self.log.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Node {self.name}{' closed' if self._closed.is_set() else ''}>"
+
+
+def _queue(size: int) -> QoS:
+    """Return the QoS for a queue of ROS 1; 0 means no limit there."""
+    if size == DEFAULT.depth:
+        return DEFAULT
+    return QoS(depth=size) if size else QoS(history="keep_all")

@@ -1,0 +1,209 @@
+"""Publishers."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from rosz.errors import ClosedError, EncodeError
+from rosz.node.endpoint import Endpoint
+from rosz.qos import QoS
+from rosz.wire import Kind, Token, own_key, pack
+
+if TYPE_CHECKING:
+    from rosz.message import Message
+    from rosz.node.node import Node
+
+__all__ = ("Publisher", "SubscriberLink")
+
+M = TypeVar("M", bound="Message")
+_HELD_SAMPLES = 1000
+
+
+class SubscriberLink(Generic[M]):
+    """One subscription, as the publisher sees it.
+
+    Attributes:
+        node: Full name of its node.
+        publish: Sends one message to it alone. A subscription that is not of rosz has no address
+            of its own, and the message goes to all.
+    """
+
+    def __init__(self, publisher: Publisher[M], token: Token) -> None:
+        self._publisher = publisher
+        self._token = token
+        self.node = token.node_name
+
+    def publish(self, message: M) -> None:
+        """Send one message to this subscription.
+
+        Raises:
+            EncodeError: A field has a value that does not fit.
+            ClosedError: The publisher is closed.
+        """
+        self._publisher.publish_to(self._token, message)
+
+
+class Publisher(Endpoint, Generic[M]):
+    """A source of messages on a topic; see `rosz.Node.publisher`.
+
+    What is published before the process is linked to all its neighbours is held, at most 1000
+    samples for at most two seconds, and sent when it is.
+    """
+
+    def __init__(self, node: Node, topic: str, message_type: type[M], qos: QoS) -> None:
+        super().__init__(
+            node, Kind.PUBLISHER, topic, message_type._type_name, message_type._type_hash, qos
+        )
+        self.message_type = message_type
+        self._encode: Callable[[Any], bytes] = message_type._encode
+        self._sequence = 0
+        self._ordered = threading.Lock()
+        self._raw = node.context.session.publisher(
+            self.key,
+            reliable=qos.reliable,
+            block=qos.reliable and qos.history == "keep_all",
+            cache=qos.depth if qos.latched else 0,
+        )
+        self._put = self._raw.put
+        self._declared.append(self._raw)
+        # A cache answers who comes late, so only a publisher without one has to hold.
+        settled = node.context.settled
+        self._held: list[tuple[bytes, bytes]] | None = (
+            None if qos.latched or settled.is_set() else []
+        )
+        self._announce()
+        if self._held is not None:
+            node.context.when_settled(self._release)
+
+    def publish(self, *args: Any, **fields: Any) -> None:
+        """Send a message: one of the topic's type, or the values of its fields.
+
+        Raises:
+            EncodeError: A field has a value that does not fit.
+            ClosedError: The publisher is closed.
+        """
+        if len(args) == 1 and not fields and isinstance(args[0], self.message_type):
+            message = args[0]
+        else:
+            message = self._build(args, fields)
+        self.publish_raw(self._encode(message))
+
+    def publish_raw(self, payload: bytes) -> None:
+        """Send a message that is encoded already (CDR with its header of four bytes).
+
+        Raises:
+            ClosedError: The publisher is closed.
+        """
+        with self._ordered:
+            self._sequence = sequence = self._sequence + 1
+            attachment = pack(sequence, time.time_ns(), self.gid)
+            if self._held is None:
+                self._put(payload, attachment)
+                return
+            if self.closed:
+                raise ClosedError(f"cannot publish on '{self.name}': the publisher is closed")
+            self._held.append((payload, attachment))
+            del self._held[:-_HELD_SAMPLES]
+
+    def publish_to(self, subscription: Token, message: M) -> None:
+        """Send a message to one subscription, where that has an address of its own.
+
+        Raises:
+            EncodeError: A field has a value that does not fit.
+            ClosedError: The publisher is closed.
+        """
+        if self.closed:
+            raise ClosedError(f"cannot publish on '{self.name}': the publisher is closed")
+        context = self.node.context
+        if not context.has_inbox(subscription.zid):
+            self.publish(message)
+            return
+        address = own_key(context.domain, "inbox", subscription.zid, str(subscription.entity_id))
+        context.session.put(
+            address, self._encode(message), attachment=pack(0, time.time_ns(), self.gid)
+        )
+
+    def _build(self, args: tuple[Any, ...], fields: dict[str, Any]) -> M:
+        try:
+            return self.message_type(*args, **fields)
+        except TypeError as error:
+            raise EncodeError(
+                self.message_type._type_name,
+                "",
+                f"{error}; expected a message of that type or its fields,"
+                f" got {', '.join(type(a).__name__ for a in args) or 'keywords'}",
+            ) from error
+
+    def _release(self) -> None:
+        """Send what was held, in order, and hold no more."""
+        with self._ordered:
+            held, self._held = self._held, None
+            if not self._raw_closed():
+                for payload, attachment in held or ():
+                    self._put(payload, attachment)
+
+    def _raw_closed(self) -> bool:
+        return self.node.context.session.closed
+
+    def _finish(self) -> None:
+        context = self.node.context
+        if self._held:
+            context.settled.wait(context.SETTLED_BY)
+        if self._held is not None:
+            self._release()
+
+    def subscribers(self) -> list[Token]:
+        """Return the subscriptions that this publisher reaches: same topic, type and hash."""
+        view = self.node.context.graph.view()
+        return [token for token in view.subscriptions(self.name) if self.reaches(token)]
+
+    def reaches(self, token: Token) -> bool:
+        """Tell whether a subscription gets what is published here."""
+        return (
+            token.kind is Kind.SUBSCRIPTION
+            and token.name == self.name
+            and token.type_name == self.token.type_name
+            and token.type_hash == self.token.type_hash
+        )
+
+    def wait_for_subscribers(self, count: int = 1, timeout: float = 10.0) -> None:
+        """Wait until at least so many subscriptions are reached.
+
+        Args:
+            count: How many.
+            timeout: Seconds.
+
+        Raises:
+            WaitTimeout: There were fewer when the time was over.
+            ClosedError: The context was shut down meanwhile.
+        """
+        self.node.context.graph.wait_for(
+            lambda view: sum(map(self.reaches, view.subscriptions(self.name))) >= count,
+            timeout,
+            f"{count} subscriber(s) of '{self.name}' with type '{self.token.type_name}'",
+        )
+
+    def on_connection(
+        self,
+        connected: Callable[[SubscriberLink[M]], None] | None = None,
+        disconnected: Callable[[str], None] | None = None,
+    ) -> None:
+        """Have subscriptions told as they come and go, those that exist already first.
+
+        Args:
+            connected: Gets the link, whose ``publish`` reaches that subscription alone.
+            disconnected: Gets the full name of the node.
+        """
+
+        def changed(token: Token, alive: bool) -> None:
+            if not self.reaches(token):
+                return
+            if alive and connected is not None:
+                connected(SubscriberLink(self, token))
+            elif not alive and disconnected is not None:
+                disconnected(token.node_name)
+
+        self._declared.append(self.node.listen(changed))

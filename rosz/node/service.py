@@ -1,0 +1,129 @@
+"""Service servers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rosz.errors import DecodeError, EncodeError, RoszError, ServiceError, TransportError
+from rosz.node.endpoint import Endpoint
+from rosz.node.pool import Pool
+from rosz.qos import QoS
+from rosz.wire import Kind, pack, unpack
+
+if TYPE_CHECKING:
+    from rosz.message import Message
+    from rosz.message import Service as ServiceType
+    from rosz.node.node import Node
+    from rosz.session import Query
+
+__all__ = ("Service", "to_response")
+
+_NO_GID = bytes(16)
+
+
+class Service(Endpoint):
+    """A server of a service; see `rosz.Node.service`.
+
+    Every call gets a thread of a bounded pool. What the handler raises is logged here and arrives
+    at the caller as `ServiceError`.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        service_type: type[ServiceType],
+        handler: Callable[[Any], Any],
+        qos: QoS,
+        threads: int,
+    ) -> None:
+        super().__init__(
+            node, Kind.SERVICE, name, service_type._type_name, service_type._type_hash, qos
+        )
+        self.service_type = service_type
+        self._handler = handler
+        self._pool = Pool(threads, f"rosz-srv{name}")
+        session = node.context.session
+        self._declared.append(
+            session.queryable(
+                self.key, lambda query: self._pool.run(lambda: self._serve(query)), complete=True
+            )
+        )
+        self._announce()
+
+    def _serve(self, query: Query) -> None:
+        with query:
+            if self.closed:
+                return
+            try:
+                attachment = query.attachment
+                origin = unpack(attachment) if attachment is not None else None
+                payload = self._answer(query.payload or b"")
+                sequence, gid = (origin.sequence, origin.gid) if origin else (0, _NO_GID)
+                query.reply(self.key, payload, attachment=pack(sequence, time.time_ns(), gid))
+            except TransportError as error:
+                self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
+            except (ServiceError, DecodeError) as error:
+                self._refuse(query, str(error))
+
+    def _answer(self, request: bytes) -> bytes:
+        """Return the encoded response.
+
+        Raises:
+            DecodeError: The request is damaged.
+            ServiceError: The handler raised, or returned what is no response.
+        """
+        types = self.service_type
+        message = types.Request._decode(request)
+        try:
+            result = self._handler(message)
+        except Exception as error:
+            self.node.log.exception("handler of service '%s' failed", self.name)
+            raise ServiceError(f"error processing request: {error}") from error
+        try:
+            return types.Response._encode(to_response(types.Response, result))
+        except EncodeError as error:
+            self.node.log.exception("handler of service '%s' returned no response", self.name)
+            raise ServiceError(f"handler returned invalid value: {error}") from error
+
+    def _refuse(self, query: Query, text: str) -> None:
+        try:
+            query.reply_error(text)
+        except RoszError as error:
+            self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
+
+
+def to_response(response: type[Message], result: Any) -> Message:
+    """Turn what a handler returned into a response, as rospy does.
+
+    Args:
+        response: Class of the response.
+        result: A response, a list or tuple of all field values, a dictionary of some, ``None`` for
+            a response without fields, or the value of a single field.
+
+    Raises:
+        EncodeError: It is none of these.
+    """
+    if isinstance(result, response):
+        return result
+    fields = response.__struct_fields__
+    try:
+        if isinstance(result, dict):
+            return response(**result)
+        if isinstance(result, list | tuple):
+            if len(result) == len(fields):
+                return response(*result)
+        elif len(fields) == 1:
+            return response(result)
+        elif result is None and not fields:
+            return response()
+    except TypeError as error:
+        raise EncodeError(response._type_name, "", str(error)) from error
+    raise EncodeError(
+        response._type_name,
+        "",
+        f"got {type(result).__name__} {result!r:.80}, expected a response, or values for"
+        f" {', '.join(fields) or 'no fields'}",
+    )
