@@ -6,35 +6,83 @@ from functools import cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2] / "interfaces"
-PRIMITIVES = frozenset(
-    [
-        "bool",
-        "byte",
-        "char",
-        "int8",
-        "uint8",
-        "int16",
-        "uint16",
-        "int32",
-        "uint32",
-        "int64",
-        "uint64",
-        "float32",
-        "float64",
-        "string",
-        "wstring",
-    ]
-)
 KINDS = {"msg": 1, "srv": 2, "action": 3}  # sections of a file of each kind
+
+# Primitive types and the numbers that a type hash gives them.
+PRIMITIVES = {
+    "int8": 2,
+    "uint8": 3,
+    "char": 3,
+    "int16": 4,
+    "uint16": 5,
+    "int32": 6,
+    "uint32": 7,
+    "int64": 8,
+    "uint64": 9,
+    "float32": 10,
+    "float64": 11,
+    "bool": 15,
+    "byte": 16,
+    "string": 17,
+    "wstring": 18,
+}
+TIMES = {"time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration"}
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field line: its type without bounds and array marks, its name, its default as text."""
+    """A field line: the type as it is written, the name, the default as text."""
+
+    spelling: str
+    name: str
+    default: str
+
+    @property
+    def base(self) -> str:
+        """The type without bounds and array marks."""
+        return re.split(r"[\[<]", self.spelling, maxsplit=1)[0]
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A constant line."""
 
     type: str
     name: str
-    default: str
+    value: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """The text of one message, which is a whole file or a part of one."""
+
+    package: str
+    text: str
+
+    @cached_property
+    def lines(self) -> list[Field | Constant]:
+        """The fields and constants in their order."""
+        found: list[Field | Constant] = []
+        for line in self.text.splitlines():
+            code = line.partition("#")[0].strip()
+            if constant := re.fullmatch(r"(\S+)\s+(\w+)\s*=\s*(.*)", code):
+                found.append(Constant(*constant.groups()))
+            elif code:
+                spelling, name, *default = code.split(maxsplit=2)
+                found.append(Field(spelling, name, "".join(default)))
+        return found
+
+    @property
+    def fields(self) -> list[Field]:
+        """The fields without the constants."""
+        return [line for line in self.lines if isinstance(line, Field)]
+
+    def message(self, field: Field) -> str:
+        """Return the message that a field refers to, as package/msg/Name, or nothing."""
+        if field.base in PRIMITIVES:
+            return ""
+        package, _, name = TIMES.get(field.base, field.base).rpartition("/")
+        return f"{package or self.package}/msg/{name}"
 
 
 @dataclass(frozen=True)
@@ -51,34 +99,16 @@ class Definition:
         return f"{self.package}/{self.kind}/{self.name}"
 
     @cached_property
-    def sections(self) -> list[str]:
-        """The message texts that the file holds."""
-        return re.split(r"^---$", self.text, flags=re.MULTILINE)
-
-    @cached_property
-    def fields(self) -> list[Field]:
-        """The fields of all sections, without constants."""
-        found = []
-        for line in self.text.splitlines():
-            words = line.partition("#")[0].split(maxsplit=2)
-            if len(words) < 2 or "=" in words[1] or (words[2:3] and words[2].startswith("=")):
-                continue
-            base = re.match(r"[\w/]+", words[0])
-            assert base, f"{self}: {line!r} has no type"
-            found.append(Field(base[0], words[1], words[2].strip() if words[2:] else ""))
-        return found
+    def sections(self) -> list[Section]:
+        """The messages that the file holds."""
+        texts = re.split(r"^---$", self.text, flags=re.MULTILINE)
+        return [Section(self.package, text) for text in texts]
 
     @cached_property
     def references(self) -> set[str]:
         """The messages that the fields refer to, as package/msg/Name."""
-        found = set()
-        for field in self.fields:
-            if field.type in {"time", "duration"}:
-                found.add(f"builtin_interfaces/msg/{field.type.capitalize()}")
-            elif field.type not in PRIMITIVES:
-                package, _, name = field.type.rpartition("/")
-                found.add(f"{package or self.package}/msg/{name}")
-        return found
+        found = {part.message(field) for part in self.sections for field in part.fields}
+        return found - {""}
 
 
 def read() -> list[Definition]:

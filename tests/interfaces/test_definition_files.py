@@ -43,8 +43,7 @@ def test_file_is_well_kept(definition: Definition) -> None:
 @pytest.mark.parametrize("definition", DEFINITIONS, ids=str)
 def test_fields_are_named_once_and_refer_to_what_exists(definition: Definition) -> None:
     for section in definition.sections:
-        part = Definition(definition.path, definition.package, "msg", definition.name, section)
-        counts = Counter(field.name for field in part.fields)
+        counts = Counter(field.name for field in section.fields)
         assert not [name for name, count in counts.items() if count > 1]
         assert all(re.fullmatch(r"[a-z]([a-z0-9_]*[a-z0-9])?", name) for name in counts)
     assert definition.references <= NAMES

@@ -59,16 +59,18 @@ def test_types_that_rosbags_does_not_know_belong_to_the_packages_listed() -> Non
 @pytest.mark.parametrize("definition", DEFINITIONS, ids=str)
 def test_rosbags_reads_every_section(definition: Definition) -> None:
     for section in definition.sections:
-        _, fields = get_types_from_msg(section, "some_msgs/msg/Section")["some_msgs/msg/Section"]
-        part = Definition(definition.path, definition.package, "msg", definition.name, section)
-        assert [name for name, _ in fields] == [field.name for field in part.fields]
+        types = get_types_from_msg(section.text, "some_msgs/msg/Section")
+        constants, fields = types["some_msgs/msg/Section"]
+        assert [name for name, _ in fields] == [field.name for field in section.fields]
+        assert len(constants) == len(section.lines) - len(section.fields)
 
 
 def test_defaults_are_those_of_jazzy() -> None:
     found = {
         (str(definition), field.name): field.default
         for definition in DEFINITIONS
-        for field in definition.fields
+        for section in definition.sections
+        for field in section.fields
         if field.default
     }
     assert found == DEFAULTS
