@@ -75,7 +75,7 @@ class Subscription(Endpoint, Generic[M]):
         )
         self.message_type = message_type
         self._decode: Callable[[bytes], Any] | None = None if raw else message_type._decode
-        self._fill_seq = not raw and "header" in message_type.__struct_fields__
+        self._fill_seq = not raw and message_type._has_header
         self._callback = callback
         self._with_info = with_info
         depth = None if qos.history == "keep_all" else max(qos.depth, 1)
