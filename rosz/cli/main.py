@@ -98,9 +98,9 @@ def _invoke(app: object, argv: list[str], program: str) -> int:
     except typer.Abort:
         return _INTERRUPTED
     except TyperException as error:
-        message = getattr(error, "format_message", lambda: str(error))()
-        usage = f"; see '{program} --help'"
-        return _fail(f"{message.rstrip('.')}{usage}", getattr(error, "exit_code", 2))
+        format_message = getattr(error, "format_message", error.__str__)
+        text = f"{format_message().rstrip('.')}; see '{program} --help'"
+        return _fail(text, getattr(error, "exit_code", 2))
     return code if isinstance(code, int) else 0
 
 

@@ -79,7 +79,7 @@ def floor(module: str) -> int:
 
 
 def imported(tree: ast.Module) -> Iterator[tuple[str, int]]:
-    """Yield every imported module with its line: at load time, in functions and for typing alike."""
+    """Yield every imported module with its line: at load time, in functions, for typing."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:

@@ -1,0 +1,107 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rosz.environment import Environment, package_index
+from rosz.errors import ExecutableNotFound, NotFoundError, PackageError, PackageNotFound, UsageError
+from rosz.packages import PackageIndex
+
+
+def make(folder: Path, name: str, *, executables: tuple[str, ...] = (), plain: str = "") -> Path:
+    (folder / "scripts").mkdir(parents=True)
+    (folder / "package.xml").write_text(f"<package format='2'><name>{name}</name></package>")
+    for executable in executables:
+        file = folder / "scripts" / executable
+        file.write_text("#!/bin/sh\n")
+        file.chmod(0o755)
+    if plain:
+        (folder / "scripts" / plain).write_text("x")
+    return folder
+
+
+def test_finds_packages_at_any_depth_and_first_root_wins(tmp_path: Path) -> None:
+    first = make(tmp_path / "one" / "deep" / "folder", "alpha")
+    make(tmp_path / "two" / "alpha", "alpha")
+    beta = make(tmp_path / "two" / "b", "beta")
+    make(beta / "inner", "hidden")
+    index = PackageIndex([tmp_path / "one", tmp_path / "two"])
+    assert index.find("alpha").path == first
+    assert index.find("beta").path == beta
+    assert index.names() == ["alpha", "beta"]
+    with pytest.raises(PackageNotFound, match="did you mean 'alpha'"):
+        index.find("alfa")
+    with pytest.raises(PackageNotFound, match="searched"):
+        index.find("hidden")
+
+
+def test_a_root_may_be_a_package(tmp_path: Path) -> None:
+    make(tmp_path / "p", "solo")
+    assert PackageIndex([tmp_path / "p"]).find("solo").path == tmp_path / "p"
+
+
+def test_ignored_folders(tmp_path: Path) -> None:
+    make(tmp_path / "a", "alpha")
+    (tmp_path / "a" / "CATKIN_IGNORE").touch()
+    make(tmp_path / "off" / "b", "beta")
+    (tmp_path / "off" / "COLCON_IGNORE").touch()
+    assert PackageIndex([tmp_path]).names() == []
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [("<package><name>a</package>", r"package\.xml:1:"), ("<robot/>", "expected <package>")],
+)
+def test_a_bad_manifest_is_named(tmp_path: Path, text: str, reason: str) -> None:
+    (tmp_path / "package.xml").write_text(text)
+    with pytest.raises(PackageError, match=reason):
+        PackageIndex([tmp_path]).names()
+
+
+def test_executables(tmp_path: Path) -> None:
+    make(tmp_path / "p", "p", executables=("talker.py", "listener.py"), plain="data.py")
+    package = PackageIndex([tmp_path]).find("p")
+    assert package.executables() == ["listener.py", "talker.py"]
+    assert package.executable("talker.py") == tmp_path / "p" / "scripts" / "talker.py"
+    with pytest.raises(ExecutableNotFound, match=r"chmod \+x .*data\.py"):
+        package.executable("data.py")
+    with pytest.raises(ExecutableNotFound, match=r"did you mean 'talker\.py'"):
+        package.executable("talkr.py")
+    assert package.file("data.py").is_file()
+    with pytest.raises(NotFoundError, match="has no file"):
+        package.file("none.launch")
+
+
+def test_an_install_space_keeps_executables_apart(tmp_path: Path) -> None:
+    make(tmp_path / "share" / "p", "p")
+    program = tmp_path / "lib" / "p" / "node"
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    assert PackageIndex([tmp_path / "share"]).find("p").executable("node") == program
+
+
+def test_environment_reads_paths_and_workspace(tmp_path: Path) -> None:
+    source = tmp_path / "ws" / "src"
+    make(source / "p", "p")
+    environ = {"HOME": "/home/u", "ROSZ_PACKAGE_PATH": "/x", "ROS_PACKAGE_PATH": "/y:/x"}
+    found = Environment.read(environ, source / "p" / "scripts")
+    assert found.package_roots == (Path("/x"), Path("/y"), source)
+    assert found.home == Path("/home/u/.ros")
+    assert found.log_dir == Path("/home/u/.ros/log")
+    assert package_index(found).find("p").path == source / "p"
+
+
+def test_shipped_packages_are_found(tmp_path: Path) -> None:
+    index = package_index(Environment.read({"HOME": str(tmp_path)}, tmp_path))
+    assert index.find("std_msgs").file("String.msg").is_file()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("ROS_DOMAIN_ID", "x"), ("ROS_DOMAIN_ID", "233"), ("ROSZ_MODE", "mesh"), ("ROSZ_SHM", "-1")],
+)
+def test_meaningless_settings_are_refused(tmp_path: Path, name: str, value: str) -> None:
+    with pytest.raises(UsageError, match=f"{name} is '{value}'"):
+        Environment.read({name: value}, tmp_path)
