@@ -172,7 +172,7 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
         respawn_max: How often at most; None for no limit.
         required: The launch ends when it ends.
         output: ``screen`` or ``log``.
-        cwd: ``node`` (the folder of the executable), ``ROS_HOME``, or for an ``<executable>`` a path.
+        cwd: ``node`` (the executable's folder), ``ROS_HOME``, or for an ``<executable>`` a path.
         remaps: (from, to) in order, as written.
         env: (name, value) in order, later ones win; without ``ROS_NAMESPACE``.
         wait_for: All of these are awaited before it starts.

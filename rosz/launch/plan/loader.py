@@ -1,0 +1,356 @@
+"""From files to a plan: the walk through tags, groups and includes.
+
+The walk keeps its own stack, so neither deep groups nor long chains of includes reach Python's
+limits, and a file that includes itself under a condition works as far as `MAX_INCLUDES`.
+"""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from rosz.errors import LaunchFileError, RoszError, near_miss
+from rosz.launch.plan.context import LaunchContext, LaunchText
+from rosz.launch.plan.document import Document, Element, parse
+from rosz.launch.plan.fault import Fault, TextFault
+from rosz.launch.plan.ledger import Ledger
+from rosz.launch.plan.machine import read_machine
+from rosz.launch.plan.model import ArgDoc, Notice, Place, Plan
+from rosz.launch.plan.node import namespace, read_executable, read_node, read_test
+from rosz.launch.plan.param import read_param, read_rosparam
+from rosz.launch.plan.scope import Scope, make_global
+from rosz.launch.plan.substitution import Substitution
+from rosz.launch.plan.tag import Tag
+from rosz.launch.plan.tags import misplaced
+from rosz.launch.plan.waiting import read_wait
+
+__all__ = ("MAX_INCLUDES", "describe_args", "plan")
+
+MAX_INCLUDES = 300
+"""How deep includes may nest; roslaunch gives up at about as many."""
+
+_SHOWN_INCLUDES = 12
+
+
+def plan(
+    files: Sequence[str | Path | LaunchText],
+    args: Mapping[str, str],
+    context: LaunchContext,
+    *,
+    ns: str = "",
+) -> Plan:
+    """Read launch files.
+
+    Args:
+        files: Paths, relative to the context's folder, or texts; read in order into one plan.
+        args: Values for ``<arg>`` by name, for all files.
+        context: The outside.
+        ns: Namespace to begin in: ``__ns``, else ``ROS_NAMESPACE``.
+
+    Raises:
+        LaunchFileError: A file is refused, or cannot be read.
+    """
+    loader = _Loader(context, args, ns)
+    for file in files:
+        loader.load(file)
+    return loader.finish()
+
+
+def describe_args(
+    files: Sequence[str | Path | LaunchText],
+    args: Mapping[str, str],
+    context: LaunchContext,
+    *,
+    ns: str = "",
+) -> tuple[ArgDoc, ...]:
+    """Return the args that the last file takes, in order; nothing but ``<arg>`` is read.
+
+    Raises:
+        LaunchFileError: A file is refused, or cannot be read.
+    """
+    loader = _Loader(context, args, ns, args_only=True)
+    for file in files:
+        loader.load(file)
+    return tuple(loader.docs.values())
+
+
+class _Frame:
+    """A list of tags being walked through."""
+
+    __slots__ = ("chain", "children", "leave", "root", "scope")
+
+    def __init__(
+        self,
+        children: Sequence[Element],
+        scope: Scope,
+        chain: tuple[tuple[str, str], ...],
+        *,
+        root: str = "launch",
+        leave: Callable[[], None] | None = None,
+    ) -> None:
+        self.children: Iterator[Element] = iter(children)
+        self.scope = scope
+        self.chain = chain
+        self.root = root
+        self.leave = leave
+
+
+class _Loader:
+    """One reading of some files into one plan."""
+
+    def __init__(
+        self, context: LaunchContext, args: Mapping[str, str], ns: str, *, args_only: bool = False
+    ) -> None:
+        self.docs: dict[str, ArgDoc] = {}
+        self.ledger = Ledger(context)
+        self._context = context
+        self._given = dict(args)
+        self._ns = ns
+        self._args_only = args_only
+        self._substitution = Substitution(context)
+        self._documents: dict[str, Document] = {}
+        self._declared: set[str] = set()
+        self._stack: list[_Frame] = []
+        self._chain: tuple[tuple[str, str], ...] = ()
+
+    def finish(self) -> Plan:
+        used = self._declared | self._substitution.asked
+        unused = tuple(name for name in self._given if name not in used)
+        for name in unused:
+            hint = near_miss(name, self._declared)
+            text = f"no file declares an arg '{name}', so '{name}:=…' does nothing{hint}"
+            self.ledger.warnings.append(Notice(text, Place("<command line>")))
+        return self.ledger.finish(unused)
+
+    def load(self, file: str | Path | LaunchText) -> None:
+        """Read one file into the plan."""
+        self._chain = ()
+        self.ledger.default_machine = ""
+        if isinstance(file, LaunchText):
+            path = file.name
+            data = file.text.encode() if isinstance(file.text, str) else file.text
+            document = parse(path, data)
+        else:
+            path = str(file)
+            try:
+                document = self._document(path)
+            except OSError as error:
+                raise LaunchFileError(f"cannot be read: {error.strerror}", path) from error
+        try:
+            scope = Scope(make_global(self._ns), path)
+        except TextFault as fault:
+            raise LaunchFileError(fault.reason, "<command line>") from fault
+        scope.args = dict(self._given)
+        self.docs = {}
+        self._launch(document.launch, scope)
+        self._stack = [_Frame(document.launch.children, scope, ())]
+        self._walk()
+
+    def _document(self, path: str) -> Document:
+        if path not in self._documents:
+            self._documents[path] = parse(path, self._context.read(path))
+        absolute = os.path.normpath(os.path.join(self._context.cwd, path))  # noqa: PTH118  # pure
+        self.ledger.files.setdefault(absolute)
+        return self._documents[path]
+
+    def _walk(self) -> None:
+        stack = self._stack
+        while stack:
+            frame = stack[-1]
+            self._chain = frame.chain
+            element = next(frame.children, None)
+            if element is None:
+                stack.pop()
+                if frame.leave is not None:
+                    frame.leave()
+                continue
+            try:
+                self._read(element, frame)
+            except Fault as fault:
+                self._refuse(fault)
+
+    def _read(self, element: Element, frame: _Frame) -> None:
+        if self._args_only and element.tag != "arg":
+            return
+        tag = self._tag(element, frame.scope)
+        reader = _READERS.get(element.tag)
+        if reader is None:
+            if element.tag == "master":
+                tag.warn("<master> has no meaning any more")
+            else:
+                tag.warn(misplaced(element.tag, frame.root))
+        elif tag.wanted():
+            reader(self, tag)
+
+    def _tag(self, element: Element, scope: Scope) -> Tag:
+        places = tuple(place for place, _ in self._chain)
+        return Tag(element, scope, self._substitution, self._notify, places)
+
+    def _launch(self, element: Element, scope: Scope) -> None:
+        """Look at a ``<launch>`` itself; conditions on it change nothing, as in roslaunch."""
+        tag = self._tag(element, scope)
+        try:
+            tag.check()
+            if "if" in element.attributes or "unless" in element.attributes:
+                tag.wanted()
+                tag.warn("conditions on <launch> do nothing; put them on its tags or the <include>")
+        except Fault as fault:
+            self._refuse(fault)
+        text = element.attributes.get("deprecated")
+        if text:
+            self.ledger.deprecations.append(Notice(text, tag.place))
+
+    def read_arg(self, tag: Tag) -> None:
+        tag.check()
+        name, value, default = tag.require("name"), tag.get("value"), tag.get("default")
+        if value is not None and default is not None:
+            tag.fail("<arg> has both 'value' and 'default'; keep one", "default")
+        doc = tag.alias("doc", "description")
+        try:
+            tag.scope.declare(name, value, default)
+        except TextFault as fault:
+            tag.fail(fault.reason, "name")
+        self._declared.add(name)
+        if len(self._stack) == 1 and not value:
+            self.docs[name] = ArgDoc(name, doc, default)
+
+    def read_let(self, tag: Tag) -> None:
+        tag.check()
+        tag.scope.args[tag.require("name")] = tag.require("value")
+
+    def read_group(self, tag: Tag) -> None:
+        tag.check()
+        scope = self._open(tag, namespace(tag))
+        scope.private = list(scope.private)
+        scope.waits = (*scope.waits, *read_wait(tag, scope.ns))
+        self._stack.append(_Frame(tag.element.children, scope, self._chain, root="group"))
+
+    def _open(self, tag: Tag, ns: str | None, *, include: bool = False) -> Scope:
+        try:
+            scope = tag.scope.include(ns) if include else tag.scope.child(ns)
+        except TextFault as fault:
+            tag.fail(fault.reason, "ns")
+        if tag.get("clear_params") and tag.flag("clear_params"):
+            if not ns:
+                tag.fail("'clear_params' needs 'ns'", "clear_params")
+            self.ledger.clear(scope.ns)
+        return scope
+
+    def read_namespace(self, tag: Tag) -> None:
+        tag.check()
+        try:
+            tag.scope.ns = tag.scope.child(tag.require("namespace")).ns
+        except TextFault as fault:
+            tag.fail(fault.reason, "namespace")
+
+    def read_include(self, tag: Tag) -> None:
+        tag.check()
+        path = tag.require("file")
+        pass_all = tag.flag("pass_all_args")
+        scope = self._open(tag, namespace(tag), include=True)
+        if pass_all:
+            for name, value in tag.scope.args.items():
+                scope.declare(name, value, None)
+            scope.lenient = True
+        self._read_passed(tag, scope)
+        try:
+            passed = scope.enter()
+        except TextFault as fault:
+            tag.fail(fault.reason)
+        document = self._include(tag, path)
+        scope.file = path
+        chain = self._chain
+        self._chain = (*chain, (str(tag.place), path))
+        self._launch(document.launch, scope)
+
+        def leave() -> None:
+            unknown = [name for name in passed if name not in scope.declared]
+            if unknown and not pass_all:
+                self._chain = chain
+                hint = near_miss(unknown[0], scope.declared)
+                takes = f"; it takes {', '.join(scope.declared)}" if scope.declared else ""
+                reason = f"'{path}' declares no arg '{unknown[0]}'{hint or takes}"
+                self._refuse(Fault(tag.element, reason))
+
+        self._stack.append(_Frame(document.launch.children, scope, self._chain, leave=leave))
+
+    def _read_passed(self, tag: Tag, scope: Scope) -> None:
+        """Read the ``<arg>`` and ``<env>`` tags of an include."""
+        for element in tag.element.children:
+            inner = tag.inside(element, scope)
+            if inner.name not in {"arg", "env"}:
+                inner.warn(misplaced(element.tag, "include"))
+            elif inner.wanted():
+                if inner.name == "env":
+                    inner.env(scope)
+                else:
+                    self.read_arg(inner)
+
+    def _include(self, tag: Tag, path: str) -> Document:
+        if len(self._chain) >= MAX_INCLUDES:
+            loop = [file for _, file in self._chain]
+            by_way = (
+                " and ".join(dict.fromkeys(loop[-loop[::-1].index(path) :])) if path in loop else ""
+            )
+            again = f"; '{path}' includes itself through {by_way}" if by_way else ""
+            tag.fail(f"includes nest deeper than {MAX_INCLUDES}{again}", "file")
+        try:
+            return self._document(path)
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            hint = ""
+            if path.endswith(".py"):
+                hint = "; launch files in Python are not read"
+            tag.fail(f"'{path}' cannot be read: {reason}{hint}", "file")
+        except LaunchFileError as error:
+            if path.endswith((".py", ".yaml", ".yml")):
+                tag.fail(f"'{path}' is no XML; launch files are read as XML only", "file")
+            places = (*(place for place, _ in self._chain), str(tag.place))
+            raise LaunchFileError(
+                error.reason, error.path, error.line, error.column, _shorten(places)
+            ) from None
+
+    def _notify(self, element: Element, text: str, attribute: str | None, index: int) -> None:
+        line, column = element.locate(attribute, index)
+        places = tuple(place for place, _ in self._chain)
+        self.ledger.warnings.append(Notice(text, Place(element.file, line, column, places)))
+
+    def _refuse(self, fault: Fault) -> NoReturn:
+        places = tuple(place for place, _ in self._chain)
+        element = fault.element
+        path, line, column = element.file, *element.locate(fault.attribute, fault.index)
+        if fault.place is not None:
+            if fault.place[0] != path:
+                places = (*places, f"{path}:{line}:{column}")
+            path, line, column = fault.place
+        cause = fault.__cause__ if isinstance(fault.__cause__, RoszError) else None
+        raise LaunchFileError(fault.reason, path, line, column, _shorten(places)) from cause
+
+
+def _shorten(places: tuple[str, ...]) -> tuple[str, ...]:
+    """Leave out the middle of a long chain of includes."""
+    if len(places) <= _SHOWN_INCLUDES:
+        return places
+    half = _SHOWN_INCLUDES // 2
+    return (*places[:half], f"… {len(places) - 2 * half} more", *places[-half:])
+
+
+_READERS: Mapping[str, Callable[[_Loader, Tag], None]] = {
+    "arg": _Loader.read_arg,
+    "env": lambda _, tag: tag.env(tag.scope),
+    "executable": lambda loader, tag: read_executable(tag, loader.ledger),
+    "group": _Loader.read_group,
+    "include": _Loader.read_include,
+    "let": _Loader.read_let,
+    "machine": lambda loader, tag: read_machine(tag, loader.ledger),
+    "node": lambda loader, tag: read_node(tag, loader.ledger),
+    "param": lambda loader, tag: read_param(tag, loader.ledger),
+    "push-ros-namespace": _Loader.read_namespace,
+    "push_ros_namespace": _Loader.read_namespace,
+    "remap": lambda _, tag: tag.remap(tag.scope),
+    "rosparam": lambda loader, tag: read_rosparam(tag, loader.ledger),
+    "set_env": lambda _, tag: tag.env(tag.scope),
+    "test": lambda loader, tag: read_test(tag, loader.ledger),
+}

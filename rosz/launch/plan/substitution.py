@@ -1,0 +1,209 @@
+"""Substitution args: ``$(arg x)``, ``$(find pkg)/file``, ``$(eval …)`` and the others.
+
+A value is worked through twice, as roslaunch does: first all but ``find``, then ``find``, which
+needs the path behind it settled. The second pass sees what the first one put in. Substitutions do
+not nest, there is no escape, and an unclosed one stays as it is.
+
+Beyond roslaunch, as ROS 2 has it: ``$(var x)`` is ``$(arg x)``, and ``$(find-pkg-share pkg)`` is
+the folder of a package without anything done to what follows it.
+"""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rosz.errors import RoszError, near_miss
+from rosz.launch.plan.context import LaunchContext
+from rosz.launch.plan.expression import evaluate
+from rosz.launch.plan.fault import TextFault
+from rosz.launch.plan.scope import Scope
+from rosz.launch.plan.value import automatic
+
+__all__ = ("Substitution",)
+
+_EVAL = "$(eval "
+_COMMANDS = ("anon", "arg", "dirname", "env", "find", "find-pkg-share", "optenv", "var")
+
+
+class Substitution:
+    """Substitution with the outside that it asks.
+
+    Args:
+        context: The outside.
+
+    Attributes:
+        asked: Names of all args that were asked for.
+    """
+
+    def __init__(self, context: LaunchContext) -> None:
+        self._context = context
+        self.asked: set[str] = set()
+
+    def __call__(self, text: str, scope: Scope) -> str:
+        """Return a text with all substitutions made.
+
+        Raises:
+            TextFault: A substitution is malformed or has no value.
+        """
+        if "$" not in text:
+            return text
+        if text.startswith(_EVAL) and text.endswith(")"):
+            return self._evaluate(text[len(_EVAL) : -1], scope)
+        resolved = text
+        for inner, index in _collect(text):
+            command, words = _split(inner, index)
+            if command not in {"find", "eval"}:
+                value = self._value(command, words, scope, index)
+                resolved = resolved.replace(f"$({inner})", value)
+        return self._find_all(resolved, text)
+
+    def _value(self, command: str, words: list[str], scope: Scope, index: int) -> str:
+        if command == "optenv":
+            if not words:
+                raise TextFault("$(optenv NAME DEFAULT…) needs the name of a variable", index)
+            return self._context.environ.get(words[0], " ".join(words[1:]))
+        if command == "dirname":
+            return self._dirname(scope)
+        if len(words) != 1:
+            noun = {"env": "variable", "find-pkg-share": "package"}.get(command, "name")
+            raise TextFault(
+                f"$({command} …) takes one {noun}, got {len(words)}: '{' '.join(words)}'", index
+            )
+        try:
+            match command:
+                case "env":
+                    return self._env(words[0])
+                case "anon":
+                    return self._anon(words[0], scope)
+                case "find-pkg-share":
+                    return self._find(words[0])
+                case _:
+                    return self._arg(words[0], scope)
+        except TextFault as fault:
+            raise TextFault(fault.reason, index) from None
+
+    def _env(self, name: str) -> str:
+        environ = self._context.environ
+        if name in environ:
+            return environ[name]
+        hint = near_miss(name, environ) or f"; set it, or write $(optenv {name} DEFAULT)"
+        raise TextFault(f"environment variable '{name}' is not set{hint}")
+
+    def _anon(self, base: str, scope: Scope) -> str:
+        if base not in scope.anonymous:
+            scope.anonymous[base] = self._context.anonymous(base)
+        return scope.anonymous[base]
+
+    def _arg(self, name: str, scope: Scope) -> str:
+        self.asked.add(name)
+        if name in scope.args:
+            return scope.args[name]
+        hint = near_miss(name, scope.args)
+        if name in scope.declared:
+            hint = f"; it has no default, so give it: {name}:=VALUE"
+        elif not hint:
+            hint = f"; declare it before: <arg name='{name}' default='…'/>"
+        raise TextFault(f"arg '{name}' is not set{hint}")
+
+    def _dirname(self, scope: Scope) -> str:
+        folder = os.path.dirname(scope.file)  # noqa: PTH120  # pure text work, no file is meant
+        return os.path.normpath(os.path.join(self._context.cwd, folder))  # noqa: PTH118  # dito
+
+    def _find(self, package: str) -> str:
+        try:
+            return self._context.find(package)
+        except RoszError as error:
+            raise TextFault(str(error)) from error
+
+    def _find_all(self, text: str, source: str) -> str:
+        """Settle ``$(find PKG)`` with the path that follows, up to the first space."""
+        resolved = text
+        for inner, index in _collect(text):
+            command, words = _split(inner, index)
+            if command != "find":
+                continue
+            written = f"$({inner})"
+            place = max(source.find(written), 0)
+            if len(words) != 1:
+                raise TextFault(f"$(find …) takes one package, got {len(words)}", place)
+            before, _, after = resolved.partition(written)
+            path, space, rest = after.partition(" ")
+            try:
+                resolved = before + self._path(words[0], path) + space + rest
+            except TextFault as fault:
+                raise TextFault(fault.reason, place) from None
+        return resolved
+
+    def _path(self, package: str, path: str) -> str:
+        path = path.replace("\\", "/").removeprefix("/")
+        folder = self._find(package)
+        if not path:
+            return folder
+        built = self._context.built(package, path.rpartition("/")[2])
+        return built or os.path.join(folder, path)  # noqa: PTH118  # an absolute path wins, as ever
+
+    def _evaluate(self, text: str, scope: Scope) -> str:
+        def arg(name: str) -> Any:
+            return automatic(self._arg(name, scope))
+
+        def variable(name: str) -> Any | None:
+            self.asked.add(name)
+            return automatic(scope.args[name]) if name in scope.args else None
+
+        own: Mapping[str, Callable[..., Any]] = {
+            "anon": lambda base: self._anon(base, scope),
+            "arg": arg,
+            "dirname": lambda: self._dirname(scope),
+            "env": self._env,
+            "find": self._find,
+            "optenv": lambda name, default="": self._context.environ.get(name, default),
+            "var": arg,
+        }
+        try:
+            return evaluate(text, own, variable)
+        except TextFault as fault:
+            raise TextFault(f"$(eval …): {fault.reason}", len(_EVAL) + fault.index) from None
+
+
+def _split(inner: str, index: int) -> tuple[str, list[str]]:
+    words = [word for word in inner.split(" ") if word]
+    if words and words[0] in _COMMANDS:
+        return words[0], words[1:]
+    if words and words[0] == "eval":
+        raise TextFault(
+            "$(eval …) must be the whole value, from the first character to the last", index
+        )
+    name = words[0] if words else ""
+    hint = near_miss(name, [*_COMMANDS, "eval"]) or f"; there are {', '.join(_COMMANDS)}, eval"
+    raise TextFault(f"unknown substitution '$({inner})'{hint}", index)
+
+
+_NEXT = {
+    ("", "$"): "$",
+    ("$", "$"): "$",
+    ("$", "("): "$(",
+}
+
+
+def _collect(text: str) -> list[tuple[str, int]]:
+    """Find all substitutions: what stands inside, and where they start."""
+    found: list[tuple[str, int]] = []
+    state = ""
+    start = 0
+    for index, character in enumerate(text):
+        if state in {"$(", "in"}:
+            if character in "$(":
+                reason = "they do not nest, $(eval …) can combine values"
+                raise TextFault(f"'{character}' inside a substitution; {reason}", index)
+            if character == ")":
+                if state == "in":
+                    found.append((text[start + 2 : index], start))
+                state = ""
+            else:
+                state = "in"
+        else:
+            state = _NEXT.get((state, character), "")
+            start = index if state == "$" else start
+    return found
