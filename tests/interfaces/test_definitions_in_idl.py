@@ -1,0 +1,93 @@
+"""Compare what rosz.idl makes of the definitions with the plain reading, and with real ROS 1."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rosz.idl import (
+    Catalog,
+    Definition,
+    message_hash,
+    message_md5,
+    parse_action,
+    service_hash,
+    service_md5,
+)
+
+from .fingerprints import FILES, type_hash
+
+ROS_1 = Path("/usr/lib/python3/dist-packages")  # where Debian installs ROS 1's generated modules
+
+# Jazzy changed these, or what they hold: fields or constants added, renamed or of another type.
+CHANGED = {
+    "sensor_msgs/msg/BatteryState",
+    "sensor_msgs/msg/CameraInfo",
+    "sensor_msgs/msg/NavSatFix",
+    "sensor_msgs/msg/NavSatStatus",
+    "sensor_msgs/msg/Range",
+    "sensor_msgs/srv/SetCameraInfo",
+    "shape_msgs/msg/SolidPrimitive",
+    "stereo_msgs/msg/DisparityImage",
+    "visualization_msgs/msg/ImageMarker",
+    "visualization_msgs/msg/InteractiveMarker",
+    "visualization_msgs/msg/InteractiveMarkerControl",
+    "visualization_msgs/msg/InteractiveMarkerInit",
+    "visualization_msgs/msg/InteractiveMarkerUpdate",
+    "visualization_msgs/msg/Marker",
+    "visualization_msgs/msg/MarkerArray",
+}
+
+
+def find(name: str) -> Definition:
+    return Definition(FILES[name].text, str(FILES[name].path))
+
+
+def named(kind: str) -> list[str]:
+    return [name for name, item in FILES.items() if item.kind == kind]
+
+
+def installed() -> dict[str, str]:
+    """Return the MD5 sums of the installed ROS 1 types of which there is a definition here."""
+    found = {}
+    for name in (*named("msg"), *named("srv")):
+        package, kind, base = name.split("/")
+        module = ROS_1 / package / kind / f"_{base}.py"
+        if module.exists():
+            # A service's own class follows those of its request and response.
+            sums = re.findall(r"^ +_md5sum = ['\"](\w+)", module.read_text("utf-8"), re.MULTILINE)
+            found[name] = sums[-1]
+    return found
+
+
+CATALOG = Catalog(find)
+INSTALLED = installed()
+
+
+@pytest.mark.parametrize("name", named("msg"))
+def test_message_has_the_hash_that_the_rules_give(name: str) -> None:
+    assert message_hash(CATALOG.message(name), CATALOG) == f"RIHS01_{type_hash(name)}"
+
+
+@pytest.mark.parametrize("name", named("srv"))
+def test_service_has_the_hash_that_the_rules_give(name: str) -> None:
+    assert service_hash(CATALOG.service(name), CATALOG) == f"RIHS01_{type_hash(name)}"
+
+
+@pytest.mark.parametrize("name", named("action"))
+def test_action_has_the_fields_of_the_file(name: str) -> None:
+    spec = parse_action(name, FILES[name].text)
+    parts = [[field.name for field in part.fields] for part in (spec.goal, spec.result)]
+    parts.append([field.name for field in spec.feedback.fields])
+    assert parts == [[field.name for field in part.fields] for part in FILES[name].sections]
+
+
+@pytest.mark.skipif(not INSTALLED, reason="ROS 1's message packages are not installed")
+def test_installed_ros_1_types_have_the_md5sum_of_ros_1() -> None:
+    ours = {
+        name: message_md5(CATALOG.message(name), CATALOG)
+        if FILES[name].kind == "msg"
+        else service_md5(CATALOG.service(name), CATALOG)
+        for name in INSTALLED
+    }
+    assert {name for name in ours if ours[name] != INSTALLED[name]} == CHANGED & INSTALLED.keys()
