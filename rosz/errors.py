@@ -20,6 +20,7 @@ One root, so that ``except RoszError`` catches all that rosz reports and nothing
     ├── TransportError              the session cannot do what was asked (also ConnectionError)
     │   └── NoReplica               nobody holds the parameter store
     ├── ClosedError                 the thing used has been closed or shut down
+    ├── TimeMovedBackwards          ROS time was set back during a sleep
     ├── WaitTimeout                 a wait ended without its event (also TimeoutError)
     ├── ServiceError                a service answered with an error, or nobody serves it
     │   └── ServiceNotFound
@@ -53,6 +54,7 @@ __all__ = (
     "ServiceError",
     "ServiceNotFound",
     "SourceError",
+    "TimeMovedBackwards",
     "TransportError",
     "TypeNotFound",
     "UsageError",
@@ -120,7 +122,9 @@ class SourceError(RoszError):
         """``path:line:column``, as far as known."""
         if not self.line:
             return self.path
-        return f"{self.path}:{self.line}:{self.column}" if self.column else f"{self.path}:{self.line}"
+        return (
+            f"{self.path}:{self.line}:{self.column}" if self.column else f"{self.path}:{self.line}"
+        )
 
 
 class DefinitionError(SourceError):
@@ -166,7 +170,9 @@ class PackageNotFound(NotFoundError):
         package: The name.
     """
 
-    def __init__(self, package: str, known: Iterable[str] = (), searched: Iterable[str] = ()) -> None:
+    def __init__(
+        self, package: str, known: Iterable[str] = (), searched: Iterable[str] = ()
+    ) -> None:
         self.package = package
         where = ", ".join(searched) or "nowhere: the package path is empty"
         hint = near_miss(package, known) or "; add its folder to ROSZ_PACKAGE_PATH"
@@ -248,6 +254,23 @@ class NoReplica(TransportError):
 
 class ClosedError(RoszError):
     """The node, session or endpoint has been closed."""
+
+
+class TimeMovedBackwards(RoszError):
+    """ROS time was set back, as by a simulation that starts over, during a sleep.
+
+    Attributes:
+        before: ROS time when the sleep began, in nanoseconds.
+        after: ROS time that it was set back to.
+    """
+
+    def __init__(self, before: int, after: int) -> None:
+        self.before = before
+        self.after = after
+        super().__init__(
+            f"ROS time moved backwards by {(before - after) / 1e9:g} s during a sleep;"
+            " sleep again, or use reset=True where a rate or timer should go on"
+        )
 
 
 class WaitTimeout(RoszError, TimeoutError):

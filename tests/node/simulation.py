@@ -1,0 +1,71 @@
+"""A simulated clock that tells when somebody falls asleep on it, so that tests need not guess."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rosz.errors import RoszError
+from rosz.node.clock import Clock
+
+SECOND = 1_000_000_000
+START = 100 * SECOND
+PATIENCE = 20.0
+
+
+class Beds(set[Any]):
+    """The set of those asleep, which counts them in."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.taken = threading.Semaphore(0)
+
+    def add(self, element: Any, /) -> None:
+        super().add(element)
+        self.taken.release()
+
+
+class SimulatedClock(Clock):
+    """A clock at `START` seconds, or at none yet."""
+
+    def __init__(self, start: int = START) -> None:
+        super().__init__()
+        self.beds = Beds()
+        self._source.sleepers = self.beds
+        self.enable_simulation()
+        if start:
+            self.advance(start)
+
+    def wait_for_sleeper(self) -> None:
+        """Wait until one more sleep has begun."""
+        assert self.beds.taken.acquire(timeout=PATIENCE), "nobody fell asleep"
+
+
+class Task:
+    """A call on a thread of its own, and what became of it."""
+
+    def __init__(self, function: Callable[[], object]) -> None:
+        self._function = function
+        self._result: object = None
+        self._error: RoszError | None = None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._result = self._function()
+        except RoszError as error:
+            self._error = error
+
+    @property
+    def done(self) -> bool:
+        return not self._thread.is_alive()
+
+    def result(self) -> object:
+        """Wait for the call, and return or raise what it did."""
+        self._thread.join(PATIENCE)
+        assert self.done, "the call has not returned"
+        if self._error is not None:
+            raise self._error
+        return self._result
