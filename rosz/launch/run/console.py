@@ -1,0 +1,68 @@
+"""What the launch itself says, in roslaunch's words: to the screen, and to its log."""
+
+from __future__ import annotations
+
+from typing import TextIO
+
+from rosz.launch.run.folder import LaunchLog
+
+__all__ = ("Console",)
+
+_BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
+
+
+class Console:
+    """Two streams; colours where they are terminals.
+
+    Args:
+        out: For what goes well.
+        err: For what does not.
+    """
+
+    def __init__(self, out: TextIO, err: TextIO) -> None:
+        self._out = out
+        self._err = err
+        self.log: LaunchLog | None = None
+
+    @property
+    def is_terminal(self) -> bool:
+        """Whether somebody looks on."""
+        return self._out.isatty()
+
+    def say(self, text: str = "") -> None:
+        """Print a line."""
+        self._print(self._out, text, "", "INFO")
+
+    def strong(self, text: str) -> None:
+        """Print a line that matters."""
+        self._print(self._out, text, _BOLD, "INFO")
+
+    def error(self, text: str) -> None:
+        """Print a line about something that went wrong."""
+        self._print(self._err, text, _RED, "ERROR")
+
+    def title(self, text: str) -> None:
+        """Name the terminal's window."""
+        if self.is_terminal:
+            self._put(self._out, f"\033]2;{text}\007")
+
+    def note(self, text: str) -> None:
+        """Write to the log only."""
+        if self.log is not None:
+            self.log.write("INFO", text)
+
+    def _print(self, stream: TextIO, text: str, colour: str, level: str) -> None:
+        if text and self.log is not None:
+            self.log.write(level, text)
+        if colour and stream.isatty():
+            text = f"{colour}{text}{_PLAIN}"
+        self._put(stream, f"{text}\n")
+
+    @staticmethod
+    def _put(stream: TextIO, text: str) -> None:
+        # One write per message, so that lines of nodes never come to lie within it.
+        try:
+            stream.write(text)
+            stream.flush()
+        except (OSError, ValueError):
+            return  # the terminal was closed; ending the nodes in order matters more

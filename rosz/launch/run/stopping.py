@@ -1,0 +1,58 @@
+"""What ends a launch from outside: Ctrl-C, SIGTERM, a closed terminal."""
+
+from __future__ import annotations
+
+import faulthandler
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rosz.launch.run.console import Console
+from rosz.launch.run.loop import Loop
+
+__all__ = ("stopped_by_signals",)
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def stopped_by_signals(
+    loop: Loop, console: Console, shutdown: Callable[[], None], kill: Callable[[], None]
+) -> Iterator[None]:
+    """Have the first signal shut a launch down, and a second one kill what is left.
+
+    A SIGHUP that is ignored stays so, as ``nohup`` means it. Outside the main thread nothing is
+    installed.
+
+    Args:
+        loop: Where the two are called.
+        console: Its log gets the stacks of all threads at the second signal.
+        shutdown: Called at the first.
+        kill: Called at each further one.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    seen = threading.Event()
+
+    def handle(number: int, _frame: object) -> None:
+        if not seen.is_set():
+            seen.set()
+            loop.post(shutdown)
+            return
+        if console.log is not None:
+            console.note(f"{signal.Signals(number).name} again; the stacks of all threads:")
+            faulthandler.dump_traceback(console.log.fileno())
+        loop.post(kill)
+
+    before: dict[signal.Signals, Any] = {}
+    for number in _SIGNALS:
+        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            before[number] = signal.signal(number, handle)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
