@@ -3,6 +3,9 @@ from __future__ import annotations
 import signal
 import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import pytest
 from simulation import PATIENCE, SECOND, START, Beds, SimulatedClock, Task
@@ -227,44 +230,69 @@ def test_wall_sleeps_under_way_keep_to_wall_time() -> None:
     assert task.result() is True
 
 
-def test_closing_from_a_signal_handler_during_a_sleep() -> None:
-    clock = SimulatedClock()
-    before = signal.signal(signal.SIGUSR1, lambda *_: clock.close())
+class Interrupted(Beds):
+    """Does, in the midst of falling asleep, what a signal handler may do there."""
+
+    def __init__(self, handler: Callable[[], None]) -> None:
+        super().__init__()
+        self._handler = handler
+
+    def add(self, element: Any, /) -> None:
+        self._handler()
+        super().add(element)
+        self._handler()
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_closing_while_the_same_thread_falls_asleep(simulated: bool) -> None:
+    clock = SimulatedClock() if simulated else Clock()
+    clock._source.sleepers = Interrupted(clock.close)
+    assert clock.sleep(10**30) is False
+
+
+@contextmanager
+def signals_to_this_thread(handler: Callable[..., None], clock: SimulatedClock) -> Iterator[None]:
+    """Send signals from when somebody sleeps until the end of the block.
+
+    One is not always enough: Python sees it only later if it comes just before a thread blocks.
+    """
+    before = signal.signal(signal.SIGUSR1, handler)
     main = threading.main_thread().ident
     assert main is not None
+    over = threading.Event()
 
     def interrupt() -> None:
         clock.wait_for_sleeper()
-        signal.pthread_kill(main, signal.SIGUSR1)
+        while not over.wait(0.01):
+            signal.pthread_kill(main, signal.SIGUSR1)
 
+    task = Task(interrupt)
     try:
-        Task(interrupt)
-        assert clock.sleep(SECOND) is False
+        yield
     finally:
+        over.set()
+        task.result()
         signal.signal(signal.SIGUSR1, before)
+
+
+def test_closing_from_a_signal_handler_during_a_sleep() -> None:
+    clock = SimulatedClock()
+    with signals_to_this_thread(lambda *_: clock.close(), clock):
+        assert clock.sleep(SECOND) is False
 
 
 def test_error_from_a_signal_handler_leaves_no_sleeper_behind() -> None:
     clock = SimulatedClock()
+    raised = False
 
     def handler(*_: object) -> None:
-        raise KeyboardInterrupt
+        nonlocal raised
+        if not raised:
+            raised = True
+            raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGUSR1, handler)
-    main = threading.main_thread().ident
-    assert main is not None
-
-    def interrupt() -> None:
-        clock.wait_for_sleeper()
-        signal.pthread_kill(main, signal.SIGUSR1)
-
-    try:
-        task = Task(interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            clock.sleep(SECOND)
-        task.result()
-    finally:
-        signal.signal(signal.SIGUSR1, before)
+    with signals_to_this_thread(handler, clock), pytest.raises(KeyboardInterrupt):
+        clock.sleep(SECOND)
     assert not clock.beds
 
 
