@@ -1,0 +1,187 @@
+"""Writes the Python of message and service classes."""
+
+from __future__ import annotations
+
+import json
+import math
+
+from rosz.idl.catalog import Catalog
+from rosz.idl.decode import Decoder
+from rosz.idl.encode import Encoder
+from rosz.idl.layout import ARRAYS, OCTETS
+from rosz.idl.md5 import message_md5, service_md5
+from rosz.idl.names import Module, attribute, class_name
+from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec, ros1_name
+from rosz.idl.typehash import message_hash, service_hash
+
+__all__ = ("message_class", "service_class")
+
+_TIME = "builtin_interfaces/msg/Time"
+_DURATION = "builtin_interfaces/msg/Duration"
+_HEADER = "std_msgs/msg/Header"
+
+BASES = {
+    _TIME: "_TimeValue, _Message",
+    _DURATION: "_DurationValue, _Message",
+    _HEADER: "_Sequenced",
+}
+"""Base classes of types that have more in ROS 1 than their fields."""
+
+_ROS1_FIELDS = {
+    "sensor_msgs/msg/CameraInfo": {"D": "d", "K": "k", "R": "r", "P": "p"},
+    "stereo_msgs/msg/DisparityImage": {"T": "t"},
+}
+"""Fields that ROS 1 spells in another way: its name to ours."""
+
+_PYTHON = {
+    "bool": "bool",
+    "float32": "float",
+    "float64": "float",
+    "string": "str",
+    "wstring": "str",
+}
+
+
+def message_class(spec: MessageSpec, catalog: Catalog, module: Module) -> str:
+    """Return the source of a message class.
+
+    Args:
+        spec: The message.
+        catalog: Where the types in it are.
+        module: The module that the class will stand in.
+    """
+    name = class_name(spec.name)
+    base = BASES.get(spec.name, "_Message")
+    body = [_field(field, module) for field in spec.fields]
+    body += _ros1_fields(spec)
+    body += [f"{attribute(one.name)} = {_literal(one.value)}" for one in spec.constants]
+    body += _names(spec.name, message_hash(spec, catalog), message_md5(spec, catalog), spec.text)
+    body += [f"_schema = {_schema(spec, module)}", ""]
+    body += _codec(
+        "_encode(m: _Any) -> bytes", Encoder(spec, catalog, module).lines(), "_plain(m, {0})", name
+    )
+    body += [""]
+    body += _codec(
+        f"_decode(data: bytes) -> {name}",
+        Decoder(spec, catalog, module).lines(),
+        "_explain(data, {0})",
+        name,
+    )
+    return "\n".join([f"class {name}({base}):", *_indented(body)])
+
+
+def service_class(spec: ServiceSpec, catalog: Catalog) -> str:
+    """Return the source of a service class; those of its two messages stand before it."""
+    name = class_name(spec.name)
+    body = [f"Request = {name}Request", f"Response = {name}Response"]
+    body += _names(spec.name, service_hash(spec, catalog), service_md5(spec, catalog), spec.text)
+    return "\n".join([f"class {name}(_Service):", *_indented(body)])
+
+
+def _indented(lines: list[str]) -> list[str]:
+    return [f"    {line}" if line else "" for line in lines]
+
+
+def _names(name: str, type_hash: str, md5: str, text: str) -> list[str]:
+    return [
+        f'_type = "{ros1_name(name)}"',
+        f'_type_name = "{name}"',
+        f'_type_hash = "{type_hash}"',
+        f'_md5sum = "{md5}"',
+        *_text(text),
+    ]
+
+
+def _text(text: str) -> list[str]:
+    """Write a definition as a literal that can be read."""
+    parts = [_literal(line) for line in text.splitlines(keepends=True)]
+    if len(parts) <= 1:
+        return [f"_text = {parts[0] if parts else _literal('')}"]
+    return ["_text = (", *(f"    {part}" for part in parts), ")"]
+
+
+def _codec(signature: str, lines: list[str], fallback: str, name: str) -> list[str]:
+    code = ["@staticmethod", f"def {signature}:", "    try:"]
+    code += [f"        {line}" for line in lines]
+    return [*code, "    except _FAULTS:", f"        return {fallback.format(name)}"]
+
+
+def _ros1_fields(spec: MessageSpec) -> list[str]:
+    lines: list[str] = []
+    for old, new in _ROS1_FIELDS.get(spec.name, {}).items():
+        lines += ["", "@property", f"def {old}(self) -> _Any:", f"    return self.{new}"]
+        lines += [
+            "",
+            f"@{old}.setter",
+            f"def {old}(self, value: _Any) -> None:",
+            f"    self.{new} = value",
+        ]
+    return [*lines, ""] if lines else []
+
+
+def _schema(spec: MessageSpec, module: Module) -> str:
+    entries = []
+    for field in spec.fields:
+        kind = field.type
+        bound = f"<={kind.bound}" if kind.bound else ""
+        base = f'"{kind.base}{bound}"' if kind.primitive else module.cls(kind.base)
+        entries.append(f'("{attribute(field.name)}", {base}, "{kind.suffix}")')
+    return f"({', '.join(entries)}{',' * (len(entries) == 1)})"
+
+
+def _field(field: Field, module: Module) -> str:
+    return f"{attribute(field.name)}: {_annotation(field.type, module)} = {_default(field, module)}"
+
+
+def _annotation(kind: FieldType, module: Module) -> str:
+    element = _PYTHON.get(kind.base, "int") if kind.primitive else module.cls(kind.base)
+    if kind.shape == "one":
+        return element
+    if kind.base in OCTETS:
+        return "_Bytes"
+    return f"_Array[{element}]" if kind.base in ARRAYS else f"list[{element}]"
+
+
+def _default(field: Field, module: Module) -> str:
+    kind = field.type
+    if field.default is not None:
+        given = field.default if isinstance(field.default, tuple) else None
+        return _literal(field.default) if given is None else _default_list(kind, given, module)
+    if kind.shape == "one":
+        if not kind.primitive:
+            return f"_field(default_factory={module.cls(kind.base)})"
+        return {"str": '""', "float": "0.0", "bool": "False"}.get(
+            _PYTHON.get(kind.base, "int"), "0"
+        )
+    fixed = kind.size if kind.shape == "fixed" else 0
+    if kind.base in OCTETS:
+        return module.define("_z", f"bytes({fixed})") if fixed else 'b""'
+    if kind.base in ARRAYS:
+        code = ARRAYS[kind.base]
+        maker = (
+            f'{module.use("zeros")}("{code}", {fixed})'
+            if fixed
+            else f'{module.use("empty")}("{code}")'
+        )
+        return f"_field(default_factory={module.define('_d', maker)})"
+    if not fixed:
+        return "[]"
+    if kind.primitive:
+        one = {"bool": "False"}.get(kind.base, '""')
+        return f"_field(default_factory=lambda: [{one}] * {fixed})"
+    return f"_field(default_factory=lambda: [{module.cls(kind.base)}() for _ in range({fixed})])"
+
+
+def _default_list(kind: FieldType, values: tuple[Scalar, ...], module: Module) -> str:
+    listed = f"[{', '.join(_literal(value) for value in values)}]"
+    if kind.base in OCTETS:
+        return repr(bytes(int(value) & 0xFF for value in values))
+    if kind.base in ARRAYS:
+        return f'_field(default_factory=lambda: _array("{ARRAYS[kind.base]}", {listed}))'
+    return f"_field(default_factory=lambda: {listed})"
+
+
+def _literal(value: object) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return "_nan" if math.isnan(value) else "_inf" if value > 0 else "-_inf"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

@@ -1,0 +1,124 @@
+"""Generates the modules of packages, and tells whether generated ones are stale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from rosz.errors import DefinitionError, TypeNotFound, near_miss
+from rosz.idl.catalog import Catalog, Definition
+from rosz.idl.module import MARKER, index_module, message_module, service_module
+
+__all__ = ("Folders", "generate", "read_definition", "shipped_module", "stale", "write")
+
+
+def read_definition(file: Path) -> Definition:
+    """Read a definition file.
+
+    Raises:
+        DefinitionError: It cannot be read, or is not UTF-8.
+    """
+    try:
+        return Definition(file.read_text("utf-8"), str(file))
+    except UnicodeDecodeError as error:
+        before = error.object[: error.start]
+        line = before.count(b"\n") + 1
+        column = error.start - before.rfind(b"\n")
+        raise DefinitionError("not UTF-8", str(file), line, column) from error
+    except OSError as error:
+        raise DefinitionError(f"cannot be read: {error.strerror}", str(file)) from error
+
+
+class Folders:
+    """Definitions in the folders of packages: ``<package>/msg/*.msg`` and ``srv/*.srv``.
+
+    Args:
+        folder: Gives the folder of a package by its name; None where there is no such package.
+    """
+
+    def __init__(self, folder: Callable[[str], Path | None]) -> None:
+        self._folder = folder
+
+    def names(self, package: str, kind: str) -> list[str]:
+        """Return the full names of a package's types of one kind, sorted."""
+        folder = self._folder(package)
+        files = sorted((folder / kind).glob(f"*.{kind}")) if folder else []
+        return [f"{package}/{kind}/{file.stem}" for file in files]
+
+    def find(self, name: str) -> Definition:
+        """Return the definition of a full name.
+
+        Raises:
+            TypeNotFound: There is no such package, or no such type in it.
+            DefinitionError: The file cannot be read.
+        """
+        package, kind, base = name.split("/")
+        folder = self._folder(package)
+        if folder is None:
+            raise TypeNotFound(name, f"there is no package '{package}'")
+        file = folder / kind / f"{base}.{kind}"
+        if not file.is_file():
+            known = self.names(package, kind)
+            raise TypeNotFound(
+                name, f"'{folder / kind}' has no '{base}.{kind}'{near_miss(name, known)}"
+            )
+        return read_definition(file)
+
+
+def shipped_module(name: str) -> str:
+    """Return the module in ``rosz.msgs`` of a type's class, by the type's full name."""
+    package, kind, _ = name.split("/")
+    return f"rosz.msgs.{package}.{kind}"
+
+
+def generate(
+    package: str, folders: Folders, catalog: Catalog, place: Callable[[str], str | None]
+) -> dict[str, str]:
+    """Generate the modules of one package.
+
+    Args:
+        package: Its name.
+        folders: Where its definitions are.
+        catalog: All definitions that they refer to.
+        place: Module of a type's class by the type's full name, for imports.
+
+    Returns:
+        Sources by file name: ``__init__.py``, and ``msg.py`` and ``srv.py`` as far as it has such.
+
+    Raises:
+        DefinitionError: A definition is not well-formed, or refers to what is not there.
+    """
+    messages = [catalog.message(name) for name in folders.names(package, "msg")]
+    services = [catalog.service(name) for name in folders.names(package, "srv")]
+    index = index_module(package, [m.name for m in messages], [s.name for s in services])
+    files = {"__init__.py": index}
+    if messages:
+        files["msg.py"] = message_module(messages, catalog, place, package)
+    if services:
+        files["srv.py"] = service_module(services, catalog, place, package)
+    return files
+
+
+def stale(files: dict[str, str], folder: Path) -> Iterator[str]:
+    """Yield what differs between generated sources and the files in a folder."""
+    for name, source in files.items():
+        file = folder / name
+        if not file.is_file():
+            yield f"{file} is missing"
+        elif file.read_text("utf-8") != source:
+            yield f"{file} is stale"
+    for file in sorted(folder.glob("*.py")):
+        if file.name not in files:
+            yield f"{file} has no definitions any more"
+
+
+def write(files: dict[str, str], folder: Path) -> None:
+    """Write generated sources, and remove generated files that have no definitions any more."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, source in files.items():
+        file = folder / name
+        if not file.is_file() or file.read_text("utf-8") != source:
+            file.write_text(source, "utf-8")
+    for file in folder.glob("*.py"):
+        if file.name not in files and file.read_text("utf-8").startswith(MARKER):
+            file.unlink()

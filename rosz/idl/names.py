@@ -1,0 +1,118 @@
+"""Names in generated modules: attributes of fields, classes, and what is defined once per module."""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import re
+
+from rosz.idl.spec import FieldType
+
+__all__ = ("Locals", "Module", "attribute", "class_name", "module_of")
+
+
+_RESERVED = re.compile(r"[a-z][0-9]*")
+"""One letter, perhaps with a number: what generated code calls its own variables."""
+
+
+def attribute(name: str) -> str:
+    """Return the attribute of a field or constant: its name, or ``name_`` for Python's words."""
+    return f"{name}_" if keyword.iskeyword(name) else name
+
+
+def class_name(name: str) -> str:
+    """Return the class of a full type name: ``Twist``, ``SetBoolRequest``, ``SetBool``."""
+    package, kind, base = name.split("/")
+    for part in ("Request", "Response"):
+        if kind == "srv" and base.endswith(f"_{part}"):
+            return base.removesuffix(f"_{part}") + part
+    return attribute(base)
+
+
+def module_of(name: str) -> tuple[str, str]:
+    """Return package and kind (``msg`` or ``srv``) of a full type name."""
+    package, kind, _ = name.split("/")
+    return package, kind
+
+
+class Locals:
+    """Names of local variables in one generated function, short and distinct."""
+
+    def __init__(self) -> None:
+        self._taken = {*dir(builtins), *keyword.kwlist, *keyword.softkwlist, "data", "m", "out"}
+
+    def name(self, base: str) -> str:
+        """Return a name like that of a field."""
+        name = base
+        number = 1
+        while name in self._taken or name[0].isupper() or _RESERVED.fullmatch(name):
+            if name[0].isupper():  # might be a class
+                base = name = f"the_{base}"
+                continue
+            number += 1
+            name = f"{base}_{number}"
+        self._taken.add(name)
+        return name
+
+
+class Module:
+    """What a generated module defines and imports besides its classes.
+
+    Args:
+        own: Full names of the types whose classes the module defines.
+    """
+
+    def __init__(self, own: list[str]) -> None:
+        self._own = {class_name(name): name for name in own}
+        self._imports: dict[str, str] = {}
+        self._defined: dict[str, str] = {}
+        self._fresh: list[str] = []
+        self._lists: dict[str, str] = {}
+        self.runtime: set[str] = set()
+
+    @property
+    def imports(self) -> dict[str, str]:
+        """Classes of other modules: full name to the name it has here."""
+        return dict(self._imports)
+
+    def cls(self, name: str) -> str:
+        """Return the name that a message class has in this module."""
+        plain = class_name(name)
+        if self._own.get(plain) == name:
+            return plain
+        if name not in self._imports:
+            taken = set(self._imports.values()) | set(self._own)
+            self._imports[name] = plain if plain not in taken else name.replace("/", "_")
+        return self._imports[name]
+
+    def use(self, name: str) -> str:
+        """Import a name of ``rosz.message.runtime``; return how it is called here."""
+        self.runtime.add(name)
+        return f"_{name}"
+
+    def define(self, prefix: str, value: str) -> str:
+        """Return the name of a module-level value, defining it at its first use."""
+        if value not in self._defined:
+            number = sum(name.startswith(prefix) for name in self._defined.values()) + 1
+            self._defined[value] = f"{prefix}{number}"
+            self._fresh.append(f"{prefix}{number} = {value}")
+        return self._defined[value]
+
+    def string_list(self, kind: FieldType, place: str) -> str:
+        """Define the memory of one field of strings, shared by its two codecs; return its name."""
+        if place not in self._lists:
+            limits = []
+            if kind.shape == "fixed":
+                limits.append(f"size={kind.size}")
+            if kind.shape == "bounded":
+                limits.append(f"most={kind.size}")
+            if kind.bound:
+                limits.append(f"bound={kind.bound}")
+            name = self._lists[place] = f"_s{len(self._lists) + 1}"
+            self._fresh.append(f"{name} = {self.use('StringList')}({', '.join(limits)})")
+        return self._lists[place]
+
+    def fresh(self) -> list[str]:
+        """Return the definitions made since the last call."""
+        lines, self._fresh = self._fresh, []
+        return lines

@@ -1,0 +1,109 @@
+"""RIHS01, the hash that ROS 2 identifies a type by (REP 2016).
+
+SHA-256 over a JSON text that describes the fields of the type and of all types in it. Constants,
+defaults and comments are not in it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from rosz.idl.catalog import Catalog
+from rosz.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
+
+__all__ = ("describe", "message_hash", "service_event", "service_hash")
+
+_IDS = {
+    "int8": 2,
+    "uint8": 3,
+    "char": 3,  # the .msg char is a uint8; ids 13 and 14 are IDL's
+    "int16": 4,
+    "uint16": 5,
+    "int32": 6,
+    "uint32": 7,
+    "int64": 8,
+    "uint64": 9,
+    "float32": 10,
+    "float64": 11,
+    "bool": 15,
+    "byte": 16,
+    "string": 17,
+    "wstring": 18,
+}
+_MESSAGE = 1
+_BOUNDED = 4  # added for a string with a bound
+_SHAPES = {"one": 0, "fixed": 48, "bounded": 96, "sequence": 144}
+_EMPTY = Field("structure_needs_at_least_one_member", FieldType("uint8"))
+_EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
+
+
+def message_hash(spec: MessageSpec, catalog: Catalog) -> str:
+    """Return ``RIHS01_`` and 64 hexadecimal digits for a message."""
+    return _hash(spec, catalog.below(spec).values())
+
+
+def service_hash(spec: ServiceSpec, catalog: Catalog) -> str:
+    """Return the hash of a service: of a type that holds request, response and event."""
+    event = service_event(spec)
+    info = catalog.message(_EVENT_INFO)
+    below = {spec.request.name: spec.request, spec.response.name: spec.response, event.name: event}
+    below[info.name] = info
+    for part in (spec.request, spec.response, info):
+        below |= catalog.below(part)
+    whole = MessageSpec(
+        spec.name,
+        (
+            Field("request_message", FieldType(spec.request.name)),
+            Field("response_message", FieldType(spec.response.name)),
+            Field("event_message", FieldType(event.name)),
+        ),
+    )
+    return _hash(whole, below.values())
+
+
+def service_event(spec: ServiceSpec) -> MessageSpec:
+    """Return the message type that service introspection publishes."""
+    return MessageSpec(
+        f"{spec.name}_Event",
+        (
+            Field("info", FieldType(_EVENT_INFO)),
+            Field("request", FieldType(spec.request.name, shape="bounded", size=1)),
+            Field("response", FieldType(spec.response.name, shape="bounded", size=1)),
+        ),
+    )
+
+
+def describe(spec: MessageSpec) -> dict[str, Any]:
+    """Return the description of one type, in ROS 2's order of keys."""
+    return {
+        "type_name": spec.name,
+        "fields": [
+            {"name": field.name, "type": _describe_type(field.type)}
+            for field in spec.fields or (_EMPTY,)
+        ],
+    }
+
+
+def _describe_type(kind: FieldType) -> dict[str, Any]:
+    base = _IDS.get(kind.base, _MESSAGE) + (_BOUNDED if kind.bound else 0)
+    return {
+        "type_id": base + _SHAPES[kind.shape],
+        "capacity": kind.size,
+        "string_capacity": kind.bound,
+        "nested_type_name": "" if kind.primitive else kind.base,
+    }
+
+
+def _hash(spec: MessageSpec, below: Iterable[MessageSpec]) -> str:
+    text = json.dumps(
+        {
+            "type_description": describe(spec),
+            "referenced_type_descriptions": [
+                describe(other) for other in sorted(below, key=lambda other: other.name)
+            ],
+        }
+    )
+    return "RIHS01_" + hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,295 @@
+"""The plain codec: slow, tolerant, exact about what is wrong.
+
+It walks a class's schema field by field. The generated code falls back on it for values that are
+acceptable but unusual, for big-endian bytes, and to say what is wrong and where.
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+from array import array
+from typing import Any, NoReturn, TypeVar
+
+from rosz.errors import DecodeError, EncodeError
+from rosz.message.numbers import flags, numbers, octets
+from rosz.message.schema import ARRAY_CODES, OCTETS, SCALAR_CODES, Slot, slots
+from rosz.message.texts import pack_wide, put_text, read_wide
+
+__all__ = ("decode_plainly", "encode_plainly")
+
+_T = TypeVar("_T")
+
+_HEADER = b"\0\1\0\0"
+_ORDERS = {b"\0\0": ">", b"\0\1": "<"}
+_SIZES = {name: struct.calcsize(code) for name, code in SCALAR_CODES.items()}
+_BYTES = frozenset({"byte", "char"})
+_FEW = 60
+
+_FAULTS = (struct.error, AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
+
+
+def encode_plainly(message: Any, cls: type[Any]) -> bytes:
+    """Return a message as CDR, or say what is wrong with it.
+
+    Args:
+        message: The value.
+        cls: The message class whose schema it must fit.
+
+    Raises:
+        EncodeError: A value does not fit.
+    """
+    writer = _Writer(cls._type)
+    writer.message(message, cls, "")
+    return _HEADER + writer.data
+
+
+def decode_plainly(data: bytes, cls: type[_T]) -> _T:
+    """Return the message in CDR bytes of either byte order, or say what is wrong with them.
+
+    Raises:
+        DecodeError: They are no message of that class.
+    """
+    type_name: str = cls._type  # type: ignore[attr-defined]
+    order = _ORDERS.get(data[:2])
+    if len(data) < len(_HEADER):
+        raise DecodeError(type_name, 0, f"expected a header of 4 bytes, got {len(data)}")
+    if order is None:
+        raise DecodeError(
+            type_name, 0, f"expected encapsulation 0x0000 or 0x0001 (CDR), got 0x{data[:2].hex()}"
+        )
+    message: _T = _Reader(type_name, data, order).message(cls, "")
+    return message
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return f"{type(value).__name__} {text if len(text) <= _FEW else text[: _FEW - 1] + '…'}"
+
+
+class _Writer:
+    """The bytes so far; alignment counts from the first byte after the header."""
+
+    def __init__(self, type_name: str) -> None:
+        self._type = type_name
+        self.data = bytearray()
+
+    def _refuse(self, path: str, expected: str, value: object, why: str = "") -> NoReturn:
+        reason = f"expected {expected}, got {_shown(value)}{': ' + why if why else ''}"
+        raise EncodeError(self._type, path, reason)
+
+    def _put(self, code: str, *values: object) -> None:
+        packed = struct.pack("<" + code, *values)
+        self.data += bytes(-len(self.data) % min(len(packed), 8)) + packed
+
+    def message(self, value: Any, cls: Any, path: str) -> None:
+        fields = slots(cls)
+        for slot in fields:
+            name = f"{path}.{slot.name}" if path else slot.name
+            try:
+                member = getattr(value, slot.name)
+            except AttributeError:
+                self._refuse(path, cls._type, value, f"it has no field '{slot.name}'")
+            self._field(slot, member, name)
+        if not fields:
+            self.data += b"\0"
+
+    def _field(self, slot: Slot, value: Any, path: str) -> None:
+        if slot.shape == "one":
+            self._one(slot, value, path)
+        elif isinstance(slot.kind, str) and slot.kind in ARRAY_CODES | _OCTET_CODES:
+            self._block(slot, value, path)
+        else:
+            self._list(slot, value, path)
+
+    def _one(self, slot: Slot, value: Any, path: str) -> None:
+        kind = slot.kind
+        if not isinstance(kind, str):
+            self.message(value, kind, path)
+        elif kind in ("string", "wstring"):
+            self._text(slot, value, path)
+        else:
+            try:
+                self._put(SCALAR_CODES[kind], _number(kind, value))
+            except _FAULTS as error:
+                self._refuse(path, kind, value, "" if isinstance(error, TypeError) else str(error))
+
+    def _text(self, slot: Slot, value: Any, path: str) -> None:
+        wide = slot.kind == "wstring"
+        given = value.decode() if isinstance(value, bytes | bytearray) and not wide else value
+        try:
+            packed = pack_wide(given) if wide else put_text(given)
+        except AttributeError:
+            self._refuse(path, str(slot.kind), value)
+        except ValueError as error:
+            self._refuse(path, str(slot.kind), value, str(error))
+        length = len(packed) // 4 if wide else len(packed)
+        if slot.bound and length - (not wide) > slot.bound:
+            units = "code units" if wide else "bytes of UTF-8"
+            self._refuse(path, f"at most {slot.bound} {units}", value)
+        self._put("I", length)
+        self.data += packed
+
+    def _count(self, slot: Slot, value: Any, count: int, path: str) -> None:
+        if slot.shape == "fixed" and count != slot.size:
+            self._refuse(path, f"{slot.size} elements", value, f"it has {count}")
+        if slot.shape == "bounded" and count > slot.size:
+            self._refuse(path, f"at most {slot.size} elements", value, f"it has {count}")
+        if slot.counted:
+            self._put("I", count)
+
+    def _block(self, slot: Slot, value: Any, path: str) -> None:
+        """Write a sequence of numbers, which goes to the wire in one piece."""
+        kind = str(slot.kind)
+        try:
+            if kind == "bool":
+                block: Any = flags(value)
+            elif kind in OCTETS:
+                block = octets(value)
+            else:
+                block = numbers(value, ARRAY_CODES[kind])
+        except _FAULTS as error:
+            block = self._by_number(kind, value, path, error)
+        self._count(slot, value, len(block), path)
+        if len(block):
+            self.data += bytes(-len(self.data) % _SIZES[kind])
+            self.data += block if isinstance(block, bytes) else block.tobytes()
+
+    def _by_number(self, kind: str, value: Any, path: str, error: Exception) -> bytes:
+        """Find the number that is wrong in a sequence; take what one at a time is acceptable."""
+        if isinstance(value, str | bytes | bytearray | dict | set) or not hasattr(
+            value, "__iter__"
+        ):
+            self._refuse(path, f"a sequence of {kind}", value)
+        packed = []
+        for index, number in enumerate(value):
+            try:
+                packed.append(struct.pack("<" + SCALAR_CODES[kind], _number(kind, number)))
+            except _FAULTS as fault:
+                why = "" if isinstance(fault, TypeError) else str(fault)
+                self._refuse(f"{path}[{index}]", kind, number, why)
+        if kind in OCTETS:
+            return b"".join(packed)
+        self._refuse(path, f"a sequence of {kind}", value, str(error))
+
+    def _list(self, slot: Slot, value: Any, path: str) -> None:
+        if isinstance(value, str | bytes | dict | set) or not hasattr(value, "__len__"):
+            kind = slot.kind if isinstance(slot.kind, str) else slot.kind._type
+            self._refuse(path, f"a sequence of {kind}", value)
+        self._count(slot, value, len(value), path)
+        for index, element in enumerate(value):
+            self._one(slot, element, f"{path}[{index}]")
+
+
+_OCTET_CODES = {kind: "B" for kind in (*OCTETS, "bool")}
+
+
+def _number(kind: str, value: Any) -> Any:
+    """Turn a value into what struct packs for the type.
+
+    Raises:
+        TypeError: It is not of such a kind.
+        OverflowError: A float is too large.
+        struct.error: An integer is outside the range (raised later, by struct).
+    """
+    if kind == "bool":
+        return bool(value)
+    if kind in ("float32", "float64"):
+        if isinstance(value, str | bytes | bytearray):
+            raise TypeError(f"'{type(value).__name__}' is no number")
+        return float(value)
+    if kind in _BYTES and isinstance(value, bytes) and len(value) == 1:
+        return value[0]
+    number = value.__index__() if hasattr(value, "__index__") else None
+    if number is None:
+        raise TypeError(f"'{type(value).__name__}' is no integer")
+    signed_byte = kind == "byte" and -0x80 <= number < 0  # ROS 1's byte is an int8
+    return number + 0x100 if signed_byte else number
+
+
+class _Reader:
+    """A position in the bytes; alignment counts from the first byte after the header."""
+
+    def __init__(self, type_name: str, data: bytes, order: str) -> None:
+        self._type = type_name
+        self._data = data
+        self._order = order
+        self._at = len(_HEADER)
+
+    def _refuse(self, path: str, reason: str) -> NoReturn:
+        raise DecodeError(self._type, self._at, f"{path}: {reason}" if path else reason)
+
+    def _take(self, size: int, path: str, what: str, alignment: int = 1) -> bytes:
+        start = self._at + (len(_HEADER) - self._at) % alignment
+        left = len(self._data) - start
+        if size > left:
+            self._refuse(path, f"expected {what} ({size} bytes), {max(left, 0)} left")
+        self._at = start + size
+        return self._data[start : self._at]
+
+    def _scalar(self, kind: str, path: str) -> Any:
+        size = _SIZES[kind]
+        packed = self._take(size, path, kind, size)
+        return struct.unpack(self._order + SCALAR_CODES[kind], packed)[0]
+
+    def message(self, cls: Any, path: str) -> Any:
+        fields = slots(cls)
+        if not fields:
+            self._take(1, path, "an empty message")
+        prefix = f"{path}." if path else ""
+        return cls(*[self._field(slot, prefix + slot.name) for slot in fields])
+
+    def _field(self, slot: Slot, path: str) -> Any:
+        if slot.shape == "one":
+            return self._one(slot, path)
+        count = slot.size
+        if slot.counted:
+            count = self._scalar("uint32", path)
+            if slot.shape == "bounded" and count > slot.size:
+                self._refuse(path, f"expected at most {slot.size} elements, got {count}")
+        if isinstance(slot.kind, str) and slot.kind in _SIZES:
+            return self._block(slot.kind, count, path)
+        left = len(self._data) - self._at
+        if count > left:
+            self._refuse(path, f"expected {count} elements, {left} bytes left")
+        return [self._one(slot, f"{path}[{index}]") for index in range(count)]
+
+    def _one(self, slot: Slot, path: str) -> Any:
+        kind = slot.kind
+        if not isinstance(kind, str):
+            return self.message(kind, path)
+        if kind in ("string", "wstring"):
+            return self._text(slot, path)
+        return self._scalar(kind, path)
+
+    def _text(self, slot: Slot, path: str) -> str:
+        wide = slot.kind == "wstring"
+        length = self._scalar("uint32", path)
+        packed = self._take(length * 4 if wide else length, path, f"a {slot.kind}")
+        content = length if wide else max(length - 1, 0)
+        if slot.bound and content > slot.bound:
+            self._refuse(path, f"expected at most {slot.bound} units, got {content}")
+        try:
+            if not wide:
+                return packed[:-1].decode()
+            return read_wide(self._swapped("I", packed).tobytes())
+        except (UnicodeDecodeError, OverflowError) as error:
+            self._refuse(path, f"no valid {slot.kind}: {error}")
+
+    def _block(self, kind: str, count: int, path: str) -> Any:
+        if not count:
+            packed = b""
+        else:
+            size = _SIZES[kind]
+            packed = self._take(count * size, path, f"{count} elements of {kind}", size)
+        if kind in OCTETS:
+            return packed
+        if kind == "bool":
+            return [octet != 0 for octet in packed]
+        return self._swapped(ARRAY_CODES[kind], packed)
+
+    def _swapped(self, code: str, packed: bytes) -> array[Any]:
+        block = array(code, packed)
+        if (self._order == ">") != (sys.byteorder == "big"):
+            block.byteswap()
+        return block

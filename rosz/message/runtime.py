@@ -1,0 +1,127 @@
+"""What generated codecs call: conversions of odd values, caches, and the way out of trouble.
+
+The generated code trusts its values and lets ``struct`` and the attribute look-ups object. Whatever
+they raise (``FAULTS``) leads to the plain codec, which is slow, accepts what can be accepted (an
+int8 list for a byte sequence, big-endian bytes, …) and otherwise says exactly what is wrong.
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections.abc import Callable
+from struct import Struct
+from typing import Any
+
+from rosz.message.base import Message, Sequenced, Service
+from rosz.message.numbers import flags, numbers, octets
+from rosz.message.plain import decode_plainly, encode_plainly
+from rosz.message.texts import StringList, Texts, pack_wide, put_text, read_wide
+
+__all__ = (
+    "FAULTS",
+    "PADDING",
+    "Message",
+    "Sequenced",
+    "Service",
+    "StringList",
+    "Template",
+    "Texts",
+    "decode_plainly",
+    "empty",
+    "encode_plainly",
+    "flags",
+    "numbers",
+    "octets",
+    "pack_wide",
+    "put_text",
+    "read_block",
+    "read_flags",
+    "read_wide",
+    "texts",
+    "zeros",
+)
+
+FAULTS = (
+    struct.error,
+    AttributeError,
+    TypeError,
+    ValueError,
+    LookupError,
+    ArithmeticError,
+    BufferError,
+)
+"""What wrong values and damaged bytes make the generated code raise."""
+
+PADDING = tuple(bytes(n) for n in range(8))
+
+texts = Texts()
+"""Shared by all types: the same frame names turn up in many."""
+
+_MOST_SHAPES = 1024
+_LONGEST_SHAPE = 1024
+
+
+class Template(dict[Any, Callable[..., bytes]]):
+    """Packers of one run of fields with strings in it, by the lengths of these strings.
+
+    With the lengths known, the whole run has a fixed layout, so one call of ``struct`` packs it.
+
+    Args:
+        codes: Codes of ``struct`` in order, separated by blanks; ``$`` for a string's bytes, ``|4`` for padding.
+        start: Offset of the run from the end of the header modulo 8, -4 for the header itself, or
+            None where it varies: then it leads the key.
+    """
+
+    __slots__ = ("_codes", "_start")
+
+    def __init__(self, codes: str, start: int | None) -> None:
+        super().__init__()
+        self._codes = codes.split()
+        self._start = start
+
+    def __missing__(self, key: Any) -> Callable[..., bytes]:
+        numbers = list(key) if isinstance(key, tuple) else [key]
+        offset = numbers.pop(0) if self._start is None else self._start
+        layout = ["<"]
+        for code in self._codes:
+            if code[0] == "|":
+                one, alignment = "", int(code[1:])
+            else:
+                one = f"{numbers.pop(0)}s" if code == "$" else code
+                alignment = struct.calcsize(one[-1])
+            padding = -offset % alignment
+            offset += padding + struct.calcsize("<" + one)
+            layout.append(f"{padding}x{one}" if padding else one)
+        pack = Struct("".join(layout)).pack
+        if offset <= _LONGEST_SHAPE:
+            if len(self) >= _MOST_SHAPES:
+                self.clear()
+            self[key] = pack
+        return pack
+
+
+def read_flags(octets: bytes) -> list[bool]:
+    """Return octets as truth values."""
+    return memoryview(octets).cast("?").tolist() if octets else []  # type: ignore[return-value]
+
+
+def read_block(code: str, data: bytes, start: int, end: int) -> array[Any]:
+    """Return many numbers, with one copy less than the plain way makes.
+
+    Raises:
+        ValueError: The bytes end before, or in the middle of a number.
+    """
+    block = array(code)
+    block.frombytes(memoryview(data)[start:end])
+    return block
+
+
+def empty(code: str) -> Callable[[], array[Any]]:
+    """Return a maker of empty arrays."""
+    return array(code).__copy__
+
+
+def zeros(code: str, size: int) -> Callable[[], array[Any]]:
+    """Return a maker of arrays of zeros."""
+    return array(code, bytes(size * array(code).itemsize)).__copy__
