@@ -17,6 +17,7 @@ from rosz.errors import ClosedError, RoszError
 from rosz.graph import Graph
 from rosz.node.clock import Clock
 from rosz.session import Closable, Sample, Session, SessionConfig
+from rosz.session.probe import is_answered
 from rosz.session.settle import serve_links, settle
 from rosz.wire import own_key
 
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = ("Context",)
 
 _log = logging.getLogger("rosz.context")
-_ALONE_AFTER = 0.25
 _CLOSED_BY = 2.0
 
 
@@ -68,6 +68,9 @@ class Context:
         self.domain = self.environment.domain
         self._process = os.getpid()
         config = config or SessionConfig.node(self.environment)
+        alone = config.mode == "peer" and not (
+            config.connect or config.listen or config.multicast or is_answered(config.rendezvous)
+        )
         self.session = Session.open(config)
         self.graph = Graph(self.session, self.domain)
         self.clock = Clock()
@@ -75,6 +78,7 @@ class Context:
         self._hooks: list[Callable[[str], None]] = []
         self._lock = threading.RLock()
         self._stopping = threading.Event()
+        self._flushed = threading.Event()
         self._stopped = threading.Event()
         self._closer: threading.Thread | None = None
         self.reason = ""
@@ -85,15 +89,16 @@ class Context:
         self._inbox: dict[int, Callable[[Sample], None]] = {}
         if config.mode == "peer":
             self._links = serve_links(self.session)
-            threading.Thread(target=self._settle, name="rosz-settle", daemon=True).start()
-        else:
+        if config.mode != "peer" or alone:
             self.settled.set()
+        else:
+            threading.Thread(target=self._settle, name="rosz-settle", daemon=True).start()
 
     def _settle(self) -> None:
         try:
-            settle(self.session, first=_ALONE_AFTER, whole=self.SETTLED_BY, stop=self._stopping)
+            settle(self.session, timeout=self.SETTLED_BY, stop=self._flushed)
         except RoszError as error:
-            if not self._stopping.is_set():
+            if not self._flushed.is_set():
                 _log.warning("cannot tell whether all peers are linked: %s", error)
         finally:
             with self._lock:
@@ -219,6 +224,7 @@ class Context:
                 hook(reason)
             except Exception:  # noqa: BLE001  # the callback boundary
                 _log.exception("a shutdown hook failed")
+        self._flushed.set()
         self.graph.close()
         self.session.close()
         atexit.unregister(self.close)

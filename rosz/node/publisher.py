@@ -68,7 +68,6 @@ class Publisher(Endpoint, Generic[M]):
             cache=qos.depth if qos.latched else 0,
         )
         self._put = self._raw.put
-        self._declared.append(self._raw)
         # A cache answers who comes late, so only a publisher without one has to hold.
         settled = node.context.settled
         self._held: list[tuple[bytes, bytes]] | None = (
@@ -141,12 +140,9 @@ class Publisher(Endpoint, Generic[M]):
         """Send what was held, in order, and hold no more."""
         with self._ordered:
             held, self._held = self._held, None
-            if not self._raw_closed():
+            if not self.closed or not self.node.context.session.closed:
                 for payload, attachment in held or ():
                     self._put(payload, attachment)
-
-    def _raw_closed(self) -> bool:
-        return self.node.context.session.closed
 
     def _finish(self) -> None:
         context = self.node.context
@@ -154,6 +150,9 @@ class Publisher(Endpoint, Generic[M]):
             context.settled.wait(context.SETTLED_BY)
         if self._held is not None:
             self._release()
+        # Zenoh's handle refuses to be undeclared while another thread is inside its put.
+        with self._ordered:
+            self._raw.close()
 
     def subscribers(self) -> list[Token]:
         """Return the subscriptions that this publisher reaches: same topic, type and hash."""

@@ -44,31 +44,27 @@ def _answer(session: Session, query: Query) -> None:
             return  # the session closed meanwhile; whoever asked sees that it is gone
 
 
-def settle(session: Session, *, first: float, whole: float, stop: threading.Event) -> bool:
+def settle(session: Session, *, timeout: float, stop: threading.Event) -> bool:
     """Wait until the session is linked to all that its neighbours are linked to.
 
     Args:
-        session: A peer.
-        first: Seconds after which a session without any link counts as alone.
-        whole: Seconds for all.
+        session: A peer that is not alone.
+        timeout: Seconds.
         stop: Ends the wait when set.
 
     Returns:
         Whether it is settled; false when the time was over or the wait was stopped.
     """
-    begin = time.monotonic()
-    while not session.peers():
-        if time.monotonic() - begin > first:
-            return True
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
         if stop.wait(_POLL):
             return False
-    while time.monotonic() - begin < whole:
+        if not session.peers():
+            continue
         wanted: set[str] = set()
         for reply in session.get(f"{_SPACE}/*", timeout=_ASK_TIMEOUT):
             if reply.ok:
                 wanted.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
         if wanted <= {session.zid, *session.peers()}:
             return True
-        if stop.wait(_POLL):
-            return False
     return False
