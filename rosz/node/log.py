@@ -59,7 +59,6 @@ class NodeLog(NodeLogger):
         backups: int = BACKUPS,
     ) -> None:
         super().__init__(_BASE, level)
-        self.propagate = False
         self.manager = LoggerTree(self, clock)
         self.node = node
         self._ros_name = node.strip("/").replace("/", ".")

@@ -132,7 +132,6 @@ class Timer:
         try:
             self._loop()
         finally:
-            self._clock.close()
             if self._on_end is not None:
                 self._on_end(self)
 

@@ -215,6 +215,14 @@ def test_identical_texts_are_throttled() -> None:
     assert seen.texts == ["say a", "say b", "say a", "say a"]
 
 
+def test_texts_are_compared_with_their_arguments_filled_in() -> None:
+    log, seen = make()
+    for number in (1, 1, 2):
+        log.info("%(n)d", {"n": number}, throttle_identical=3600)
+        log.info("-%d", number, throttle_identical=3600)
+    assert seen.texts == ["1", "-1", "2", "-2"]
+
+
 def test_throttle_by_the_line_of_a_wrapper_s_caller() -> None:
     log, seen = make()
 

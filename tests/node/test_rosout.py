@@ -144,6 +144,26 @@ def test_slow_publisher_does_not_hold_up_logging_and_misses_are_counted(bench: B
     assert messages == ["first", *map(str, range(rosout._CAPACITY))]
 
 
+def test_publishing_may_wait_for_a_thread_that_logs(bench: Bench) -> None:
+    def publish(*line: object) -> None:
+        if line[2] == "one":
+            thread = threading.Thread(target=bench.log.info, args=("two",))
+            thread.start()
+            thread.join()
+        bench.publish(*line)
+
+    bench.log.publish_to(publish)
+    bench.log.info("one")
+    (sink,) = (each for each in bench.log.handlers if isinstance(each, rosout.RosoutSink))
+    # What logging does at the end of a program.
+    sink.acquire()
+    sink.flush()
+    published = not bench.lines.empty()
+    sink.release()
+    assert published
+    assert bench.messages() == ["one", "two"]
+
+
 def test_failing_publisher_is_told_once_and_not_to_itself(bench: Bench) -> None:
     told: list[str] = []
 
