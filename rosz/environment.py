@@ -41,6 +41,8 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         zenoh_config: ``ZENOH_SESSION_CONFIG_URI``, a Zenoh configuration file.
         zenoh_override: ``ZENOH_CONFIG_OVERRIDE``, ``path/to/key=json;…``.
         package_roots: Folders to look for packages in, first ones first.
+        console_format: ``ROSCONSOLE_FORMAT``.
+        color: Whether terminals get colours; ``NO_COLOR`` says no.
         home: ``ROS_HOME`` or ``~/.ros``.
         log_dir: ``ROS_LOG_DIR`` or ``<home>/log``.
     """
@@ -57,6 +59,8 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
     zenoh_config: str = ""
     zenoh_override: str = ""
     package_roots: tuple[Path, ...] = ()
+    console_format: str = ""
+    color: bool = True
     home: Path = Path(".ros")
     log_dir: Path = Path(".ros/log")
 
@@ -86,6 +90,8 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
             zenoh_config=env.get("ZENOH_SESSION_CONFIG_URI", ""),
             zenoh_override=env.get("ZENOH_CONFIG_OVERRIDE", ""),
             package_roots=_package_roots(env, cwd or _working_folder()),
+            console_format=env.get("ROSCONSOLE_FORMAT", ""),
+            color=not env.get("NO_COLOR"),
             home=home,
             log_dir=Path(env.get("ROS_LOG_DIR") or home / "log"),
         )

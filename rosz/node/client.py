@@ -147,9 +147,10 @@ class Client(Endpoint):
                 raise self._late(limit)
             raise ServiceError(f"service [{self.name}] responded with an error: {text}")
         try:
-            return self.service_type.Response._decode(reply.payload)
+            response: Message = self.service_type.Response._decode(reply.payload)
         except DecodeError as error:
             raise ServiceError(f"service [{self.name}] answered with damage: {error}") from error
+        return response
 
     def _late(self, limit: float) -> WaitTimeout:
         return WaitTimeout(

@@ -153,8 +153,8 @@ class Context:
         """
         if self._process != os.getpid():
             raise ClosedError(
-                "this process was forked from one that uses rosz; threads and links do not survive a"
-                " fork: start the child first, or use the 'spawn' method of multiprocessing"
+                "this process was forked from one that uses rosz; threads and links do not outlive"
+                " a fork: start the child first, or use the 'spawn' method of multiprocessing"
             )
         if self._stopping.is_set():
             raise ClosedError(

@@ -80,7 +80,7 @@ class Endpoint:
         self.closed = False
 
     def _announce(self) -> None:
-        """Make the endpoint known; what it needs must be declared before, so that others find it."""
+        """Make the endpoint known; what it needs must be declared before that."""
         self._declared.append(self.node.context.session.token(self._token_key))
 
     def close(self) -> None:

@@ -12,9 +12,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from rosz import names
-from rosz.errors import UsageError
+from rosz.errors import ClosedError, UsageError
 from rosz.node import control, signals
 from rosz.node.client import Client
+from rosz.node.console import DEFAULT_FORMAT
 from rosz.node.context import Context
 from rosz.node.endpoint import Endpoint, Withdrawal
 from rosz.node.log import NodeLog
@@ -23,7 +24,7 @@ from rosz.node.rate import Rate
 from rosz.node.service import Service
 from rosz.node.subscription import Subscription
 from rosz.node.timer import Timer, TimerEvent
-from rosz.qos import DEFAULT, SERVICES, QoS
+from rosz.qos import DEFAULT, ROSOUT, SERVICES, QoS
 from rosz.wire import Kind, Token, format_process, format_token
 from rosz.wire.processes import ProcessToken
 
@@ -101,15 +102,37 @@ class Node:
         self._hooks: list[Callable[[str], None]] = []
         self._closed = threading.Event()
         self._withdraw = context.on_shutdown(self._end)
+        environment = context.environment
         self.log = NodeLog(
             self.name,
             clock=context.clock,
-            log_dir=context.environment.log_dir,
+            log_dir=environment.log_dir,
             file_name=arguments.special.get("__log", ""),
+            console_format=environment.console_format or DEFAULT_FORMAT,
+            color=environment.color,
         )
         self._set_initial_params()
         self._announce()
         control.attach(self)
+        # Loading the message type takes longer than the rest of a start, and nobody waits for it.
+        threading.Thread(target=self._open_rosout, name="rosz-rosout-open", daemon=True).start()
+
+    def _open_rosout(self) -> None:
+        from rosz.msgs.builtin_interfaces.msg import Time
+        from rosz.msgs.rcl_interfaces.msg import Log
+
+        try:
+            rosout = self.publisher("/rosout", Log, qos=ROSOUT)
+        except ClosedError:
+            return  # a program that ends within its first moments
+
+        def publish(
+            level: int, name: str, message: str, file: str, function: str, line: int, stamp: int
+        ) -> None:
+            time = Time(*divmod(stamp, _SECOND))
+            rosout.publish(Log(time, level, name, message, file, function, line))
+
+        self.log.publish_to(publish)
 
     def _set_initial_params(self) -> None:
         import yaml
@@ -289,9 +312,12 @@ class Node:
                 self.context.clock,
                 oneshot=oneshot,
                 name=f"rosz-timer{self.name}",
-                on_error=lambda error: self.log.error("a timer callback failed", exc_info=error),
+                on_error=self._report,
             )
         )
+
+    def _report(self, text: str, error: Exception) -> None:
+        self.log.error("%s", text, exc_info=error)
 
     def rate(self, hz: float) -> Rate:
         """Return a pace-maker: iterate over it, or call its ``sleep``.
