@@ -17,9 +17,11 @@ class Console:
     Args:
         out: For what goes well.
         err: For what does not.
+        verbose: Whether notes are printed too.
     """
 
-    def __init__(self, out: TextIO, err: TextIO) -> None:
+    def __init__(self, out: TextIO, err: TextIO, *, verbose: bool = False) -> None:
+        self._verbose = verbose
         self._out = out
         self._err = err
         self.log: LaunchLog | None = None
@@ -47,8 +49,10 @@ class Console:
             self._put(self._out, f"\033]2;{text}\007")
 
     def note(self, text: str) -> None:
-        """Write to the log only."""
-        if self.log is not None:
+        """Print a line that only those want to see who asked for it."""
+        if self._verbose:
+            self.say(text)
+        elif self.log is not None:
             self.log.write("INFO", text)
 
     def _print(self, stream: TextIO, text: str, colour: str, level: str) -> None:

@@ -13,6 +13,7 @@ from rosz.session import Session
 
 if TYPE_CHECKING:
     from rosz.graph import Graph
+    from rosz.node.context import Context
 
 __all__ = ("GraphReadiness", "Network")
 
@@ -33,6 +34,22 @@ class Network(msgspec.Struct, frozen=True, kw_only=True):
     session: Session | None = None
     domain: int = 0
     alone: bool = True
+
+    @classmethod
+    def of(cls, context: Context) -> Network:
+        """Return the network of a context.
+
+        Args:
+            context: The context of the launch process.
+        """
+        store = ReplicaStore(context.params)
+        return cls(
+            store=store,
+            readiness=GraphReadiness(context.graph, store),
+            session=context.session,
+            domain=context.domain,
+            alone=not context.session.peers(),
+        )
 
 
 class GraphReadiness:

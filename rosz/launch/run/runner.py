@@ -40,6 +40,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
         required: All nodes are required.
         local: Nodes of other machines are left out.
         prefixed: Lines on the screen begin with the name of their node.
+        verbose: The command line of each process is printed.
         overview: What the launch will do is printed first.
         title: The terminal's window is named after the launch.
         timeouts: How long processes may take to end.
@@ -50,6 +51,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
     required: bool = False
     local: bool = False
     prefixed: bool = False
+    verbose: bool = False
     overview: bool = True
     title: bool = True
     timeouts: Timeouts = Timeouts()
@@ -106,7 +108,7 @@ class Runner:
         self._workplace = workplace
         self._network = network
         self._options = options
-        self._console = Console(out, err)
+        self._console = Console(out, err, verbose=options.verbose)
         self._remote = remote
         self._loop = Loop()
         self._stop: Callable[[], None] = self._loop.stop

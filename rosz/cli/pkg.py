@@ -1,0 +1,83 @@
+"""``rosz pkg``: list, find and create packages."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rosz.packages import PackageIndex
+
+__all__ = ("app",)
+
+app = typer.Typer(
+    add_completion=False, no_args_is_help=True, help="List, find and create packages."
+)
+
+
+@app.command("list")
+def list_packages(
+    *,
+    names: Annotated[bool, typer.Option("--names", "-n", help="Only their names.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+) -> None:
+    """List all packages with their folders."""
+    packages = _index().packages()
+    if json:
+        import msgspec
+
+        rows = {package.name: str(package.path) for package in packages}
+        sys.stdout.write(msgspec.json.format(msgspec.json.encode(rows)).decode() + "\n")
+        return
+    for package in packages:
+        sys.stdout.write(f"{package.name}\n" if names else f"{package.name} {package.path}\n")
+
+
+@app.command("find")
+def find_package(name: Annotated[str, typer.Argument(metavar="PACKAGE")]) -> None:
+    """Print the folder of a package."""
+    sys.stdout.write(f"{_index().find(name).path}\n")
+
+
+@app.command("create")
+def create_package(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    dependencies: Annotated[list[str] | None, typer.Argument(metavar="[DEPENDENCY]...")] = None,
+    *,
+    description: Annotated[str, typer.Option("--description", "-d", help="What it is.")] = "",
+    maintainer: Annotated[str, typer.Option("--maintainer", "-m", help="Who looks after it.")] = "",
+    license_name: Annotated[str, typer.Option("--license", "-l", help="Under what terms.")] = "",
+) -> None:
+    """Create a package in the present folder, with a message, a talker and a launch file."""
+    from rosz.launch.run.template import create
+
+    folder = create(
+        Path.cwd(),
+        name,
+        dependencies or [],
+        description=description,
+        maintainer=maintainer,
+        license_name=license_name,
+    )
+    index = _index()
+    for dependency in dependencies or []:
+        if dependency not in index.names() and dependency not in _BUILT_IN:
+            sys.stderr.write(f"WARNING: dependency '{dependency}' is not on the package path\n")
+    sys.stdout.write(
+        f"created {folder}\nrun it with: rosz launch {folder / 'launch' / 'talker.launch'}\n"
+    )
+
+
+# What ROS 1 packages list as dependencies and rosz brings, though not as packages.
+_BUILT_IN = frozenset(
+    {"catkin", "message_generation", "message_runtime", "roslib", "rospy", "roscpp"}
+)
+
+
+def _index() -> PackageIndex:
+    from rosz.environment import Environment, package_index
+
+    return package_index(Environment.read())

@@ -1,0 +1,114 @@
+"""A new package: a message of its own, a node that publishes it, a launch file that starts that."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from rosz.errors import LaunchError, UsageError
+
+__all__ = ("create",)
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
+
+_MANIFEST = """\
+<?xml version="1.0"?>
+<package format="2">
+  <name>{name}</name>
+  <version>0.0.1</version>
+  <description>{description}</description>
+  <maintainer email="user@example.com">{maintainer}</maintainer>
+  <license>{license_name}</license>
+{dependencies}</package>
+"""
+
+_MESSAGE = """\
+# A number, and what to call it.
+int64 data
+string name
+"""
+
+_TALKER = '''\
+#!/usr/bin/env python3
+"""Publish a number, counting up."""
+
+import rosz
+from {name}.msg import Number
+
+with rosz.Node("talker") as node:
+    numbers = node.publisher("numbers", Number, queue_size=10)
+    rate = node.params.get("~rate", 1.0)
+    for tick in node.rate(rate):
+        numbers.publish(Number(data=tick, name="tick"))
+        node.log.info("published %d", tick)
+'''
+
+_LAUNCH = """\
+<launch>
+  <arg name="rate" default="1.0" doc="numbers per second"/>
+  <node pkg="{name}" type="talker.py" name="talker" output="screen">
+    <param name="rate" value="$(arg rate)"/>
+  </node>
+</launch>
+"""
+
+
+def create(
+    parent: Path,
+    name: str,
+    dependencies: Sequence[str] = (),
+    *,
+    description: str = "",
+    maintainer: str = "",
+    license_name: str = "",
+) -> Path:
+    """Create a package that runs at once.
+
+    Args:
+        parent: Folder to create it in.
+        name: Its name.
+        dependencies: Names of packages that it needs.
+        description: What it is.
+        maintainer: Who looks after it.
+        license_name: Under what terms.
+
+    Returns:
+        Its folder.
+
+    Raises:
+        UsageError: The name is no name of a package.
+        LaunchError: The folder exists, or cannot be written.
+    """
+    if not _NAME.fullmatch(name):
+        raise UsageError(
+            f"'{name}' is no name of a package; expected lower-case letters, digits and '_', a"
+            " letter first"
+        )
+    folder = parent / name
+    depends = "".join(f"  <depend>{escape(package)}</depend>\n" for package in dependencies)
+    files = {
+        "package.xml": _MANIFEST.format(
+            name=name,
+            description=escape(description or f"The {name} package"),
+            maintainer=escape(maintainer or "user"),
+            license_name=escape(license_name or "TODO"),
+            dependencies=depends,
+        ),
+        "msg/Number.msg": _MESSAGE,
+        "scripts/talker.py": _TALKER.format(name=name),
+        "launch/talker.launch": _LAUNCH.format(name=name),
+    }
+    try:
+        folder.mkdir()
+        for path, text in files.items():
+            file = folder / path
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+        (folder / "scripts/talker.py").chmod(0o755)
+    except FileExistsError as error:
+        raise LaunchError(f"'{error.filename}' exists already; choose another name") from error
+    except OSError as error:
+        raise LaunchError(f"cannot create '{error.filename}': {error.strerror}") from error
+    return folder

@@ -1,0 +1,112 @@
+"""Scripts from the days of Python 2: what to say when one does not run under Python 3."""
+
+from __future__ import annotations
+
+import re
+
+from rosz.errors import SourceError
+
+__all__ = ("explain", "hint")
+
+_CONVERT = "convert the file with: 2to3 -w {path} (or futurize -w {path})"
+
+# What the parser of Python 3 says about Python 2, and what it is. Where it says no more than
+# "invalid syntax", the line itself is looked at.
+_MESSAGES = (
+    (re.compile(r"Missing parentheses in call to 'print'"), "print without parentheses"),
+    (re.compile(r"Missing parentheses in call to 'exec'"), "exec without parentheses"),
+    (re.compile(r"multiple exception types must be parenthesized"), "'except Error, name'"),
+    (re.compile(r"leading zeros in decimal integer literals"), "an octal number such as 0777"),
+    (re.compile(r"parameters cannot be parenthesized"), "a tuple among the parameters"),
+)
+_LINES = (
+    (re.compile(r"^\s*print\s*>>"), "print to a file without parentheses"),
+    (re.compile(r"^\s*print\s+[^(=\s]"), "print without parentheses"),
+    (re.compile(r"^\s*raise\s+[\w.]+\s*,"), "'raise Error, text'"),
+    (re.compile(r"^\s*except\s+[^:]+,\s*\w+\s*:"), "'except Error, name'"),
+    (re.compile(r"<>"), "'<>' for '!='"),
+    (re.compile(r"`[^`]*`"), "backticks for repr()"),
+    (re.compile(r"\b\d+[lL]\b"), "a long number such as 10L"),
+    (re.compile(r"\b[uU][rR]['\"]"), "a text such as ur''"),
+)
+_NAMES = {
+    "basestring": "str",
+    "cmp": "(a > b) - (a < b)",
+    "execfile": "exec(open(path).read())",
+    "long": "int",
+    "raw_input": "input",
+    "reduce": "functools.reduce",
+    "reload": "importlib.reload",
+    "unichr": "chr",
+    "unicode": "str",
+    "xrange": "range",
+}
+_MODULES = {
+    "ConfigParser": "configparser",
+    "Queue": "queue",
+    "SocketServer": "socketserver",
+    "StringIO": "io",
+    "Tkinter": "tkinter",
+    "__builtin__": "builtins",
+    "cPickle": "pickle",
+    "commands": "subprocess",
+    "cookielib": "http.cookiejar",
+    "httplib": "http.client",
+    "thread": "_thread",
+    "tkMessageBox": "tkinter.messagebox",
+    "urllib2": "urllib.request",
+    "urlparse": "urllib.parse",
+}
+_METHODS = {
+    "has_key": "'key in dict'",
+    "iteritems": "items()",
+    "iterkeys": "keys()",
+    "itervalues": "values()",
+}
+
+
+def explain(error: SyntaxError, path: str) -> SourceError | None:
+    """Return a syntax error as one line, if it is Python 2 that causes it.
+
+    Args:
+        error: What compiling the script raised.
+        path: The script.
+
+    Returns:
+        None where it is an error in Python 3 as well.
+    """
+    line, column = error.lineno or 0, error.offset or 0
+    if isinstance(error, TabError):
+        reason = (
+            "indented by tabs and spaces in turn, as Python 2 allowed; write 8 columns for each"
+            f" tab with: expand -i -t 8 {path}"
+        )
+        return SourceError(reason, path, line, column)
+    what = _match(error)
+    if what is None:
+        return None
+    return SourceError(
+        f"this is Python 2 ({what}); {_CONVERT.format(path=path)}", path, line, column
+    )
+
+
+def _match(error: SyntaxError) -> str | None:
+    for pattern, what in _MESSAGES:
+        if pattern.search(error.msg):
+            return what
+    for pattern, what in _LINES:
+        if pattern.search(error.text or ""):
+            return what
+    return None
+
+
+def hint(error: BaseException) -> str:
+    """Return what to write instead of a name that only Python 2 has; empty for other errors."""
+    name = getattr(error, "name", None) or ""
+    if isinstance(error, ModuleNotFoundError) and name in _MODULES:
+        return f"module '{name}' is Python 2; Python 3 has '{_MODULES[name]}'"
+    if isinstance(error, NameError) and name in _NAMES:
+        return f"'{name}' is Python 2; Python 3 has '{_NAMES[name]}'"
+    if isinstance(error, AttributeError) and name in _METHODS:
+        return f"'{name}' is Python 2; Python 3 has {_METHODS[name]}"
+    return ""
