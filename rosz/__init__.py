@@ -1,1 +1,52 @@
-"""rosz: the ROS 1 experience without a master, on Eclipse Zenoh."""
+"""rosz: the ROS 1 experience without a master, on Eclipse Zenoh.
+
+>>> import rosz
+>>> from rosz.msgs.std_msgs.msg import String
+>>> with rosz.Node("talker") as node:
+...     chatter = node.publisher("chatter", String)
+...     for tick in node.rate(10):
+...         chatter.publish(String(data=f"hello {tick}"))
+
+The names here load what they need on first use, so that a command does not pay for all of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rosz.environment import Environment
+    from rosz.errors import RoszError, ServiceError, WaitTimeout
+    from rosz.node import Client, Context, MessageInfo, Node, Publisher, Service, Subscription
+    from rosz.qos import QoS
+
+__all__ = (
+    "Client",
+    "Context",
+    "Environment",
+    "MessageInfo",
+    "Node",
+    "Publisher",
+    "QoS",
+    "RoszError",
+    "Service",
+    "ServiceError",
+    "Subscription",
+    "WaitTimeout",
+)
+
+_HOMES = {
+    "Environment": "rosz.environment",
+    "QoS": "rosz.qos",
+    "RoszError": "rosz.errors",
+    "ServiceError": "rosz.errors",
+    "WaitTimeout": "rosz.errors",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'rosz' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(_HOMES.get(name, "rosz.node")), name)

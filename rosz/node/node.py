@@ -126,7 +126,7 @@ class Node:
         except ClosedError:
             return  # a program that ends within its first moments
 
-        def publish(
+        def publish(  # noqa: PLR0917  # the signature of RosoutSink
             level: int, name: str, message: str, file: str, function: str, line: int, stamp: int
         ) -> None:
             time = Time(*divmod(stamp, _SECOND))

@@ -49,12 +49,11 @@ class RosoutSink(logging.Handler):
         self._closed_for_good = False
         self._thread: threading.Thread | None = None
 
-    def createLock(self) -> None:  # noqa: N802  # logging's name
-        """Have no lock: the queue needs none, and who drains it must not hold one."""
-        self.lock = None
-
     def handle(self, record: logging.LogRecord) -> bool:
-        """Queue a record, unless it comes from publishing one."""
+        """Queue a record, unless it comes from publishing one.
+
+        No lock is held: the queue needs none, and who drains it may hold one.
+        """
         if threading.current_thread() is self._thread:
             return False
         passed = self.filter(record)
