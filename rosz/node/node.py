@@ -135,6 +135,8 @@ class Node:
         self.log.publish_to(publish)
 
     def _set_initial_params(self) -> None:
+        if not self.context.arguments.params:
+            return
         import yaml
 
         for name, text in self.context.arguments.params.items():

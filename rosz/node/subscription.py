@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import threading
 import time
 from collections import deque
@@ -257,6 +256,8 @@ class Subscription(Endpoint, Generic[M]):
 
     async def __aiter__(self) -> AsyncIterator[M]:
         """Yield messages in an asyncio program until the subscription or its context is closed."""
+        import asyncio
+
         loop = asyncio.get_running_loop()
         arrived = asyncio.Event()
 

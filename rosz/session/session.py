@@ -16,6 +16,7 @@ import zenoh
 import zenoh.ext
 
 from rosz.errors import ClosedError, TransportError, WaitTimeout
+from rosz.session.calls import wait_for_calls
 from rosz.session.config import SessionConfig, overrides, zenoh_settings
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.stamp import HybridClock, Stamp
@@ -33,6 +34,7 @@ _TARGETS = {
     "best": zenoh.QueryTarget.BEST_MATCHING,
 }
 _HEARTBEAT_SECONDS = 0.5
+_CALLS_END_BY = 1.0
 _REPLY_MARGIN = 1.0
 """Seconds given to Zenoh's own query timeout to report before a wait ends by itself."""
 
@@ -76,6 +78,16 @@ class _Declared:
                 entity.undeclare()
 
 
+class _ClosedSession:
+    """Stands for the session once it is closed, so that no call reaches Zenoh any more."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise ClosedError(f"the session is closed: no {name.replace('_', ' ')} any more")
+
+
+_CLOSED = _ClosedSession()
+
+
 class RawPublisher(_Declared):
     """A declared publisher of bytes."""
 
@@ -108,7 +120,7 @@ class Session:
     """
 
     def __init__(self, raw: zenoh.Session) -> None:
-        self._raw = raw
+        self._raw: Any = raw
         self._closing = threading.Lock()
         self.zid = str(raw.zid())
         self.clock = HybridClock(self.zid)
@@ -431,13 +443,19 @@ class Session:
     @property
     def closed(self) -> bool:
         """Whether the session has been closed."""
-        return bool(self._raw.is_closed())
+        return self._raw is _CLOSED
 
     def close(self) -> None:
-        """Close the session and all that is declared on it; again is no error."""
+        """Close the session and all that is declared on it; again is no error.
+
+        Calls that other threads have under way are waited for, a second at most: a program that
+        ends while a thread is inside Zenoh is aborted by the runtime.
+        """
         with self._closing:
-            if not self._raw.is_closed():
-                self._raw.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
+            raw, self._raw = self._raw, _CLOSED
+            if raw is not _CLOSED:
+                raw.close()
+        wait_for_calls(_CALLS_END_BY)
 
     def __enter__(self) -> Self:
         return self
