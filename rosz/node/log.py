@@ -98,6 +98,11 @@ class NodeLog(NodeLogger):
         if self._rosout is not None:
             self._rosout.publish_to(publish)
 
+    def flush(self) -> None:
+        """Wait, for a second at most, until what was logged is published on ``/rosout``."""
+        if self._rosout is not None:
+            self._rosout.flush()
+
     def get_levels(self) -> dict[str, str]:
         """Return the level in effect, such as ``INFO``, of each logger of the node."""
         return {

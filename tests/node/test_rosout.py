@@ -25,8 +25,7 @@ class Bench:
 
     def messages(self) -> list[object]:
         """Return the messages published so far, all that is logged included."""
-        for handler in self.log.handlers:
-            handler.flush()
+        self.log.flush()
         found = []
         while not self.lines.empty():
             found.append(self.lines.get()[2])
@@ -239,6 +238,7 @@ def test_log_without_rosout() -> None:
     log = NodeLog("/talker", clock=SimulatedClock(), console=False, rosout=False)
     log.publish_to(lambda *_: pytest.fail("published"))
     log.info("x")
+    log.flush()
     log.close()
 
 
