@@ -1,0 +1,27 @@
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from .ros1 import Ros1, available
+
+# ROSZ_EXAMPLES=20000 makes a night of it.
+settings.register_profile(
+    "params",
+    deadline=None,
+    max_examples=int(os.environ.get("ROSZ_EXAMPLES", "100")),
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+settings.load_profile("params")
+
+
+@pytest.fixture(scope="session")
+def ros1() -> Iterator[Ros1]:
+    if not available():
+        pytest.skip("ROS 1 is not installed: apt install python3-rosmaster python3-rosparam")
+    worker = Ros1()
+    yield worker
+    worker.close()
