@@ -103,9 +103,10 @@ class Node:
         self._closed = threading.Event()
         self._withdraw = context.on_shutdown(self._end)
         environment = context.environment
+        self.clock = context.clock.branch()
         self.log = NodeLog(
             self.name,
-            clock=context.clock,
+            clock=self.clock,
             log_dir=environment.log_dir,
             file_name=arguments.special.get("__log", ""),
             console_format=environment.console_format or DEFAULT_FORMAT,
@@ -311,15 +312,11 @@ class Node:
             Timer(
                 round(period * _SECOND),
                 callback,
-                self.context.clock,
+                self.clock,
                 oneshot=oneshot,
-                name=f"rosz-timer{self.name}",
-                on_error=self._report,
+                on_error=self.log.report,
             )
         )
-
-    def _report(self, text: str, error: Exception) -> None:
-        self.log.error("%s", text, exc_info=error)
 
     def rate(self, hz: float) -> Rate:
         """Return a pace-maker: iterate over it, or call its ``sleep``.
@@ -328,11 +325,11 @@ class Node:
             hz: Times per second, in ROS time.
         """
         self.context.cooperative = True
-        return Rate(hz, self.context.clock)
+        return Rate(hz, self.clock)
 
     def now(self) -> int:
         """Return the time in nanoseconds: simulated where ``use_sim_time`` is set, else wall."""
-        return self.context.clock.now()
+        return self.clock.now()
 
     def sleep(self, seconds: float) -> bool:
         """Sleep, in ROS time.
@@ -341,7 +338,7 @@ class Node:
             Whether the time was slept through; false when the node was shut down meanwhile.
         """
         self.context.cooperative = True
-        return self.context.clock.sleep(round(seconds * _SECOND))
+        return self.clock.sleep(round(seconds * _SECOND))
 
     def spin(self) -> None:
         """Wait until the node is shut down; callbacks run on threads of their own meanwhile."""
@@ -392,11 +389,13 @@ class Node:
             self._closed.set()
             hooks, parts = self._hooks[::-1], self._parts[::-1]
         self._withdraw()
+        self.clock.close()
         for hook in hooks:
             try:
                 hook(reason)
             except Exception:  # the callback boundary
                 self.log.exception("a shutdown hook failed")
+        self.log.flush()
         for part in parts:
             part.close()
         self.log.close()
