@@ -15,8 +15,9 @@ Beyond roslaunch, additive: ``wait_for``, ``wait_timeout``, ``spawn_delay``, ``r
   of a package.
 - ``<executable cmd="…">`` runs a program that is no node; ``shell`` is not supported.
 
-``<arg>`` and ``<param>`` keep ROS 1's rules: an included file sees only what is passed to it, a
-``<param>`` outside a node is a global parameter, and ``<param from="…">`` is ``<rosparam file="…">``.
+``<arg>`` and ``<param>`` keep ROS 1's rules: an included file sees only what is passed to it, and a
+``<param>`` outside a node is a global parameter. For ``<param from="…">`` there is
+``<rosparam file="…">``.
 """
 
 from rosz.launch.plan.arguments import LaunchArguments, parse_arguments

@@ -191,13 +191,6 @@ def power(budget: Budget, base: Any, exponent: Any) -> Any:
     return base**exponent
 
 
-def _pow(budget: Budget, base: Any, exponent: Any, modulus: Any = None) -> Any:
-    if modulus is None:
-        return power(budget, base, exponent)
-    budget.charge(exponent.bit_length() * modulus.bit_length() // 256)
-    return pow(base, exponent, modulus)
-
-
 def _range(budget: Budget, *args: int) -> range:
     numbers = range(*args)
     try:
@@ -285,4 +278,4 @@ def functions(budget: Budget) -> tuple[dict[str, Any], dict[str, Any]]:
         if not name.startswith("_"):
             before[name] = bind(_BOUNDED[name]) if name in _BOUNDED else value
     after = {name: bind(function) for name, function in _BOUNDED.items() if name not in vars(math)}
-    return before, {**_BUILTINS, **after, "pow": bind(_pow)}
+    return before, {**_BUILTINS, **after}

@@ -26,6 +26,7 @@ _HINTS = {
     expat.errors.codes[
         expat.errors.XML_ERROR_INVALID_TOKEN
     ]: "; attributes need quotes, and in values '&' is written '&amp;' and '<' is written '&lt;'",
+    expat.errors.codes[expat.errors.XML_ERROR_SYNTAX]: "; a launch file begins with <launch>",
     expat.errors.codes[
         expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT
     ]: "; everything must stand inside one <launch> tag",

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import ast
 import operator
-from collections.abc import Callable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from rosz.errors import near_miss
@@ -58,7 +59,10 @@ _VALUES = (bool, int, float, complex, str, list, tuple, dict, set, frozenset, ra
 
 
 def evaluate(
-    text: str, own: Mapping[str, Callable[..., Any]], arg: Callable[[str], Any | None]
+    text: str,
+    own: Mapping[str, Callable[..., Any]],
+    arg: Callable[[str], Any | None],
+    args: Iterable[str] = (),
 ) -> str:
     """Evaluate an expression and write the result as ``str`` does.
 
@@ -66,6 +70,7 @@ def evaluate(
         text: The expression.
         own: The functions of launch files: ``arg``, ``env``, ``find`` …
         arg: Returns the value of an arg by its name, None where there is none.
+        args: Names of the args, to suggest where a name is unknown.
 
     Raises:
         TextFault: It is no expression, reaches for something forbidden, takes too much, or fails.
@@ -77,12 +82,13 @@ def evaluate(
     stripped = text.lstrip(" \t")
     shift = len(text) - len(stripped)
     try:
-        tree = ast.parse(stripped, mode="eval")
+        with warnings.catch_warnings(action="ignore"):  # of escapes, which are harmless here
+            tree = ast.parse(stripped, mode="eval")
     except SyntaxError as error:
         raise TextFault(f"no expression: {error.msg}", (error.offset or 1) - 1 + shift) from None
     except (ValueError, RecursionError, MemoryError) as error:
         raise TextFault(f"no expression: {error or 'nested too deep'}") from None
-    walk = _Walk(own, arg)
+    walk = _Walk(own, arg, args)
     try:
         value = walk.value(tree.body)
         if not isinstance(value, _VALUES):
@@ -101,12 +107,16 @@ class _Walk:
     """One evaluation."""
 
     def __init__(
-        self, own: Mapping[str, Callable[..., Any]], arg: Callable[[str], Any | None]
+        self,
+        own: Mapping[str, Callable[..., Any]],
+        arg: Callable[[str], Any | None],
+        args: Iterable[str],
     ) -> None:
         self._budget = Budget(_BUDGET)
         before, self._after = functions(self._budget)
         self._before = {**before, **own}
         self._arg = arg
+        self._args = args
         self._locals: list[dict[str, Any]] = []
         self._depth = 0
         self.column = 0
@@ -142,7 +152,7 @@ class _Walk:
         if node.id in self._after:
             return self._after[node.id]
         self.column = node.col_offset
-        hint = near_miss(node.id, [*self._before, *self._after])
+        hint = near_miss(node.id, self._args) or near_miss(node.id, [*self._before, *self._after])
         if node.id == "math":
             hint = "; the names of math stand alone: write 'pi', not 'math.pi'"
         raise ExpressionError(f"'{node.id}' is no arg of this file and no function{hint}")

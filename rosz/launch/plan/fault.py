@@ -6,10 +6,7 @@ loader, which knows the chain of includes, turns it into a `LaunchFileError`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from rosz.launch.plan.document import Element
+from rosz.launch.plan.document import Element
 
 __all__ = ("Fault", "TextFault")
 

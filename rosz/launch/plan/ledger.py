@@ -7,7 +7,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from rosz import names
-from rosz.errors import LaunchFileError, near_miss
+from rosz.errors import LaunchFileError, ParamError, near_miss
 from rosz.launch.plan.context import LaunchContext
 from rosz.launch.plan.fault import TextFault
 from rosz.launch.plan.model import (
@@ -21,6 +21,7 @@ from rosz.launch.plan.model import (
     TestPlan,
 )
 from rosz.launch.plan.scope import join
+from rosz.params.values import normalise
 
 __all__ = ("Ledger",)
 
@@ -65,11 +66,15 @@ class Ledger:
         """Add a parameter; it replaces an earlier one of the name, at that one's turn.
 
         Raises:
-            TextFault: It has no name.
+            TextFault: It has no name, or the value is none that a parameter can have.
         """
         name = names.canonical(name)
         if name == "/":
             raise TextFault("the root of all parameters takes no value; give a name")
+        try:
+            value = normalise(value)
+        except ParamError as error:
+            raise TextFault(f"parameter '{name}' {error}") from error
         parent = name
         while len(parent) > 1:
             parent = parent.rpartition("/")[0] or "/"
@@ -81,9 +86,6 @@ class Ledger:
         if name in self._above and name not in self._params:
             text = f"parameter '{name}' and '{self._above[name]}' below it are both set"
             self.warnings.append(Notice(text, place))
-        if value is None:
-            text = f"parameter '{name}' is null, which cannot be stored; give a value"
-            self.warnings.append(Notice(text, place))
         if name.startswith("~"):
             text = f"'{name}' is private to the launcher here, not to a node; write it without '~'"
             self.warnings.append(Notice(text, place))
@@ -93,14 +95,12 @@ class Ledger:
         """Add a parameter, or each leaf of a dict.
 
         Raises:
-            TextFault: A value has no name, or a key is no text.
+            TextFault: A value has no name.
         """
         if not isinstance(value, dict):
             self.add_param(name, value, place)
             return
         for key, inner in value.items():
-            if not isinstance(key, str):
-                raise TextFault(f"key {key!r} of '{name}' is no text; put it in quotes")
             self.add_params(join(name, key), inner, place)
 
     def add_machine(self, machine: MachinePlan) -> None:

@@ -63,12 +63,15 @@ class Notice(msgspec.Struct, frozen=True):
 
 
 class ParamPlan(msgspec.Struct, frozen=True):
-    """One parameter to be set before any node starts; dicts are unrolled into their leaves.
+    """One parameter to be set before any node starts.
+
+    The dicts of ``<rosparam>`` are unrolled into their leaves, and empty ones vanish, as roslaunch
+    has it; a dict of ``<param type="yaml">`` is set whole.
 
     Attributes:
         name: Global name. One that begins with ``~`` comes from ``<rosparam param="~x">``, which
             roslaunch keeps so; `target` says where it ends up.
-        value: bool, int, float, str, bytes, list, None, date or datetime; an empty dict never.
+        value: What a parameter can have, see `rosz.params.values`.
         place: Where the value was written.
     """
 
@@ -267,12 +270,12 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     deprecations: tuple[Notice, ...] = ()
 
     def node(self, name: str) -> NodePlan:
-        """Return the node or test of that full name.
+        """Return the node or test of that full name, the node where there are both.
 
         Raises:
             NotFoundError: There is none; the message lists what there is.
         """
-        known = {node.full_name: node for node in self.processes}
+        known = {node.full_name: node for node in reversed(self.processes)}
         if name in known:
             return known[name]
         listing = f"; the nodes are {', '.join(sorted(known))}" if known else "; there are no nodes"

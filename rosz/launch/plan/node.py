@@ -74,7 +74,9 @@ def read_test(tag: Tag, ledger: Ledger) -> None:
         if limit <= 0:
             tag.fail(f"'time-limit' is '{limit:g}'; expected more than 0 seconds", "time-limit")
     retry = tag.whole("retry", 0, -math.inf) or 0
-    ledger.add_test(TestPlan(_node(tag, ledger, name), test_name, limit, retry))
+    # The runner of tests ends with each of them, so 'required' says nothing there.
+    node = replace(_node(tag, ledger, name), required=False)
+    ledger.add_test(TestPlan(node, test_name, limit, retry))
 
 
 def read_executable(tag: Tag, ledger: Ledger) -> None:
@@ -215,7 +217,9 @@ def _refuse_empty(tag: Tag, package: str, type_name: str, name: str) -> None:
     if not type_name.strip():
         tag.fail("'type' is empty", "type")
     if "/" in name:
-        tag.fail(f"node name '{name}' contains '/'; put the namespace into 'ns'", "name")
+        ns, _, base = name.rpartition("/")
+        hint = f"; write ns='{ns}' name='{base}'" if ns else f"; write name='{base}'"
+        tag.fail(f"node name '{name}' contains '/'{hint}", "name")
 
 
 def _fates(tag: Tag) -> tuple[bool, bool]:

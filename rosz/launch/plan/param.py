@@ -64,7 +64,7 @@ def _value(tag: Tag, context: LaunchContext, source: str) -> Any:
     except ValueError as error:
         tag.fail(str(error), source)
     except YamlError as error:
-        tag.fail(f"no YAML: {error.reason}", source)
+        tag.fail(error.reason, source)
 
 
 def _read(tag: Tag, context: LaunchContext, path: str, attribute: str) -> bytes:
@@ -129,6 +129,8 @@ def _load(
 ) -> None:
     text = tag.element.text
     if file is not None:
+        if not file:
+            tag.fail("'file' is empty", "file")
         text = _text(tag, _read(tag, ledger.context, file, "file"), "file")
     try:
         text = tag.substitute(text) if substitute else text
@@ -140,9 +142,7 @@ def _load(
         value = load_yaml(text)
     except YamlError as error:
         line, column = max(error.line - 1, 0), max(error.column - 1, 0)
-        raise _fault(tag, file, f"no YAML: {error.reason}", line, column) from error
-    if value is None:
-        value = {}
+        raise _fault(tag, file, error.reason, line, column) from error
     if not named and not isinstance(value, dict):
         tag.fail(
             f"<rosparam> without 'param' needs a dict, got {type(value).__name__}: {value!r:.60}"

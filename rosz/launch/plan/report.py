@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from rosz import names
+from rosz.errors import LaunchError
 from rosz.launch.plan.model import ArgDoc, NodePlan, Plan
 
 __all__ = (
@@ -58,8 +59,9 @@ def node_file(plan: Plan, name: str, *, ns: str = "/") -> str:
 
     Raises:
         NotFoundError: There is no such node.
+        LaunchError: A node and a test share the name, or two tests.
     """
-    return plan.node(_resolve(name, ns)).place.file
+    return _one(plan, name, ns).place.file
 
 
 def node_args(
@@ -81,8 +83,9 @@ def node_args(
 
     Raises:
         NotFoundError: There is no such node, or ``find`` does not find its executable.
+        LaunchError: A node and a test share the name, or two tests.
     """
-    node = plan.node(_resolve(name, ns))
+    node = _one(plan, name, ns)
     changed = {key: value for key, value in environment(node).items() if environ.get(key) != value}
     words = [f'{key}="{value}"' for key, value in changed.items()]
     return " ".join([*words, *command_line(node, find)])
@@ -129,7 +132,14 @@ def describe(docs: Iterable[ArgDoc]) -> str:
     return "\n".join(lines) or "No arguments."
 
 
-def _resolve(name: str, ns: str) -> str:
+def _one(plan: Plan, name: str, ns: str) -> NodePlan:
+    """Return the node or test of a name that a person typed."""
     if names.is_private(name):
-        return names.canonical(f"{ns}/roslaunch/{name[1:]}")
-    return names.canonical(name if names.is_global(name) else f"/{ns}/{name}")
+        resolved = names.canonical(f"{ns}/roslaunch/{name[1:]}")
+    else:
+        resolved = names.canonical(name if names.is_global(name) else f"/{ns}/{name}")
+    node = plan.node(resolved)
+    places = [str(other.place) for other in plan.processes if other.full_name == resolved]
+    if len(places) > 1:
+        raise LaunchError(f"'{resolved}' is not one but several: {', '.join(places)}")
+    return node

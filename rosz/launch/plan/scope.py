@@ -33,6 +33,7 @@ class Scope:
         private: ``~params`` for nodes to come: (name, value, origin).
         waits: Conditions for nodes to come.
         remaps: (from, to) in order, those of outer scopes first; no name twice.
+        included: The file was included by another.
         incoming: Args for an include while its tag is read, else None.
         lenient: Args may be set twice, which ``pass_all_args`` allows.
     """
@@ -46,6 +47,7 @@ class Scope:
         self.env: list[tuple[str, str]] = []
         self.private: list[tuple[str, Any, Any]] = []
         self.waits: tuple[Any, ...] = ()
+        self.included = False
         self.incoming: dict[str, str] | None = None
         self.lenient = False
         self.remaps: list[tuple[str, str]] = []
@@ -67,6 +69,7 @@ class Scope:
         # the list itself, unless it is empty: roslaunch's nodes see such params from included files
         scope.private = self.private or []
         scope.waits = self.waits
+        scope.included = self.included
         scope.remaps = list(self.remaps)
         return scope
 
@@ -89,6 +92,7 @@ class Scope:
                 raise TextFault(f"<arg name='{name}'> of an include needs a value")
         self.args = incoming
         self.incoming = None
+        self.included = True
         self.declared = []
         self.anonymous = {}
         return list(incoming)

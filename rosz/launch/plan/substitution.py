@@ -24,6 +24,7 @@ from rosz.launch.plan.value import automatic
 __all__ = ("Substitution",)
 
 _EVAL = "$(eval "
+_SUGGESTED = ("anon", "arg", "dirname", "env", "eval", "find", "optenv")
 _COMMANDS = ("anon", "arg", "dirname", "env", "find", "find-pkg-share", "optenv", "var")
 
 
@@ -101,8 +102,11 @@ class Substitution:
         if name in scope.args:
             return scope.args[name]
         hint = near_miss(name, scope.args)
-        if name in scope.declared:
-            hint = f"; it has no default, so give it: {name}:=VALUE"
+        if name in (scope.incoming or {}):
+            hint = "; the args of an <include> do not see each other"
+        elif name in scope.declared:
+            how = "the <include> must pass it" if scope.included else f"give it: {name}:=VALUE"
+            hint = f"; it has no default, so {how}"
         elif not hint:
             hint = f"; declare it before: <arg name='{name}' default='…'/>"
         raise TextFault(f"arg '{name}' is not set{hint}")
@@ -162,7 +166,7 @@ class Substitution:
             "var": arg,
         }
         try:
-            return evaluate(text, own, variable)
+            return evaluate(text, own, variable, scope.args)
         except TextFault as fault:
             raise TextFault(f"$(eval …): {fault.reason}", len(_EVAL) + fault.index) from None
 
@@ -176,7 +180,7 @@ def _split(inner: str, index: int) -> tuple[str, list[str]]:
             "$(eval …) must be the whole value, from the first character to the last", index
         )
     name = words[0] if words else ""
-    hint = near_miss(name, [*_COMMANDS, "eval"]) or f"; there are {', '.join(_COMMANDS)}, eval"
+    hint = near_miss(name, _SUGGESTED) or f"; there are {', '.join(_COMMANDS)}, eval"
     raise TextFault(f"unknown substitution '$({inner})'{hint}", index)
 
 

@@ -55,22 +55,22 @@ def _double(text: str) -> float:
         raise ValueError(f"'{text}' is no double") from None
 
 
-def load_yaml(text: str) -> Any:
-    """Read one YAML document as rosparam does.
+def load_yaml(text: str, path: str = "<string>") -> Any:
+    """Read a YAML text as rosparam does; one without any value is the empty dict.
+
+    Args:
+        text: The text.
+        path: Where it is from, for messages.
 
     Raises:
-        YamlError: It is none, with line and column in the text.
+        YamlError: It is no YAML, has several documents, or holds what no parameter can.
     """
-    import yaml
+    from rosz.params.yaml import load_all
 
-    try:
-        return yaml.safe_load(text)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
-        raise YamlError(str(error.problem), "<string>", line, column) from None
-    except yaml.YAMLError as error:
-        raise YamlError(str(error)) from None
+    documents = load_all(text, path)
+    if len(documents) > 1:
+        raise YamlError(f"it has {len(documents)} documents, expected one", path)
+    return documents[0] if documents else {}
 
 
 TYPES: Mapping[str, Callable[[str], Any]] = {

@@ -1,0 +1,2 @@
+#!/usr/bin/env python3
+"""Stand in for a node that launch files name."""

@@ -1,0 +1,261 @@
+"""Questions to the real roslaunch, where the machine has one, and the same questions to rosz."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from rosz.errors import RoszError
+from rosz.launch.plan import (
+    NodePlan,
+    Plan,
+    SystemContext,
+    describe_args,
+    parse_arguments,
+    plan,
+    report,
+)
+from rosz.packages import PackageIndex
+
+_PYTHON = Path("/usr/bin/python3")
+_WORKER = Path(__file__).with_name("roslaunch_worker.py")
+
+
+class Roslaunch:
+    """Real roslaunch in one long-lived process.
+
+    Args:
+        environ: Its environment, by `environment`.
+    """
+
+    def __init__(self, environ: Mapping[str, str]) -> None:
+        self._log = Path(environ["ROS_HOME"], "roslaunch.log")
+        with self._log.open("w") as log:
+            self._process = subprocess.Popen(
+                [_PYTHON, _WORKER],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                env=dict(environ),
+            )
+        if not self._line():
+            pytest.skip(f"no roslaunch to compare with: {self._log.read_text().splitlines()[-1]}")
+
+    def _line(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline()
+
+    def ask(
+        self,
+        files: Sequence[str],
+        cwd: Path,
+        argv: Sequence[str] = (),
+        environ: Mapping[str, str] | None = None,
+    ) -> dict[str, Any]:
+        """Return what roslaunch makes of some files."""
+        assert self._process.stdin is not None
+        question = {
+            "files": list(files),
+            "argv": list(argv),
+            "cwd": str(cwd),
+            "environ": dict(environ or {}),
+            "unset": ["ROS_NAMESPACE", "ROSZ_TEST"],
+        }
+        self._process.stdin.write(json.dumps(question) + "\n")
+        self._process.stdin.flush()
+        line = self._line()
+        assert line, self._log.read_text()[-2000:]
+        found: dict[str, Any] = json.loads(line)
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.wait(10)
+        self._process.stdout.close()
+
+
+def environment(packages: Path, home: Path) -> dict[str, str]:
+    """Return the environment that both read launch files in."""
+    return {
+        "PATH": os.environ["PATH"],
+        "HOME": str(home),
+        "ROS_HOME": str(home),
+        "ROS_IP": "127.0.0.1",
+        "ROS_MASTER_URI": "http://127.0.0.1:1",
+        "ROS_PACKAGE_PATH": str(packages),
+    }
+
+
+@contextmanager
+def real_roslaunch(environ: Mapping[str, str]) -> Iterator[Roslaunch]:
+    """Start real roslaunch; skip where there is none."""
+    if not _PYTHON.exists():
+        pytest.skip(f"no Python at {_PYTHON}, so no roslaunch to compare with")
+    found = Roslaunch(environ)
+    try:
+        yield found
+    finally:
+        found.close()
+
+
+class Rosz:
+    """The same questions to rosz.
+
+    Args:
+        environ: The environment, by `environment`.
+    """
+
+    def __init__(self, environ: Mapping[str, str]) -> None:
+        self._index = PackageIndex([Path(environ["ROS_PACKAGE_PATH"])])
+        self._environ = environ
+
+    def context(self, cwd: Path, environ: Mapping[str, str] | None = None) -> SystemContext:
+        """Return an outside that numbers anonymous names."""
+        counts: Counter[str] = Counter()
+
+        def anonymous(base: str) -> str:
+            counts[base] += 1
+            return f"{base}_anonymous_{counts[base]}"
+
+        return SystemContext(self._index, {**self._environ, **(environ or {})}, cwd, anonymous)
+
+    def plan(
+        self,
+        files: Sequence[str],
+        cwd: Path,
+        argv: Sequence[str] = (),
+        environ: Mapping[str, str] | None = None,
+    ) -> Plan:
+        """Return the plan of some files."""
+        given = parse_arguments(argv)
+        ns = given.ns or (environ or {}).get("ROS_NAMESPACE", "")
+        return plan(files, given.args, self.context(cwd, environ), ns=ns)
+
+    def ask(
+        self,
+        files: Sequence[str],
+        cwd: Path,
+        argv: Sequence[str] = (),
+        environ: Mapping[str, str] | None = None,
+    ) -> dict[str, Any]:
+        """Return what rosz makes of some files, in the form of `Roslaunch.ask`."""
+        given = parse_arguments(argv)
+        try:
+            found = self.plan(files, cwd, argv, environ)
+        except RoszError as error:
+            return {"error": str(error)}
+        ns = given.ns or (environ or {}).get("ROS_NAMESPACE", "/")
+        context = self.context(cwd, environ)
+        named = [node.full_name for node in found.nodes if node.named]
+        return {
+            "error": None,
+            "params": [[param.name, repr(param.value)] for param in found.params],
+            "nodes": [_process(node) for node in found.nodes],
+            "tests": [
+                {
+                    **_process(test.node),
+                    "test_name": test.test_name,
+                    "limit": test.time_limit,
+                    "retry": test.retry,
+                }
+                for test in found.tests
+            ],
+            "clear": list(found.clear),
+            "setup": [_setup(s.action, s.file, s.name) for s in found.setup],
+            "machines": sorted(
+                [
+                    *(m.name, m.address, m.ssh_port, m.user or None, m.password or None),
+                    *(m.timeout, m.assignable),
+                ]
+                for m in found.machines
+            ),
+            "complaints": [str(notice) for notice in (*found.warnings, *found.deprecations)],
+            "dump": report.dump_params(found) + "\n",
+            "node_list": report.list_nodes(found) + "\n",
+            "file_list": report.list_files(found) + "\n",
+            "ros_args": self._ros_args(files, given.args, context, ns),
+            "args": {name: self._args(found, name, environ or {}) for name in named},
+            "places": {name: _place(found, name) for name in named},
+        }
+
+    def _ros_args(
+        self, files: Sequence[str], args: Mapping[str, str], context: SystemContext, ns: str
+    ) -> str:
+        return report.describe(describe_args(files, args, context, ns=ns)) + "\n"
+
+    def _args(self, found: Plan, name: str, environ: Mapping[str, str]) -> str | None:
+        def find(package: str, type_name: str) -> str:
+            return str(self._index.find(package).executable(type_name))
+
+        try:
+            return report.node_args(found, name, find, {**self._environ, **environ}) + "\n"
+        except RoszError:
+            return None
+
+
+def _place(found: Plan, name: str) -> str | None:
+    try:
+        return report.node_file(found, name) + "\n"
+    except RoszError:
+        return None
+
+
+def _process(node: NodePlan) -> dict[str, Any]:
+    return {
+        "package": node.package,
+        "type": node.type,
+        "name": node.name if node.named else None,
+        "namespace": node.namespace,
+        "machine": node.machine,
+        "respawn": node.respawn,
+        "respawn_delay": node.respawn_delay,
+        "required": node.required,
+        "output": node.output,
+        "cwd": node.cwd,
+        "remaps": [list(pair) for pair in node.remaps],
+        "env": [list(pair) for pair in node.env],
+        "file": node.place.file,
+    }
+
+
+def _setup(action: str, file: str, name: str) -> list[str]:
+    return ["rosparam", action, *([file] if file else []), name]
+
+
+def differences(ours: Mapping[str, Any], real: Mapping[str, Any]) -> list[str]:
+    """List where rosz and roslaunch differ, in words."""
+    if ours["error"] is not None or real["error"] is not None:
+        if ours["error"] is not None and real["error"] is not None:
+            return []
+        return [f"error: rosz {ours['error']!r}, roslaunch {real['error']!r}"]
+    pairs = ((key, *_comparable(key, ours[key], wanted)) for key, wanted in real.items())
+    return [f"{key}: rosz {a!r}, roslaunch {b!r}" for key, a, b in pairs if a != b]
+
+
+def _comparable(key: str, ours: Any, real: Any) -> tuple[Any, Any]:
+    """Bring two reports into a form in which they must be equal."""
+    if key == "complaints":
+        return bool(ours), bool(ours or real)  # rosz warns about more
+    if key == "file_list":
+        return sorted(ours.split()), sorted(set(real.split()))
+    if key == "setup":
+        return ours, [[*words[:-1], words[-1].rstrip("/") or "/"] for words in real]
+    if key in {"ros_args", "dump"} and real is None:
+        return None, None  # roslaunch stumbles over binary values, and args that are not given
+    if key == "dump" and "&id" in real:
+        # PyYAML writes aliases wherever two parameters came from one anchor.
+        return yaml.safe_load(ours), yaml.safe_load(real)
+    return ours, real

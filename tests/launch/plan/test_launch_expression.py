@@ -1,0 +1,218 @@
+"""Expressions: what they may, what they may not, and that they always come to an end."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rosz.launch.plan.expression import evaluate
+from rosz.launch.plan.fault import TextFault
+
+ARGS: dict[str, Any] = {"n": 3, "rate": 0.5, "flag": True, "name": "Marvin", "max": 7}
+OWN: dict[str, Callable[..., Any]] = {"arg": ARGS.__getitem__, "env": lambda name: f"<{name}>"}
+
+
+def run(text: str) -> str:
+    return evaluate(text, OWN, ARGS.get, ARGS)
+
+
+@pytest.mark.parametrize(
+    ("text", "result"),
+    [
+        ("  1 + 2", "3"),
+        ("n", "3"),
+        ("arg('rate') * 2", "1.0"),
+        ("env('X') + name", "<X>Marvin"),
+        ("pi", str(math.pi)),
+        ("e > 2.7 and e < 2.8", "True"),
+        ("max", "7"),
+        ("min(n, 2)", "2"),
+        ("true and not false", "True"),
+        ("1 if flag else 2", "1"),
+        ("1 < n <= 3", "True"),
+        ("1 < n < 3", "False"),
+        ("0 or name", "Marvin"),
+        ("n and 0", "0"),
+        ("~n, +n, -n", "(-4, 3, -3)"),
+        ("5 % 3, 7 // 2, 2 ** 3, 1 << 4", "(2, 3, 8, 16)"),
+        ("16 >> 2, 6 & 3, 6 | 3, 6 ^ 3", "(4, 2, 7, 5)"),
+        ("name[0] + name[-1] + name[1:3] + name[::-1]", "MnarnivraM"),
+        ("{'a': 1, **{'b': 2}}['b']", "2"),
+        ("[*[1, 2], 3]", "[1, 2, 3]"),
+        ("sorted({3, 1})", "[1, 3]"),
+        ("[i + j for i in [1, 2] for j in (10, 20) if i * j != 20]", "[11, 22]"),
+        ("{k: v for k, v in [('a', 1)]}", "{'a': 1}"),
+        ("','.join(str(i) for i in range(n))", "0,1,2"),
+        ("list(map(lambda i, j: i * j, [1, 2], [3, 4]))", "[3, 8]"),
+        ("(lambda f: f(f, 4))(lambda f, i: 1 if i < 2 else i * f(f, i - 1))", "24"),
+        ("[x for x in range(3)][n - 1]", "2"),
+        ("'%s is %5.1f%%' % (name, rate)", "Marvin is   0.5%"),
+        ("'{:>8}|{0}'.replace('0', '').format(name, n)", "  Marvin|3"),
+        ("f'{name!r:>10}{rate:.2f}'", "  'Marvin'0.50"),
+        ("name.upper().startswith('MAR')", "True"),
+        ("'a,b'.split(',')", "['a', 'b']"),
+        ("{'a': 1}.get('b', 5)", "5"),
+        ("list({'a': 1}.items())", "[('a', 1)]"),
+        ("isinstance(n, int)", "True"),
+        ("sum([1, 2], 10), prod([2, 3]), factorial(5), comb(5, 2)", "(13, 6, 120, 10)"),
+        ("int('0x1f', 16), float('1e3'), bool(''), str(None)", "(31, 1000.0, False, 'None')"),
+        ("dict(a=1)", "{'a': 1}"),
+        ("round(2.567, 2), round(2.5), abs(-1), divmod(7, 2)", "(2.57, 2, 1, (3, 1))"),
+        ("pow(2, 10), 2 ** -1", "(1024.0, 0.5)"),
+        ("list(zip('ab', [1, 2])), list(enumerate('a')), list(reversed([1, 2]))",
+         "([('a', 1), ('b', 2)], [(0, 'a')], [2, 1])"),
+        ("'%s 123456' % n", "3 123456"),
+        ("None", "None"),
+        ("1 is not None", "True"),
+        ("'x' not in name", "True"),
+    ],
+)  # fmt: skip
+def test_values_are_those_of_python(text: str, result: str) -> None:
+    assert run(text) == result
+
+
+@pytest.mark.parametrize(
+    ("text", "reason", "index"),
+    [
+        ("", "no expression", 0),
+        ("1 +", "no expression", None),
+        ("x = 1", "no expression", None),
+        ("import os", "no expression", None),
+        ("1\n2", "no expression", None),
+        ("\0", "no expression", None),
+        ("().__class__", "may not contain '__'", 3),
+        ("nam", "'nam' is no arg of this file and no function; did you mean 'name'", 0),
+        ("1 + math.pi", "the names of math stand alone", 4),
+        ("open('/etc/passwd')", "'open' is no arg", 0),
+        ("eval('1')", "'eval' is no arg", 0),
+        ("getattr(n, 'real')", "'getattr' is no arg", 0),
+        ("type(n)", "'type' is no arg", 0),
+        ("globals()", "'globals' is no arg", 0),
+        ("n.real", "'.real' of a int is not available", None),
+        ("name.encode()", "'.encode' of a str is not available", None),
+        ("'{0.x}'.format(n)", "reaches for an attribute", None),
+        ("'{0[a].b}'.format(n)", "reaches for an attribute", None),
+        ("name.format_map({})", "'.format_map' of a str is not available", None),
+        ("abs.name", "'.name' of a builtin_function_or_method is not available", None),
+        ("(y := 1)", "':=' is not available", 1),
+        ("b'x'", "b'x' is not available", 0),
+        ("...", "Ellipsis is not available", 0),
+        ("[1] @ [2]", "'@' is not available", 0),
+        ("lambda: 1", "the result is a function", 0),
+        ("n(1)", "3 is no function", 0),
+        ("[abs][0]", "the result is a function", 0),
+        ("(lambda *a: a)(1)", "a lambda takes plain parameters", None),
+        ("(lambda a: a)()", "a lambda of 1 parameters got 0", None),
+        ("[0 for n.x in [1]]", "a loop assigns to names only", None),
+        ("[0 for a, b in [(1,)]]", "expected 2 values in a loop, got 1", None),
+        ("1 / 0", "ZeroDivisionError", 0),
+        ("'a' + 1", "TypeError", 0),
+        ("[1][5]", "IndexError", 0),
+        ("arg('nope')", "KeyError", 0),
+        ("sqrt(-1)", "ValueError", 0),
+        ("exp(1000)", "OverflowError", 0),
+        ("n" * 10_001, "longer than 10000", 0),
+    ],
+)
+def test_what_is_no_value_is_refused(text: str, reason: str, index: int | None) -> None:
+    with pytest.raises(TextFault) as caught:
+        run(text)
+    assert reason in caught.value.reason
+    if index is not None:
+        assert caught.value.index == index
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "9 ** 9 ** 9",
+        "1 << 10 ** 9",
+        "2 ** 4000 * 2 ** 4000",
+        "'a' * 10 ** 9",
+        "[0] * 10 ** 9",
+        "10 ** 9 * (0,)",
+        "range(10 ** 12)",
+        "range(10 ** 30)",
+        "list(range(10 ** 6))",
+        "[0 for a in range(1000) for b in range(1000)]",
+        "[[0] * 300 for a in range(1000)]",
+        "factorial(10 ** 6)",
+        "comb(10 ** 7, 5 * 10 ** 6)",
+        "perm(10 ** 6)",
+        "prod(range(1, 9999))",
+        "lcm(*range(1, 5000))",
+        "round(5, -10 ** 9)",
+        "sum([[1] * 1000] * 1000, [])",
+        "name.ljust(10 ** 9)",
+        "'%1000000d' % 1",
+        "'%(a)1000000d' % {'a': 1}",
+        "'%*d' % (10 ** 9, 1)",
+        "f'{1:1000000000}'",
+        "'{:1000000000}'.format(1)",
+        "'{:{w}}'.format(1, w=10 ** 9)",
+        "format(1, '1000000000')",
+        "'a'.replace('a', 'b' * 60000).replace('b', 'c' * 60000)",
+        "('x' * 60000).join(['y'] * 60000)",
+        "(lambda f: f(f))(lambda f: f(f))",
+        "(lambda t: [('ab' in t) for i in range(5000)])('a' * 500000)",
+        "(lambda t: [t == t + '' for i in range(5000)])('a' * 500000)",
+        "(lambda x: x(x(x(x([1] * 30)))))(lambda v: [v] * 30)",
+        "[" * 90 + "]" * 90,
+        "(" * 300 + "1" + ")" * 300,
+        "-" * 3000 + "1",
+        "not " * 2000 + "1",
+    ],
+)
+def test_what_would_take_too_much_is_refused_at_once(text: str) -> None:
+    start = time.process_time()
+    with pytest.raises(TextFault):
+        run(text)
+    assert time.process_time() - start < 2
+
+
+_ATOMS = ["1", "2.5", "n", "name", "'a'", "[1, 2]", "{'k': 1}", "pi", "range(3)", "(1, 2)", "None"]
+_FORMS = [
+    "({0} + {1})", "({0} * {1})", "({0} ** {1})", "({0} - {1})", "({0} % {1})", "({0} < {1})",
+    "({0} == {1})", "({0} if {1} else {0})", "[{0}, {1}]", "str({0})", "len({0})", "{0}[{1}]",
+    "({0} or {1})", "list({0})", "'%s' % {0}", "{0}.upper()", "[i for i in {0}]", "max({0}, {1})",
+    "(lambda a: a)({0})", "{{'x': {0}}}", "({0} << {1})", "(not {0})", "{0}.count({1})",
+]  # fmt: skip
+_expressions = st.recursive(
+    st.sampled_from(_ATOMS),
+    lambda inner: st.builds(str.format, st.sampled_from(_FORMS), inner, inner),
+    max_leaves=8,
+)
+
+
+@given(text=_expressions)
+@settings(max_examples=300, deadline=None)
+def test_random_expressions_agree_with_python(text: str) -> None:
+    names: dict[str, Any] = {**vars(math), **ARGS}
+    names.pop("max")
+    try:
+        wanted = str(eval(text, {}, names))
+    except Exception:  # noqa: BLE001  # Python's errors are of every kind
+        wanted = "fault"
+    try:
+        found = evaluate(text, OWN, names.get)
+    except TextFault as fault:
+        found = wanted if " than " in fault.reason else "fault"  # the bounds are not Python's
+    assert found == wanted
+
+
+@given(
+    text=st.text(max_size=60) | st.lists(st.sampled_from([*_ATOMS, *"()[]{}.,:+*'"])).map("".join)
+)
+@settings(max_examples=300, deadline=None)
+def test_any_text_is_a_value_or_a_fault(text: str) -> None:
+    try:
+        index = len(run(text)) * 0
+    except TextFault as fault:
+        index = fault.index
+    assert 0 <= index <= len(text) + 1

@@ -1,0 +1,28 @@
+"""Random launch files, read by rosz and by real roslaunch."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from hypothesis import HealthCheck, event, given, settings
+from launch_trees import Tree, launch_trees
+from roslaunch_oracle import Roslaunch, Rosz, differences
+
+EXAMPLES = int(os.environ.get("ROSZ_LAUNCH_EXAMPLES", "300"))
+
+
+@settings(
+    max_examples=EXAMPLES,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(tree=launch_trees())
+def test_random_files_are_read_alike(
+    tree: Tree, tmp_path: Path, roslaunch: Roslaunch, rosz: Rosz
+) -> None:
+    file = tree.write(tmp_path)
+    real = roslaunch.ask([file], tmp_path, tree.argv)
+    event("refused" if real["error"] else "read")
+    found = differences(rosz.ask([file], tmp_path, tree.argv), real)
+    assert not found, "\n".join([*found, *tree.files.values()])
