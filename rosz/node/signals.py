@@ -55,13 +55,7 @@ class _Handler:
         if self._seen:
             _leave(number)
         self._seen = True
-        # The main thread may hold a lock that the shutdown needs.
-        threading.Thread(
-            target=self._context.shutdown,
-            args=(signal.Signals(number).name,),
-            name="rosz-signal",
-            daemon=True,
-        ).start()
+        _shut_down(self._context, number)
         if not self._context.cooperative:
             raise KeyboardInterrupt
 
@@ -88,7 +82,15 @@ class _Watcher(threading.Thread):
                 if seen:
                     _leave(number)
                 seen = True
-                self._context.shutdown(signal.Signals(number).name)
+                _shut_down(self._context, number)
+
+
+def _shut_down(context: Context, number: int) -> None:
+    """Shut down on a thread: this one may hold a lock that is needed, or has to hear of more."""
+    reason = signal.Signals(number).name
+    threading.Thread(
+        target=context.shutdown, args=(reason,), name="rosz-signal", daemon=True
+    ).start()
 
 
 def _leave(number: int) -> None:
