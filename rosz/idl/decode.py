@@ -9,10 +9,10 @@ with their length once, at the end.
 from __future__ import annotations
 
 from rosz.idl.catalog import Catalog
-from rosz.idl.encode import element_of, merge
-from rosz.idl.layout import ALIGNED, ARRAYS, CODES, OCTETS, Phase, fixed_layout, in_run, size_of
+from rosz.idl.layout import ALIGNED, ARRAYS, CODES, OCTETS, Layout, Phase, in_run, size_of
 from rosz.idl.names import Locals, Module
-from rosz.idl.spec import Field, FieldType, MessageSpec
+from rosz.idl.pieces import merge
+from rosz.idl.spec import Field, FieldType, MessageSpec, element_of
 
 __all__ = ("Decoder",)
 
@@ -269,34 +269,25 @@ class Decoder:
         count = self._count(kind)
         if not kind.primitive:
             spec = self._catalog.message(kind.base)
-            layout = fixed_layout(spec, self._catalog, self._phase)
+            layout = Layout.of(spec, self._catalog, self._phase)
             if layout is not None:
-                self._alike(spec, local, count, *layout)
+                self._alike(spec, local, count, layout)
                 return
         self._loop(kind, local, count)
 
-    def _alike(
-        self,
-        spec: MessageSpec,
-        local: str,
-        count: str,
-        leaves: list[tuple[tuple[str, ...], str]],
-        form: str,
-        size: int,
-    ) -> None:
+    def _alike(self, spec: MessageSpec, local: str, count: str, layout: Layout) -> None:
         """Read elements that all have the same layout."""
-        start = self._start_of_elements(count, size_of(leaves[0][1]) if leaves else 1)
-        self._sweep_elements(start, count, size)
-        unpack = self._module.define("_i", f'_Struct("{merge([form])}").iter_unpack')
+        alignment = size_of(layout.leaves[0][1]) if layout.leaves else 1
+        start = self._start_of_elements(count, alignment)
+        self._sweep_elements(start, count, layout.size)
+        unpack = self._module.define("_i", f'_Struct("{merge([layout.form])}").iter_unpack')
         elements = f"{unpack}(data[{start} : p])"
-        if all(len(leaf) == 1 for leaf, _ in leaves):
+        if all(len(leaf) == 1 for leaf, _ in layout.leaves):
             self._emit(f"{local} = list(_starmap({self._module.cls(spec.name)}, {elements}))")
             return
-        names = ["_".join(("e", *leaf)) for leaf, _ in leaves]
-        value = self._nested(spec, "e")
-        self._emit(
-            f"{local} = [{value} for {', '.join(names)}{',' * (len(names) == 1)} in {elements}]"
-        )
+        names = ["_".join(("e", *leaf)) for leaf, _ in layout.leaves]
+        targets = ", ".join(names) + "," * (len(names) == 1)
+        self._emit(f"{local} = [{self._nested(spec, 'e')} for {targets} in {elements}]")
 
     def _nested(self, spec: MessageSpec, local: str) -> str:
         values = [

@@ -8,13 +8,14 @@ known, behind an aligned double all that matters.
 from __future__ import annotations
 
 import struct
+from typing import TypeAlias
 
 import msgspec
 
 from rosz.idl.catalog import Catalog
 from rosz.idl.spec import FieldType, MessageSpec
 
-__all__ = ("ALIGNED", "ARRAYS", "CODES", "OCTETS", "Phase", "fixed_layout", "in_run", "size_of")
+__all__ = ("ALIGNED", "ARRAYS", "CODES", "OCTETS", "Layout", "Phase", "in_run", "size_of", "widest")
 
 CODES = {
     "bool": "?",
@@ -37,6 +38,8 @@ ALIGNED = 8
 """What alignments repeat after."""
 
 _SHORT = 64
+
+Leaf: TypeAlias = tuple[tuple[str, ...], str]
 
 
 def size_of(code: str) -> int:
@@ -76,62 +79,80 @@ class Phase(msgspec.Struct, frozen=True):
         return Phase(modulus, self.rest % modulus)
 
 
-def fixed_layout(
-    spec: MessageSpec, catalog: Catalog, start: Phase
-) -> tuple[list[tuple[tuple[str, ...], str]], str, int] | None:
-    """Lay out a message whose elements in a sequence all look alike.
+class Layout(msgspec.Struct, frozen=True):
+    """How elements of a sequence lie that all look alike.
 
-    Args:
-        spec: The message.
-        catalog: Where the types in it are.
-        start: What is known about the offset of the first element.
-
-    Returns:
-        Paths and codes of its primitives, the format of one element, its size; None where elements
-        differ in size or padding.
+    Attributes:
+        leaves: The primitives in an element: the attributes that lead to it, and its code.
+        form: Format of one element.
+        size: Bytes of one element.
     """
-    leaves = _leaves(spec, catalog, ())
-    if leaves is None:
-        return None
-    alignments = [size_of(code) for _, code in leaves if code[-1] != "s"] or [1]
-    phase = start.aligned(alignments[0] if leaves and leaves[0][1][-1] != "s" else 1)
-    if phase.modulus < max(alignments):
-        return None
-    begin = phase
-    layout = ["<"]
-    size = 0
-    for _, code in leaves:
-        padding = phase.padding(1 if code[-1] == "s" else size_of(code)) or 0
-        width = size_of(code)
-        layout.append(f"{padding}x{code}" if padding else code)
-        phase = phase.plus(padding + width)
-        size += padding + width
-    if not leaves:
-        layout.append("x")
-        size = 1
-        phase = phase.plus(1)
-    largest = max(alignments)
-    if (phase.rest - begin.rest) % largest:
-        return None
-    return leaves, "".join(layout), size
+
+    leaves: tuple[Leaf, ...]
+    form: str
+    size: int
+
+    @classmethod
+    def of(cls, spec: MessageSpec, catalog: Catalog, start: Phase) -> Layout | None:
+        """Lay out a message.
+
+        Args:
+            spec: The message.
+            catalog: Where the types in it are.
+            start: What is known about the offset of the first element.
+
+        Returns:
+            None where elements differ in size or padding.
+        """
+        leaves = _leaves(spec, catalog, ())
+        if leaves is None:
+            return None
+        if not leaves:
+            return cls((), "<x", 1)
+        largest = max(size_of(code) for _, code in leaves)
+        begin = phase = start.aligned(size_of(leaves[0][1]))
+        if phase.modulus < largest:
+            return None
+        form = ["<"]
+        size = 0
+        for _, code in leaves:
+            padding = phase.padding(size_of(code)) or 0
+            form.append(f"{padding}x{code}" if padding else code)
+            size += padding + size_of(code)
+            phase = phase.plus(padding + size_of(code))
+        if (phase.rest - begin.rest) % largest:
+            return None
+        return cls(tuple(leaves), "".join(form), size)
 
 
-def _leaves(
-    spec: MessageSpec, catalog: Catalog, path: tuple[str, ...]
-) -> list[tuple[tuple[str, ...], str]] | None:
-    leaves: list[tuple[tuple[str, ...], str]] = []
+def _leaves(spec: MessageSpec, catalog: Catalog, path: tuple[str, ...]) -> list[Leaf] | None:
+    leaves: list[Leaf] = []
     for field in spec.fields:
         kind = field.type
-        if kind.shape == "one" and kind.base in CODES:
-            leaves.append(((*path, field.name), CODES[kind.base]))
-        elif kind.shape == "one" and not kind.primitive:
-            below = _leaves(catalog.message(kind.base), catalog, (*path, field.name))
-            if below is None or not below:
-                return None
-            leaves += below
-        else:
+        if kind.shape != "one" or kind.base in ("string", "wstring"):
             return None
+        if kind.primitive:
+            leaves.append(((*path, field.name), CODES[kind.base]))
+            continue
+        below = _leaves(catalog.message(kind.base), catalog, (*path, field.name))
+        if not below:
+            return None
+        leaves += below
     return leaves
+
+
+def widest(spec: MessageSpec, catalog: Catalog) -> int:
+    """Return the largest alignment in a message."""
+    largest = 1
+    for field in spec.fields:
+        kind = field.type
+        if kind.counted or kind.base in ("string", "wstring"):
+            largest = max(largest, 4)
+        if kind.base in CODES:
+            largest = max(largest, size_of(CODES[kind.base]))
+        elif not kind.primitive:
+            largest = max(largest, widest(catalog.message(kind.base), catalog))
+    return largest
 
 
 def in_run(kind: FieldType) -> bool:

@@ -17,6 +17,7 @@ __all__ = (
     "ServiceSpec",
     "Shape",
     "Value",
+    "element_of",
     "ros1_name",
 )
 
@@ -78,6 +79,11 @@ class FieldType(msgspec.Struct, frozen=True):
         if self.shape == "one":
             return ""
         return {"fixed": f"[{self.size}]", "bounded": f"[<={self.size}]"}.get(self.shape, "[]")
+
+
+def element_of(kind: FieldType) -> FieldType:
+    """Return the type of one element of a sequence."""
+    return FieldType(kind.base, kind.bound)
 
 
 class Field(msgspec.Struct, frozen=True):

@@ -58,29 +58,33 @@ PADDING = tuple(bytes(n) for n in range(8))
 texts = Texts()
 """Shared by all types: the same frame names turn up in many."""
 
-_MOST_SHAPES = 1024
+_MOST_SHAPES = 4096
 _LONGEST_SHAPE = 1024
 
 
-class Template(dict[Any, Callable[..., bytes]]):
+class Template(dict[Any, Any]):
     """Packers of one run of fields with strings in it, by the lengths of these strings.
 
     With the lengths known, the whole run has a fixed layout, so one call of ``struct`` packs it.
 
     Args:
-        codes: Codes of ``struct`` in order, separated by blanks; ``$`` for a string's bytes, ``|4`` for padding.
+        codes: Codes of ``struct`` in order, separated by blanks; ``$`` for a string's bytes,
+            ``|4`` for padding.
         start: Offset of the run from the end of the header modulo 8, -4 for the header itself, or
             None where it varies: then it leads the key.
+        full: Where it is given, entries are pairs: the packer, and the offset behind the run modulo
+            this number.
     """
 
-    __slots__ = ("_codes", "_start")
+    __slots__ = ("_codes", "_full", "_start")
 
-    def __init__(self, codes: str, start: int | None) -> None:
+    def __init__(self, codes: str, start: int | None, full: int = 0) -> None:
         super().__init__()
         self._codes = codes.split()
         self._start = start
+        self._full = full
 
-    def __missing__(self, key: Any) -> Callable[..., bytes]:
+    def __missing__(self, key: Any) -> Any:
         numbers = list(key) if isinstance(key, tuple) else [key]
         offset = numbers.pop(0) if self._start is None else self._start
         layout = ["<"]
@@ -89,16 +93,17 @@ class Template(dict[Any, Callable[..., bytes]]):
                 one, alignment = "", int(code[1:])
             else:
                 one = f"{numbers.pop(0)}s" if code == "$" else code
-                alignment = struct.calcsize(one[-1])
+                alignment = 1 if one[-1] == "s" else struct.calcsize(one[-1])
             padding = -offset % alignment
             offset += padding + struct.calcsize("<" + one)
             layout.append(f"{padding}x{one}" if padding else one)
         pack = Struct("".join(layout)).pack
+        entry = (pack, offset % self._full) if self._full else pack
         if offset <= _LONGEST_SHAPE:
             if len(self) >= _MOST_SHAPES:
                 self.clear()
-            self[key] = pack
-        return pack
+            self[key] = entry
+        return entry
 
 
 def read_flags(octets: bytes) -> list[bool]:

@@ -140,7 +140,7 @@ class GoalStatusArray(_Message):
             status_list = m.status_list
             n1 = len(status_list)
             out = [_p3(256, n1)]
-            p2 = 4
+            p2 = 0
             for status_list_one in status_list:
                 goal_info = status_list_one.goal_info
                 goal_id = goal_info.goal_id
@@ -148,8 +148,8 @@ class GoalStatusArray(_Message):
                 if type(uuid) is not bytes or len(uuid) != 16:
                     uuid = bytes(_octets(uuid, 16))
                 stamp = goal_info.stamp
-                out.append(_t1[p2 & 7](uuid, stamp.sec, stamp.nanosec, status_list_one.status))
-                p2 = (p2 + 19 & -4) + 1
+                out.append(_t1[p2](uuid, stamp.sec, stamp.nanosec, status_list_one.status))
+                p2 = 1
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GoalStatusArray)

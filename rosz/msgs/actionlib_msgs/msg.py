@@ -20,7 +20,7 @@ __all__ = (
     "GoalStatus",
     "GoalStatusArray",
 )
-_t1 = _Template("I i I I $", -4)
+_t1 = _Template("I i I I $", -4, 4)
 _u1 = _Struct("<Ii2I").unpack_from
 
 
@@ -48,7 +48,8 @@ class GoalID(_Message):
             b1 = m.id.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, stamp.sec, stamp.nanosec, n1, b1)
         except _FAULTS:
             return _plain(m, GoalID)
 
@@ -63,7 +64,8 @@ class GoalID(_Message):
             return GoalID(Time(sec, nanosec), id_2)
         except _FAULTS:
             return _explain(data, GoalID)
-_t2 = _Template("I i I I $ B I $", -4)
+_t2 = _Template("I i I I $ B", -4, 4)
+_t3 = _Template("I $", None, 4)
 _u2 = _Struct("<I").unpack_from
 
 
@@ -117,7 +119,9 @@ class GoalStatus(_Message):
             b2 = m.text.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t2[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, m.status, n2, b2)
+            f3, p4 = _t2[n1]
+            f5, p6 = _t3[p4, n2]
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, m.status), f5(n2, b2)))
         except _FAULTS:
             return _plain(m, GoalStatus)
 
@@ -138,8 +142,8 @@ class GoalStatus(_Message):
             return GoalStatus(GoalID(Time(sec, nanosec), id_2), status, text)
         except _FAULTS:
             return _explain(data, GoalStatus)
-_t3 = _Template("I i I I $ I", -4)
-_t4 = _Template("i I I $ B I $", None)
+_t4 = _Template("I i I I $ I", -4)
+_t5 = _Template("i I I $ B", None, 4)
 _u3 = _Struct("<i2I").unpack_from
 
 
@@ -166,8 +170,8 @@ class GoalStatusArray(_Message):
             n1, b1 = _texts[header.frame_id]
             status_list = m.status_list
             n2 = len(status_list)
-            out = [_t3[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            out = [_t4[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p3 = 0
             for status_list_one in status_list:
                 goal_id = status_list_one.goal_id
                 stamp_2 = goal_id.stamp
@@ -177,9 +181,10 @@ class GoalStatusArray(_Message):
                 b5 = status_list_one.text.encode()
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
-                p6 = ((p3 + 3 & -4) + n4 + 16 & -4) + n5 + 4
-                out.append(_t4[p3 & 7, n4, n5](stamp_2.sec, stamp_2.nanosec, n4, b4, status_list_one.status, n5, b5))
-                p3 = p6
+                f6, p7 = _t5[p3, n4]
+                f8, p9 = _t3[p7, n5]
+                out += (f6(stamp_2.sec, stamp_2.nanosec, n4, b4, status_list_one.status), f8(n5, b5))
+                p3 = p9
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GoalStatusArray)

@@ -20,7 +20,7 @@ __all__ = (
     "DiagnosticStatus",
     "KeyValue",
 )
-_t1 = _Template("I I $ I $", -4)
+_t1 = _Template("I I $ I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<I").unpack_from
 
@@ -47,7 +47,8 @@ class KeyValue(_Message):
             b2 = m.value.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t1[n1, n2](256, n1, b1, n2, b2)
+            f3, p4 = _t1[n1, n2]
+            return f3(256, n1, b1, n2, b2)
         except _FAULTS:
             return _plain(m, KeyValue)
 
@@ -67,8 +68,9 @@ class KeyValue(_Message):
             return KeyValue(key, value)
         except _FAULTS:
             return _explain(data, KeyValue)
-_t2 = _Template("I B I $ I $ I $ I", -4)
-_t3 = _Template("I $ I $", None)
+_t2 = _Template("I B I $ I $", -4, 4)
+_t3 = _Template("I $ I", None)
+_t4 = _Template("I $ I $", None, 4)
 _u3 = _Struct("<IB3xI").unpack_from
 
 
@@ -110,19 +112,19 @@ class DiagnosticStatus(_Message):
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
             n3, b3 = _texts[m.hardware_id]
-            p4 = ((n1 + 3 & -4) + n2 + 7 & -4) + n3 + 4
+            f4, p5 = _t2[n1, n2]
             values = m.values
-            n5 = len(values)
-            out = [_t2[n1, n2, n3](256, m.level, n1, b1, n2, b2, n3, b3, n5)]
-            p6 = (p4 + 3 & -4) + 4
+            n6 = len(values)
+            out = [f4(256, m.level, n1, b1, n2, b2), _t3[p5, n3](n3, b3, n6)]
+            p7 = 0
             for values_one in values:
-                n7, b7 = _texts[values_one.key]
-                b8 = values_one.value.encode()
-                if 0 in b8: raise ValueError
-                n8 = len(b8) + 1
-                p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + n8 + 4
-                out.append(_t3[p6 & 7, n7, n8](n7, b7, n8, b8))
-                p6 = p9
+                n8, b8 = _texts[values_one.key]
+                b9 = values_one.value.encode()
+                if 0 in b9: raise ValueError
+                n9 = len(b9) + 1
+                f10, p11 = _t4[p7, n8, n9]
+                out.append(f10(n8, b8, n9, b9))
+                p7 = p11
             return b"".join(out)
         except _FAULTS:
             return _plain(m, DiagnosticStatus)
@@ -164,8 +166,8 @@ class DiagnosticStatus(_Message):
             return DiagnosticStatus(level, name, message, hardware_id, values)
         except _FAULTS:
             return _explain(data, DiagnosticStatus)
-_t4 = _Template("I i I I $ I", -4)
-_t5 = _Template("B I $ I $ I $ I", None)
+_t5 = _Template("I i I I $ I", -4)
+_t6 = _Template("B I $ I $", None, 4)
 _u4 = _Struct("<Ii2I").unpack_from
 
 
@@ -192,28 +194,28 @@ class DiagnosticArray(_Message):
             n1, b1 = _texts[header.frame_id]
             status = m.status
             n2 = len(status)
-            out = [_t4[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            out = [_t5[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p3 = 0
             for status_one in status:
                 n4, b4 = _texts[status_one.name]
                 b5 = status_one.message.encode()
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
-                p6 = ((p3 + 4 & -4) + n4 + 7 & -4) + n5 + 4
-                n7, b7 = _texts[status_one.hardware_id]
+                n6, b6 = _texts[status_one.hardware_id]
+                f7, p8 = _t6[p3, n4, n5]
                 values = status_one.values
-                n8 = len(values)
-                out.append(_t5[p3 & 7, n4, n5, n7](status_one.level, n4, b4, n5, b5, n7, b7, n8))
-                p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + 4
+                n9 = len(values)
+                out += (f7(status_one.level, n4, b4, n5, b5), _t3[p8, n6](n6, b6, n9))
+                p10 = 0
                 for values_one in values:
-                    n10, b10 = _texts[values_one.key]
-                    b11 = values_one.value.encode()
-                    if 0 in b11: raise ValueError
-                    n11 = len(b11) + 1
-                    p12 = ((p9 + 3 & -4) + n10 + 7 & -4) + n11 + 4
-                    out.append(_t3[p9 & 7, n10, n11](n10, b10, n11, b11))
-                    p9 = p12
-                p3 = p9
+                    n11, b11 = _texts[values_one.key]
+                    b12 = values_one.value.encode()
+                    if 0 in b12: raise ValueError
+                    n12 = len(b12) + 1
+                    f13, p14 = _t4[p10, n11, n12]
+                    out.append(f13(n11, b11, n12, b12))
+                    p10 = p14
+                p3 = p10
             return b"".join(out)
         except _FAULTS:
             return _plain(m, DiagnosticArray)

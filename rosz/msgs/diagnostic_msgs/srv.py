@@ -23,7 +23,7 @@ __all__ = (
     "SelfTestRequest",
     "SelfTestResponse",
 )
-_t1 = _Template("I I $", -4)
+_t1 = _Template("I I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 
 
@@ -46,7 +46,8 @@ class AddDiagnosticsRequest(_Message):
             b1 = m.load_namespace.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, AddDiagnosticsRequest)
 
@@ -61,7 +62,7 @@ class AddDiagnosticsRequest(_Message):
             return AddDiagnosticsRequest(load_namespace)
         except _FAULTS:
             return _explain(data, AddDiagnosticsRequest)
-_t2 = _Template("I ? I $", -4)
+_t2 = _Template("I ? I $", -4, 4)
 _u2 = _Struct("<I?3xI").unpack_from
 
 
@@ -84,7 +85,8 @@ class AddDiagnosticsResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t2[n1](256, m.success, n1, b1)
+            f2, p3 = _t2[n1]
+            return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, AddDiagnosticsResponse)
 
@@ -116,7 +118,7 @@ class AddDiagnostics(_Service):
         "bool success     # whether they were loaded\n"
         "string message   # what to tell a person\n"
     )
-_p1 = _Struct("<Ix").pack
+_t3 = _Template("I x", -4)
 _u3 = _Struct("<Ix").unpack_from
 
 
@@ -131,7 +133,7 @@ class SelfTestRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t3[0](256)
         except _FAULTS:
             return _plain(m, SelfTestRequest)
 
@@ -143,9 +145,10 @@ class SelfTestRequest(_Message):
             return SelfTestRequest()
         except _FAULTS:
             return _explain(data, SelfTestRequest)
-_t3 = _Template("I I $ B I", -4)
-_t4 = _Template("B I $ I $ I $ I", None)
-_t5 = _Template("I $ I $", None)
+_t4 = _Template("I I $ B I", -4)
+_t5 = _Template("B I $ I $", None, 4)
+_t6 = _Template("I $ I", None)
+_t7 = _Template("I $ I $", None, 4)
 _u4 = _Struct("<I").unpack_from
 
 
@@ -172,28 +175,28 @@ class SelfTestResponse(_Message):
             n1 = len(b1) + 1
             status = m.status
             n2 = len(status)
-            out = [_t3[n1](256, n1, b1, m.passed, n2)]
-            p3 = (n1 + 8 & -4) + 4
+            out = [_t4[n1](256, n1, b1, m.passed, n2)]
+            p3 = 0
             for status_one in status:
                 n4, b4 = _texts[status_one.name]
                 b5 = status_one.message.encode()
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
-                p6 = ((p3 + 4 & -4) + n4 + 7 & -4) + n5 + 4
-                n7, b7 = _texts[status_one.hardware_id]
+                n6, b6 = _texts[status_one.hardware_id]
+                f7, p8 = _t5[p3, n4, n5]
                 values = status_one.values
-                n8 = len(values)
-                out.append(_t4[p3 & 7, n4, n5, n7](status_one.level, n4, b4, n5, b5, n7, b7, n8))
-                p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + 4
+                n9 = len(values)
+                out += (f7(status_one.level, n4, b4, n5, b5), _t6[p8, n6](n6, b6, n9))
+                p10 = 0
                 for values_one in values:
-                    n10, b10 = _texts[values_one.key]
-                    b11 = values_one.value.encode()
-                    if 0 in b11: raise ValueError
-                    n11 = len(b11) + 1
-                    p12 = ((p9 + 3 & -4) + n10 + 7 & -4) + n11 + 4
-                    out.append(_t5[p9 & 7, n10, n11](n10, b10, n11, b11))
-                    p9 = p12
-                p3 = p9
+                    n11, b11 = _texts[values_one.key]
+                    b12 = values_one.value.encode()
+                    if 0 in b12: raise ValueError
+                    n12 = len(b12) + 1
+                    f13, p14 = _t7[p10, n11, n12]
+                    out.append(f13(n11, b11, n12, b12))
+                    p10 = p14
+                p3 = p10
             return b"".join(out)
         except _FAULTS:
             return _plain(m, SelfTestResponse)

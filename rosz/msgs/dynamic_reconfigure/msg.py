@@ -25,7 +25,7 @@ __all__ = (
     "SensorLevels",
     "StrParameter",
 )
-_t1 = _Template("I I $ ?", -4)
+_t1 = _Template("I I $ ?", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<?").unpack_from
 
@@ -49,7 +49,8 @@ class BoolParameter(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t1[n1](256, n1, b1, m.value)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1, m.value)
         except _FAULTS:
             return _plain(m, BoolParameter)
 
@@ -103,7 +104,7 @@ class IntParameter(_Message):
             return IntParameter(name, value)
         except _FAULTS:
             return _explain(data, IntParameter)
-_t3 = _Template("I I $ I $", -4)
+_t3 = _Template("I I $ I $", -4, 4)
 _u4 = _Struct("<I").unpack_from
 
 
@@ -129,7 +130,8 @@ class StrParameter(_Message):
             b2 = m.value.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t3[n1, n2](256, n1, b1, n2, b2)
+            f3, p4 = _t3[n1, n2]
+            return f3(256, n1, b1, n2, b2)
         except _FAULTS:
             return _plain(m, StrParameter)
 
@@ -233,13 +235,13 @@ class GroupState(_Message):
         except _FAULTS:
             return _explain(data, GroupState)
 _p1 = _Struct("<2I").pack
-_t6 = _Template("I $ ?", None)
-_t7 = _Template("I", None)
-_t8 = _Template("I $ i", 0)
+_t6 = _Template("I $ ?", None, 8)
+_t7 = _Template("I", None, 8)
+_t8 = _Template("I $ i", None, 8)
 _p2 = _Struct("<I").pack
-_t9 = _Template("I $ I $", None)
+_t9 = _Template("I $ I $", None, 8)
 _t10 = _Template("I $ d", None)
-_t11 = _Template("I $ ? i i", 0)
+_t11 = _Template("I $ ? i i", None, 8)
 
 
 class Config(_Message):
@@ -272,44 +274,49 @@ class Config(_Message):
             p2 = 4
             for bools_one in bools:
                 n3, b3 = _texts[bools_one.name]
-                out.append(_t6[p2 & 7, n3](n3, b3, bools_one.value))
-                p2 = (p2 + 3 & -4) + n3 + 5
+                f4, p5 = _t6[p2, n3]
+                out.append(f4(n3, b3, bools_one.value))
+                p2 = p5
             ints = m.ints
-            n4 = len(ints)
-            out.append(_t7[p2 & 7](n4))
-            p5 = (p2 + 3 & -4) + 4
+            n6 = len(ints)
+            f7, p8 = _t7[p2]
+            out.append(f7(n6))
+            p9 = p8
             for ints_one in ints:
-                n6, b6 = _texts[ints_one.name]
-                out.append(_t8[n6](n6, b6, ints_one.value))
-                p5 = (p5 + n6 + 7 & -4) + 4
+                n10, b10 = _texts[ints_one.name]
+                f11, p12 = _t8[p9, n10]
+                out.append(f11(n10, b10, ints_one.value))
+                p9 = p12
             strs = m.strs
-            n7 = len(strs)
-            out.append(_p2(n7))
-            p8 = p5 + 4
+            n13 = len(strs)
+            out.append(_p2(n13))
+            p14 = p9 + 4 & 7
             for strs_one in strs:
-                n9, b9 = _texts[strs_one.name]
-                b10 = strs_one.value.encode()
-                if 0 in b10: raise ValueError
-                n10 = len(b10) + 1
-                p11 = ((p8 + 3 & -4) + n9 + 7 & -4) + n10 + 4
-                out.append(_t9[p8 & 7, n9, n10](n9, b9, n10, b10))
-                p8 = p11
+                n15, b15 = _texts[strs_one.name]
+                b16 = strs_one.value.encode()
+                if 0 in b16: raise ValueError
+                n16 = len(b16) + 1
+                f17, p18 = _t9[p14, n15, n16]
+                out.append(f17(n15, b15, n16, b16))
+                p14 = p18
             doubles = m.doubles
-            n12 = len(doubles)
-            out.append(_t7[p8 & 7](n12))
-            p13 = (p8 + 3 & -4) + 4
+            n19 = len(doubles)
+            f20, p21 = _t7[p14]
+            out.append(f20(n19))
+            p22 = p21
             for doubles_one in doubles:
-                n14, b14 = _texts[doubles_one.name]
-                out.append(_t10[p13 & 7, n14](n14, b14, doubles_one.value))
-                p13 = 0
+                n23, b23 = _texts[doubles_one.name]
+                out.append(_t10[p22, n23](n23, b23, doubles_one.value))
+                p22 = 0
             groups = m.groups
-            n15 = len(groups)
-            out.append(_p2(n15))
-            p16 = p13 + 4
+            n24 = len(groups)
+            out.append(_p2(n24))
+            p25 = p22 + 4 & 7
             for groups_one in groups:
-                n17, b17 = _texts[groups_one.name]
-                out.append(_t11[n17](n17, b17, groups_one.state, groups_one.id, groups_one.parent))
-                p16 = (p16 + n17 + 8 & -4)
+                n26, b26 = _texts[groups_one.name]
+                f27, p28 = _t11[p25, n26]
+                out.append(f27(n26, b26, groups_one.state, groups_one.id, groups_one.parent))
+                p25 = p28
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Config)
@@ -388,7 +395,9 @@ class Config(_Message):
             return Config(bools, ints, strs, doubles, groups)
         except _FAULTS:
             return _explain(data, Config)
-_t12 = _Template("I I $ I $ I I $ I $", -4)
+_t12 = _Template("I I $ I $ I", -4)
+_t13 = _Template("I $", 0, 4)
+_t14 = _Template("I $", None, 4)
 
 
 class ParamDescription(_Message):
@@ -422,11 +431,12 @@ class ParamDescription(_Message):
             b3 = m.description.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + n3
-            b5 = m.edit_method.encode()
-            if 0 in b5: raise ValueError
-            n5 = len(b5) + 1
-            return _t12[n1, n2, n3, n5](256, n1, b1, n2, b2, m.level, n3, b3, n5, b5)
+            b4 = m.edit_method.encode()
+            if 0 in b4: raise ValueError
+            n4 = len(b4) + 1
+            f5, p6 = _t13[n3]
+            f7, p8 = _t14[p6, n4]
+            return b"".join((_t12[n1, n2](256, n1, b1, n2, b2, m.level), f5(n3, b3), f7(n4, b4)))
         except _FAULTS:
             return _plain(m, ParamDescription)
 
@@ -456,9 +466,8 @@ class ParamDescription(_Message):
             return ParamDescription(name, type_2, level, description, edit_method)
         except _FAULTS:
             return _explain(data, ParamDescription)
-_t13 = _Template("I I $ I $ I", -4)
-_t14 = _Template("I $ I $ I I $ I $", None)
-_t15 = _Template("i i", None)
+_t15 = _Template("I $ I $ I", None)
+_t16 = _Template("i i", None)
 
 
 class Group(_Message):
@@ -491,24 +500,24 @@ class Group(_Message):
             n2 = len(b2) + 1
             parameters = m.parameters
             n3 = len(parameters)
-            out = [_t13[n1, n2](256, n1, b1, n2, b2, n3)]
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + 4
+            out = [_t12[n1, n2](256, n1, b1, n2, b2, n3)]
+            p4 = 0
             for parameters_one in parameters:
                 n5, b5 = _texts[parameters_one.name]
                 b6 = parameters_one.type.encode()
                 if 0 in b6: raise ValueError
                 n6 = len(b6) + 1
-                p7 = ((p4 + 3 & -4) + n5 + 7 & -4) + n6 + 4
-                b8 = parameters_one.description.encode()
+                b7 = parameters_one.description.encode()
+                if 0 in b7: raise ValueError
+                n7 = len(b7) + 1
+                b8 = parameters_one.edit_method.encode()
                 if 0 in b8: raise ValueError
                 n8 = len(b8) + 1
-                b9 = parameters_one.edit_method.encode()
-                if 0 in b9: raise ValueError
-                n9 = len(b9) + 1
-                p10 = ((p7 + 3 & -4) + n8 + 11 & -4) + n9 + 4
-                out.append(_t14[p4 & 7, n5, n6, n8, n9](n5, b5, n6, b6, parameters_one.level, n8, b8, n9, b9))
-                p4 = p10
-            out.append(_t15[p4 & 7](m.parent, m.id))
+                f9, p10 = _t13[n7]
+                f11, p12 = _t14[p10, n8]
+                out += (_t15[p4, n5, n6](n5, b5, n6, b6, parameters_one.level), f9(n7, b7), f11(n8, b8))
+                p4 = p12
+            out.append(_t16[p4](m.parent, m.id))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Group)
@@ -556,7 +565,9 @@ class Group(_Message):
             return Group(name, type_2, parameters, parent, id_2)
         except _FAULTS:
             return _explain(data, Group)
-_t16 = _Template("I $ I $ I", 0)
+_t17 = _Template("I $ I $ I", None, 8)
+_t18 = _Template("I $", None, 8)
+_t19 = _Template("i i", None, 8)
 
 
 class ConfigDescription(_Message):
@@ -592,160 +603,178 @@ class ConfigDescription(_Message):
                 n4 = len(b4) + 1
                 parameters = groups_one.parameters
                 n5 = len(parameters)
-                out.append(_t16[n3, n4](n3, b3, n4, b4, n5))
-                p6 = ((p2 + n3 + 7 & -4) + n4 + 7 & -4) + 4
+                f6, p7 = _t17[p2, n3, n4]
+                out.append(f6(n3, b3, n4, b4, n5))
+                p8 = p7
                 for parameters_one in parameters:
-                    n7, b7 = _texts[parameters_one.name]
-                    b8 = parameters_one.type.encode()
-                    if 0 in b8: raise ValueError
-                    n8 = len(b8) + 1
-                    p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + n8 + 4
-                    b10 = parameters_one.description.encode()
+                    n9, b9 = _texts[parameters_one.name]
+                    b10 = parameters_one.type.encode()
                     if 0 in b10: raise ValueError
                     n10 = len(b10) + 1
-                    b11 = parameters_one.edit_method.encode()
+                    b11 = parameters_one.description.encode()
                     if 0 in b11: raise ValueError
                     n11 = len(b11) + 1
-                    p12 = ((p9 + 3 & -4) + n10 + 11 & -4) + n11 + 4
-                    out.append(_t14[p6 & 7, n7, n8, n10, n11](n7, b7, n8, b8, parameters_one.level, n10, b10, n11, b11))
-                    p6 = p12
-                out.append(_t15[p6 & 7](groups_one.parent, groups_one.id))
-                p2 = (p6 + 3 & -4)
+                    f12, p13 = _t17[p8, n9, n10]
+                    b14 = parameters_one.edit_method.encode()
+                    if 0 in b14: raise ValueError
+                    n14 = len(b14) + 1
+                    f15, p16 = _t18[p13, n11]
+                    f17, p18 = _t18[p16, n14]
+                    out += (f12(n9, b9, n10, b10, parameters_one.level), f15(n11, b11), f17(n14, b14))
+                    p8 = p18
+                f19, p20 = _t19[p8]
+                out.append(f19(groups_one.parent, groups_one.id))
+                p2 = p20
             max_2 = m.max
             bools = max_2.bools
-            n13 = len(bools)
-            out.append(_p2(n13))
-            p14 = p2 + 4
+            n21 = len(bools)
+            out.append(_p2(n21))
+            p22 = p2 + 4 & 7
             for bools_one in bools:
-                n15, b15 = _texts[bools_one.name]
-                out.append(_t6[p14 & 7, n15](n15, b15, bools_one.value))
-                p14 = (p14 + 3 & -4) + n15 + 5
+                n23, b23 = _texts[bools_one.name]
+                f24, p25 = _t6[p22, n23]
+                out.append(f24(n23, b23, bools_one.value))
+                p22 = p25
             ints = max_2.ints
-            n16 = len(ints)
-            out.append(_t7[p14 & 7](n16))
-            p17 = (p14 + 3 & -4) + 4
+            n26 = len(ints)
+            f27, p28 = _t7[p22]
+            out.append(f27(n26))
+            p29 = p28
             for ints_one in ints:
-                n18, b18 = _texts[ints_one.name]
-                out.append(_t8[n18](n18, b18, ints_one.value))
-                p17 = (p17 + n18 + 7 & -4) + 4
+                n30, b30 = _texts[ints_one.name]
+                f31, p32 = _t8[p29, n30]
+                out.append(f31(n30, b30, ints_one.value))
+                p29 = p32
             strs = max_2.strs
-            n19 = len(strs)
-            out.append(_p2(n19))
-            p20 = p17 + 4
+            n33 = len(strs)
+            out.append(_p2(n33))
+            p34 = p29 + 4 & 7
             for strs_one in strs:
-                n21, b21 = _texts[strs_one.name]
-                b22 = strs_one.value.encode()
-                if 0 in b22: raise ValueError
-                n22 = len(b22) + 1
-                p23 = ((p20 + 3 & -4) + n21 + 7 & -4) + n22 + 4
-                out.append(_t9[p20 & 7, n21, n22](n21, b21, n22, b22))
-                p20 = p23
+                n35, b35 = _texts[strs_one.name]
+                b36 = strs_one.value.encode()
+                if 0 in b36: raise ValueError
+                n36 = len(b36) + 1
+                f37, p38 = _t9[p34, n35, n36]
+                out.append(f37(n35, b35, n36, b36))
+                p34 = p38
             doubles = max_2.doubles
-            n24 = len(doubles)
-            out.append(_t7[p20 & 7](n24))
-            p25 = (p20 + 3 & -4) + 4
+            n39 = len(doubles)
+            f40, p41 = _t7[p34]
+            out.append(f40(n39))
+            p42 = p41
             for doubles_one in doubles:
-                n26, b26 = _texts[doubles_one.name]
-                out.append(_t10[p25 & 7, n26](n26, b26, doubles_one.value))
-                p25 = 0
+                n43, b43 = _texts[doubles_one.name]
+                out.append(_t10[p42, n43](n43, b43, doubles_one.value))
+                p42 = 0
             groups_2 = max_2.groups
-            n27 = len(groups_2)
-            out.append(_p2(n27))
-            p28 = p25 + 4
+            n44 = len(groups_2)
+            out.append(_p2(n44))
+            p45 = p42 + 4 & 7
             for groups_one_2 in groups_2:
-                n29, b29 = _texts[groups_one_2.name]
-                out.append(_t11[n29](n29, b29, groups_one_2.state, groups_one_2.id, groups_one_2.parent))
-                p28 = (p28 + n29 + 8 & -4)
+                n46, b46 = _texts[groups_one_2.name]
+                f47, p48 = _t11[p45, n46]
+                out.append(f47(n46, b46, groups_one_2.state, groups_one_2.id, groups_one_2.parent))
+                p45 = p48
             min_2 = m.min
             bools_2 = min_2.bools
-            n30 = len(bools_2)
-            out.append(_p2(n30))
-            p31 = p28 + 4
+            n49 = len(bools_2)
+            out.append(_p2(n49))
+            p50 = p45 + 4 & 7
             for bools_one_2 in bools_2:
-                n32, b32 = _texts[bools_one_2.name]
-                out.append(_t6[p31 & 7, n32](n32, b32, bools_one_2.value))
-                p31 = (p31 + 3 & -4) + n32 + 5
+                n51, b51 = _texts[bools_one_2.name]
+                f52, p53 = _t6[p50, n51]
+                out.append(f52(n51, b51, bools_one_2.value))
+                p50 = p53
             ints_2 = min_2.ints
-            n33 = len(ints_2)
-            out.append(_t7[p31 & 7](n33))
-            p34 = (p31 + 3 & -4) + 4
+            n54 = len(ints_2)
+            f55, p56 = _t7[p50]
+            out.append(f55(n54))
+            p57 = p56
             for ints_one_2 in ints_2:
-                n35, b35 = _texts[ints_one_2.name]
-                out.append(_t8[n35](n35, b35, ints_one_2.value))
-                p34 = (p34 + n35 + 7 & -4) + 4
+                n58, b58 = _texts[ints_one_2.name]
+                f59, p60 = _t8[p57, n58]
+                out.append(f59(n58, b58, ints_one_2.value))
+                p57 = p60
             strs_2 = min_2.strs
-            n36 = len(strs_2)
-            out.append(_p2(n36))
-            p37 = p34 + 4
+            n61 = len(strs_2)
+            out.append(_p2(n61))
+            p62 = p57 + 4 & 7
             for strs_one_2 in strs_2:
-                n38, b38 = _texts[strs_one_2.name]
-                b39 = strs_one_2.value.encode()
-                if 0 in b39: raise ValueError
-                n39 = len(b39) + 1
-                p40 = ((p37 + 3 & -4) + n38 + 7 & -4) + n39 + 4
-                out.append(_t9[p37 & 7, n38, n39](n38, b38, n39, b39))
-                p37 = p40
+                n63, b63 = _texts[strs_one_2.name]
+                b64 = strs_one_2.value.encode()
+                if 0 in b64: raise ValueError
+                n64 = len(b64) + 1
+                f65, p66 = _t9[p62, n63, n64]
+                out.append(f65(n63, b63, n64, b64))
+                p62 = p66
             doubles_2 = min_2.doubles
-            n41 = len(doubles_2)
-            out.append(_t7[p37 & 7](n41))
-            p42 = (p37 + 3 & -4) + 4
+            n67 = len(doubles_2)
+            f68, p69 = _t7[p62]
+            out.append(f68(n67))
+            p70 = p69
             for doubles_one_2 in doubles_2:
-                n43, b43 = _texts[doubles_one_2.name]
-                out.append(_t10[p42 & 7, n43](n43, b43, doubles_one_2.value))
-                p42 = 0
+                n71, b71 = _texts[doubles_one_2.name]
+                out.append(_t10[p70, n71](n71, b71, doubles_one_2.value))
+                p70 = 0
             groups_3 = min_2.groups
-            n44 = len(groups_3)
-            out.append(_p2(n44))
-            p45 = p42 + 4
+            n72 = len(groups_3)
+            out.append(_p2(n72))
+            p73 = p70 + 4 & 7
             for groups_one_3 in groups_3:
-                n46, b46 = _texts[groups_one_3.name]
-                out.append(_t11[n46](n46, b46, groups_one_3.state, groups_one_3.id, groups_one_3.parent))
-                p45 = (p45 + n46 + 8 & -4)
+                n74, b74 = _texts[groups_one_3.name]
+                f75, p76 = _t11[p73, n74]
+                out.append(f75(n74, b74, groups_one_3.state, groups_one_3.id, groups_one_3.parent))
+                p73 = p76
             dflt = m.dflt
             bools_3 = dflt.bools
-            n47 = len(bools_3)
-            out.append(_p2(n47))
-            p48 = p45 + 4
+            n77 = len(bools_3)
+            out.append(_p2(n77))
+            p78 = p73 + 4 & 7
             for bools_one_3 in bools_3:
-                n49, b49 = _texts[bools_one_3.name]
-                out.append(_t6[p48 & 7, n49](n49, b49, bools_one_3.value))
-                p48 = (p48 + 3 & -4) + n49 + 5
+                n79, b79 = _texts[bools_one_3.name]
+                f80, p81 = _t6[p78, n79]
+                out.append(f80(n79, b79, bools_one_3.value))
+                p78 = p81
             ints_3 = dflt.ints
-            n50 = len(ints_3)
-            out.append(_t7[p48 & 7](n50))
-            p51 = (p48 + 3 & -4) + 4
+            n82 = len(ints_3)
+            f83, p84 = _t7[p78]
+            out.append(f83(n82))
+            p85 = p84
             for ints_one_3 in ints_3:
-                n52, b52 = _texts[ints_one_3.name]
-                out.append(_t8[n52](n52, b52, ints_one_3.value))
-                p51 = (p51 + n52 + 7 & -4) + 4
+                n86, b86 = _texts[ints_one_3.name]
+                f87, p88 = _t8[p85, n86]
+                out.append(f87(n86, b86, ints_one_3.value))
+                p85 = p88
             strs_3 = dflt.strs
-            n53 = len(strs_3)
-            out.append(_p2(n53))
-            p54 = p51 + 4
+            n89 = len(strs_3)
+            out.append(_p2(n89))
+            p90 = p85 + 4 & 7
             for strs_one_3 in strs_3:
-                n55, b55 = _texts[strs_one_3.name]
-                b56 = strs_one_3.value.encode()
-                if 0 in b56: raise ValueError
-                n56 = len(b56) + 1
-                p57 = ((p54 + 3 & -4) + n55 + 7 & -4) + n56 + 4
-                out.append(_t9[p54 & 7, n55, n56](n55, b55, n56, b56))
-                p54 = p57
+                n91, b91 = _texts[strs_one_3.name]
+                b92 = strs_one_3.value.encode()
+                if 0 in b92: raise ValueError
+                n92 = len(b92) + 1
+                f93, p94 = _t9[p90, n91, n92]
+                out.append(f93(n91, b91, n92, b92))
+                p90 = p94
             doubles_3 = dflt.doubles
-            n58 = len(doubles_3)
-            out.append(_t7[p54 & 7](n58))
-            p59 = (p54 + 3 & -4) + 4
+            n95 = len(doubles_3)
+            f96, p97 = _t7[p90]
+            out.append(f96(n95))
+            p98 = p97
             for doubles_one_3 in doubles_3:
-                n60, b60 = _texts[doubles_one_3.name]
-                out.append(_t10[p59 & 7, n60](n60, b60, doubles_one_3.value))
-                p59 = 0
+                n99, b99 = _texts[doubles_one_3.name]
+                out.append(_t10[p98, n99](n99, b99, doubles_one_3.value))
+                p98 = 0
             groups_4 = dflt.groups
-            n61 = len(groups_4)
-            out.append(_p2(n61))
-            p62 = p59 + 4
+            n100 = len(groups_4)
+            out.append(_p2(n100))
+            p101 = p98 + 4 & 7
             for groups_one_4 in groups_4:
-                n63, b63 = _texts[groups_one_4.name]
-                out.append(_t11[n63](n63, b63, groups_one_4.state, groups_one_4.id, groups_one_4.parent))
-                p62 = (p62 + n63 + 8 & -4)
+                n102, b102 = _texts[groups_one_4.name]
+                f103, p104 = _t11[p101, n102]
+                out.append(f103(n102, b102, groups_one_4.state, groups_one_4.id, groups_one_4.parent))
+                p101 = p104
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ConfigDescription)
@@ -999,7 +1028,7 @@ class ConfigDescription(_Message):
             return ConfigDescription(groups, Config(bools, ints, strs, doubles, groups_2), Config(bools_2, ints_2, strs_2, doubles_2, groups_3), Config(bools_3, ints_3, strs_3, doubles_3, groups_4))
         except _FAULTS:
             return _explain(data, ConfigDescription)
-_p3 = _Struct("<Ix").pack
+_t20 = _Template("I x", -4)
 _u7 = _Struct("<Ix").unpack_from
 
 
@@ -1023,7 +1052,7 @@ class SensorLevels(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256)
+            return _t20[0](256)
         except _FAULTS:
             return _plain(m, SensorLevels)
 

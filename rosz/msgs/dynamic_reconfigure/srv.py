@@ -26,13 +26,13 @@ __all__ = (
     "ReconfigureResponse",
 )
 _p1 = _Struct("<2I").pack
-_t1 = _Template("I $ ?", None)
-_t2 = _Template("I", None)
-_t3 = _Template("I $ i", 0)
+_t1 = _Template("I $ ?", None, 8)
+_t2 = _Template("I", None, 8)
+_t3 = _Template("I $ i", None, 8)
 _p2 = _Struct("<I").pack
-_t4 = _Template("I $ I $", None)
+_t4 = _Template("I $ I $", None, 8)
 _t5 = _Template("I $ d", None)
-_t6 = _Template("I $ ? i i", 0)
+_t6 = _Template("I $ ? i i", None, 8)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<I").unpack_from
 _u3 = _Struct("<?").unpack_from
@@ -64,44 +64,49 @@ class ReconfigureRequest(_Message):
             p2 = 4
             for bools_one in bools:
                 n3, b3 = _texts[bools_one.name]
-                out.append(_t1[p2 & 7, n3](n3, b3, bools_one.value))
-                p2 = (p2 + 3 & -4) + n3 + 5
+                f4, p5 = _t1[p2, n3]
+                out.append(f4(n3, b3, bools_one.value))
+                p2 = p5
             ints = config.ints
-            n4 = len(ints)
-            out.append(_t2[p2 & 7](n4))
-            p5 = (p2 + 3 & -4) + 4
+            n6 = len(ints)
+            f7, p8 = _t2[p2]
+            out.append(f7(n6))
+            p9 = p8
             for ints_one in ints:
-                n6, b6 = _texts[ints_one.name]
-                out.append(_t3[n6](n6, b6, ints_one.value))
-                p5 = (p5 + n6 + 7 & -4) + 4
+                n10, b10 = _texts[ints_one.name]
+                f11, p12 = _t3[p9, n10]
+                out.append(f11(n10, b10, ints_one.value))
+                p9 = p12
             strs = config.strs
-            n7 = len(strs)
-            out.append(_p2(n7))
-            p8 = p5 + 4
+            n13 = len(strs)
+            out.append(_p2(n13))
+            p14 = p9 + 4 & 7
             for strs_one in strs:
-                n9, b9 = _texts[strs_one.name]
-                b10 = strs_one.value.encode()
-                if 0 in b10: raise ValueError
-                n10 = len(b10) + 1
-                p11 = ((p8 + 3 & -4) + n9 + 7 & -4) + n10 + 4
-                out.append(_t4[p8 & 7, n9, n10](n9, b9, n10, b10))
-                p8 = p11
+                n15, b15 = _texts[strs_one.name]
+                b16 = strs_one.value.encode()
+                if 0 in b16: raise ValueError
+                n16 = len(b16) + 1
+                f17, p18 = _t4[p14, n15, n16]
+                out.append(f17(n15, b15, n16, b16))
+                p14 = p18
             doubles = config.doubles
-            n12 = len(doubles)
-            out.append(_t2[p8 & 7](n12))
-            p13 = (p8 + 3 & -4) + 4
+            n19 = len(doubles)
+            f20, p21 = _t2[p14]
+            out.append(f20(n19))
+            p22 = p21
             for doubles_one in doubles:
-                n14, b14 = _texts[doubles_one.name]
-                out.append(_t5[p13 & 7, n14](n14, b14, doubles_one.value))
-                p13 = 0
+                n23, b23 = _texts[doubles_one.name]
+                out.append(_t5[p22, n23](n23, b23, doubles_one.value))
+                p22 = 0
             groups = config.groups
-            n15 = len(groups)
-            out.append(_p2(n15))
-            p16 = p13 + 4
+            n24 = len(groups)
+            out.append(_p2(n24))
+            p25 = p22 + 4 & 7
             for groups_one in groups:
-                n17, b17 = _texts[groups_one.name]
-                out.append(_t6[n17](n17, b17, groups_one.state, groups_one.id, groups_one.parent))
-                p16 = (p16 + n17 + 8 & -4)
+                n26, b26 = _texts[groups_one.name]
+                f27, p28 = _t6[p25, n26]
+                out.append(f27(n26, b26, groups_one.state, groups_one.id, groups_one.parent))
+                p25 = p28
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ReconfigureRequest)
@@ -201,44 +206,49 @@ class ReconfigureResponse(_Message):
             p2 = 4
             for bools_one in bools:
                 n3, b3 = _texts[bools_one.name]
-                out.append(_t1[p2 & 7, n3](n3, b3, bools_one.value))
-                p2 = (p2 + 3 & -4) + n3 + 5
+                f4, p5 = _t1[p2, n3]
+                out.append(f4(n3, b3, bools_one.value))
+                p2 = p5
             ints = config.ints
-            n4 = len(ints)
-            out.append(_t2[p2 & 7](n4))
-            p5 = (p2 + 3 & -4) + 4
+            n6 = len(ints)
+            f7, p8 = _t2[p2]
+            out.append(f7(n6))
+            p9 = p8
             for ints_one in ints:
-                n6, b6 = _texts[ints_one.name]
-                out.append(_t3[n6](n6, b6, ints_one.value))
-                p5 = (p5 + n6 + 7 & -4) + 4
+                n10, b10 = _texts[ints_one.name]
+                f11, p12 = _t3[p9, n10]
+                out.append(f11(n10, b10, ints_one.value))
+                p9 = p12
             strs = config.strs
-            n7 = len(strs)
-            out.append(_p2(n7))
-            p8 = p5 + 4
+            n13 = len(strs)
+            out.append(_p2(n13))
+            p14 = p9 + 4 & 7
             for strs_one in strs:
-                n9, b9 = _texts[strs_one.name]
-                b10 = strs_one.value.encode()
-                if 0 in b10: raise ValueError
-                n10 = len(b10) + 1
-                p11 = ((p8 + 3 & -4) + n9 + 7 & -4) + n10 + 4
-                out.append(_t4[p8 & 7, n9, n10](n9, b9, n10, b10))
-                p8 = p11
+                n15, b15 = _texts[strs_one.name]
+                b16 = strs_one.value.encode()
+                if 0 in b16: raise ValueError
+                n16 = len(b16) + 1
+                f17, p18 = _t4[p14, n15, n16]
+                out.append(f17(n15, b15, n16, b16))
+                p14 = p18
             doubles = config.doubles
-            n12 = len(doubles)
-            out.append(_t2[p8 & 7](n12))
-            p13 = (p8 + 3 & -4) + 4
+            n19 = len(doubles)
+            f20, p21 = _t2[p14]
+            out.append(f20(n19))
+            p22 = p21
             for doubles_one in doubles:
-                n14, b14 = _texts[doubles_one.name]
-                out.append(_t5[p13 & 7, n14](n14, b14, doubles_one.value))
-                p13 = 0
+                n23, b23 = _texts[doubles_one.name]
+                out.append(_t5[p22, n23](n23, b23, doubles_one.value))
+                p22 = 0
             groups = config.groups
-            n15 = len(groups)
-            out.append(_p2(n15))
-            p16 = p13 + 4
+            n24 = len(groups)
+            out.append(_p2(n24))
+            p25 = p22 + 4 & 7
             for groups_one in groups:
-                n17, b17 = _texts[groups_one.name]
-                out.append(_t6[n17](n17, b17, groups_one.state, groups_one.id, groups_one.parent))
-                p16 = (p16 + n17 + 8 & -4)
+                n26, b26 = _texts[groups_one.name]
+                f27, p28 = _t6[p25, n26]
+                out.append(f27(n26, b26, groups_one.state, groups_one.id, groups_one.parent))
+                p25 = p28
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ReconfigureResponse)

@@ -54,7 +54,7 @@ __all__ = (
     "UInt8MultiArray",
     "WString",
 )
-_p1 = _Struct("<I?").pack
+_t1 = _Template("I ?", -4)
 _u1 = _Struct("<I?").unpack_from
 
 
@@ -74,7 +74,7 @@ class Bool(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.data)
+            return _t1[0](256, m.data)
         except _FAULTS:
             return _plain(m, Bool)
 
@@ -86,7 +86,7 @@ class Bool(_Message):
             return Bool(data_2)
         except _FAULTS:
             return _explain(data, Bool)
-_p2 = _Struct("<IB").pack
+_t2 = _Template("I B", -4)
 _u2 = _Struct("<IB").unpack_from
 
 
@@ -106,7 +106,7 @@ class Byte(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _t2[0](256, m.data)
         except _FAULTS:
             return _plain(m, Byte)
 
@@ -118,7 +118,7 @@ class Byte(_Message):
             return Byte(data_2)
         except _FAULTS:
             return _explain(data, Byte)
-_t1 = _Template("I I $ I I", -4)
+_t3 = _Template("I I $ I I", -4)
 _u3 = _Struct("<2I").unpack_from
 
 
@@ -144,7 +144,7 @@ class MultiArrayDimension(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.label]
-            return _t1[n1](256, n1, b1, m.size, m.stride)
+            return _t3[n1](256, n1, b1, m.size, m.stride)
         except _FAULTS:
             return _plain(m, MultiArrayDimension)
 
@@ -160,9 +160,9 @@ class MultiArrayDimension(_Message):
             return MultiArrayDimension(label, size, stride)
         except _FAULTS:
             return _explain(data, MultiArrayDimension)
-_p3 = _Struct("<2I").pack
-_t2 = _Template("I $ I I", 0)
-_p4 = _Struct("<I").pack
+_p1 = _Struct("<2I").pack
+_t4 = _Template("I $ I I", 0)
+_p2 = _Struct("<I").pack
 _u4 = _Struct("<I").unpack_from
 
 
@@ -191,13 +191,11 @@ class MultiArrayLayout(_Message):
         try:
             dim = m.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
-            out.append(_p4(m.data_offset))
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+            out.append(_p2(m.data_offset))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MultiArrayLayout)
@@ -245,17 +243,15 @@ class ByteMultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ByteMultiArray)
@@ -302,7 +298,7 @@ class Char(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _t2[0](256, m.data)
         except _FAULTS:
             return _plain(m, Char)
 
@@ -314,7 +310,7 @@ class Char(_Message):
             return Char(data_2)
         except _FAULTS:
             return _explain(data, Char)
-_p5 = _Struct("<Ix").pack
+_t5 = _Template("I x", -4)
 _u5 = _Struct("<Ix").unpack_from
 
 
@@ -329,7 +325,7 @@ class Empty(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p5(256)
+            return _t5[0](256)
         except _FAULTS:
             return _plain(m, Empty)
 
@@ -341,7 +337,7 @@ class Empty(_Message):
             return Empty()
         except _FAULTS:
             return _explain(data, Empty)
-_p6 = _Struct("<If").pack
+_p3 = _Struct("<If").pack
 _u6 = _Struct("<If").unpack_from
 
 
@@ -361,7 +357,7 @@ class Float32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p6(256, m.data)
+            return _p3(256, m.data)
         except _FAULTS:
             return _plain(m, Float32)
 
@@ -397,17 +393,15 @@ class Float32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "f":
                 data_2 = _numbers(data_2, "f")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float32MultiArray)
@@ -436,7 +430,7 @@ class Float32MultiArray(_Message):
             return Float32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float32MultiArray)
-_p7 = _Struct("<Id").pack
+_p4 = _Struct("<Id").pack
 _u7 = _Struct("<Id").unpack_from
 
 
@@ -456,7 +450,7 @@ class Float64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p7(256, m.data)
+            return _p4(256, m.data)
         except _FAULTS:
             return _plain(m, Float64)
 
@@ -469,6 +463,7 @@ class Float64(_Message):
         except _FAULTS:
             return _explain(data, Float64)
 _d2 = _empty("d")
+_t6 = _Template("I $ I I", None, 8)
 
 
 class Float64MultiArray(_Message):
@@ -492,18 +487,19 @@ class Float64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
+            out = [_p1(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                f4, p5 = _t6[p2, n3]
+                out.append(f4(n3, b3, dim_one.size, dim_one.stride))
+                p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "d":
                 data_2 = _numbers(data_2, "d")
-            n4 = len(data_2)
-            p5 = 0 if n4 else p2
-            out += (_p3(layout.data_offset, n4), (_PADDING[-(p2) & 7] if n4 else b""), data_2)
+            n6 = len(data_2)
+            p7 = 0 if n6 else p2
+            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float64MultiArray)
@@ -532,7 +528,7 @@ class Float64MultiArray(_Message):
             return Float64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float64MultiArray)
-_p8 = _Struct("<Ih").pack
+_t7 = _Template("I h", -4)
 _u8 = _Struct("<Ih").unpack_from
 
 
@@ -552,7 +548,7 @@ class Int16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p8(256, m.data)
+            return _t7[0](256, m.data)
         except _FAULTS:
             return _plain(m, Int16)
 
@@ -588,17 +584,15 @@ class Int16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "h":
                 data_2 = _numbers(data_2, "h")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int16MultiArray)
@@ -627,7 +621,7 @@ class Int16MultiArray(_Message):
             return Int16MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int16MultiArray)
-_p9 = _Struct("<Ii").pack
+_p5 = _Struct("<Ii").pack
 _u9 = _Struct("<Ii").unpack_from
 
 
@@ -647,7 +641,7 @@ class Int32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p9(256, m.data)
+            return _p5(256, m.data)
         except _FAULTS:
             return _plain(m, Int32)
 
@@ -683,17 +677,15 @@ class Int32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "i":
                 data_2 = _numbers(data_2, "i")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int32MultiArray)
@@ -722,7 +714,7 @@ class Int32MultiArray(_Message):
             return Int32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int32MultiArray)
-_p10 = _Struct("<Iq").pack
+_p6 = _Struct("<Iq").pack
 _u10 = _Struct("<Iq").unpack_from
 
 
@@ -742,7 +734,7 @@ class Int64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p10(256, m.data)
+            return _p6(256, m.data)
         except _FAULTS:
             return _plain(m, Int64)
 
@@ -778,18 +770,19 @@ class Int64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
+            out = [_p1(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                f4, p5 = _t6[p2, n3]
+                out.append(f4(n3, b3, dim_one.size, dim_one.stride))
+                p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "q":
                 data_2 = _numbers(data_2, "q")
-            n4 = len(data_2)
-            p5 = 0 if n4 else p2
-            out += (_p3(layout.data_offset, n4), (_PADDING[-(p2) & 7] if n4 else b""), data_2)
+            n6 = len(data_2)
+            p7 = 0 if n6 else p2
+            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int64MultiArray)
@@ -818,7 +811,7 @@ class Int64MultiArray(_Message):
             return Int64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int64MultiArray)
-_p11 = _Struct("<Ib").pack
+_t8 = _Template("I b", -4)
 _u11 = _Struct("<Ib").unpack_from
 
 
@@ -838,7 +831,7 @@ class Int8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p11(256, m.data)
+            return _t8[0](256, m.data)
         except _FAULTS:
             return _plain(m, Int8)
 
@@ -874,17 +867,15 @@ class Int8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int8MultiArray)
@@ -913,7 +904,7 @@ class Int8MultiArray(_Message):
             return Int8MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int8MultiArray)
-_t3 = _Template("I I $", -4)
+_t9 = _Template("I I $", -4, 4)
 
 
 class String(_Message):
@@ -935,7 +926,8 @@ class String(_Message):
             b1 = m.data.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t3[n1](256, n1, b1)
+            f2, p3 = _t9[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, String)
 
@@ -950,7 +942,7 @@ class String(_Message):
             return String(data_2)
         except _FAULTS:
             return _explain(data, String)
-_p12 = _Struct("<IH").pack
+_t10 = _Template("I H", -4)
 _u12 = _Struct("<IH").unpack_from
 
 
@@ -970,7 +962,7 @@ class UInt16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p12(256, m.data)
+            return _t10[0](256, m.data)
         except _FAULTS:
             return _plain(m, UInt16)
 
@@ -1006,17 +998,15 @@ class UInt16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "H":
                 data_2 = _numbers(data_2, "H")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt16MultiArray)
@@ -1063,7 +1053,7 @@ class UInt32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256, m.data)
+            return _p1(256, m.data)
         except _FAULTS:
             return _plain(m, UInt32)
 
@@ -1099,17 +1089,15 @@ class UInt32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "I":
                 data_2 = _numbers(data_2, "I")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt32MultiArray)
@@ -1138,7 +1126,7 @@ class UInt32MultiArray(_Message):
             return UInt32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, UInt32MultiArray)
-_p13 = _Struct("<IQ").pack
+_p7 = _Struct("<IQ").pack
 _u13 = _Struct("<IQ").unpack_from
 
 
@@ -1158,7 +1146,7 @@ class UInt64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p13(256, m.data)
+            return _p7(256, m.data)
         except _FAULTS:
             return _plain(m, UInt64)
 
@@ -1194,18 +1182,19 @@ class UInt64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
+            out = [_p1(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                f4, p5 = _t6[p2, n3]
+                out.append(f4(n3, b3, dim_one.size, dim_one.stride))
+                p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "Q":
                 data_2 = _numbers(data_2, "Q")
-            n4 = len(data_2)
-            p5 = 0 if n4 else p2
-            out += (_p3(layout.data_offset, n4), (_PADDING[-(p2) & 7] if n4 else b""), data_2)
+            n6 = len(data_2)
+            p7 = 0 if n6 else p2
+            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt64MultiArray)
@@ -1252,7 +1241,7 @@ class UInt8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _t2[0](256, m.data)
         except _FAULTS:
             return _plain(m, UInt8)
 
@@ -1287,17 +1276,15 @@ class UInt8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt8MultiArray)
@@ -1346,7 +1333,7 @@ class WString(_Message):
         try:
             b1 = _pack_wide(m.data)
             n1 = len(b1) >> 2
-            return b"".join((_p3(256, n1), b1))
+            return b"".join((_p1(256, n1), b1))
         except _FAULTS:
             return _plain(m, WString)
 

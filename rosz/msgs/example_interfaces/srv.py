@@ -102,7 +102,7 @@ class AddTwoInts(_Service):
         "---\n"
         "int64 sum\n"
     )
-_p3 = _Struct("<I?").pack
+_t1 = _Template("I ?", -4)
 _u3 = _Struct("<I?").unpack_from
 
 
@@ -122,7 +122,7 @@ class SetBoolRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256, m.data)
+            return _t1[0](256, m.data)
         except _FAULTS:
             return _plain(m, SetBoolRequest)
 
@@ -134,7 +134,7 @@ class SetBoolRequest(_Message):
             return SetBoolRequest(data_2)
         except _FAULTS:
             return _explain(data, SetBoolRequest)
-_t1 = _Template("I ? I $", -4)
+_t2 = _Template("I ? I $", -4, 4)
 _u4 = _Struct("<I?3xI").unpack_from
 
 
@@ -157,7 +157,8 @@ class SetBoolResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, m.success, n1, b1)
+            f2, p3 = _t2[n1]
+            return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, SetBoolResponse)
 
@@ -189,7 +190,7 @@ class SetBool(_Service):
         "bool success     # whether it was done\n"
         "string message   # what to tell a person\n"
     )
-_p4 = _Struct("<Ix").pack
+_t3 = _Template("I x", -4)
 _u5 = _Struct("<Ix").unpack_from
 
 
@@ -204,7 +205,7 @@ class TriggerRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p4(256)
+            return _t3[0](256)
         except _FAULTS:
             return _plain(m, TriggerRequest)
 
@@ -237,7 +238,8 @@ class TriggerResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, m.success, n1, b1)
+            f2, p3 = _t2[n1]
+            return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, TriggerResponse)
 

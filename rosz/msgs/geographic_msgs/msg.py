@@ -196,7 +196,7 @@ class GeoPoseStamped(_Message):
             return GeoPoseStamped(Header(Time(sec, nanosec), frame_id), GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2)))
         except _FAULTS:
             return _explain(data, GeoPoseStamped)
-_t2 = _Template("I i I I $ I", -4)
+_t2 = _Template("I i I I $ I", -4, 8)
 _t3 = _Template("i I I $ d d d d d d d", None)
 _u6 = _Struct("<I").unpack_from
 _u7 = _Struct("<i2I").unpack_from
@@ -225,17 +225,18 @@ class GeoPath(_Message):
             n1, b1 = _texts[header.frame_id]
             poses = m.poses
             n2 = len(poses)
-            out = [_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            f3, p4 = _t2[n1]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p5 = p4
             for poses_one in poses:
                 header_2 = poses_one.header
                 stamp_2 = header_2.stamp
-                n4, b4 = _texts[header_2.frame_id]
+                n6, b6 = _texts[header_2.frame_id]
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t3[p3 & 7, n4](stamp_2.sec, stamp_2.nanosec, n4, b4, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w))
-                p3 = 0
+                out.append(_t3[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w))
+                p5 = 0
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GeoPath)
@@ -401,7 +402,7 @@ class GeoPoseWithCovarianceStamped(_Message):
             return GeoPoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id), GeoPoseWithCovariance(GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2)), covariance))
         except _FAULTS:
             return _explain(data, GeoPoseWithCovarianceStamped)
-_t5 = _Template("I I $ I $", -4)
+_t5 = _Template("I I $ I $", -4, 4)
 _u9 = _Struct("<2I").unpack_from
 
 
@@ -427,7 +428,8 @@ class KeyValue(_Message):
             b2 = m.value.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t5[n1, n2](256, n1, b1, n2, b2)
+            f3, p4 = _t5[n1, n2]
+            return f3(256, n1, b1, n2, b2)
         except _FAULTS:
             return _plain(m, KeyValue)
 
@@ -448,7 +450,7 @@ class KeyValue(_Message):
         except _FAULTS:
             return _explain(data, KeyValue)
 _p4 = _Struct("<I16s3dI").pack
-_t6 = _Template("I $ I $", None)
+_t6 = _Template("I $ I $", None, 8)
 _u10 = _Struct("<I16s3dI").unpack_from
 
 
@@ -486,9 +488,9 @@ class WayPoint(_Message):
                 b4 = props_one.value.encode()
                 if 0 in b4: raise ValueError
                 n4 = len(b4) + 1
-                p5 = ((p2 + 3 & -4) + n3 + 7 & -4) + n4 + 4
-                out.append(_t6[p2 & 7, n3, n4](n3, b3, n4, b4))
-                p2 = p5
+                f5, p6 = _t6[p2, n3, n4]
+                out.append(f5(n3, b3, n4, b4))
+                p2 = p6
             return b"".join(out)
         except _FAULTS:
             return _plain(m, WayPoint)
@@ -519,6 +521,7 @@ class WayPoint(_Message):
 _p5 = _Struct("<I16sI").pack
 _p6 = _Struct("<16s").pack
 _p7 = _Struct("<I").pack
+_t7 = _Template("I $ I $", None, 4)
 _u11 = _Struct("<I16sI").unpack_from
 _u12 = _Struct("<16s").unpack_from
 
@@ -556,17 +559,17 @@ class MapFeature(_Message):
                     uuid_2 = bytes(_octets(uuid_2, 16))
                 out.append(_p6(uuid_2))
             props = m.props
-            n3 = len(props)
-            out.append(_p7(n3))
-            p4 = 0
+            n2 = len(props)
+            out.append(_p7(n2))
+            p3 = 0
             for props_one in props:
-                n5, b5 = _texts[props_one.key]
-                b6 = props_one.value.encode()
-                if 0 in b6: raise ValueError
-                n6 = len(b6) + 1
-                p7 = ((p4 + 3 & -4) + n5 + 7 & -4) + n6 + 4
-                out.append(_t6[p4 & 7, n5, n6](n5, b5, n6, b6))
-                p4 = p7
+                n4, b4 = _texts[props_one.key]
+                b5 = props_one.value.encode()
+                if 0 in b5: raise ValueError
+                n5 = len(b5) + 1
+                f6, p7 = _t7[p3, n4, n5]
+                out.append(f6(n4, b4, n5, b5))
+                p3 = p7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MapFeature)
@@ -601,10 +604,10 @@ class MapFeature(_Message):
             return MapFeature(UUID(uuid), components, props)
         except _FAULTS:
             return _explain(data, MapFeature)
-_t7 = _Template("I i I I $ 16s d d d d d d I", -4)
-_t8 = _Template("16s d d d I", None)
-_t9 = _Template("I", None)
-_t10 = _Template("16s I", None)
+_t8 = _Template("I i I I $ 16s d d d d d d I", -4)
+_t9 = _Template("16s d d d I", None)
+_t10 = _Template("I", None, 8)
+_t11 = _Template("16s I", None, 8)
 _u13 = _Struct("<6dI").unpack_from
 _u14 = _Struct("<3dI").unpack_from
 
@@ -648,7 +651,7 @@ class GeographicMap(_Message):
             max_pt = bounds.max_pt
             points = m.points
             n2 = len(points)
-            out = [_t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n2)]
+            out = [_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n2)]
             p3 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -658,61 +661,64 @@ class GeographicMap(_Message):
                 position = points_one.position
                 props = points_one.props
                 n4 = len(props)
-                out.append(_t8[p3 & 7](uuid_2, position.latitude, position.longitude, position.altitude, n4))
+                out.append(_t9[p3](uuid_2, position.latitude, position.longitude, position.altitude, n4))
                 p5 = 4
                 for props_one in props:
                     n6, b6 = _texts[props_one.key]
                     b7 = props_one.value.encode()
                     if 0 in b7: raise ValueError
                     n7 = len(b7) + 1
-                    p8 = ((p5 + 3 & -4) + n6 + 7 & -4) + n7 + 4
-                    out.append(_t6[p5 & 7, n6, n7](n6, b6, n7, b7))
-                    p5 = p8
+                    f8, p9 = _t6[p5, n6, n7]
+                    out.append(f8(n6, b6, n7, b7))
+                    p5 = p9
                 p3 = p5
             features = m.features
-            n9 = len(features)
-            out.append(_t9[p3 & 7](n9))
-            p10 = (p3 + 3 & -4) + 4
+            n10 = len(features)
+            f11, p12 = _t10[p3]
+            out.append(f11(n10))
+            p13 = p12
             for features_one in features:
                 id_4 = features_one.id
                 uuid_3 = id_4.uuid
                 if type(uuid_3) is not bytes or len(uuid_3) != 16:
                     uuid_3 = bytes(_octets(uuid_3, 16))
                 components = features_one.components
-                n11 = len(components)
-                out.append(_t10[p10 & 7](uuid_3, n11))
-                p12 = (p10 + 19 & -4) + 4
+                n14 = len(components)
+                f15, p16 = _t11[p13]
+                out.append(f15(uuid_3, n14))
+                p17 = p16
                 for components_one in components:
                     uuid_4 = components_one.uuid
                     if type(uuid_4) is not bytes or len(uuid_4) != 16:
                         uuid_4 = bytes(_octets(uuid_4, 16))
                     out.append(_p6(uuid_4))
-                    p12 = p12
+                    p17 = p17
                 props_2 = features_one.props
-                n13 = len(props_2)
-                out.append(_p7(n13))
-                p14 = p12 + 4
+                n18 = len(props_2)
+                out.append(_p7(n18))
+                p19 = p17 + 4 & 7
                 for props_one_2 in props_2:
-                    n15, b15 = _texts[props_one_2.key]
-                    b16 = props_one_2.value.encode()
-                    if 0 in b16: raise ValueError
-                    n16 = len(b16) + 1
-                    p17 = ((p14 + 3 & -4) + n15 + 7 & -4) + n16 + 4
-                    out.append(_t6[p14 & 7, n15, n16](n15, b15, n16, b16))
-                    p14 = p17
-                p10 = p14
+                    n20, b20 = _texts[props_one_2.key]
+                    b21 = props_one_2.value.encode()
+                    if 0 in b21: raise ValueError
+                    n21 = len(b21) + 1
+                    f22, p23 = _t6[p19, n20, n21]
+                    out.append(f22(n20, b20, n21, b21))
+                    p19 = p23
+                p13 = p19
             props_3 = m.props
-            n18 = len(props_3)
-            out.append(_t9[p10 & 7](n18))
-            p19 = (p10 + 3 & -4) + 4
+            n24 = len(props_3)
+            f25, p26 = _t10[p13]
+            out.append(f25(n24))
+            p27 = p26
             for props_one_3 in props_3:
-                n20, b20 = _texts[props_one_3.key]
-                b21 = props_one_3.value.encode()
-                if 0 in b21: raise ValueError
-                n21 = len(b21) + 1
-                p22 = ((p19 + 3 & -4) + n20 + 7 & -4) + n21 + 4
-                out.append(_t6[p19 & 7, n20, n21](n20, b20, n21, b21))
-                p19 = p22
+                n28, b28 = _texts[props_one_3.key]
+                b29 = props_one_3.value.encode()
+                if 0 in b29: raise ValueError
+                n29 = len(b29) + 1
+                f30, p31 = _t6[p27, n28, n29]
+                out.append(f30(n28, b28, n29, b29))
+                p27 = p31
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GeographicMap)
@@ -798,7 +804,7 @@ class GeographicMap(_Message):
             return GeographicMap(Header(Time(sec, nanosec), frame_id), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3)
         except _FAULTS:
             return _explain(data, GeographicMap)
-_t11 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
+_t12 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
 
 
 class GeographicMapChanges(_Message):
@@ -837,7 +843,7 @@ class GeographicMapChanges(_Message):
             max_pt = bounds.max_pt
             points = diffs.points
             n3 = len(points)
-            out = [_t11[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
+            out = [_t12[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
             p4 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -847,71 +853,75 @@ class GeographicMapChanges(_Message):
                 position = points_one.position
                 props = points_one.props
                 n5 = len(props)
-                out.append(_t8[p4 & 7](uuid_2, position.latitude, position.longitude, position.altitude, n5))
+                out.append(_t9[p4](uuid_2, position.latitude, position.longitude, position.altitude, n5))
                 p6 = 4
                 for props_one in props:
                     n7, b7 = _texts[props_one.key]
                     b8 = props_one.value.encode()
                     if 0 in b8: raise ValueError
                     n8 = len(b8) + 1
-                    p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + n8 + 4
-                    out.append(_t6[p6 & 7, n7, n8](n7, b7, n8, b8))
-                    p6 = p9
+                    f9, p10 = _t6[p6, n7, n8]
+                    out.append(f9(n7, b7, n8, b8))
+                    p6 = p10
                 p4 = p6
             features = diffs.features
-            n10 = len(features)
-            out.append(_t9[p4 & 7](n10))
-            p11 = (p4 + 3 & -4) + 4
+            n11 = len(features)
+            f12, p13 = _t10[p4]
+            out.append(f12(n11))
+            p14 = p13
             for features_one in features:
                 id_4 = features_one.id
                 uuid_3 = id_4.uuid
                 if type(uuid_3) is not bytes or len(uuid_3) != 16:
                     uuid_3 = bytes(_octets(uuid_3, 16))
                 components = features_one.components
-                n12 = len(components)
-                out.append(_t10[p11 & 7](uuid_3, n12))
-                p13 = (p11 + 19 & -4) + 4
+                n15 = len(components)
+                f16, p17 = _t11[p14]
+                out.append(f16(uuid_3, n15))
+                p18 = p17
                 for components_one in components:
                     uuid_4 = components_one.uuid
                     if type(uuid_4) is not bytes or len(uuid_4) != 16:
                         uuid_4 = bytes(_octets(uuid_4, 16))
                     out.append(_p6(uuid_4))
-                    p13 = p13
+                    p18 = p18
                 props_2 = features_one.props
-                n14 = len(props_2)
-                out.append(_p7(n14))
-                p15 = p13 + 4
+                n19 = len(props_2)
+                out.append(_p7(n19))
+                p20 = p18 + 4 & 7
                 for props_one_2 in props_2:
-                    n16, b16 = _texts[props_one_2.key]
-                    b17 = props_one_2.value.encode()
-                    if 0 in b17: raise ValueError
-                    n17 = len(b17) + 1
-                    p18 = ((p15 + 3 & -4) + n16 + 7 & -4) + n17 + 4
-                    out.append(_t6[p15 & 7, n16, n17](n16, b16, n17, b17))
-                    p15 = p18
-                p11 = p15
+                    n21, b21 = _texts[props_one_2.key]
+                    b22 = props_one_2.value.encode()
+                    if 0 in b22: raise ValueError
+                    n22 = len(b22) + 1
+                    f23, p24 = _t6[p20, n21, n22]
+                    out.append(f23(n21, b21, n22, b22))
+                    p20 = p24
+                p14 = p20
             props_3 = diffs.props
-            n19 = len(props_3)
-            out.append(_t9[p11 & 7](n19))
-            p20 = (p11 + 3 & -4) + 4
+            n25 = len(props_3)
+            f26, p27 = _t10[p14]
+            out.append(f26(n25))
+            p28 = p27
             for props_one_3 in props_3:
-                n21, b21 = _texts[props_one_3.key]
-                b22 = props_one_3.value.encode()
-                if 0 in b22: raise ValueError
-                n22 = len(b22) + 1
-                p23 = ((p20 + 3 & -4) + n21 + 7 & -4) + n22 + 4
-                out.append(_t6[p20 & 7, n21, n22](n21, b21, n22, b22))
-                p20 = p23
+                n29, b29 = _texts[props_one_3.key]
+                b30 = props_one_3.value.encode()
+                if 0 in b30: raise ValueError
+                n30 = len(b30) + 1
+                f31, p32 = _t6[p28, n29, n30]
+                out.append(f31(n29, b29, n30, b30))
+                p28 = p32
             deletes = m.deletes
-            n24 = len(deletes)
-            out.append(_t9[p20 & 7](n24))
-            p25 = (p20 + 3 & -4) + 4
+            n33 = len(deletes)
+            f34, p35 = _t10[p28]
+            out.append(f34(n33))
+            p36 = p35
             for deletes_one in deletes:
                 uuid_5 = deletes_one.uuid
                 if type(uuid_5) is not bytes or len(uuid_5) != 16:
                     uuid_5 = bytes(_octets(uuid_5, 16))
                 out.append(_p6(uuid_5))
-                p25 = p25
+                p36 = p36
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GeographicMapChanges)
@@ -1051,15 +1061,15 @@ class RouteSegment(_Message):
             props = m.props
             n1 = len(props)
             out = [_p8(256, uuid, uuid_2, uuid_3, n1)]
-            p2 = 4
+            p2 = 0
             for props_one in props:
                 n3, b3 = _texts[props_one.key]
                 b4 = props_one.value.encode()
                 if 0 in b4: raise ValueError
                 n4 = len(b4) + 1
-                p5 = ((p2 + 3 & -4) + n3 + 7 & -4) + n4 + 4
-                out.append(_t6[p2 & 7, n3, n4](n3, b3, n4, b4))
-                p2 = p5
+                f5, p6 = _t7[p2, n3, n4]
+                out.append(f5(n3, b3, n4, b4))
+                p2 = p6
             return b"".join(out)
         except _FAULTS:
             return _plain(m, RouteSegment)
@@ -1087,7 +1097,7 @@ class RouteSegment(_Message):
             return RouteSegment(UUID(uuid), UUID(uuid_2), UUID(uuid_3), props)
         except _FAULTS:
             return _explain(data, RouteSegment)
-_t12 = _Template("16s 16s 16s I", None)
+_t13 = _Template("16s 16s 16s I", None, 8)
 _u16 = _Struct("<16s16s16s").unpack_from
 
 
@@ -1130,7 +1140,7 @@ class RouteNetwork(_Message):
             max_pt = bounds.max_pt
             points = m.points
             n2 = len(points)
-            out = [_t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n2)]
+            out = [_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n2)]
             p3 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -1140,21 +1150,22 @@ class RouteNetwork(_Message):
                 position = points_one.position
                 props = points_one.props
                 n4 = len(props)
-                out.append(_t8[p3 & 7](uuid_2, position.latitude, position.longitude, position.altitude, n4))
+                out.append(_t9[p3](uuid_2, position.latitude, position.longitude, position.altitude, n4))
                 p5 = 4
                 for props_one in props:
                     n6, b6 = _texts[props_one.key]
                     b7 = props_one.value.encode()
                     if 0 in b7: raise ValueError
                     n7 = len(b7) + 1
-                    p8 = ((p5 + 3 & -4) + n6 + 7 & -4) + n7 + 4
-                    out.append(_t6[p5 & 7, n6, n7](n6, b6, n7, b7))
-                    p5 = p8
+                    f8, p9 = _t6[p5, n6, n7]
+                    out.append(f8(n6, b6, n7, b7))
+                    p5 = p9
                 p3 = p5
             segments = m.segments
-            n9 = len(segments)
-            out.append(_t9[p3 & 7](n9))
-            p10 = (p3 + 3 & -4) + 4
+            n10 = len(segments)
+            f11, p12 = _t10[p3]
+            out.append(f11(n10))
+            p13 = p12
             for segments_one in segments:
                 id_4 = segments_one.id
                 uuid_3 = id_4.uuid
@@ -1169,30 +1180,32 @@ class RouteNetwork(_Message):
                 if type(uuid_5) is not bytes or len(uuid_5) != 16:
                     uuid_5 = bytes(_octets(uuid_5, 16))
                 props_2 = segments_one.props
-                n11 = len(props_2)
-                out.append(_t12[p10 & 7](uuid_3, uuid_4, uuid_5, n11))
-                p12 = (p10 + 51 & -4) + 4
+                n14 = len(props_2)
+                f15, p16 = _t13[p13]
+                out.append(f15(uuid_3, uuid_4, uuid_5, n14))
+                p17 = p16
                 for props_one_2 in props_2:
-                    n13, b13 = _texts[props_one_2.key]
-                    b14 = props_one_2.value.encode()
-                    if 0 in b14: raise ValueError
-                    n14 = len(b14) + 1
-                    p15 = ((p12 + 3 & -4) + n13 + 7 & -4) + n14 + 4
-                    out.append(_t6[p12 & 7, n13, n14](n13, b13, n14, b14))
-                    p12 = p15
-                p10 = p12
+                    n18, b18 = _texts[props_one_2.key]
+                    b19 = props_one_2.value.encode()
+                    if 0 in b19: raise ValueError
+                    n19 = len(b19) + 1
+                    f20, p21 = _t6[p17, n18, n19]
+                    out.append(f20(n18, b18, n19, b19))
+                    p17 = p21
+                p13 = p17
             props_3 = m.props
-            n16 = len(props_3)
-            out.append(_t9[p10 & 7](n16))
-            p17 = (p10 + 3 & -4) + 4
+            n22 = len(props_3)
+            f23, p24 = _t10[p13]
+            out.append(f23(n22))
+            p25 = p24
             for props_one_3 in props_3:
-                n18, b18 = _texts[props_one_3.key]
-                b19 = props_one_3.value.encode()
-                if 0 in b19: raise ValueError
-                n19 = len(b19) + 1
-                p20 = ((p17 + 3 & -4) + n18 + 7 & -4) + n19 + 4
-                out.append(_t6[p17 & 7, n18, n19](n18, b18, n19, b19))
-                p17 = p20
+                n26, b26 = _texts[props_one_3.key]
+                b27 = props_one_3.value.encode()
+                if 0 in b27: raise ValueError
+                n27 = len(b27) + 1
+                f28, p29 = _t6[p25, n26, n27]
+                out.append(f28(n26, b26, n27, b27))
+                p25 = p29
             return b"".join(out)
         except _FAULTS:
             return _plain(m, RouteNetwork)
@@ -1271,7 +1284,7 @@ class RouteNetwork(_Message):
             return RouteNetwork(Header(Time(sec, nanosec), frame_id), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, segments, props_3)
         except _FAULTS:
             return _explain(data, RouteNetwork)
-_t13 = _Template("I i I I $ 16s I", -4)
+_t14 = _Template("I i I I $ 16s I", -4)
 
 
 class RoutePath(_Message):
@@ -1305,26 +1318,24 @@ class RoutePath(_Message):
                 uuid = bytes(_octets(uuid, 16))
             segments = m.segments
             n2 = len(segments)
-            out = [_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, n2)]
-            p3 = (n1 + 23 & -4) + 4
+            out = [_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, n2)]
             for segments_one in segments:
                 uuid_2 = segments_one.uuid
                 if type(uuid_2) is not bytes or len(uuid_2) != 16:
                     uuid_2 = bytes(_octets(uuid_2, 16))
                 out.append(_p6(uuid_2))
-                p3 = p3
             props = m.props
-            n4 = len(props)
-            out.append(_p7(n4))
-            p5 = p3 + 4
+            n3 = len(props)
+            out.append(_p7(n3))
+            p4 = 0
             for props_one in props:
-                n6, b6 = _texts[props_one.key]
-                b7 = props_one.value.encode()
-                if 0 in b7: raise ValueError
-                n7 = len(b7) + 1
-                p8 = ((p5 + 3 & -4) + n6 + 7 & -4) + n7 + 4
-                out.append(_t6[p5 & 7, n6, n7](n6, b6, n7, b7))
-                p5 = p8
+                n5, b5 = _texts[props_one.key]
+                b6 = props_one.value.encode()
+                if 0 in b6: raise ValueError
+                n6 = len(b6) + 1
+                f7, p8 = _t7[p4, n5, n6]
+                out.append(f7(n5, b5, n6, b6))
+                p4 = p8
             return b"".join(out)
         except _FAULTS:
             return _plain(m, RoutePath)

@@ -80,9 +80,10 @@ class GetGeoPathRequest(_Message):
             return GetGeoPathRequest(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2))
         except _FAULTS:
             return _explain(data, GetGeoPathRequest)
-_t1 = _Template("I ? I $ i I I $ I", -4)
-_t2 = _Template("i I I $ d d d d d d d", None)
-_t3 = _Template("16s 16s 16s d", None)
+_t1 = _Template("I ? I $ i I", -4, 8)
+_t2 = _Template("I $ I", None, 8)
+_t3 = _Template("i I I $ d d d d d d d", None)
+_t4 = _Template("16s 16s 16s d", None)
 _u2 = _Struct("<I?3xI").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 _u4 = _Struct("<I").unpack_from
@@ -124,19 +125,21 @@ class GetGeoPathResponse(_Message):
             header = plan.header
             stamp = header.stamp
             n2, b2 = _texts[header.frame_id]
+            f3, p4 = _t1[n1]
             poses = plan.poses
-            n3 = len(poses)
-            out = [_t1[n1, n2](256, m.success, n1, b1, stamp.sec, stamp.nanosec, n2, b2, n3)]
-            p4 = ((n1 + 3 & -4) + n2 + 15 & -4) + 4
+            n5 = len(poses)
+            f6, p7 = _t2[p4, n2]
+            out = [f3(256, m.success, n1, b1, stamp.sec, stamp.nanosec), f6(n2, b2, n5)]
+            p8 = p7
             for poses_one in poses:
                 header_2 = poses_one.header
                 stamp_2 = header_2.stamp
-                n5, b5 = _texts[header_2.frame_id]
+                n9, b9 = _texts[header_2.frame_id]
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t2[p4 & 7, n5](stamp_2.sec, stamp_2.nanosec, n5, b5, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w))
-                p4 = 0
+                out.append(_t3[p8, n9](stamp_2.sec, stamp_2.nanosec, n9, b9, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w))
+                p8 = 0
             network = m.network
             uuid = network.uuid
             if type(uuid) is not bytes or len(uuid) != 16:
@@ -149,7 +152,7 @@ class GetGeoPathResponse(_Message):
             uuid_3 = goal_seg.uuid
             if type(uuid_3) is not bytes or len(uuid_3) != 16:
                 uuid_3 = bytes(_octets(uuid_3, 16))
-            out.append(_t3[p4 & 7](uuid, uuid_2, uuid_3, m.distance))
+            out.append(_t4[p8](uuid, uuid_2, uuid_3, m.distance))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetGeoPathResponse)
@@ -208,7 +211,7 @@ class GetGeoPath(_Service):
         "unique_identifier_msgs/UUID goal_seg    # segment nearest to the goal\n"
         "float64 distance                        # m, length of the path\n"
     )
-_t4 = _Template("I I $ d d d d d d", -4)
+_t5 = _Template("I I $ d d d d d d", -4)
 _u8 = _Struct("<2I").unpack_from
 _u9 = _Struct("<6d").unpack_from
 
@@ -237,7 +240,7 @@ class GetGeographicMapRequest(_Message):
             bounds = m.bounds
             min_pt = bounds.min_pt
             max_pt = bounds.max_pt
-            return _t4[n1](256, n1, b1, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude)
+            return _t5[n1](256, n1, b1, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude)
         except _FAULTS:
             return _plain(m, GetGeographicMapRequest)
 
@@ -253,11 +256,11 @@ class GetGeographicMapRequest(_Message):
             return GetGeographicMapRequest(url, BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)))
         except _FAULTS:
             return _explain(data, GetGeographicMapRequest)
-_t5 = _Template("I ? I $ i I I $ 16s d d d d d d I", -4)
-_t6 = _Template("16s d d d I", None)
-_t7 = _Template("I $ I $", None)
-_t8 = _Template("I", None)
-_t9 = _Template("16s I", None)
+_t6 = _Template("I $ 16s d d d d d d I", None)
+_t7 = _Template("16s d d d I", None)
+_t8 = _Template("I $ I $", None, 8)
+_t9 = _Template("I", None, 8)
+_t10 = _Template("16s I", None, 8)
 _p2 = _Struct("<16s").pack
 _p3 = _Struct("<I").pack
 _u10 = _Struct("<16s").unpack_from
@@ -290,6 +293,7 @@ class GetGeographicMapResponse(_Message):
             header = map_2.header
             stamp = header.stamp
             n2, b2 = _texts[header.frame_id]
+            f3, p4 = _t1[n1]
             id_2 = map_2.id
             uuid = id_2.uuid
             if type(uuid) is not bytes or len(uuid) != 16:
@@ -298,9 +302,9 @@ class GetGeographicMapResponse(_Message):
             min_pt = bounds.min_pt
             max_pt = bounds.max_pt
             points = map_2.points
-            n3 = len(points)
-            out = [_t5[n1, n2](256, m.success, n1, b1, stamp.sec, stamp.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
-            p4 = 4
+            n5 = len(points)
+            out = [f3(256, m.success, n1, b1, stamp.sec, stamp.nanosec), _t6[p4, n2](n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n5)]
+            p6 = 4
             for points_one in points:
                 id_3 = points_one.id
                 uuid_2 = id_3.uuid
@@ -308,62 +312,65 @@ class GetGeographicMapResponse(_Message):
                     uuid_2 = bytes(_octets(uuid_2, 16))
                 position = points_one.position
                 props = points_one.props
-                n5 = len(props)
-                out.append(_t6[p4 & 7](uuid_2, position.latitude, position.longitude, position.altitude, n5))
-                p6 = 4
+                n7 = len(props)
+                out.append(_t7[p6](uuid_2, position.latitude, position.longitude, position.altitude, n7))
+                p8 = 4
                 for props_one in props:
-                    n7, b7 = _texts[props_one.key]
-                    b8 = props_one.value.encode()
-                    if 0 in b8: raise ValueError
-                    n8 = len(b8) + 1
-                    p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + n8 + 4
-                    out.append(_t7[p6 & 7, n7, n8](n7, b7, n8, b8))
-                    p6 = p9
-                p4 = p6
+                    n9, b9 = _texts[props_one.key]
+                    b10 = props_one.value.encode()
+                    if 0 in b10: raise ValueError
+                    n10 = len(b10) + 1
+                    f11, p12 = _t8[p8, n9, n10]
+                    out.append(f11(n9, b9, n10, b10))
+                    p8 = p12
+                p6 = p8
             features = map_2.features
-            n10 = len(features)
-            out.append(_t8[p4 & 7](n10))
-            p11 = (p4 + 3 & -4) + 4
+            n13 = len(features)
+            f14, p15 = _t9[p6]
+            out.append(f14(n13))
+            p16 = p15
             for features_one in features:
                 id_4 = features_one.id
                 uuid_3 = id_4.uuid
                 if type(uuid_3) is not bytes or len(uuid_3) != 16:
                     uuid_3 = bytes(_octets(uuid_3, 16))
                 components = features_one.components
-                n12 = len(components)
-                out.append(_t9[p11 & 7](uuid_3, n12))
-                p13 = (p11 + 19 & -4) + 4
+                n17 = len(components)
+                f18, p19 = _t10[p16]
+                out.append(f18(uuid_3, n17))
+                p20 = p19
                 for components_one in components:
                     uuid_4 = components_one.uuid
                     if type(uuid_4) is not bytes or len(uuid_4) != 16:
                         uuid_4 = bytes(_octets(uuid_4, 16))
                     out.append(_p2(uuid_4))
-                    p13 = p13
+                    p20 = p20
                 props_2 = features_one.props
-                n14 = len(props_2)
-                out.append(_p3(n14))
-                p15 = p13 + 4
+                n21 = len(props_2)
+                out.append(_p3(n21))
+                p22 = p20 + 4 & 7
                 for props_one_2 in props_2:
-                    n16, b16 = _texts[props_one_2.key]
-                    b17 = props_one_2.value.encode()
-                    if 0 in b17: raise ValueError
-                    n17 = len(b17) + 1
-                    p18 = ((p15 + 3 & -4) + n16 + 7 & -4) + n17 + 4
-                    out.append(_t7[p15 & 7, n16, n17](n16, b16, n17, b17))
-                    p15 = p18
-                p11 = p15
+                    n23, b23 = _texts[props_one_2.key]
+                    b24 = props_one_2.value.encode()
+                    if 0 in b24: raise ValueError
+                    n24 = len(b24) + 1
+                    f25, p26 = _t8[p22, n23, n24]
+                    out.append(f25(n23, b23, n24, b24))
+                    p22 = p26
+                p16 = p22
             props_3 = map_2.props
-            n19 = len(props_3)
-            out.append(_t8[p11 & 7](n19))
-            p20 = (p11 + 3 & -4) + 4
+            n27 = len(props_3)
+            f28, p29 = _t9[p16]
+            out.append(f28(n27))
+            p30 = p29
             for props_one_3 in props_3:
-                n21, b21 = _texts[props_one_3.key]
-                b22 = props_one_3.value.encode()
-                if 0 in b22: raise ValueError
-                n22 = len(b22) + 1
-                p23 = ((p20 + 3 & -4) + n21 + 7 & -4) + n22 + 4
-                out.append(_t7[p20 & 7, n21, n22](n21, b21, n22, b22))
-                p20 = p23
+                n31, b31 = _texts[props_one_3.key]
+                b32 = props_one_3.value.encode()
+                if 0 in b32: raise ValueError
+                n32 = len(b32) + 1
+                f33, p34 = _t8[p30, n31, n32]
+                out.append(f33(n31, b31, n32, b32))
+                p30 = p34
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetGeographicMapResponse)
@@ -473,7 +480,7 @@ class GetGeographicMap(_Service):
         "string status                        # what to tell a person\n"
         "geographic_msgs/GeographicMap map    # may cover more or less than was asked for\n"
     )
-_p4 = _Struct("<I16s16s16s").pack
+_t11 = _Template("I 16s 16s 16s", -4)
 _u13 = _Struct("<I16s16s16s").unpack_from
 
 
@@ -509,7 +516,7 @@ class GetRoutePlanRequest(_Message):
             uuid_3 = goal.uuid
             if type(uuid_3) is not bytes or len(uuid_3) != 16:
                 uuid_3 = bytes(_octets(uuid_3, 16))
-            return _p4(256, uuid, uuid_2, uuid_3)
+            return _t11[0](256, uuid, uuid_2, uuid_3)
         except _FAULTS:
             return _plain(m, GetRoutePlanRequest)
 
@@ -521,7 +528,9 @@ class GetRoutePlanRequest(_Message):
             return GetRoutePlanRequest(UUID(uuid), UUID(uuid_2), UUID(uuid_3))
         except _FAULTS:
             return _explain(data, GetRoutePlanRequest)
-_t10 = _Template("I ? I $ i I I $ 16s I", -4)
+_t12 = _Template("I ? I $ i I", -4)
+_t13 = _Template("I $ 16s I", 0)
+_t14 = _Template("I $ I $", None, 4)
 
 
 class GetRoutePlanResponse(_Message):
@@ -555,26 +564,24 @@ class GetRoutePlanResponse(_Message):
                 uuid = bytes(_octets(uuid, 16))
             segments = plan.segments
             n3 = len(segments)
-            out = [_t10[n1, n2](256, m.success, n1, b1, stamp.sec, stamp.nanosec, n2, b2, uuid, n3)]
-            p4 = ((n1 + 3 & -4) + n2 + 31 & -4) + 4
+            out = [_t12[n1](256, m.success, n1, b1, stamp.sec, stamp.nanosec), _t13[n2](n2, b2, uuid, n3)]
             for segments_one in segments:
                 uuid_2 = segments_one.uuid
                 if type(uuid_2) is not bytes or len(uuid_2) != 16:
                     uuid_2 = bytes(_octets(uuid_2, 16))
                 out.append(_p2(uuid_2))
-                p4 = p4
             props = plan.props
-            n5 = len(props)
-            out.append(_p3(n5))
-            p6 = p4 + 4
+            n4 = len(props)
+            out.append(_p3(n4))
+            p5 = 0
             for props_one in props:
-                n7, b7 = _texts[props_one.key]
-                b8 = props_one.value.encode()
-                if 0 in b8: raise ValueError
-                n8 = len(b8) + 1
-                p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + n8 + 4
-                out.append(_t7[p6 & 7, n7, n8](n7, b7, n8, b8))
-                p6 = p9
+                n6, b6 = _texts[props_one.key]
+                b7 = props_one.value.encode()
+                if 0 in b7: raise ValueError
+                n7 = len(b7) + 1
+                f8, p9 = _t14[p5, n6, n7]
+                out.append(f8(n6, b6, n7, b7))
+                p5 = p9
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetRoutePlanResponse)
@@ -639,7 +646,7 @@ class GetRoutePlan(_Service):
         "string status                      # what to tell a person\n"
         "RoutePath plan\n"
     )
-_t11 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
+_t15 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
 _u14 = _Struct("<Ii2I").unpack_from
 
 
@@ -676,7 +683,7 @@ class UpdateGeographicMapRequest(_Message):
             max_pt = bounds.max_pt
             points = diffs.points
             n3 = len(points)
-            out = [_t11[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
+            out = [_t15[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
             p4 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -686,71 +693,75 @@ class UpdateGeographicMapRequest(_Message):
                 position = points_one.position
                 props = points_one.props
                 n5 = len(props)
-                out.append(_t6[p4 & 7](uuid_2, position.latitude, position.longitude, position.altitude, n5))
+                out.append(_t7[p4](uuid_2, position.latitude, position.longitude, position.altitude, n5))
                 p6 = 4
                 for props_one in props:
                     n7, b7 = _texts[props_one.key]
                     b8 = props_one.value.encode()
                     if 0 in b8: raise ValueError
                     n8 = len(b8) + 1
-                    p9 = ((p6 + 3 & -4) + n7 + 7 & -4) + n8 + 4
-                    out.append(_t7[p6 & 7, n7, n8](n7, b7, n8, b8))
-                    p6 = p9
+                    f9, p10 = _t8[p6, n7, n8]
+                    out.append(f9(n7, b7, n8, b8))
+                    p6 = p10
                 p4 = p6
             features = diffs.features
-            n10 = len(features)
-            out.append(_t8[p4 & 7](n10))
-            p11 = (p4 + 3 & -4) + 4
+            n11 = len(features)
+            f12, p13 = _t9[p4]
+            out.append(f12(n11))
+            p14 = p13
             for features_one in features:
                 id_4 = features_one.id
                 uuid_3 = id_4.uuid
                 if type(uuid_3) is not bytes or len(uuid_3) != 16:
                     uuid_3 = bytes(_octets(uuid_3, 16))
                 components = features_one.components
-                n12 = len(components)
-                out.append(_t9[p11 & 7](uuid_3, n12))
-                p13 = (p11 + 19 & -4) + 4
+                n15 = len(components)
+                f16, p17 = _t10[p14]
+                out.append(f16(uuid_3, n15))
+                p18 = p17
                 for components_one in components:
                     uuid_4 = components_one.uuid
                     if type(uuid_4) is not bytes or len(uuid_4) != 16:
                         uuid_4 = bytes(_octets(uuid_4, 16))
                     out.append(_p2(uuid_4))
-                    p13 = p13
+                    p18 = p18
                 props_2 = features_one.props
-                n14 = len(props_2)
-                out.append(_p3(n14))
-                p15 = p13 + 4
+                n19 = len(props_2)
+                out.append(_p3(n19))
+                p20 = p18 + 4 & 7
                 for props_one_2 in props_2:
-                    n16, b16 = _texts[props_one_2.key]
-                    b17 = props_one_2.value.encode()
-                    if 0 in b17: raise ValueError
-                    n17 = len(b17) + 1
-                    p18 = ((p15 + 3 & -4) + n16 + 7 & -4) + n17 + 4
-                    out.append(_t7[p15 & 7, n16, n17](n16, b16, n17, b17))
-                    p15 = p18
-                p11 = p15
+                    n21, b21 = _texts[props_one_2.key]
+                    b22 = props_one_2.value.encode()
+                    if 0 in b22: raise ValueError
+                    n22 = len(b22) + 1
+                    f23, p24 = _t8[p20, n21, n22]
+                    out.append(f23(n21, b21, n22, b22))
+                    p20 = p24
+                p14 = p20
             props_3 = diffs.props
-            n19 = len(props_3)
-            out.append(_t8[p11 & 7](n19))
-            p20 = (p11 + 3 & -4) + 4
+            n25 = len(props_3)
+            f26, p27 = _t9[p14]
+            out.append(f26(n25))
+            p28 = p27
             for props_one_3 in props_3:
-                n21, b21 = _texts[props_one_3.key]
-                b22 = props_one_3.value.encode()
-                if 0 in b22: raise ValueError
-                n22 = len(b22) + 1
-                p23 = ((p20 + 3 & -4) + n21 + 7 & -4) + n22 + 4
-                out.append(_t7[p20 & 7, n21, n22](n21, b21, n22, b22))
-                p20 = p23
+                n29, b29 = _texts[props_one_3.key]
+                b30 = props_one_3.value.encode()
+                if 0 in b30: raise ValueError
+                n30 = len(b30) + 1
+                f31, p32 = _t8[p28, n29, n30]
+                out.append(f31(n29, b29, n30, b30))
+                p28 = p32
             deletes = updates.deletes
-            n24 = len(deletes)
-            out.append(_t8[p20 & 7](n24))
-            p25 = (p20 + 3 & -4) + 4
+            n33 = len(deletes)
+            f34, p35 = _t9[p28]
+            out.append(f34(n33))
+            p36 = p35
             for deletes_one in deletes:
                 uuid_5 = deletes_one.uuid
                 if type(uuid_5) is not bytes or len(uuid_5) != 16:
                     uuid_5 = bytes(_octets(uuid_5, 16))
                 out.append(_p2(uuid_5))
-                p25 = p25
+                p36 = p36
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UpdateGeographicMapRequest)
@@ -849,7 +860,7 @@ class UpdateGeographicMapRequest(_Message):
             return UpdateGeographicMapRequest(GeographicMapChanges(Header(Time(sec, nanosec), frame_id), GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3), deletes))
         except _FAULTS:
             return _explain(data, UpdateGeographicMapRequest)
-_t12 = _Template("I ? I $", -4)
+_t16 = _Template("I ? I $", -4, 4)
 
 
 class UpdateGeographicMapResponse(_Message):
@@ -871,7 +882,8 @@ class UpdateGeographicMapResponse(_Message):
             b1 = m.status.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t12[n1](256, m.success, n1, b1)
+            f2, p3 = _t16[n1]
+            return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, UpdateGeographicMapResponse)
 

@@ -555,7 +555,7 @@ class PolygonInstance(_Message):
             return PolygonInstance(Polygon(points), id_2)
         except _FAULTS:
             return _explain(data, PolygonInstance)
-_t5 = _Template("I i I I $ I", -4)
+_t5 = _Template("I i I I $ I", -4, 8)
 _u11 = _Struct("<I").unpack_from
 
 
@@ -584,7 +584,8 @@ class PolygonInstanceStamped(_Message):
             polygon_2 = polygon.polygon
             points = polygon_2.points
             n2 = len(points)
-            return b"".join((_t5[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p5(e.x, e.y, e.z) for e in points]), _t4[(n1 + 7 & -4) + n2 * 12 + 4 & 7](polygon.id)))
+            f3, p4 = _t5[n1]
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p5(e.x, e.y, e.z) for e in points]), _t4[p4 + n2 * 12 & 7](polygon.id)))
         except _FAULTS:
             return _plain(m, PolygonInstanceStamped)
 
@@ -605,6 +606,7 @@ class PolygonInstanceStamped(_Message):
             return PolygonInstanceStamped(Header(Time(sec, nanosec), frame_id), PolygonInstance(Polygon(points), id_2))
         except _FAULTS:
             return _explain(data, PolygonInstanceStamped)
+_t6 = _Template("I i I I $ I", -4)
 
 
 class PolygonStamped(_Message):
@@ -631,7 +633,7 @@ class PolygonStamped(_Message):
             polygon = m.polygon
             points = polygon.points
             n2 = len(points)
-            return b"".join((_t5[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p5(e.x, e.y, e.z) for e in points])))
+            return b"".join((_t6[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p5(e.x, e.y, e.z) for e in points])))
         except _FAULTS:
             return _plain(m, PolygonStamped)
 
@@ -786,8 +788,9 @@ class PoseArray(_Message):
             n1, b1 = _texts[header.frame_id]
             poses = m.poses
             n2 = len(poses)
-            p3 = 0 if n2 else (n1 + 7 & -4) + 4
-            return b"".join((_t5[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), (_PADDING[-((n1 + 7 & -4) + 4) & 7] if n2 else b""), b"".join([_p9(e_position.x, e_position.y, e_position.z, e_orientation.x, e_orientation.y, e_orientation.z, e_orientation.w) for e in poses for e_position in (e.position,) for e_orientation in (e.orientation,)])))
+            f3, p4 = _t5[n1]
+            p5 = 0 if n2 else p4
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, n2), (_PADDING[-(p4) & 7] if n2 else b""), b"".join([_p9(e_position.x, e_position.y, e_position.z, e_orientation.x, e_orientation.y, e_orientation.z, e_orientation.w) for e in poses for e_position in (e.position,) for e_orientation in (e.orientation,)])))
         except _FAULTS:
             return _plain(m, PoseArray)
 
@@ -807,7 +810,7 @@ class PoseArray(_Message):
             return PoseArray(Header(Time(sec, nanosec), frame_id), poses)
         except _FAULTS:
             return _explain(data, PoseArray)
-_t6 = _Template("I i I I $ d d d d d d d", -4)
+_t7 = _Template("I i I I $ d d d d d d d", -4)
 _u14 = _Struct("<7d").unpack_from
 
 
@@ -835,7 +838,7 @@ class PoseStamped(_Message):
             pose = m.pose
             position = pose.position
             orientation = pose.orientation
-            return _t6[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
+            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
         except _FAULTS:
             return _plain(m, PoseStamped)
 
@@ -922,7 +925,7 @@ class PoseWithCovarianceStamped(_Message):
             covariance = pose.covariance
             if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_t6[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w), covariance))
+            return b"".join((_t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w), covariance))
         except _FAULTS:
             return _plain(m, PoseWithCovarianceStamped)
 
@@ -942,7 +945,7 @@ class PoseWithCovarianceStamped(_Message):
             return PoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id), PoseWithCovariance(Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), covariance))
         except _FAULTS:
             return _explain(data, PoseWithCovarianceStamped)
-_t7 = _Template("I i I I $ d d d d", -4)
+_t8 = _Template("I i I I $ d d d d", -4)
 _u15 = _Struct("<4d").unpack_from
 
 
@@ -968,7 +971,7 @@ class QuaternionStamped(_Message):
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
             quaternion = m.quaternion
-            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, quaternion.x, quaternion.y, quaternion.z, quaternion.w)
+            return _t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, quaternion.x, quaternion.y, quaternion.z, quaternion.w)
         except _FAULTS:
             return _plain(m, QuaternionStamped)
 
@@ -1018,7 +1021,7 @@ class Transform(_Message):
             return Transform(Vector3(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))
         except _FAULTS:
             return _explain(data, Transform)
-_t8 = _Template("I i I I $ I $ d d d d d d d", -4)
+_t9 = _Template("I i I I $ I $ d d d d d d d", -4)
 
 
 class TransformStamped(_Message):
@@ -1050,7 +1053,7 @@ class TransformStamped(_Message):
             transform = m.transform
             translation = transform.translation
             rotation = transform.rotation
-            return _t8[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w)
+            return _t9[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w)
         except _FAULTS:
             return _plain(m, TransformStamped)
 
@@ -1278,7 +1281,8 @@ class Vector3Stamped(_Message):
             return Vector3Stamped(Header(Time(sec, nanosec), frame_id), Vector3(x_2, y_2, z_2))
         except _FAULTS:
             return _explain(data, Vector3Stamped)
-_t9 = _Template("I i I I $ I $ I $ d d d d d d", -4)
+_t10 = _Template("I i I I $ I $", -4, 8)
+_t11 = _Template("I $ d d d d d d", None)
 
 
 class VelocityStamped(_Message):
@@ -1312,11 +1316,11 @@ class VelocityStamped(_Message):
             b3 = m.reference_frame_id.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + n3 + 4
+            f4, p5 = _t10[n1, n2]
             velocity = m.velocity
             linear = velocity.linear
             angular = velocity.angular
-            return _t9[n1, n2, n3](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, n3, b3, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2), _t11[p5, n3](n3, b3, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)))
         except _FAULTS:
             return _plain(m, VelocityStamped)
 

@@ -19,7 +19,7 @@ __all__ = (
     "TransitionDescription",
     "TransitionEvent",
 )
-_t1 = _Template("I B I $", -4)
+_t1 = _Template("I B I $", -4, 4)
 _u1 = _Struct("<IB3xI").unpack_from
 
 
@@ -68,7 +68,8 @@ class State(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.label]
-            return _t1[n1](256, m.id, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, m.id, n1, b1)
         except _FAULTS:
             return _plain(m, State)
 
@@ -175,7 +176,8 @@ class Transition(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.label]
-            return _t1[n1](256, m.id, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, m.id, n1, b1)
         except _FAULTS:
             return _plain(m, Transition)
 
@@ -190,7 +192,8 @@ class Transition(_Message):
             return Transition(id_2, label)
         except _FAULTS:
             return _explain(data, Transition)
-_t2 = _Template("I B I $ B I $ B I $", -4)
+_t2 = _Template("I B I $ B I $ B", -4, 4)
+_t3 = _Template("I $", None, 4)
 _u2 = _Struct("<I").unpack_from
 
 
@@ -220,8 +223,9 @@ class TransitionDescription(_Message):
             n2, b2 = _texts[start_state.label]
             goal_state = m.goal_state
             n3, b3 = _texts[goal_state.label]
-            p4 = ((n1 + 4 & -4) + n2 + 8 & -4) + n3 + 4
-            return _t2[n1, n2, n3](256, transition.id, n1, b1, start_state.id, n2, b2, goal_state.id, n3, b3)
+            f4, p5 = _t2[n1, n2]
+            f6, p7 = _t3[p5, n3]
+            return b"".join((f4(256, transition.id, n1, b1, start_state.id, n2, b2, goal_state.id), f6(n3, b3)))
         except _FAULTS:
             return _plain(m, TransitionDescription)
 
@@ -248,7 +252,8 @@ class TransitionDescription(_Message):
             return TransitionDescription(Transition(id_2, label), State(id_3, label_2), State(id_4, label_3))
         except _FAULTS:
             return _explain(data, TransitionDescription)
-_t3 = _Template("I Q B I $ B I $ B I $", -4)
+_t4 = _Template("I Q B I $ B I $ B", -4, 8)
+_t5 = _Template("I $", None, 8)
 _u3 = _Struct("<IQB3xI").unpack_from
 
 
@@ -280,8 +285,9 @@ class TransitionEvent(_Message):
             n2, b2 = _texts[start_state.label]
             goal_state = m.goal_state
             n3, b3 = _texts[goal_state.label]
-            p4 = ((n1 + 4 & -4) + n2 + 8 & -4) + n3 + 4
-            return _t3[n1, n2, n3](256, m.timestamp, transition.id, n1, b1, start_state.id, n2, b2, goal_state.id, n3, b3)
+            f4, p5 = _t4[n1, n2]
+            f6, p7 = _t5[p5, n3]
+            return b"".join((f4(256, m.timestamp, transition.id, n1, b1, start_state.id, n2, b2, goal_state.id), f6(n3, b3)))
         except _FAULTS:
             return _plain(m, TransitionEvent)
 

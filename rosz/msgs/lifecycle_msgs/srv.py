@@ -31,7 +31,7 @@ __all__ = (
     "GetStateRequest",
     "GetStateResponse",
 )
-_t1 = _Template("I B I $", -4)
+_t1 = _Template("I B I $", -4, 4)
 _u1 = _Struct("<IB3xI").unpack_from
 
 
@@ -53,7 +53,8 @@ class ChangeStateRequest(_Message):
         try:
             transition = m.transition
             n1, b1 = _texts[transition.label]
-            return _t1[n1](256, transition.id, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, transition.id, n1, b1)
         except _FAULTS:
             return _plain(m, ChangeStateRequest)
 
@@ -68,7 +69,7 @@ class ChangeStateRequest(_Message):
             return ChangeStateRequest(Transition(id_2, label))
         except _FAULTS:
             return _explain(data, ChangeStateRequest)
-_p1 = _Struct("<I?").pack
+_t2 = _Template("I ?", -4)
 _u2 = _Struct("<I?").unpack_from
 
 
@@ -84,7 +85,7 @@ class ChangeStateResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.success)
+            return _t2[0](256, m.success)
         except _FAULTS:
             return _plain(m, ChangeStateResponse)
 
@@ -112,7 +113,7 @@ class ChangeState(_Service):
         "---\n"
         "bool success\n"
     )
-_p2 = _Struct("<Ix").pack
+_t3 = _Template("I x", -4)
 _u3 = _Struct("<Ix").unpack_from
 
 
@@ -127,7 +128,7 @@ class GetAvailableStatesRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256)
+            return _t3[0](256)
         except _FAULTS:
             return _plain(m, GetAvailableStatesRequest)
 
@@ -139,8 +140,8 @@ class GetAvailableStatesRequest(_Message):
             return GetAvailableStatesRequest()
         except _FAULTS:
             return _explain(data, GetAvailableStatesRequest)
-_p3 = _Struct("<2I").pack
-_t2 = _Template("B I $", None)
+_p1 = _Struct("<2I").pack
+_t4 = _Template("B I $", None, 4)
 _u4 = _Struct("<2I").unpack_from
 _u5 = _Struct("<I").unpack_from
 
@@ -159,12 +160,13 @@ class GetAvailableStatesResponse(_Message):
         try:
             available_states = m.available_states
             n1 = len(available_states)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
+            p2 = 0
             for available_states_one in available_states:
                 n3, b3 = _texts[available_states_one.label]
-                out.append(_t2[p2 & 7, n3](available_states_one.id, n3, b3))
-                p2 = (p2 + 4 & -4) + n3 + 4
+                f4, p5 = _t4[p2, n3]
+                out.append(f4(available_states_one.id, n3, b3))
+                p2 = p5
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetAvailableStatesResponse)
@@ -215,7 +217,7 @@ class GetAvailableTransitionsRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256)
+            return _t3[0](256)
         except _FAULTS:
             return _plain(m, GetAvailableTransitionsRequest)
 
@@ -227,7 +229,8 @@ class GetAvailableTransitionsRequest(_Message):
             return GetAvailableTransitionsRequest()
         except _FAULTS:
             return _explain(data, GetAvailableTransitionsRequest)
-_t3 = _Template("B I $ B I $ B I $", None)
+_t5 = _Template("B I $ B I $ B", None, 4)
+_t6 = _Template("I $", None, 4)
 
 
 class GetAvailableTransitionsResponse(_Message):
@@ -244,18 +247,19 @@ class GetAvailableTransitionsResponse(_Message):
         try:
             available_transitions = m.available_transitions
             n1 = len(available_transitions)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
+            p2 = 0
             for available_transitions_one in available_transitions:
                 transition = available_transitions_one.transition
                 n3, b3 = _texts[transition.label]
                 start_state = available_transitions_one.start_state
                 n4, b4 = _texts[start_state.label]
-                p5 = ((p2 + 4 & -4) + n3 + 8 & -4) + n4 + 4
                 goal_state = available_transitions_one.goal_state
-                n6, b6 = _texts[goal_state.label]
-                out.append(_t3[p2 & 7, n3, n4, n6](transition.id, n3, b3, start_state.id, n4, b4, goal_state.id, n6, b6))
-                p2 = (p5 + 4 & -4) + n6 + 4
+                n5, b5 = _texts[goal_state.label]
+                f6, p7 = _t5[p2, n3, n4]
+                f8, p9 = _t6[p7, n5]
+                out += (f6(transition.id, n3, b3, start_state.id, n4, b4, goal_state.id), f8(n5, b5))
+                p2 = p9
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetAvailableTransitionsResponse)
@@ -318,7 +322,7 @@ class GetStateRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256)
+            return _t3[0](256)
         except _FAULTS:
             return _plain(m, GetStateRequest)
 
@@ -346,7 +350,8 @@ class GetStateResponse(_Message):
         try:
             current_state = m.current_state
             n1, b1 = _texts[current_state.label]
-            return _t1[n1](256, current_state.id, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, current_state.id, n1, b1)
         except _FAULTS:
             return _plain(m, GetStateResponse)
 

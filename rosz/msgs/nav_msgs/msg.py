@@ -46,7 +46,7 @@ __all__ = (
     "Odometry",
     "Path",
 )
-_p1 = _Struct("<Ix").pack
+_t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
 
@@ -61,7 +61,7 @@ class GetMapGoal(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, GetMapGoal)
 
@@ -73,7 +73,7 @@ class GetMapGoal(_Message):
             return GetMapGoal()
         except _FAULTS:
             return _explain(data, GetMapGoal)
-_t1 = _Template("I i I I $ i I I $ x", -4)
+_t2 = _Template("I i I I $ i I I $ x", -4, 4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 
@@ -107,7 +107,8 @@ class GetMapActionGoal(_Message):
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
             goal = m.goal
-            return _t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2)
+            f3, p4 = _t2[n1, n2]
+            return f3(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2)
         except _FAULTS:
             return _plain(m, GetMapActionGoal)
 
@@ -127,7 +128,7 @@ class GetMapActionGoal(_Message):
             return GetMapActionGoal(Header(Time(sec, nanosec), frame_id), GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal())
         except _FAULTS:
             return _explain(data, GetMapActionGoal)
-_p2 = _Struct("<IiIf2I4x7d").pack
+_p1 = _Struct("<IiIf2I4x7d").pack
 _u4 = _Struct("<IiIf2I4x7d").unpack_from
 
 
@@ -159,7 +160,7 @@ class MapMetaData(_Message):
             origin = m.origin
             position = origin.position
             orientation = origin.orientation
-            return _p2(256, map_load_time.sec, map_load_time.nanosec, m.resolution, m.width, m.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
+            return _p1(256, map_load_time.sec, map_load_time.nanosec, m.resolution, m.width, m.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
         except _FAULTS:
             return _plain(m, MapMetaData)
 
@@ -172,7 +173,7 @@ class MapMetaData(_Message):
         except _FAULTS:
             return _explain(data, MapMetaData)
 _d1 = _empty("b")
-_t2 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
+_t3 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
 _u5 = _Struct("<iIf2I").unpack_from
 _u6 = _Struct("<7dI").unpack_from
 
@@ -211,7 +212,7 @@ class OccupancyGrid(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
+            return b"".join((_t3[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
         except _FAULTS:
             return _plain(m, OccupancyGrid)
 
@@ -264,7 +265,7 @@ class GetMapResult(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
+            return b"".join((_t3[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
         except _FAULTS:
             return _plain(m, GetMapResult)
 
@@ -286,7 +287,9 @@ class GetMapResult(_Message):
             return GetMapResult(OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2))
         except _FAULTS:
             return _explain(data, GetMapResult)
-_t3 = _Template("I i I I $ i I I $ B I $ i I I $ i I f I I d d d d d d d I", -4)
+_t4 = _Template("I i I I $ i I I $ B", -4, 8)
+_t5 = _Template("I $ i I", None, 8)
+_t6 = _Template("I $ i I f I I d d d d d d d I", None)
 _u7 = _Struct("<I").unpack_from
 
 
@@ -322,12 +325,13 @@ class GetMapActionResult(_Message):
             b3 = status.text.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            p4 = ((n1 + 7 & -4) + n2 + 16 & -4) + n3 + 4
+            f4, p5 = _t4[n1, n2]
             result = m.result
             map_2 = result.map
             header_2 = map_2.header
             stamp_3 = header_2.stamp
-            n5, b5 = _texts[header_2.frame_id]
+            n6, b6 = _texts[header_2.frame_id]
+            f7, p8 = _t5[p5, n3]
             info = map_2.info
             map_load_time = info.map_load_time
             origin = info.origin
@@ -336,8 +340,8 @@ class GetMapActionResult(_Message):
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
-            n6 = len(data_2)
-            return b"".join((_t3[n1, n2, n3, n5](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, status.status, n3, b3, stamp_3.sec, stamp_3.nanosec, n5, b5, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n6), data_2))
+            n9 = len(data_2)
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, status.status), f7(n3, b3, stamp_3.sec, stamp_3.nanosec), _t6[p8, n6](n6, b6, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n9), data_2))
         except _FAULTS:
             return _plain(m, GetMapActionResult)
 
@@ -388,7 +392,7 @@ class GetMapFeedback(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, GetMapFeedback)
 
@@ -400,7 +404,8 @@ class GetMapFeedback(_Message):
             return GetMapFeedback()
         except _FAULTS:
             return _explain(data, GetMapFeedback)
-_t4 = _Template("I i I I $ i I I $ B I $ x", -4)
+_t7 = _Template("I i I I $ i I I $ B", -4, 4)
+_t8 = _Template("I $ x", None, 4)
 
 
 class GetMapActionFeedback(_Message):
@@ -435,9 +440,10 @@ class GetMapActionFeedback(_Message):
             b3 = status.text.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            p4 = ((n1 + 7 & -4) + n2 + 16 & -4) + n3 + 4
+            f4, p5 = _t7[n1, n2]
             feedback = m.feedback
-            return _t4[n1, n2, n3](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, status.status, n3, b3)
+            f6, p7 = _t8[p5, n3]
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, status.status), f6(n3, b3)))
         except _FAULTS:
             return _plain(m, GetMapActionFeedback)
 
@@ -463,9 +469,10 @@ class GetMapActionFeedback(_Message):
             return GetMapActionFeedback(Header(Time(sec, nanosec), frame_id), GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text), GetMapFeedback())
         except _FAULTS:
             return _explain(data, GetMapActionFeedback)
-_t5 = _Template("I i I I $ i I I $ x i I I $ i I I $ B", -4)
-_t6 = _Template("I $ i I I $ i I f I I d d d d d d d I", None)
-_t7 = _Template("i I I $ i I I $ B I $ x", None)
+_t9 = _Template("I i I I $ i I I $ x i I", -4, 8)
+_t10 = _Template("I $ i I I $ B", None, 8)
+_t11 = _Template("i I I $ i I I $ B", None, 8)
+_t12 = _Template("I $ x", None, 8)
 
 
 class GetMapAction(_Message):
@@ -502,22 +509,23 @@ class GetMapAction(_Message):
             header_2 = action_result.header
             stamp_3 = header_2.stamp
             n3, b3 = _texts[header_2.frame_id]
-            p4 = ((n1 + 7 & -4) + n2 + 16 & -4) + n3 + 4
+            f4, p5 = _t9[n1, n2]
             status = action_result.status
             goal_id_2 = status.goal_id
             stamp_4 = goal_id_2.stamp
-            b5 = goal_id_2.id.encode()
-            if 0 in b5: raise ValueError
-            n5 = len(b5) + 1
-            b6 = status.text.encode()
+            b6 = goal_id_2.id.encode()
             if 0 in b6: raise ValueError
             n6 = len(b6) + 1
-            p7 = ((p4 + 3 & -4) + n5 + 16 & -4) + n6 + 4
+            b7 = status.text.encode()
+            if 0 in b7: raise ValueError
+            n7 = len(b7) + 1
+            f8, p9 = _t10[p5, n3, n6]
             result = action_result.result
             map_2 = result.map
             header_3 = map_2.header
             stamp_5 = header_3.stamp
-            n8, b8 = _texts[header_3.frame_id]
+            n10, b10 = _texts[header_3.frame_id]
+            f11, p12 = _t5[p9, n7]
             info = map_2.info
             map_load_time = info.map_load_time
             origin = info.origin
@@ -526,23 +534,24 @@ class GetMapAction(_Message):
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
-            n9 = len(data_2)
+            n13 = len(data_2)
             action_feedback = m.action_feedback
             header_4 = action_feedback.header
             stamp_6 = header_4.stamp
-            n10, b10 = _texts[header_4.frame_id]
+            n14, b14 = _texts[header_4.frame_id]
             status_2 = action_feedback.status
             goal_id_3 = status_2.goal_id
             stamp_7 = goal_id_3.stamp
-            p11 = ((n9 + 7 & -4) + n10 + 15 & -4) + 4
-            b12 = goal_id_3.id.encode()
-            if 0 in b12: raise ValueError
-            n12 = len(b12) + 1
-            b13 = status_2.text.encode()
-            if 0 in b13: raise ValueError
-            n13 = len(b13) + 1
+            b15 = goal_id_3.id.encode()
+            if 0 in b15: raise ValueError
+            n15 = len(b15) + 1
+            b16 = status_2.text.encode()
+            if 0 in b16: raise ValueError
+            n16 = len(b16) + 1
+            f17, p18 = _t11[n13 + 4 & 7, n14, n15]
             feedback = action_feedback.feedback
-            return b"".join((_t5[n1, n2, n3, n5](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, stamp_3.sec, stamp_3.nanosec, n3, b3, stamp_4.sec, stamp_4.nanosec, n5, b5, status.status), _t6[(p4 + 3 & -4) + n5 + 5 & 7, n6, n8](n6, b6, stamp_5.sec, stamp_5.nanosec, n8, b8, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n9), data_2, _t7[n9 + 4 & 7, n10, n12, n13](stamp_6.sec, stamp_6.nanosec, n10, b10, stamp_7.sec, stamp_7.nanosec, n12, b12, status_2.status, n13, b13)))
+            f19, p20 = _t12[p18, n16]
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, stamp_3.sec, stamp_3.nanosec), f8(n3, b3, stamp_4.sec, stamp_4.nanosec, n6, b6, status.status), f11(n7, b7, stamp_5.sec, stamp_5.nanosec), _t6[p12, n10](n10, b10, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n13), data_2, f17(stamp_6.sec, stamp_6.nanosec, n14, b14, stamp_7.sec, stamp_7.nanosec, n15, b15, status_2.status), f19(n16, b16)))
         except _FAULTS:
             return _plain(m, GetMapAction)
 
@@ -606,8 +615,8 @@ class GetMapAction(_Message):
             return GetMapAction(GetMapActionGoal(Header(Time(sec, nanosec), frame_id), GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal()), GetMapActionResult(Header(Time(sec_3, nanosec_3), frame_id_2), GoalStatus(GoalID(Time(sec_4, nanosec_4), id_3), status, text), GetMapResult(OccupancyGrid(Header(Time(sec_5, nanosec_5), frame_id_3), MapMetaData(Time(sec_6, nanosec_6), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2))), GetMapActionFeedback(Header(Time(sec_7, nanosec_7), frame_id_4), GoalStatus(GoalID(Time(sec_8, nanosec_8), id_4), status_2, text_2), GetMapFeedback()))
         except _FAULTS:
             return _explain(data, GetMapAction)
-_t8 = _Template("I i I I $ f f I", -4)
-_p3 = _Struct("<3d").pack
+_t13 = _Template("I i I I $ f f I", -4, 8)
+_p2 = _Struct("<3d").pack
 _u8 = _Struct("<2fI").unpack_from
 _i1 = _Struct("<3d").iter_unpack
 
@@ -639,8 +648,9 @@ class GridCells(_Message):
             n1, b1 = _texts[header.frame_id]
             cells = m.cells
             n2 = len(cells)
-            p3 = 0 if n2 else (n1 + 7 & -4) + 4
-            return b"".join((_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.cell_width, m.cell_height, n2), (_PADDING[-((n1 + 7 & -4) + 4) & 7] if n2 else b""), b"".join([_p3(e.x, e.y, e.z) for e in cells])))
+            f3, p4 = _t13[n1]
+            p5 = 0 if n2 else p4
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, m.cell_width, m.cell_height, n2), (_PADDING[-(p4) & 7] if n2 else b""), b"".join([_p2(e.x, e.y, e.z) for e in cells])))
         except _FAULTS:
             return _plain(m, GridCells)
 
@@ -660,8 +670,8 @@ class GridCells(_Message):
             return GridCells(Header(Time(sec, nanosec), frame_id), cell_width, cell_height, cells)
         except _FAULTS:
             return _explain(data, GridCells)
-_t9 = _Template("I i I I $ I $ d d d d d d d", -4)
-_p4 = _Struct("<6d").pack
+_t14 = _Template("I i I I $ I $ d d d d d d d", -4)
+_p3 = _Struct("<6d").pack
 _u9 = _Struct("<7d").unpack_from
 _u10 = _Struct("<6d").unpack_from
 
@@ -706,7 +716,7 @@ class Odometry(_Message):
             covariance_2 = twist.covariance
             if type(covariance_2) is not _array or covariance_2.typecode != "d" or len(covariance_2) != 36:
                 covariance_2 = _numbers(covariance_2, "d", 36)
-            return b"".join((_t9[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w), covariance, _p4(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance_2))
+            return b"".join((_t14[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w), covariance, _p3(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance_2))
         except _FAULTS:
             return _plain(m, Odometry)
 
@@ -735,8 +745,8 @@ class Odometry(_Message):
             return Odometry(Header(Time(sec, nanosec), frame_id), child_frame_id, PoseWithCovariance(Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), covariance), TwistWithCovariance(Twist(Vector3(x_4, y_4, z_4), Vector3(x_5, y_5, z_5)), covariance_2))
         except _FAULTS:
             return _explain(data, Odometry)
-_t10 = _Template("I i I I $ I", -4)
-_t11 = _Template("i I I $ d d d d d d d", None)
+_t15 = _Template("I i I I $ I", -4, 8)
+_t16 = _Template("i I I $ d d d d d d d", None)
 
 
 class Path(_Message):
@@ -762,17 +772,18 @@ class Path(_Message):
             n1, b1 = _texts[header.frame_id]
             poses = m.poses
             n2 = len(poses)
-            out = [_t10[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            f3, p4 = _t15[n1]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p5 = p4
             for poses_one in poses:
                 header_2 = poses_one.header
                 stamp_2 = header_2.stamp
-                n4, b4 = _texts[header_2.frame_id]
+                n6, b6 = _texts[header_2.frame_id]
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t11[p3 & 7, n4](stamp_2.sec, stamp_2.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w))
-                p3 = 0
+                out.append(_t16[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w))
+                p5 = 0
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Path)

@@ -42,7 +42,7 @@ __all__ = (
     "SetMapRequest",
     "SetMapResponse",
 )
-_p1 = _Struct("<Ix").pack
+_t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
 
@@ -57,7 +57,7 @@ class GetMapRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, GetMapRequest)
 
@@ -69,7 +69,7 @@ class GetMapRequest(_Message):
             return GetMapRequest()
         except _FAULTS:
             return _explain(data, GetMapRequest)
-_t1 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
+_t2 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<iIf2I").unpack_from
 _u4 = _Struct("<7dI").unpack_from
@@ -100,7 +100,7 @@ class GetMapResponse(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
+            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
         except _FAULTS:
             return _plain(m, GetMapResponse)
 
@@ -136,7 +136,7 @@ class GetMap(_Service):
         "---\n"
         "OccupancyGrid map\n"
     )
-_t2 = _Template("I i I I $ d d d d d d d i I I $ d d d d d d d f", -4)
+_t3 = _Template("I i I I $ d d d d d d d i I I $ d d d d d d d f", -4)
 _u5 = _Struct("<7di2I").unpack_from
 _u6 = _Struct("<7df").unpack_from
 
@@ -175,7 +175,7 @@ class GetPlanRequest(_Message):
             pose_2 = goal.pose
             position_2 = pose_2.position
             orientation_2 = pose_2.orientation
-            return _t2[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, stamp_2.sec, stamp_2.nanosec, n2, b2, position_2.x, position_2.y, position_2.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, m.tolerance)
+            return _t3[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, stamp_2.sec, stamp_2.nanosec, n2, b2, position_2.x, position_2.y, position_2.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, m.tolerance)
         except _FAULTS:
             return _plain(m, GetPlanRequest)
 
@@ -196,8 +196,8 @@ class GetPlanRequest(_Message):
             return GetPlanRequest(PoseStamped(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2), Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3))), tolerance)
         except _FAULTS:
             return _explain(data, GetPlanRequest)
-_t3 = _Template("I i I I $ I", -4)
-_t4 = _Template("i I I $ d d d d d d d", None)
+_t4 = _Template("I i I I $ I", -4, 8)
+_t5 = _Template("i I I $ d d d d d d d", None)
 _u7 = _Struct("<I").unpack_from
 _u8 = _Struct("<i2I").unpack_from
 _u9 = _Struct("<7d").unpack_from
@@ -221,17 +221,18 @@ class GetPlanResponse(_Message):
             n1, b1 = _texts[header.frame_id]
             poses = plan.poses
             n2 = len(poses)
-            out = [_t3[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            f3, p4 = _t4[n1]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p5 = p4
             for poses_one in poses:
                 header_2 = poses_one.header
                 stamp_2 = header_2.stamp
-                n4, b4 = _texts[header_2.frame_id]
+                n6, b6 = _texts[header_2.frame_id]
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t4[p3 & 7, n4](stamp_2.sec, stamp_2.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w))
-                p3 = 0
+                out.append(_t5[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w))
+                p5 = 0
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetPlanResponse)
@@ -278,7 +279,7 @@ class GetPlan(_Service):
         "---\n"
         "Path plan  # empty if there is none\n"
     )
-_t5 = _Template("I I $", -4)
+_t6 = _Template("I I $", -4, 4)
 _u10 = _Struct("<2I").unpack_from
 
 
@@ -301,7 +302,8 @@ class LoadMapRequest(_Message):
             b1 = m.map_url.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t5[n1](256, n1, b1)
+            f2, p3 = _t6[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, LoadMapRequest)
 
@@ -316,7 +318,7 @@ class LoadMapRequest(_Message):
             return LoadMapRequest(map_url)
         except _FAULTS:
             return _explain(data, LoadMapRequest)
-_p2 = _Struct("<B").pack
+_p1 = _Struct("<B").pack
 
 
 class LoadMapResponse(_Message):
@@ -359,7 +361,7 @@ class LoadMapResponse(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2, _p2(m.result)))
+            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2, _p1(m.result)))
         except _FAULTS:
             return _plain(m, LoadMapResponse)
 
@@ -448,7 +450,7 @@ class SetMapRequest(_Message):
             covariance = pose.covariance
             if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2, _t4[n2 + 4 & 7, n3](stamp_2.sec, stamp_2.nanosec, n3, b3, position_2.x, position_2.y, position_2.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w), covariance))
+            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2, _t5[n2 + 4 & 7, n3](stamp_2.sec, stamp_2.nanosec, n3, b3, position_2.x, position_2.y, position_2.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w), covariance))
         except _FAULTS:
             return _plain(m, SetMapRequest)
 
@@ -480,7 +482,7 @@ class SetMapRequest(_Message):
             return SetMapRequest(OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2), PoseWithCovarianceStamped(Header(Time(sec_3, nanosec_3), frame_id_2), PoseWithCovariance(Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)), covariance)))
         except _FAULTS:
             return _explain(data, SetMapRequest)
-_p3 = _Struct("<I?").pack
+_t7 = _Template("I ?", -4)
 _u11 = _Struct("<I?").unpack_from
 
 
@@ -496,7 +498,7 @@ class SetMapResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256, m.success)
+            return _t7[0](256, m.success)
         except _FAULTS:
             return _plain(m, SetMapResponse)
 

@@ -146,11 +146,11 @@ class ListParametersResult(_Message):
         try:
             names, k = m.names, _s1.written
             b1 = k[1] if names == k[0] else _s1.put(names)
-            n2 = len(b1)
+            n1 = len(b1)
             prefixes, k = m.prefixes, _s2.written
-            b3 = k[1] if prefixes == k[0] else _s2.put(prefixes)
-            n4 = len(b3)
-            return b"".join((_p3(256), b1, _t1[n2 & 7](), b3))
+            b2 = k[1] if prefixes == k[0] else _s2.put(prefixes)
+            n2 = len(b2)
+            return b"".join((_p3(256), b1, _t1[n1 & 3](), b2))
         except _FAULTS:
             return _plain(m, ListParametersResult)
 
@@ -175,7 +175,8 @@ class ListParametersResult(_Message):
             return ListParametersResult(names, prefixes)
         except _FAULTS:
             return _explain(data, ListParametersResult)
-_t2 = _Template("I i I B I $ I $ I $ I $ I", -4)
+_t2 = _Template("I i I B I $ I $", -4, 4)
+_t3 = _Template("I $ I $ I", None)
 _u4 = _Struct("<IiIB3xI").unpack_from
 
 
@@ -223,14 +224,10 @@ class Log(_Message):
             b2 = m.msg.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            b3 = m.file.encode()
-            if 0 in b3: raise ValueError
-            n3 = len(b3) + 1
-            p4 = ((n1 + 3 & -4) + n2 + 7 & -4) + n3 + 4
-            b5 = m.function.encode()
-            if 0 in b5: raise ValueError
-            n5 = len(b5) + 1
-            return _t2[n1, n2, n3, n5](256, stamp.sec, stamp.nanosec, m.level, n1, b1, n2, b2, n3, b3, n5, b5, m.line)
+            n3, b3 = _texts[m.file]
+            f4, p5 = _t2[n1, n2]
+            n6, b6 = _texts[m.function]
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, m.level, n1, b1, n2, b2), _t3[p5, n3, n6](n3, b3, n6, b6, m.line)))
         except _FAULTS:
             return _plain(m, Log)
 
@@ -261,7 +258,7 @@ class Log(_Message):
             return Log(Time(sec, nanosec), level, name, msg, file, function, line)
         except _FAULTS:
             return _explain(data, Log)
-_t3 = _Template("I I $ I", -4)
+_t4 = _Template("I I $ I", -4)
 _u5 = _Struct("<2I").unpack_from
 
 
@@ -297,7 +294,7 @@ class LoggerLevel(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t3[n1](256, n1, b1, m.level)
+            return _t4[n1](256, n1, b1, m.level)
         except _FAULTS:
             return _plain(m, LoggerLevel)
 
@@ -315,8 +312,8 @@ class LoggerLevel(_Message):
             return _explain(data, LoggerLevel)
 _d1 = _empty("q")
 _d2 = _empty("d")
-_t4 = _Template("I B ? q d I $ I", -4)
-_t5 = _Template("I", None)
+_t5 = _Template("I B ? q d I $ I", -4, 8)
+_t6 = _Template("I", None, 8)
 _s3 = _StringList()
 _u6 = _Struct("<IB?6xqdI").unpack_from
 
@@ -363,24 +360,26 @@ class ParameterValue(_Message):
             if type(byte_array_value) is not bytes:
                 byte_array_value = _octets(byte_array_value)
             n2 = len(byte_array_value)
+            f3, p4 = _t5[n1]
             bool_array_value = m.bool_array_value
             bool_array_value = _flags(bool_array_value)
-            n3 = len(bool_array_value)
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + n3 + 4
+            n5 = len(bool_array_value)
+            f6, p7 = _t6[p4 + n2 & 7]
             integer_array_value = m.integer_array_value
             if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
                 integer_array_value = _numbers(integer_array_value, "q")
-            n5 = len(integer_array_value)
-            p6 = 0 if n5 else (p4 + 3 & -4) + 4
+            n8 = len(integer_array_value)
+            f9, p10 = _t6[p7 + n5 & 7]
+            p11 = 0 if n8 else p10
             double_array_value = m.double_array_value
             if type(double_array_value) is not _array or double_array_value.typecode != "d":
                 double_array_value = _numbers(double_array_value, "d")
-            n7 = len(double_array_value)
-            p8 = 0 if n7 else p6 + n5 * 8 + 4
+            n12 = len(double_array_value)
+            p13 = 0 if n12 else p11 + n8 * 8 + 4
             string_array_value, k = m.string_array_value, _s3.written
-            b9 = k[1] if string_array_value == k[0] else _s3.put(string_array_value)
-            n10 = len(b9)
-            return b"".join((_t4[n1](256, m.type, m.bool_value, m.integer_value, m.double_value, n1, b1, n2), byte_array_value, _t5[(n1 + 7 & -4) + n2 + 4 & 7](n3), bool_array_value, _t5[p4 & 7](n5), (_PADDING[-((p4 + 3 & -4) + 4) & 7] if n5 else b""), integer_array_value, _p3(n7), (_PADDING[-(p6 + n5 * 8 + 4) & 7] if n7 else b""), double_array_value, b9))
+            b14 = k[1] if string_array_value == k[0] else _s3.put(string_array_value)
+            n14 = len(b14)
+            return b"".join((f3(256, m.type, m.bool_value, m.integer_value, m.double_value, n1, b1, n2), byte_array_value, f6(n5), bool_array_value, f9(n8), (_PADDING[-(p10) & 7] if n8 else b""), integer_array_value, _p3(n12), (_PADDING[-(p11 + n8 * 8 + 4) & 7] if n12 else b""), double_array_value, b14))
         except _FAULTS:
             return _plain(m, ParameterValue)
 
@@ -420,7 +419,7 @@ class ParameterValue(_Message):
             return ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value)
         except _FAULTS:
             return _explain(data, ParameterValue)
-_t6 = _Template("I I $ B ? q d I $ I", -4)
+_t7 = _Template("I I $ B ? q d I $ I", -4, 8)
 _s4 = _StringList()
 _u7 = _Struct("<B?").unpack_from
 _u8 = _Struct("<qdI").unpack_from
@@ -453,24 +452,26 @@ class Parameter(_Message):
             if type(byte_array_value) is not bytes:
                 byte_array_value = _octets(byte_array_value)
             n3 = len(byte_array_value)
+            f4, p5 = _t7[n1, n2]
             bool_array_value = value.bool_array_value
             bool_array_value = _flags(bool_array_value)
-            n4 = len(bool_array_value)
-            p5 = ((n2 + 7 & -4) + n3 + 7 & -4) + n4 + 4
+            n6 = len(bool_array_value)
+            f7, p8 = _t6[p5 + n3 & 7]
             integer_array_value = value.integer_array_value
             if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
                 integer_array_value = _numbers(integer_array_value, "q")
-            n6 = len(integer_array_value)
-            p7 = 0 if n6 else (p5 + 3 & -4) + 4
+            n9 = len(integer_array_value)
+            f10, p11 = _t6[p8 + n6 & 7]
+            p12 = 0 if n9 else p11
             double_array_value = value.double_array_value
             if type(double_array_value) is not _array or double_array_value.typecode != "d":
                 double_array_value = _numbers(double_array_value, "d")
-            n8 = len(double_array_value)
-            p9 = 0 if n8 else p7 + n6 * 8 + 4
+            n13 = len(double_array_value)
+            p14 = 0 if n13 else p12 + n9 * 8 + 4
             string_array_value, k = value.string_array_value, _s4.written
-            b10 = k[1] if string_array_value == k[0] else _s4.put(string_array_value)
-            n11 = len(b10)
-            return b"".join((_t6[n1, n2](256, n1, b1, value.type, value.bool_value, value.integer_value, value.double_value, n2, b2, n3), byte_array_value, _t5[(n2 + 7 & -4) + n3 + 4 & 7](n4), bool_array_value, _t5[p5 & 7](n6), (_PADDING[-((p5 + 3 & -4) + 4) & 7] if n6 else b""), integer_array_value, _p3(n8), (_PADDING[-(p7 + n6 * 8 + 4) & 7] if n8 else b""), double_array_value, b10))
+            b15 = k[1] if string_array_value == k[0] else _s4.put(string_array_value)
+            n15 = len(b15)
+            return b"".join((f4(256, n1, b1, value.type, value.bool_value, value.integer_value, value.double_value, n2, b2, n3), byte_array_value, f7(n6), bool_array_value, f10(n9), (_PADDING[-(p11) & 7] if n9 else b""), integer_array_value, _p3(n13), (_PADDING[-(p12 + n9 * 8 + 4) & 7] if n13 else b""), double_array_value, b15))
         except _FAULTS:
             return _plain(m, Parameter)
 
@@ -516,7 +517,8 @@ class Parameter(_Message):
             return Parameter(name, ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value))
         except _FAULTS:
             return _explain(data, Parameter)
-_t7 = _Template("I I $ B I $ I $ ? ? I", -4)
+_t8 = _Template("I I $ B I $", -4, 8)
+_t9 = _Template("I $ ? ? I", None, 8)
 _p4 = _Struct("<3d").pack
 _p5 = _Struct("<2qQ").pack
 _u9 = _Struct("<2?").unpack_from
@@ -563,16 +565,17 @@ class ParameterDescriptor(_Message):
             b3 = m.additional_constraints.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            p4 = ((n1 + 8 & -4) + n2 + 7 & -4) + n3 + 4
+            f4, p5 = _t8[n1, n2]
             floating_point_range = m.floating_point_range
-            n5 = len(floating_point_range)
-            if n5 > 1: raise ValueError
-            p6 = 0 if n5 else (p4 + 5 & -4) + 4
+            n6 = len(floating_point_range)
+            if n6 > 1: raise ValueError
+            f7, p8 = _t9[p5, n3]
+            p9 = 0 if n6 else p8
             integer_range = m.integer_range
-            n7 = len(integer_range)
-            if n7 > 1: raise ValueError
-            p8 = 0 if n7 else p6 + n5 * 24 + 4
-            return b"".join((_t7[n1, n2, n3](256, n1, b1, m.type, n2, b2, n3, b3, m.read_only, m.dynamic_typing, n5), (_PADDING[-((p4 + 5 & -4) + 4) & 7] if n5 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p3(n7), (_PADDING[-(p6 + n5 * 24 + 4) & 7] if n7 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range])))
+            n10 = len(integer_range)
+            if n10 > 1: raise ValueError
+            p11 = 0 if n10 else p9 + n6 * 24 + 4
+            return b"".join((f4(256, n1, b1, m.type, n2, b2), f7(n3, b3, m.read_only, m.dynamic_typing, n6), (_PADDING[-(p8) & 7] if n6 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p3(n10), (_PADDING[-(p9 + n6 * 24 + 4) & 7] if n10 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range])))
         except _FAULTS:
             return _plain(m, ParameterDescriptor)
 
@@ -610,8 +613,8 @@ class ParameterDescriptor(_Message):
             return ParameterDescriptor(name, type_2, description, additional_constraints, read_only, dynamic_typing, floating_point_range, integer_range)
         except _FAULTS:
             return _explain(data, ParameterDescriptor)
-_t8 = _Template("I i I I $ I", -4)
-_t9 = _Template("I $ B ? q d I $ I", None)
+_t10 = _Template("I i I I $ I", -4, 8)
+_t11 = _Template("I $ B ? q d I $ I", None, 8)
 _s5 = _StringList()
 _s6 = _StringList()
 _s7 = _StringList()
@@ -647,103 +650,112 @@ class ParameterEvent(_Message):
             n1, b1 = _texts[m.node]
             new_parameters = m.new_parameters
             n2 = len(new_parameters)
-            out = [_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            f3, p4 = _t10[n1]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p5 = p4
             for new_parameters_one in new_parameters:
-                n4, b4 = _texts[new_parameters_one.name]
+                n6, b6 = _texts[new_parameters_one.name]
                 value = new_parameters_one.value
-                b5 = value.string_value.encode()
-                if 0 in b5: raise ValueError
-                n5 = len(b5) + 1
+                b7 = value.string_value.encode()
+                if 0 in b7: raise ValueError
+                n7 = len(b7) + 1
                 byte_array_value = value.byte_array_value
                 if type(byte_array_value) is not bytes:
                     byte_array_value = _octets(byte_array_value)
-                n6 = len(byte_array_value)
+                n8 = len(byte_array_value)
+                f9, p10 = _t11[p5, n6, n7]
                 bool_array_value = value.bool_array_value
                 bool_array_value = _flags(bool_array_value)
-                n7 = len(bool_array_value)
-                p8 = ((n5 + 7 & -4) + n6 + 7 & -4) + n7 + 4
+                n11 = len(bool_array_value)
+                f12, p13 = _t6[p10 + n8 & 7]
                 integer_array_value = value.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
                     integer_array_value = _numbers(integer_array_value, "q")
-                n9 = len(integer_array_value)
-                p10 = 0 if n9 else (p8 + 3 & -4) + 4
+                n14 = len(integer_array_value)
+                f15, p16 = _t6[p13 + n11 & 7]
+                p17 = 0 if n14 else p16
                 double_array_value = value.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
                     double_array_value = _numbers(double_array_value, "d")
-                n11 = len(double_array_value)
-                p12 = 0 if n11 else p10 + n9 * 8 + 4
+                n18 = len(double_array_value)
+                p19 = 0 if n18 else p17 + n14 * 8 + 4
                 string_array_value, k = value.string_array_value, _s5.written
-                b13 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
-                n14 = len(b13)
-                out += (_t9[p3 & 7, n4, n5](n4, b4, value.type, value.bool_value, value.integer_value, value.double_value, n5, b5, n6), byte_array_value, _t5[(n5 + 7 & -4) + n6 + 4 & 7](n7), bool_array_value, _t5[p8 & 7](n9), (_PADDING[-((p8 + 3 & -4) + 4) & 7] if n9 else b""), integer_array_value, _p3(n11), (_PADDING[-(p10 + n9 * 8 + 4) & 7] if n11 else b""), double_array_value, b13)
-                p3 = p12 + n11 * 8 + n14
+                b20 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
+                n20 = len(b20)
+                out += (f9(n6, b6, value.type, value.bool_value, value.integer_value, value.double_value, n7, b7, n8), byte_array_value, f12(n11), bool_array_value, f15(n14), (_PADDING[-(p16) & 7] if n14 else b""), integer_array_value, _p3(n18), (_PADDING[-(p17 + n14 * 8 + 4) & 7] if n18 else b""), double_array_value, b20)
+                p5 = p19 + n18 * 8 + n20 & 7
             changed_parameters = m.changed_parameters
-            n15 = len(changed_parameters)
-            out.append(_t5[p3 & 7](n15))
-            p16 = (p3 + 3 & -4) + 4
+            n21 = len(changed_parameters)
+            f22, p23 = _t6[p5]
+            out.append(f22(n21))
+            p24 = p23
             for changed_parameters_one in changed_parameters:
-                n17, b17 = _texts[changed_parameters_one.name]
+                n25, b25 = _texts[changed_parameters_one.name]
                 value_2 = changed_parameters_one.value
-                b18 = value_2.string_value.encode()
-                if 0 in b18: raise ValueError
-                n18 = len(b18) + 1
+                b26 = value_2.string_value.encode()
+                if 0 in b26: raise ValueError
+                n26 = len(b26) + 1
                 byte_array_value_2 = value_2.byte_array_value
                 if type(byte_array_value_2) is not bytes:
                     byte_array_value_2 = _octets(byte_array_value_2)
-                n19 = len(byte_array_value_2)
+                n27 = len(byte_array_value_2)
+                f28, p29 = _t11[p24, n25, n26]
                 bool_array_value_2 = value_2.bool_array_value
                 bool_array_value_2 = _flags(bool_array_value_2)
-                n20 = len(bool_array_value_2)
-                p21 = ((n18 + 7 & -4) + n19 + 7 & -4) + n20 + 4
+                n30 = len(bool_array_value_2)
+                f31, p32 = _t6[p29 + n27 & 7]
                 integer_array_value_2 = value_2.integer_array_value
                 if type(integer_array_value_2) is not _array or integer_array_value_2.typecode != "q":
                     integer_array_value_2 = _numbers(integer_array_value_2, "q")
-                n22 = len(integer_array_value_2)
-                p23 = 0 if n22 else (p21 + 3 & -4) + 4
+                n33 = len(integer_array_value_2)
+                f34, p35 = _t6[p32 + n30 & 7]
+                p36 = 0 if n33 else p35
                 double_array_value_2 = value_2.double_array_value
                 if type(double_array_value_2) is not _array or double_array_value_2.typecode != "d":
                     double_array_value_2 = _numbers(double_array_value_2, "d")
-                n24 = len(double_array_value_2)
-                p25 = 0 if n24 else p23 + n22 * 8 + 4
+                n37 = len(double_array_value_2)
+                p38 = 0 if n37 else p36 + n33 * 8 + 4
                 string_array_value_2, k = value_2.string_array_value, _s6.written
-                b26 = k[1] if string_array_value_2 == k[0] else _s6.put(string_array_value_2)
-                n27 = len(b26)
-                out += (_t9[p16 & 7, n17, n18](n17, b17, value_2.type, value_2.bool_value, value_2.integer_value, value_2.double_value, n18, b18, n19), byte_array_value_2, _t5[(n18 + 7 & -4) + n19 + 4 & 7](n20), bool_array_value_2, _t5[p21 & 7](n22), (_PADDING[-((p21 + 3 & -4) + 4) & 7] if n22 else b""), integer_array_value_2, _p3(n24), (_PADDING[-(p23 + n22 * 8 + 4) & 7] if n24 else b""), double_array_value_2, b26)
-                p16 = p25 + n24 * 8 + n27
+                b39 = k[1] if string_array_value_2 == k[0] else _s6.put(string_array_value_2)
+                n39 = len(b39)
+                out += (f28(n25, b25, value_2.type, value_2.bool_value, value_2.integer_value, value_2.double_value, n26, b26, n27), byte_array_value_2, f31(n30), bool_array_value_2, f34(n33), (_PADDING[-(p35) & 7] if n33 else b""), integer_array_value_2, _p3(n37), (_PADDING[-(p36 + n33 * 8 + 4) & 7] if n37 else b""), double_array_value_2, b39)
+                p24 = p38 + n37 * 8 + n39 & 7
             deleted_parameters = m.deleted_parameters
-            n28 = len(deleted_parameters)
-            out.append(_t5[p16 & 7](n28))
-            p29 = (p16 + 3 & -4) + 4
+            n40 = len(deleted_parameters)
+            f41, p42 = _t6[p24]
+            out.append(f41(n40))
+            p43 = p42
             for deleted_parameters_one in deleted_parameters:
-                n30, b30 = _texts[deleted_parameters_one.name]
+                n44, b44 = _texts[deleted_parameters_one.name]
                 value_3 = deleted_parameters_one.value
-                b31 = value_3.string_value.encode()
-                if 0 in b31: raise ValueError
-                n31 = len(b31) + 1
+                b45 = value_3.string_value.encode()
+                if 0 in b45: raise ValueError
+                n45 = len(b45) + 1
                 byte_array_value_3 = value_3.byte_array_value
                 if type(byte_array_value_3) is not bytes:
                     byte_array_value_3 = _octets(byte_array_value_3)
-                n32 = len(byte_array_value_3)
+                n46 = len(byte_array_value_3)
+                f47, p48 = _t11[p43, n44, n45]
                 bool_array_value_3 = value_3.bool_array_value
                 bool_array_value_3 = _flags(bool_array_value_3)
-                n33 = len(bool_array_value_3)
-                p34 = ((n31 + 7 & -4) + n32 + 7 & -4) + n33 + 4
+                n49 = len(bool_array_value_3)
+                f50, p51 = _t6[p48 + n46 & 7]
                 integer_array_value_3 = value_3.integer_array_value
                 if type(integer_array_value_3) is not _array or integer_array_value_3.typecode != "q":
                     integer_array_value_3 = _numbers(integer_array_value_3, "q")
-                n35 = len(integer_array_value_3)
-                p36 = 0 if n35 else (p34 + 3 & -4) + 4
+                n52 = len(integer_array_value_3)
+                f53, p54 = _t6[p51 + n49 & 7]
+                p55 = 0 if n52 else p54
                 double_array_value_3 = value_3.double_array_value
                 if type(double_array_value_3) is not _array or double_array_value_3.typecode != "d":
                     double_array_value_3 = _numbers(double_array_value_3, "d")
-                n37 = len(double_array_value_3)
-                p38 = 0 if n37 else p36 + n35 * 8 + 4
+                n56 = len(double_array_value_3)
+                p57 = 0 if n56 else p55 + n52 * 8 + 4
                 string_array_value_3, k = value_3.string_array_value, _s7.written
-                b39 = k[1] if string_array_value_3 == k[0] else _s7.put(string_array_value_3)
-                n40 = len(b39)
-                out += (_t9[p29 & 7, n30, n31](n30, b30, value_3.type, value_3.bool_value, value_3.integer_value, value_3.double_value, n31, b31, n32), byte_array_value_3, _t5[(n31 + 7 & -4) + n32 + 4 & 7](n33), bool_array_value_3, _t5[p34 & 7](n35), (_PADDING[-((p34 + 3 & -4) + 4) & 7] if n35 else b""), integer_array_value_3, _p3(n37), (_PADDING[-(p36 + n35 * 8 + 4) & 7] if n37 else b""), double_array_value_3, b39)
-                p29 = p38 + n37 * 8 + n40
+                b58 = k[1] if string_array_value_3 == k[0] else _s7.put(string_array_value_3)
+                n58 = len(b58)
+                out += (f47(n44, b44, value_3.type, value_3.bool_value, value_3.integer_value, value_3.double_value, n45, b45, n46), byte_array_value_3, f50(n49), bool_array_value_3, f53(n52), (_PADDING[-(p54) & 7] if n52 else b""), integer_array_value_3, _p3(n56), (_PADDING[-(p55 + n52 * 8 + 4) & 7] if n56 else b""), double_array_value_3, b58)
+                p43 = p57 + n56 * 8 + n58 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ParameterEvent)
@@ -886,7 +898,7 @@ class ParameterEvent(_Message):
         except _FAULTS:
             return _explain(data, ParameterEvent)
 _p6 = _Struct("<2I").pack
-_t10 = _Template("I $ B I $ I $ ? ? I", 0)
+_t12 = _Template("I $ B I $", None, 8)
 
 
 class ParameterEventDescriptors(_Message):
@@ -921,63 +933,66 @@ class ParameterEventDescriptors(_Message):
                 b5 = new_parameters_one.additional_constraints.encode()
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
-                p6 = ((p2 + n3 + 8 & -4) + n4 + 7 & -4) + n5 + 4
+                f6, p7 = _t12[p2, n3, n4]
                 floating_point_range = new_parameters_one.floating_point_range
-                n7 = len(floating_point_range)
-                if n7 > 1: raise ValueError
-                p8 = 0 if n7 else (p6 + 5 & -4) + 4
+                n8 = len(floating_point_range)
+                if n8 > 1: raise ValueError
+                f9, p10 = _t9[p7, n5]
+                p11 = 0 if n8 else p10
                 integer_range = new_parameters_one.integer_range
-                n9 = len(integer_range)
-                if n9 > 1: raise ValueError
-                p10 = 0 if n9 else p8 + n7 * 24 + 4
-                out += (_t10[n3, n4, n5](n3, b3, new_parameters_one.type, n4, b4, n5, b5, new_parameters_one.read_only, new_parameters_one.dynamic_typing, n7), (_PADDING[-((p6 + 5 & -4) + 4) & 7] if n7 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p3(n9), (_PADDING[-(p8 + n7 * 24 + 4) & 7] if n9 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range]))
-                p2 = p10 + n9 * 24
+                n12 = len(integer_range)
+                if n12 > 1: raise ValueError
+                p13 = 0 if n12 else p11 + n8 * 24 + 4
+                out += (f6(n3, b3, new_parameters_one.type, n4, b4), f9(n5, b5, new_parameters_one.read_only, new_parameters_one.dynamic_typing, n8), (_PADDING[-(p10) & 7] if n8 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p3(n12), (_PADDING[-(p11 + n8 * 24 + 4) & 7] if n12 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range]))
+                p2 = p13 + n12 * 24 & 7
             changed_parameters = m.changed_parameters
-            n11 = len(changed_parameters)
-            out.append(_p3(n11))
-            p12 = p2 + 4
+            n14 = len(changed_parameters)
+            out.append(_p3(n14))
+            p15 = p2 + 4 & 7
             for changed_parameters_one in changed_parameters:
-                n13, b13 = _texts[changed_parameters_one.name]
-                b14 = changed_parameters_one.description.encode()
-                if 0 in b14: raise ValueError
-                n14 = len(b14) + 1
-                b15 = changed_parameters_one.additional_constraints.encode()
-                if 0 in b15: raise ValueError
-                n15 = len(b15) + 1
-                p16 = ((p12 + n13 + 8 & -4) + n14 + 7 & -4) + n15 + 4
+                n16, b16 = _texts[changed_parameters_one.name]
+                b17 = changed_parameters_one.description.encode()
+                if 0 in b17: raise ValueError
+                n17 = len(b17) + 1
+                b18 = changed_parameters_one.additional_constraints.encode()
+                if 0 in b18: raise ValueError
+                n18 = len(b18) + 1
+                f19, p20 = _t12[p15, n16, n17]
                 floating_point_range_2 = changed_parameters_one.floating_point_range
-                n17 = len(floating_point_range_2)
-                if n17 > 1: raise ValueError
-                p18 = 0 if n17 else (p16 + 5 & -4) + 4
+                n21 = len(floating_point_range_2)
+                if n21 > 1: raise ValueError
+                f22, p23 = _t9[p20, n18]
+                p24 = 0 if n21 else p23
                 integer_range_2 = changed_parameters_one.integer_range
-                n19 = len(integer_range_2)
-                if n19 > 1: raise ValueError
-                p20 = 0 if n19 else p18 + n17 * 24 + 4
-                out += (_t10[n13, n14, n15](n13, b13, changed_parameters_one.type, n14, b14, n15, b15, changed_parameters_one.read_only, changed_parameters_one.dynamic_typing, n17), (_PADDING[-((p16 + 5 & -4) + 4) & 7] if n17 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range_2]), _p3(n19), (_PADDING[-(p18 + n17 * 24 + 4) & 7] if n19 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_2]))
-                p12 = p20 + n19 * 24
+                n25 = len(integer_range_2)
+                if n25 > 1: raise ValueError
+                p26 = 0 if n25 else p24 + n21 * 24 + 4
+                out += (f19(n16, b16, changed_parameters_one.type, n17, b17), f22(n18, b18, changed_parameters_one.read_only, changed_parameters_one.dynamic_typing, n21), (_PADDING[-(p23) & 7] if n21 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range_2]), _p3(n25), (_PADDING[-(p24 + n21 * 24 + 4) & 7] if n25 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_2]))
+                p15 = p26 + n25 * 24 & 7
             deleted_parameters = m.deleted_parameters
-            n21 = len(deleted_parameters)
-            out.append(_p3(n21))
-            p22 = p12 + 4
+            n27 = len(deleted_parameters)
+            out.append(_p3(n27))
+            p28 = p15 + 4 & 7
             for deleted_parameters_one in deleted_parameters:
-                n23, b23 = _texts[deleted_parameters_one.name]
-                b24 = deleted_parameters_one.description.encode()
-                if 0 in b24: raise ValueError
-                n24 = len(b24) + 1
-                b25 = deleted_parameters_one.additional_constraints.encode()
-                if 0 in b25: raise ValueError
-                n25 = len(b25) + 1
-                p26 = ((p22 + n23 + 8 & -4) + n24 + 7 & -4) + n25 + 4
+                n29, b29 = _texts[deleted_parameters_one.name]
+                b30 = deleted_parameters_one.description.encode()
+                if 0 in b30: raise ValueError
+                n30 = len(b30) + 1
+                b31 = deleted_parameters_one.additional_constraints.encode()
+                if 0 in b31: raise ValueError
+                n31 = len(b31) + 1
+                f32, p33 = _t12[p28, n29, n30]
                 floating_point_range_3 = deleted_parameters_one.floating_point_range
-                n27 = len(floating_point_range_3)
-                if n27 > 1: raise ValueError
-                p28 = 0 if n27 else (p26 + 5 & -4) + 4
+                n34 = len(floating_point_range_3)
+                if n34 > 1: raise ValueError
+                f35, p36 = _t9[p33, n31]
+                p37 = 0 if n34 else p36
                 integer_range_3 = deleted_parameters_one.integer_range
-                n29 = len(integer_range_3)
-                if n29 > 1: raise ValueError
-                p30 = 0 if n29 else p28 + n27 * 24 + 4
-                out += (_t10[n23, n24, n25](n23, b23, deleted_parameters_one.type, n24, b24, n25, b25, deleted_parameters_one.read_only, deleted_parameters_one.dynamic_typing, n27), (_PADDING[-((p26 + 5 & -4) + 4) & 7] if n27 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range_3]), _p3(n29), (_PADDING[-(p28 + n27 * 24 + 4) & 7] if n29 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_3]))
-                p22 = p30 + n29 * 24
+                n38 = len(integer_range_3)
+                if n38 > 1: raise ValueError
+                p39 = 0 if n38 else p37 + n34 * 24 + 4
+                out += (f32(n29, b29, deleted_parameters_one.type, n30, b30), f35(n31, b31, deleted_parameters_one.read_only, deleted_parameters_one.dynamic_typing, n34), (_PADDING[-(p36) & 7] if n34 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range_3]), _p3(n38), (_PADDING[-(p37 + n34 * 24 + 4) & 7] if n38 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_3]))
+                p28 = p39 + n38 * 24 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ParameterEventDescriptors)
@@ -1086,7 +1101,7 @@ class ParameterEventDescriptors(_Message):
             return ParameterEventDescriptors(new_parameters, changed_parameters, deleted_parameters)
         except _FAULTS:
             return _explain(data, ParameterEventDescriptors)
-_p7 = _Struct("<Ix").pack
+_t13 = _Template("I x", -4)
 _u11 = _Struct("<Ix").unpack_from
 
 
@@ -1124,7 +1139,7 @@ class ParameterType(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p7(256)
+            return _t13[0](256)
         except _FAULTS:
             return _plain(m, ParameterType)
 
@@ -1136,7 +1151,7 @@ class ParameterType(_Message):
             return ParameterType()
         except _FAULTS:
             return _explain(data, ParameterType)
-_t11 = _Template("I ? I $", -4)
+_t14 = _Template("I ? I $", -4, 4)
 _u12 = _Struct("<I?3xI").unpack_from
 
 
@@ -1161,7 +1176,8 @@ class SetLoggerLevelsResult(_Message):
             b1 = m.reason.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t11[n1](256, m.successful, n1, b1)
+            f2, p3 = _t14[n1]
+            return f2(256, m.successful, n1, b1)
         except _FAULTS:
             return _plain(m, SetLoggerLevelsResult)
 
@@ -1199,7 +1215,8 @@ class SetParametersResult(_Message):
             b1 = m.reason.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t11[n1](256, m.successful, n1, b1)
+            f2, p3 = _t14[n1]
+            return f2(256, m.successful, n1, b1)
         except _FAULTS:
             return _plain(m, SetParametersResult)
 

@@ -82,7 +82,7 @@ class DescribeParametersRequest(_Message):
         try:
             names, k = m.names, _s1.written
             b1 = k[1] if names == k[0] else _s1.put(names)
-            n2 = len(b1)
+            n1 = len(b1)
             return b"".join((_p1(256), b1))
         except _FAULTS:
             return _plain(m, DescribeParametersRequest)
@@ -102,7 +102,8 @@ class DescribeParametersRequest(_Message):
         except _FAULTS:
             return _explain(data, DescribeParametersRequest)
 _p2 = _Struct("<2I").pack
-_t1 = _Template("I $ B I $ I $ ? ? I", 0)
+_t1 = _Template("I $ B I $", None, 8)
+_t2 = _Template("I $ ? ? I", None, 8)
 _p3 = _Struct("<3d").pack
 _p4 = _Struct("<2qQ").pack
 _u2 = _Struct("<2I").unpack_from
@@ -135,17 +136,18 @@ class DescribeParametersResponse(_Message):
                 b5 = descriptors_one.additional_constraints.encode()
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
-                p6 = ((p2 + n3 + 8 & -4) + n4 + 7 & -4) + n5 + 4
+                f6, p7 = _t1[p2, n3, n4]
                 floating_point_range = descriptors_one.floating_point_range
-                n7 = len(floating_point_range)
-                if n7 > 1: raise ValueError
-                p8 = 0 if n7 else (p6 + 5 & -4) + 4
+                n8 = len(floating_point_range)
+                if n8 > 1: raise ValueError
+                f9, p10 = _t2[p7, n5]
+                p11 = 0 if n8 else p10
                 integer_range = descriptors_one.integer_range
-                n9 = len(integer_range)
-                if n9 > 1: raise ValueError
-                p10 = 0 if n9 else p8 + n7 * 24 + 4
-                out += (_t1[n3, n4, n5](n3, b3, descriptors_one.type, n4, b4, n5, b5, descriptors_one.read_only, descriptors_one.dynamic_typing, n7), (_PADDING[-((p6 + 5 & -4) + 4) & 7] if n7 else b""), b"".join([_p3(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p1(n9), (_PADDING[-(p8 + n7 * 24 + 4) & 7] if n9 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in integer_range]))
-                p2 = p10 + n9 * 24
+                n12 = len(integer_range)
+                if n12 > 1: raise ValueError
+                p13 = 0 if n12 else p11 + n8 * 24 + 4
+                out += (f6(n3, b3, descriptors_one.type, n4, b4), f9(n5, b5, descriptors_one.read_only, descriptors_one.dynamic_typing, n8), (_PADDING[-(p10) & 7] if n8 else b""), b"".join([_p3(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p1(n12), (_PADDING[-(p11 + n8 * 24 + 4) & 7] if n12 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in integer_range]))
+                p2 = p13 + n12 * 24 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, DescribeParametersResponse)
@@ -227,7 +229,7 @@ class GetLoggerLevelsRequest(_Message):
         try:
             names, k = m.names, _s2.written
             b1 = k[1] if names == k[0] else _s2.put(names)
-            n2 = len(b1)
+            n1 = len(b1)
             return b"".join((_p1(256), b1))
         except _FAULTS:
             return _plain(m, GetLoggerLevelsRequest)
@@ -246,7 +248,7 @@ class GetLoggerLevelsRequest(_Message):
             return GetLoggerLevelsRequest(names)
         except _FAULTS:
             return _explain(data, GetLoggerLevelsRequest)
-_t2 = _Template("I $ I", 0)
+_t3 = _Template("I $ I", 0)
 
 
 class GetLoggerLevelsResponse(_Message):
@@ -264,11 +266,9 @@ class GetLoggerLevelsResponse(_Message):
             levels = m.levels
             n1 = len(levels)
             out = [_p2(256, n1)]
-            p2 = 4
             for levels_one in levels:
-                n3, b3 = _texts[levels_one.name]
-                out.append(_t2[n3](n3, b3, levels_one.level))
-                p2 = (p2 + n3 + 7 & -4) + 4
+                n2, b2 = _texts[levels_one.name]
+                out.append(_t3[n2](n2, b2, levels_one.level))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetLoggerLevelsResponse)
@@ -330,7 +330,7 @@ class GetParameterTypesRequest(_Message):
         try:
             names, k = m.names, _s3.written
             b1 = k[1] if names == k[0] else _s3.put(names)
-            n2 = len(b1)
+            n1 = len(b1)
             return b"".join((_p1(256), b1))
         except _FAULTS:
             return _plain(m, GetParameterTypesRequest)
@@ -419,7 +419,7 @@ class GetParametersRequest(_Message):
         try:
             names, k = m.names, _s4.written
             b1 = k[1] if names == k[0] else _s4.put(names)
-            n2 = len(b1)
+            n1 = len(b1)
             return b"".join((_p1(256), b1))
         except _FAULTS:
             return _plain(m, GetParametersRequest)
@@ -438,8 +438,8 @@ class GetParametersRequest(_Message):
             return GetParametersRequest(names)
         except _FAULTS:
             return _explain(data, GetParametersRequest)
-_t3 = _Template("B ? q d I $ I", None)
-_t4 = _Template("I", None)
+_t4 = _Template("B ? q d I $ I", None, 8)
+_t5 = _Template("I", None, 8)
 _s5 = _StringList()
 _u4 = _Struct("<B?").unpack_from
 _u5 = _Struct("<qdI").unpack_from
@@ -469,25 +469,27 @@ class GetParametersResponse(_Message):
                 if type(byte_array_value) is not bytes:
                     byte_array_value = _octets(byte_array_value)
                 n4 = len(byte_array_value)
+                f5, p6 = _t4[p2, n3]
                 bool_array_value = values_one.bool_array_value
                 bool_array_value = _flags(bool_array_value)
-                n5 = len(bool_array_value)
-                p6 = ((n3 + 7 & -4) + n4 + 7 & -4) + n5 + 4
+                n7 = len(bool_array_value)
+                f8, p9 = _t5[p6 + n4 & 7]
                 integer_array_value = values_one.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
                     integer_array_value = _numbers(integer_array_value, "q")
-                n7 = len(integer_array_value)
-                p8 = 0 if n7 else (p6 + 3 & -4) + 4
+                n10 = len(integer_array_value)
+                f11, p12 = _t5[p9 + n7 & 7]
+                p13 = 0 if n10 else p12
                 double_array_value = values_one.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
                     double_array_value = _numbers(double_array_value, "d")
-                n9 = len(double_array_value)
-                p10 = 0 if n9 else p8 + n7 * 8 + 4
+                n14 = len(double_array_value)
+                p15 = 0 if n14 else p13 + n10 * 8 + 4
                 string_array_value, k = values_one.string_array_value, _s5.written
-                b11 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
-                n12 = len(b11)
-                out += (_t3[p2 & 7, n3](values_one.type, values_one.bool_value, values_one.integer_value, values_one.double_value, n3, b3, n4), byte_array_value, _t4[(n3 + 7 & -4) + n4 + 4 & 7](n5), bool_array_value, _t4[p6 & 7](n7), (_PADDING[-((p6 + 3 & -4) + 4) & 7] if n7 else b""), integer_array_value, _p1(n9), (_PADDING[-(p8 + n7 * 8 + 4) & 7] if n9 else b""), double_array_value, b11)
-                p2 = p10 + n9 * 8 + n12
+                b16 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
+                n16 = len(b16)
+                out += (f5(values_one.type, values_one.bool_value, values_one.integer_value, values_one.double_value, n3, b3, n4), byte_array_value, f8(n7), bool_array_value, f11(n10), (_PADDING[-(p12) & 7] if n10 else b""), integer_array_value, _p1(n14), (_PADDING[-(p13 + n10 * 8 + 4) & 7] if n14 else b""), double_array_value, b16)
+                p2 = p15 + n14 * 8 + n16 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetParametersResponse)
@@ -553,7 +555,7 @@ class GetParameters(_Service):
         "ParameterValue[] values  # in the order of names; empty if one of them is not declared\n"
     )
 _s6 = _StringList()
-_t5 = _Template("Q", None)
+_t6 = _Template("Q", None)
 _u6 = _Struct("<Q").unpack_from
 
 
@@ -580,8 +582,8 @@ class ListParametersRequest(_Message):
         try:
             prefixes, k = m.prefixes, _s6.written
             b1 = k[1] if prefixes == k[0] else _s6.put(prefixes)
-            n2 = len(b1)
-            return b"".join((_p1(256), b1, _t5[n2 & 7](m.depth)))
+            n1 = len(b1)
+            return b"".join((_p1(256), b1, _t6[n1 & 7](m.depth)))
         except _FAULTS:
             return _plain(m, ListParametersRequest)
 
@@ -603,7 +605,7 @@ class ListParametersRequest(_Message):
             return _explain(data, ListParametersRequest)
 _s7 = _StringList()
 _s8 = _StringList()
-_t6 = _Template("|4", None)
+_t7 = _Template("|4", None)
 
 
 class ListParametersResponse(_Message):
@@ -621,11 +623,11 @@ class ListParametersResponse(_Message):
             result = m.result
             names, k = result.names, _s7.written
             b1 = k[1] if names == k[0] else _s7.put(names)
-            n2 = len(b1)
+            n1 = len(b1)
             prefixes, k = result.prefixes, _s8.written
-            b3 = k[1] if prefixes == k[0] else _s8.put(prefixes)
-            n4 = len(b3)
-            return b"".join((_p1(256), b1, _t6[n2 & 7](), b3))
+            b2 = k[1] if prefixes == k[0] else _s8.put(prefixes)
+            n2 = len(b2)
+            return b"".join((_p1(256), b1, _t7[n1 & 3](), b2))
         except _FAULTS:
             return _plain(m, ListParametersResponse)
 
@@ -690,11 +692,9 @@ class SetLoggerLevelsRequest(_Message):
             levels = m.levels
             n1 = len(levels)
             out = [_p2(256, n1)]
-            p2 = 4
             for levels_one in levels:
-                n3, b3 = _texts[levels_one.name]
-                out.append(_t2[n3](n3, b3, levels_one.level))
-                p2 = (p2 + n3 + 7 & -4) + 4
+                n2, b2 = _texts[levels_one.name]
+                out.append(_t3[n2](n2, b2, levels_one.level))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, SetLoggerLevelsRequest)
@@ -719,7 +719,7 @@ class SetLoggerLevelsRequest(_Message):
             return SetLoggerLevelsRequest(levels)
         except _FAULTS:
             return _explain(data, SetLoggerLevelsRequest)
-_t7 = _Template("? I $", None)
+_t8 = _Template("? I $", None, 4)
 _u7 = _Struct("<?").unpack_from
 
 
@@ -738,13 +738,14 @@ class SetLoggerLevelsResponse(_Message):
             results = m.results
             n1 = len(results)
             out = [_p2(256, n1)]
-            p2 = 4
+            p2 = 0
             for results_one in results:
                 b3 = results_one.reason.encode()
                 if 0 in b3: raise ValueError
                 n3 = len(b3) + 1
-                out.append(_t7[p2 & 7, n3](results_one.successful, n3, b3))
-                p2 = (p2 + 4 & -4) + n3 + 4
+                f4, p5 = _t8[p2, n3]
+                out.append(f4(results_one.successful, n3, b3))
+                p2 = p5
             return b"".join(out)
         except _FAULTS:
             return _plain(m, SetLoggerLevelsResponse)
@@ -784,7 +785,7 @@ class SetLoggerLevels(_Service):
         "---\n"
         "SetLoggerLevelsResult[] results  # in the order of levels\n"
     )
-_t8 = _Template("I $ B ? q d I $ I", None)
+_t9 = _Template("I $ B ? q d I $ I", None, 8)
 _s9 = _StringList()
 
 
@@ -818,25 +819,27 @@ class SetParametersRequest(_Message):
                 if type(byte_array_value) is not bytes:
                     byte_array_value = _octets(byte_array_value)
                 n5 = len(byte_array_value)
+                f6, p7 = _t9[p2, n3, n4]
                 bool_array_value = value.bool_array_value
                 bool_array_value = _flags(bool_array_value)
-                n6 = len(bool_array_value)
-                p7 = ((n4 + 7 & -4) + n5 + 7 & -4) + n6 + 4
+                n8 = len(bool_array_value)
+                f9, p10 = _t5[p7 + n5 & 7]
                 integer_array_value = value.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
                     integer_array_value = _numbers(integer_array_value, "q")
-                n8 = len(integer_array_value)
-                p9 = 0 if n8 else (p7 + 3 & -4) + 4
+                n11 = len(integer_array_value)
+                f12, p13 = _t5[p10 + n8 & 7]
+                p14 = 0 if n11 else p13
                 double_array_value = value.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
                     double_array_value = _numbers(double_array_value, "d")
-                n10 = len(double_array_value)
-                p11 = 0 if n10 else p9 + n8 * 8 + 4
+                n15 = len(double_array_value)
+                p16 = 0 if n15 else p14 + n11 * 8 + 4
                 string_array_value, k = value.string_array_value, _s9.written
-                b12 = k[1] if string_array_value == k[0] else _s9.put(string_array_value)
-                n13 = len(b12)
-                out += (_t8[p2 & 7, n3, n4](n3, b3, value.type, value.bool_value, value.integer_value, value.double_value, n4, b4, n5), byte_array_value, _t4[(n4 + 7 & -4) + n5 + 4 & 7](n6), bool_array_value, _t4[p7 & 7](n8), (_PADDING[-((p7 + 3 & -4) + 4) & 7] if n8 else b""), integer_array_value, _p1(n10), (_PADDING[-(p9 + n8 * 8 + 4) & 7] if n10 else b""), double_array_value, b12)
-                p2 = p11 + n10 * 8 + n13
+                b17 = k[1] if string_array_value == k[0] else _s9.put(string_array_value)
+                n17 = len(b17)
+                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value, value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value, f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value, _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""), double_array_value, b17)
+                p2 = p16 + n15 * 8 + n17 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, SetParametersRequest)
@@ -907,13 +910,14 @@ class SetParametersResponse(_Message):
             results = m.results
             n1 = len(results)
             out = [_p2(256, n1)]
-            p2 = 4
+            p2 = 0
             for results_one in results:
                 b3 = results_one.reason.encode()
                 if 0 in b3: raise ValueError
                 n3 = len(b3) + 1
-                out.append(_t7[p2 & 7, n3](results_one.successful, n3, b3))
-                p2 = (p2 + 4 & -4) + n3 + 4
+                f4, p5 = _t8[p2, n3]
+                out.append(f4(results_one.successful, n3, b3))
+                p2 = p5
             return b"".join(out)
         except _FAULTS:
             return _plain(m, SetParametersResponse)
@@ -986,25 +990,27 @@ class SetParametersAtomicallyRequest(_Message):
                 if type(byte_array_value) is not bytes:
                     byte_array_value = _octets(byte_array_value)
                 n5 = len(byte_array_value)
+                f6, p7 = _t9[p2, n3, n4]
                 bool_array_value = value.bool_array_value
                 bool_array_value = _flags(bool_array_value)
-                n6 = len(bool_array_value)
-                p7 = ((n4 + 7 & -4) + n5 + 7 & -4) + n6 + 4
+                n8 = len(bool_array_value)
+                f9, p10 = _t5[p7 + n5 & 7]
                 integer_array_value = value.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
                     integer_array_value = _numbers(integer_array_value, "q")
-                n8 = len(integer_array_value)
-                p9 = 0 if n8 else (p7 + 3 & -4) + 4
+                n11 = len(integer_array_value)
+                f12, p13 = _t5[p10 + n8 & 7]
+                p14 = 0 if n11 else p13
                 double_array_value = value.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
                     double_array_value = _numbers(double_array_value, "d")
-                n10 = len(double_array_value)
-                p11 = 0 if n10 else p9 + n8 * 8 + 4
+                n15 = len(double_array_value)
+                p16 = 0 if n15 else p14 + n11 * 8 + 4
                 string_array_value, k = value.string_array_value, _s10.written
-                b12 = k[1] if string_array_value == k[0] else _s10.put(string_array_value)
-                n13 = len(b12)
-                out += (_t8[p2 & 7, n3, n4](n3, b3, value.type, value.bool_value, value.integer_value, value.double_value, n4, b4, n5), byte_array_value, _t4[(n4 + 7 & -4) + n5 + 4 & 7](n6), bool_array_value, _t4[p7 & 7](n8), (_PADDING[-((p7 + 3 & -4) + 4) & 7] if n8 else b""), integer_array_value, _p1(n10), (_PADDING[-(p9 + n8 * 8 + 4) & 7] if n10 else b""), double_array_value, b12)
-                p2 = p11 + n10 * 8 + n13
+                b17 = k[1] if string_array_value == k[0] else _s10.put(string_array_value)
+                n17 = len(b17)
+                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value, value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value, f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value, _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""), double_array_value, b17)
+                p2 = p16 + n15 * 8 + n17 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, SetParametersAtomicallyRequest)
@@ -1058,7 +1064,7 @@ class SetParametersAtomicallyRequest(_Message):
             return SetParametersAtomicallyRequest(parameters)
         except _FAULTS:
             return _explain(data, SetParametersAtomicallyRequest)
-_t9 = _Template("I ? I $", -4)
+_t10 = _Template("I ? I $", -4, 4)
 _u8 = _Struct("<I?3xI").unpack_from
 
 
@@ -1078,7 +1084,8 @@ class SetParametersAtomicallyResponse(_Message):
             b1 = result.reason.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t9[n1](256, result.successful, n1, b1)
+            f2, p3 = _t10[n1]
+            return f2(256, result.successful, n1, b1)
         except _FAULTS:
             return _plain(m, SetParametersAtomicallyResponse)
 

@@ -15,7 +15,7 @@ from rosz.message.runtime import texts as _texts
 __all__ = (
     "Logger",
 )
-_t1 = _Template("I I $ I $", -4)
+_t1 = _Template("I I $ I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<I").unpack_from
 
@@ -42,7 +42,8 @@ class Logger(_Message):
             b2 = m.level.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t1[n1, n2](256, n1, b1, n2, b2)
+            f3, p4 = _t1[n1, n2]
+            return f3(256, n1, b1, n2, b2)
         except _FAULTS:
             return _plain(m, Logger)
 

@@ -25,7 +25,7 @@ __all__ = (
     "SetLoggerLevelRequest",
     "SetLoggerLevelResponse",
 )
-_p1 = _Struct("<Ix").pack
+_t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
 
@@ -40,7 +40,7 @@ class EmptyRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, EmptyRequest)
 
@@ -65,7 +65,7 @@ class EmptyResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, EmptyResponse)
 
@@ -103,7 +103,7 @@ class GetLoggersRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, GetLoggersRequest)
 
@@ -115,8 +115,8 @@ class GetLoggersRequest(_Message):
             return GetLoggersRequest()
         except _FAULTS:
             return _explain(data, GetLoggersRequest)
-_p2 = _Struct("<2I").pack
-_t1 = _Template("I $ I $", None)
+_p1 = _Struct("<2I").pack
+_t2 = _Template("I $ I $", None, 4)
 _u2 = _Struct("<2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
@@ -135,16 +135,16 @@ class GetLoggersResponse(_Message):
         try:
             loggers = m.loggers
             n1 = len(loggers)
-            out = [_p2(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
+            p2 = 0
             for loggers_one in loggers:
                 n3, b3 = _texts[loggers_one.name]
                 b4 = loggers_one.level.encode()
                 if 0 in b4: raise ValueError
                 n4 = len(b4) + 1
-                p5 = ((p2 + 3 & -4) + n3 + 7 & -4) + n4 + 4
-                out.append(_t1[p2 & 7, n3, n4](n3, b3, n4, b4))
-                p2 = p5
+                f5, p6 = _t2[p2, n3, n4]
+                out.append(f5(n3, b3, n4, b4))
+                p2 = p6
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetLoggersResponse)
@@ -186,7 +186,8 @@ class GetLoggers(_Service):
         "---\n"
         "Logger[] loggers\n"
     )
-_t2 = _Template("I I $ I $", -4)
+_t3 = _Template("I I $", -4, 4)
+_t4 = _Template("I $", None, 4)
 
 
 class SetLoggerLevelRequest(_Message):
@@ -213,7 +214,9 @@ class SetLoggerLevelRequest(_Message):
             b2 = m.level.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t2[n1, n2](256, n1, b1, n2, b2)
+            f3, p4 = _t3[n1]
+            f5, p6 = _t4[p4, n2]
+            return b"".join((f3(256, n1, b1), f5(n2, b2)))
         except _FAULTS:
             return _plain(m, SetLoggerLevelRequest)
 
@@ -246,7 +249,7 @@ class SetLoggerLevelResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, SetLoggerLevelResponse)
 

@@ -55,9 +55,10 @@ class Clock(_Message):
             return Clock(Time(sec, nanosec))
         except _FAULTS:
             return _explain(data, Clock)
-_t1 = _Template("I i I I $ B I $ I $ I $", -4)
+_t1 = _Template("I i I I $ B I $", -4, 4)
+_t2 = _Template("I $", None, 4)
 _s1 = _StringList()
-_t2 = _Template("I $ I", None)
+_t3 = _Template("I $ I $ I", None)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
@@ -112,18 +113,14 @@ class Log(_Message):
             b3 = m.msg.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            p4 = ((n1 + 8 & -4) + n2 + 7 & -4) + n3 + 4
-            b5 = m.file.encode()
-            if 0 in b5: raise ValueError
-            n5 = len(b5) + 1
-            b6 = m.function.encode()
-            if 0 in b6: raise ValueError
-            n6 = len(b6) + 1
-            p7 = ((p4 + 3 & -4) + n5 + 7 & -4) + n6 + 4
+            f4, p5 = _t1[n1, n2]
+            n6, b6 = _texts[m.file]
+            f7, p8 = _t2[p5, n3]
+            n9, b9 = _texts[m.function]
             topics, k = m.topics, _s1.written
-            b8 = k[1] if topics == k[0] else _s1.put(topics)
-            n9 = len(b8)
-            return b"".join((_t1[n1, n2, n3, n5](256, stamp.sec, stamp.nanosec, n1, b1, m.level, n2, b2, n3, b3, n5, b5), _t2[(p4 + 3 & -4) + n5 + 4 & 7, n6](n6, b6, m.line), b8))
+            b10 = k[1] if topics == k[0] else _s1.put(topics)
+            n10 = len(b10)
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.level, n2, b2), f7(n3, b3), _t3[p8, n6, n9](n6, b6, n9, b9, m.line), b10))
         except _FAULTS:
             return _plain(m, Log)
 
@@ -166,7 +163,8 @@ class Log(_Message):
             return Log(Header(Time(sec, nanosec), frame_id), level, name, msg, file, function, line, topics)
         except _FAULTS:
             return _explain(data, Log)
-_t3 = _Template("I I $ I $ I $ i I i I i i i i I i I i I i I i I i I", -4)
+_t4 = _Template("I I $", -4, 4)
+_t5 = _Template("I $ i I i I i i i i I i I i I i I i I i I", None)
 _u4 = _Struct("<2I").unpack_from
 _u5 = _Struct("<iIiI4iIiIiIiIiIiI").unpack_from
 
@@ -225,10 +223,11 @@ class TopicStatistics(_Message):
             b2 = m.node_pub.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            b3 = m.node_sub.encode()
-            if 0 in b3: raise ValueError
-            n3 = len(b3) + 1
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + n3 + 4
+            f3, p4 = _t4[n1]
+            b5 = m.node_sub.encode()
+            if 0 in b5: raise ValueError
+            n5 = len(b5) + 1
+            f6, p7 = _t2[p4, n2]
             window_start = m.window_start
             window_stop = m.window_stop
             period_mean = m.period_mean
@@ -237,7 +236,7 @@ class TopicStatistics(_Message):
             stamp_age_mean = m.stamp_age_mean
             stamp_age_stddev = m.stamp_age_stddev
             stamp_age_max = m.stamp_age_max
-            return _t3[n1, n2, n3](256, n1, b1, n2, b2, n3, b3, window_start.sec, window_start.nanosec, window_stop.sec, window_stop.nanosec, m.delivered_msgs, m.dropped_msgs, m.traffic, period_mean.sec, period_mean.nanosec, period_stddev.sec, period_stddev.nanosec, period_max.sec, period_max.nanosec, stamp_age_mean.sec, stamp_age_mean.nanosec, stamp_age_stddev.sec, stamp_age_stddev.nanosec, stamp_age_max.sec, stamp_age_max.nanosec)
+            return b"".join((f3(256, n1, b1), f6(n2, b2), _t5[p7, n5](n5, b5, window_start.sec, window_start.nanosec, window_stop.sec, window_stop.nanosec, m.delivered_msgs, m.dropped_msgs, m.traffic, period_mean.sec, period_mean.nanosec, period_stddev.sec, period_stddev.nanosec, period_max.sec, period_max.nanosec, stamp_age_mean.sec, stamp_age_mean.nanosec, stamp_age_stddev.sec, stamp_age_stddev.nanosec, stamp_age_max.sec, stamp_age_max.nanosec)))
         except _FAULTS:
             return _plain(m, TopicStatistics)
 

@@ -64,7 +64,7 @@ class Floats(_Message):
             return Floats(data_2)
         except _FAULTS:
             return _explain(data, Floats)
-_t1 = _Template("I i I I $ I $", -4)
+_t1 = _Template("I i I I $ I $", -4, 4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
@@ -93,7 +93,8 @@ class HeaderString(_Message):
             b2 = m.data.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2)
+            f3, p4 = _t1[n1, n2]
+            return f3(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2)
         except _FAULTS:
             return _plain(m, HeaderString)
 

@@ -64,7 +64,8 @@ __all__ = (
 _d1 = _empty("f")
 _t1 = _Template("I i I I $ f f f f f f f B B B ? I", -4)
 _p1 = _Struct("<I").pack
-_t2 = _Template("I $ I $", 0)
+_t2 = _Template("I $", 0, 4)
+_t3 = _Template("I $", None, 4)
 _u1 = _Struct("<Ii2I").unpack_from
 _u2 = _Struct("<7f3B?I").unpack_from
 _u3 = _Struct("<I").unpack_from
@@ -179,14 +180,15 @@ class BatteryState(_Message):
             if type(cell_temperature) is not _array or cell_temperature.typecode != "f":
                 cell_temperature = _numbers(cell_temperature, "f")
             n3 = len(cell_temperature)
-            p4 = (n1 + 7 & -4) + n2 * 4 + n3 * 4
-            b5 = m.location.encode()
+            b4 = m.location.encode()
+            if 0 in b4: raise ValueError
+            n4 = len(b4) + 1
+            b5 = m.serial_number.encode()
             if 0 in b5: raise ValueError
             n5 = len(b5) + 1
-            b6 = m.serial_number.encode()
-            if 0 in b6: raise ValueError
-            n6 = len(b6) + 1
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.voltage, m.temperature, m.current, m.charge, m.capacity, m.design_capacity, m.percentage, m.power_supply_status, m.power_supply_health, m.power_supply_technology, m.present, n2), cell_voltage, _p1(n3), cell_temperature, _t2[n5, n6](n5, b5, n6, b6)))
+            f6, p7 = _t2[n4]
+            f8, p9 = _t3[p7, n5]
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.voltage, m.temperature, m.current, m.charge, m.capacity, m.design_capacity, m.percentage, m.power_supply_status, m.power_supply_health, m.power_supply_technology, m.present, n2), cell_voltage, _p1(n3), cell_temperature, f6(n4, b4), f8(n5, b5)))
         except _FAULTS:
             return _plain(m, BatteryState)
 
@@ -262,8 +264,8 @@ class RegionOfInterest(_Message):
 _d2 = _empty("d")
 _d3 = _zeros("d", 9)
 _d4 = _zeros("d", 12)
-_t3 = _Template("I i I I $ I I I $ I", -4)
-_t4 = _Template("|8", None)
+_t4 = _Template("I i I I $ I I I $ I", -4, 8)
+_t5 = _Template("|8", None)
 _p3 = _Struct("<6I?").pack
 _u5 = _Struct("<3I").unpack_from
 _u6 = _Struct("<6I?").unpack_from
@@ -361,7 +363,8 @@ class CameraInfo(_Message):
             if type(d_2) is not _array or d_2.typecode != "d":
                 d_2 = _numbers(d_2, "d")
             n3 = len(d_2)
-            p4 = 0 if n3 else ((n1 + 7 & -4) + n2 + 15 & -4) + 4
+            f4, p5 = _t4[n1, n2]
+            p6 = 0 if n3 else p5
             k_2 = m.k
             if type(k_2) is not _array or k_2.typecode != "d" or len(k_2) != 9:
                 k_2 = _numbers(k_2, "d", 9)
@@ -372,7 +375,7 @@ class CameraInfo(_Message):
             if type(p_2) is not _array or p_2.typecode != "d" or len(p_2) != 12:
                 p_2 = _numbers(p_2, "d", 12)
             roi = m.roi
-            return b"".join((_t3[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2, n3), (_PADDING[-(((n1 + 7 & -4) + n2 + 15 & -4) + 4) & 7] if n3 else b""), d_2, _t4[p4 + n3 * 8 & 7](), k_2, r_2, p_2, _p3(m.binning_x, m.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify)))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2, n3), (_PADDING[-(p5) & 7] if n3 else b""), d_2, _t5[p6 + n3 * 8 & 7](), k_2, r_2, p_2, _p3(m.binning_x, m.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify)))
         except _FAULTS:
             return _plain(m, CameraInfo)
 
@@ -406,7 +409,7 @@ class CameraInfo(_Message):
             return CameraInfo(Header(Time(sec, nanosec), frame_id), height, width, distortion_model, d_2, k_2, r_2, p_2, binning_x, binning_y, RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify))
         except _FAULTS:
             return _explain(data, CameraInfo)
-_t5 = _Template("I I $ I", -4)
+_t6 = _Template("I I $ I", -4)
 _u7 = _Struct("<2I").unpack_from
 
 
@@ -433,7 +436,7 @@ class ChannelFloat32(_Message):
             if type(values) is not _array or values.typecode != "f":
                 values = _numbers(values, "f")
             n2 = len(values)
-            return b"".join((_t5[n1](256, n1, b1, n2), values))
+            return b"".join((_t6[n1](256, n1, b1, n2), values))
         except _FAULTS:
             return _plain(m, ChannelFloat32)
 
@@ -453,7 +456,7 @@ class ChannelFloat32(_Message):
             return ChannelFloat32(name, values)
         except _FAULTS:
             return _explain(data, ChannelFloat32)
-_t6 = _Template("I i I I $ I $ I", -4)
+_t7 = _Template("I i I I $ I $ I", -4)
 
 
 class CompressedImage(_Message):
@@ -484,8 +487,7 @@ class CompressedImage(_Message):
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + n3 + 4
-            return b"".join((_t6[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, n3), data_2))
+            return b"".join((_t7[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, n3), data_2))
         except _FAULTS:
             return _plain(m, CompressedImage)
 
@@ -510,7 +512,7 @@ class CompressedImage(_Message):
             return CompressedImage(Header(Time(sec, nanosec), frame_id), format_2, data_2)
         except _FAULTS:
             return _explain(data, CompressedImage)
-_t7 = _Template("I i I I $ d d", -4)
+_t8 = _Template("I i I I $ d d", -4)
 _u8 = _Struct("<2d").unpack_from
 
 
@@ -537,7 +539,7 @@ class FluidPressure(_Message):
             header = m.header
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
-            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.fluid_pressure, m.variance)
+            return _t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.fluid_pressure, m.variance)
         except _FAULTS:
             return _plain(m, FluidPressure)
 
@@ -578,7 +580,7 @@ class Illuminance(_Message):
             header = m.header
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
-            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.illuminance, m.variance)
+            return _t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.illuminance, m.variance)
         except _FAULTS:
             return _plain(m, Illuminance)
 
@@ -594,7 +596,7 @@ class Illuminance(_Message):
             return Illuminance(Header(Time(sec, nanosec), frame_id), illuminance, variance)
         except _FAULTS:
             return _explain(data, Illuminance)
-_t8 = _Template("I i I I $ I I I $ B I I", -4)
+_t9 = _Template("I i I I $ I I I $ B I I", -4)
 
 
 class Image(_Message):
@@ -633,8 +635,7 @@ class Image(_Message):
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            p4 = ((n1 + 7 & -4) + n2 + 16 & -4) + n3
-            return b"".join((_t8[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2, m.is_bigendian, m.step, n3), data_2))
+            return b"".join((_t9[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2, m.is_bigendian, m.step, n3), data_2))
         except _FAULTS:
             return _plain(m, Image)
 
@@ -660,7 +661,7 @@ class Image(_Message):
             return Image(Header(Time(sec, nanosec), frame_id), height, width, encoding, is_bigendian, step, data_2)
         except _FAULTS:
             return _explain(data, Image)
-_t9 = _Template("I i I I $ d d d d", -4)
+_t10 = _Template("I i I I $ d d d d", -4)
 _p4 = _Struct("<3d").pack
 _u9 = _Struct("<4d").unpack_from
 _u10 = _Struct("<3d").unpack_from
@@ -715,7 +716,7 @@ class Imu(_Message):
             linear_acceleration_covariance = m.linear_acceleration_covariance
             if type(linear_acceleration_covariance) is not _array or linear_acceleration_covariance.typecode != "d" or len(linear_acceleration_covariance) != 9:
                 linear_acceleration_covariance = _numbers(linear_acceleration_covariance, "d", 9)
-            return b"".join((_t9[n1](256, stamp.sec, stamp.nanosec, n1, b1, orientation.x, orientation.y, orientation.z, orientation.w), orientation_covariance, _p4(angular_velocity.x, angular_velocity.y, angular_velocity.z), angular_velocity_covariance, _p4(linear_acceleration.x, linear_acceleration.y, linear_acceleration.z), linear_acceleration_covariance))
+            return b"".join((_t10[n1](256, stamp.sec, stamp.nanosec, n1, b1, orientation.x, orientation.y, orientation.z, orientation.w), orientation_covariance, _p4(angular_velocity.x, angular_velocity.y, angular_velocity.z), angular_velocity_covariance, _p4(linear_acceleration.x, linear_acceleration.y, linear_acceleration.z), linear_acceleration_covariance))
         except _FAULTS:
             return _plain(m, Imu)
 
@@ -744,8 +745,8 @@ class Imu(_Message):
         except _FAULTS:
             return _explain(data, Imu)
 _s1 = _StringList()
-_t10 = _Template("I i I I $ |4", -4)
-_t11 = _Template("I", None)
+_t11 = _Template("I i I I $ |4", -4, 8)
+_t12 = _Template("I", None, 8)
 
 
 class JointState(_Message):
@@ -779,23 +780,25 @@ class JointState(_Message):
             n1, b1 = _texts[header.frame_id]
             name, k = m.name, _s1.written
             b2 = k[1] if name == k[0] else _s1.put(name)
-            n3 = len(b2)
+            n2 = len(b2)
+            f3, p4 = _t11[n1]
             position = m.position
             if type(position) is not _array or position.typecode != "d":
                 position = _numbers(position, "d")
-            n4 = len(position)
-            p5 = 0 if n4 else ((n1 + 7 & -4) + n3 + 3 & -4) + 4
+            n5 = len(position)
+            f6, p7 = _t12[p4 + n2 & 7]
+            p8 = 0 if n5 else p7
             velocity = m.velocity
             if type(velocity) is not _array or velocity.typecode != "d":
                 velocity = _numbers(velocity, "d")
-            n6 = len(velocity)
-            p7 = 0 if n6 else p5 + n4 * 8 + 4
+            n9 = len(velocity)
+            p10 = 0 if n9 else p8 + n5 * 8 + 4
             effort = m.effort
             if type(effort) is not _array or effort.typecode != "d":
                 effort = _numbers(effort, "d")
-            n8 = len(effort)
-            p9 = 0 if n8 else p7 + n6 * 8 + 4
-            return b"".join((_t10[n1](256, stamp.sec, stamp.nanosec, n1, b1), b2, _t11[(n1 + 7 & -4) + n3 & 7](n4), (_PADDING[-(((n1 + 7 & -4) + n3 + 3 & -4) + 4) & 7] if n4 else b""), position, _p1(n6), (_PADDING[-(p5 + n4 * 8 + 4) & 7] if n6 else b""), velocity, _p1(n8), (_PADDING[-(p7 + n6 * 8 + 4) & 7] if n8 else b""), effort))
+            n11 = len(effort)
+            p12 = 0 if n11 else p10 + n9 * 8 + 4
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5), (_PADDING[-(p7) & 7] if n5 else b""), position, _p1(n9), (_PADDING[-(p8 + n5 * 8 + 4) & 7] if n9 else b""), velocity, _p1(n11), (_PADDING[-(p10 + n9 * 8 + 4) & 7] if n11 else b""), effort))
         except _FAULTS:
             return _plain(m, JointState)
 
@@ -831,7 +834,7 @@ class JointState(_Message):
         except _FAULTS:
             return _explain(data, JointState)
 _d5 = _empty("i")
-_t12 = _Template("I i I I $ I", -4)
+_t13 = _Template("I i I I $ I", -4)
 
 
 class Joy(_Message):
@@ -865,8 +868,7 @@ class Joy(_Message):
             if type(buttons) is not _array or buttons.typecode != "i":
                 buttons = _numbers(buttons, "i")
             n3 = len(buttons)
-            p4 = (n1 + 7 & -4) + n2 * 4 + n3 * 4
-            return b"".join((_t12[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), axes, _p1(n3), buttons))
+            return b"".join((_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), axes, _p1(n3), buttons))
         except _FAULTS:
             return _plain(m, Joy)
 
@@ -1008,7 +1010,7 @@ class LaserEcho(_Message):
             return LaserEcho(echoes)
         except _FAULTS:
             return _explain(data, LaserEcho)
-_t13 = _Template("I i I I $ f f f f f f f I", -4)
+_t14 = _Template("I i I I $ f f f f f f f I", -4)
 _u12 = _Struct("<7fI").unpack_from
 
 
@@ -1060,8 +1062,7 @@ class LaserScan(_Message):
             if type(intensities) is not _array or intensities.typecode != "f":
                 intensities = _numbers(intensities, "f")
             n3 = len(intensities)
-            p4 = (n1 + 7 & -4) + n2 * 4 + n3 * 4 + 4
-            return b"".join((_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min, m.range_max, n2), ranges, _p1(n3), intensities))
+            return b"".join((_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min, m.range_max, n2), ranges, _p1(n3), intensities))
         except _FAULTS:
             return _plain(m, LaserScan)
 
@@ -1085,7 +1086,7 @@ class LaserScan(_Message):
             return LaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max, ranges, intensities)
         except _FAULTS:
             return _explain(data, LaserScan)
-_t14 = _Template("I i I I $ d d d", -4)
+_t15 = _Template("I i I I $ d d d", -4)
 
 
 class MagneticField(_Message):
@@ -1115,7 +1116,7 @@ class MagneticField(_Message):
             magnetic_field_covariance = m.magnetic_field_covariance
             if type(magnetic_field_covariance) is not _array or magnetic_field_covariance.typecode != "d" or len(magnetic_field_covariance) != 9:
                 magnetic_field_covariance = _numbers(magnetic_field_covariance, "d", 9)
-            return b"".join((_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, magnetic_field.x, magnetic_field.y, magnetic_field.z), magnetic_field_covariance))
+            return b"".join((_t15[n1](256, stamp.sec, stamp.nanosec, n1, b1, magnetic_field.x, magnetic_field.y, magnetic_field.z), magnetic_field_covariance))
         except _FAULTS:
             return _plain(m, MagneticField)
 
@@ -1172,17 +1173,19 @@ class MultiDOFJointState(_Message):
             n1, b1 = _texts[header.frame_id]
             joint_names, k = m.joint_names, _s2.written
             b2 = k[1] if joint_names == k[0] else _s2.put(joint_names)
-            n3 = len(b2)
+            n2 = len(b2)
+            f3, p4 = _t11[n1]
             transforms = m.transforms
-            n4 = len(transforms)
-            p5 = 0 if n4 else ((n1 + 7 & -4) + n3 + 3 & -4) + 4
+            n5 = len(transforms)
+            f6, p7 = _t12[p4 + n2 & 7]
+            p8 = 0 if n5 else p7
             twist = m.twist
-            n6 = len(twist)
-            p7 = 0 if n6 else p5 + n4 * 56 + 4
+            n9 = len(twist)
+            p10 = 0 if n9 else p8 + n5 * 56 + 4
             wrench = m.wrench
-            n8 = len(wrench)
-            p9 = 0 if n8 else p7 + n6 * 48 + 4
-            return b"".join((_t10[n1](256, stamp.sec, stamp.nanosec, n1, b1), b2, _t11[(n1 + 7 & -4) + n3 & 7](n4), (_PADDING[-(((n1 + 7 & -4) + n3 + 3 & -4) + 4) & 7] if n4 else b""), b"".join([_p8(e_translation.x, e_translation.y, e_translation.z, e_rotation.x, e_rotation.y, e_rotation.z, e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]), _p1(n6), (_PADDING[-(p5 + n4 * 56 + 4) & 7] if n6 else b""), b"".join([_p9(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in twist for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p1(n8), (_PADDING[-(p7 + n6 * 48 + 4) & 7] if n8 else b""), b"".join([_p9(e_force.x, e_force.y, e_force.z, e_torque.x, e_torque.y, e_torque.z) for e in wrench for e_force in (e.force,) for e_torque in (e.torque,)])))
+            n11 = len(wrench)
+            p12 = 0 if n11 else p10 + n9 * 48 + 4
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5), (_PADDING[-(p7) & 7] if n5 else b""), b"".join([_p8(e_translation.x, e_translation.y, e_translation.z, e_rotation.x, e_rotation.y, e_rotation.z, e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]), _p1(n9), (_PADDING[-(p8 + n5 * 56 + 4) & 7] if n9 else b""), b"".join([_p9(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in twist for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p1(n11), (_PADDING[-(p10 + n9 * 48 + 4) & 7] if n11 else b""), b"".join([_p9(e_force.x, e_force.y, e_force.z, e_torque.x, e_torque.y, e_torque.z) for e in wrench for e_force in (e.force,) for e_torque in (e.torque,)])))
         except _FAULTS:
             return _plain(m, MultiDOFJointState)
 
@@ -1260,26 +1263,22 @@ class MultiEchoLaserScan(_Message):
             n1, b1 = _texts[header.frame_id]
             ranges = m.ranges
             n2 = len(ranges)
-            out = [_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min, m.range_max, n2)]
-            p3 = (n1 + 7 & -4)
+            out = [_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min, m.range_max, n2)]
             for ranges_one in ranges:
                 echoes = ranges_one.echoes
                 if type(echoes) is not _array or echoes.typecode != "f":
                     echoes = _numbers(echoes, "f")
-                n4 = len(echoes)
-                out += (_p1(n4), echoes)
-                p3 = p3 + n4 * 4 + 4
+                n3 = len(echoes)
+                out += (_p1(n3), echoes)
             intensities = m.intensities
-            n5 = len(intensities)
-            out.append(_p1(n5))
-            p6 = p3 + 4
+            n4 = len(intensities)
+            out.append(_p1(n4))
             for intensities_one in intensities:
                 echoes_2 = intensities_one.echoes
                 if type(echoes_2) is not _array or echoes_2.typecode != "f":
                     echoes_2 = _numbers(echoes_2, "f")
-                n7 = len(echoes_2)
-                out += (_p1(n7), echoes_2)
-                p6 = p6 + n7 * 4 + 4
+                n5 = len(echoes_2)
+                out += (_p1(n5), echoes_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MultiEchoLaserScan)
@@ -1314,7 +1313,7 @@ class MultiEchoLaserScan(_Message):
             return MultiEchoLaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max, ranges, intensities)
         except _FAULTS:
             return _explain(data, MultiEchoLaserScan)
-_p10 = _Struct("<IbxH").pack
+_t16 = _Template("I b H", -4)
 _u13 = _Struct("<IbxH").unpack_from
 
 
@@ -1359,7 +1358,7 @@ class NavSatStatus(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p10(256, m.status, m.service)
+            return _t16[0](256, m.status, m.service)
         except _FAULTS:
             return _plain(m, NavSatStatus)
 
@@ -1371,8 +1370,8 @@ class NavSatStatus(_Message):
             return NavSatStatus(status, service)
         except _FAULTS:
             return _explain(data, NavSatStatus)
-_t15 = _Template("I i I I $ b H d d d", -4)
-_p11 = _Struct("<B").pack
+_t17 = _Template("I i I I $ b H d d d", -4)
+_p10 = _Struct("<B").pack
 _u14 = _Struct("<b").unpack_from
 _u15 = _Struct("<H").unpack_from
 
@@ -1422,7 +1421,7 @@ class NavSatFix(_Message):
             position_covariance = m.position_covariance
             if type(position_covariance) is not _array or position_covariance.typecode != "d" or len(position_covariance) != 9:
                 position_covariance = _numbers(position_covariance, "d", 9)
-            return b"".join((_t15[n1](256, stamp.sec, stamp.nanosec, n1, b1, status.status, status.service, m.latitude, m.longitude, m.altitude), position_covariance, _p11(m.position_covariance_type)))
+            return b"".join((_t17[n1](256, stamp.sec, stamp.nanosec, n1, b1, status.status, status.service, m.latitude, m.longitude, m.altitude), position_covariance, _p10(m.position_covariance_type)))
         except _FAULTS:
             return _plain(m, NavSatFix)
 
@@ -1445,8 +1444,8 @@ class NavSatFix(_Message):
             return NavSatFix(Header(Time(sec, nanosec), frame_id), NavSatStatus(status, service), latitude, longitude, altitude, position_covariance, position_covariance_type)
         except _FAULTS:
             return _explain(data, NavSatFix)
-_p12 = _Struct("<3f").pack
-_t16 = _Template("I $ I", 0)
+_p11 = _Struct("<3f").pack
+_t18 = _Template("I $ I", 0)
 _i4 = _Struct("<3f").iter_unpack
 
 
@@ -1479,16 +1478,14 @@ class PointCloud(_Message):
             n2 = len(points)
             channels = m.channels
             n3 = len(channels)
-            out = [_t12[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p12(e.x, e.y, e.z) for e in points]), _p1(n3)]
-            p4 = (n1 + 7 & -4) + n2 * 12
+            out = [_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p11(e.x, e.y, e.z) for e in points]), _p1(n3)]
             for channels_one in channels:
-                n5, b5 = _texts[channels_one.name]
+                n4, b4 = _texts[channels_one.name]
                 values = channels_one.values
                 if type(values) is not _array or values.typecode != "f":
                     values = _numbers(values, "f")
-                n6 = len(values)
-                out += (_t16[n5](n5, b5, n6), values)
-                p4 = (p4 + n5 + 7 & -4) + n6 * 4 + 4
+                n5 = len(values)
+                out += (_t18[n4](n4, b4, n5), values)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, PointCloud)
@@ -1523,7 +1520,7 @@ class PointCloud(_Message):
             return PointCloud(Header(Time(sec, nanosec), frame_id), points, channels)
         except _FAULTS:
             return _explain(data, PointCloud)
-_t17 = _Template("I I $ I B I", -4)
+_t19 = _Template("I I $ I B I", -4)
 _u16 = _Struct("<IB3xI").unpack_from
 
 
@@ -1567,7 +1564,7 @@ class PointField(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t17[n1](256, n1, b1, m.offset, m.datatype, m.count)
+            return _t19[n1](256, n1, b1, m.offset, m.datatype, m.count)
         except _FAULTS:
             return _plain(m, PointField)
 
@@ -1583,10 +1580,10 @@ class PointField(_Message):
             return PointField(name, offset, datatype, count)
         except _FAULTS:
             return _explain(data, PointField)
-_t18 = _Template("I i I I $ I I I", -4)
-_t19 = _Template("I $ I B I", 0)
-_p13 = _Struct("<?3x3I").pack
-_p14 = _Struct("<?").pack
+_t20 = _Template("I i I I $ I I I", -4)
+_t21 = _Template("I $ I B I", 0)
+_p12 = _Struct("<?3x3I").pack
+_p13 = _Struct("<?").pack
 _u17 = _Struct("<?3x3I").unpack_from
 _u18 = _Struct("<?").unpack_from
 
@@ -1630,17 +1627,15 @@ class PointCloud2(_Message):
             n1, b1 = _texts[header.frame_id]
             fields = m.fields
             n2 = len(fields)
-            out = [_t18[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            out = [_t20[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2)]
             for fields_one in fields:
-                n4, b4 = _texts[fields_one.name]
-                out.append(_t19[n4](n4, b4, fields_one.offset, fields_one.datatype, fields_one.count))
-                p3 = (p3 + n4 + 7 & -4) + 4
+                n3, b3 = _texts[fields_one.name]
+                out.append(_t21[n3](n3, b3, fields_one.offset, fields_one.datatype, fields_one.count))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
-            n5 = len(data_2)
-            out += (_p13(m.is_bigendian, m.point_step, m.row_step, n5), data_2, _p14(m.is_dense))
+            n4 = len(data_2)
+            out += (_p12(m.is_bigendian, m.point_step, m.row_step, n4), data_2, _p13(m.is_dense))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, PointCloud2)
@@ -1673,7 +1668,7 @@ class PointCloud2(_Message):
             return PointCloud2(Header(Time(sec, nanosec), frame_id), height, width, fields, is_bigendian, point_step, row_step, data_2, is_dense)
         except _FAULTS:
             return _explain(data, PointCloud2)
-_t20 = _Template("I i I I $ B f f f f f", -4)
+_t22 = _Template("I i I I $ B f f f f f", -4)
 _u19 = _Struct("<5f").unpack_from
 
 
@@ -1717,7 +1712,7 @@ class Range(_Message):
             header = m.header
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
-            return _t20[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.radiation_type, m.field_of_view, m.min_range, m.max_range, m.range, m.variance)
+            return _t22[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.radiation_type, m.field_of_view, m.min_range, m.max_range, m.range, m.variance)
         except _FAULTS:
             return _plain(m, Range)
 
@@ -1759,7 +1754,7 @@ class RelativeHumidity(_Message):
             header = m.header
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
-            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.relative_humidity, m.variance)
+            return _t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.relative_humidity, m.variance)
         except _FAULTS:
             return _plain(m, RelativeHumidity)
 
@@ -1800,7 +1795,7 @@ class Temperature(_Message):
             header = m.header
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
-            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.temperature, m.variance)
+            return _t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.temperature, m.variance)
         except _FAULTS:
             return _plain(m, Temperature)
 
@@ -1816,7 +1811,7 @@ class Temperature(_Message):
             return Temperature(Header(Time(sec, nanosec), frame_id), temperature, variance)
         except _FAULTS:
             return _explain(data, Temperature)
-_t21 = _Template("I i I I $ i I I $", -4)
+_t23 = _Template("I i I I $ i I I $", -4, 4)
 _u20 = _Struct("<i2I").unpack_from
 
 
@@ -1847,7 +1842,8 @@ class TimeReference(_Message):
             b2 = m.source.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t21[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, time_ref.sec, time_ref.nanosec, n2, b2)
+            f3, p4 = _t23[n1, n2]
+            return f3(256, stamp.sec, stamp.nanosec, n1, b1, time_ref.sec, time_ref.nanosec, n2, b2)
         except _FAULTS:
             return _plain(m, TimeReference)
 

@@ -27,7 +27,7 @@ __all__ = (
     "SetCameraInfoRequest",
     "SetCameraInfoResponse",
 )
-_t1 = _Template("I i I I $ I I I $ I", -4)
+_t1 = _Template("I i I I $ I I I $ I", -4, 8)
 _t2 = _Template("|8", None)
 _p1 = _Struct("<6I?").pack
 _u1 = _Struct("<Ii2I").unpack_from
@@ -61,7 +61,8 @@ class SetCameraInfoRequest(_Message):
             if type(d_2) is not _array or d_2.typecode != "d":
                 d_2 = _numbers(d_2, "d")
             n3 = len(d_2)
-            p4 = 0 if n3 else ((n1 + 7 & -4) + n2 + 15 & -4) + 4
+            f4, p5 = _t1[n1, n2]
+            p6 = 0 if n3 else p5
             k_2 = camera_info.k
             if type(k_2) is not _array or k_2.typecode != "d" or len(k_2) != 9:
                 k_2 = _numbers(k_2, "d", 9)
@@ -72,7 +73,7 @@ class SetCameraInfoRequest(_Message):
             if type(p_2) is not _array or p_2.typecode != "d" or len(p_2) != 12:
                 p_2 = _numbers(p_2, "d", 12)
             roi = camera_info.roi
-            return b"".join((_t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, camera_info.height, camera_info.width, n2, b2, n3), (_PADDING[-(((n1 + 7 & -4) + n2 + 15 & -4) + 4) & 7] if n3 else b""), d_2, _t2[p4 + n3 * 8 & 7](), k_2, r_2, p_2, _p1(camera_info.binning_x, camera_info.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify)))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, camera_info.height, camera_info.width, n2, b2, n3), (_PADDING[-(p5) & 7] if n3 else b""), d_2, _t2[p6 + n3 * 8 & 7](), k_2, r_2, p_2, _p1(camera_info.binning_x, camera_info.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify)))
         except _FAULTS:
             return _plain(m, SetCameraInfoRequest)
 
@@ -106,7 +107,7 @@ class SetCameraInfoRequest(_Message):
             return SetCameraInfoRequest(CameraInfo(Header(Time(sec, nanosec), frame_id), height, width, distortion_model, d_2, k_2, r_2, p_2, binning_x, binning_y, RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify)))
         except _FAULTS:
             return _explain(data, SetCameraInfoRequest)
-_t3 = _Template("I ? I $", -4)
+_t3 = _Template("I ? I $", -4, 4)
 _u5 = _Struct("<I?3xI").unpack_from
 
 
@@ -129,7 +130,8 @@ class SetCameraInfoResponse(_Message):
             b1 = m.status_message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t3[n1](256, m.success, n1, b1)
+            f2, p3 = _t3[n1]
+            return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, SetCameraInfoResponse)
 

@@ -100,7 +100,7 @@ class Mesh(_Message):
                 if type(vertex_indices) is not _array or vertex_indices.typecode != "I" or len(vertex_indices) != 3:
                     vertex_indices = _numbers(vertex_indices, "I", 3)
                 out.append(vertex_indices)
-                p2 = p2 + 4
+                p2 = p2 + 4 & 7
             vertices = m.vertices
             n3 = len(vertices)
             p4 = 0 if n3 else p2 + 4

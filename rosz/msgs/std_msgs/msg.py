@@ -58,7 +58,7 @@ __all__ = (
     "UInt8",
     "UInt8MultiArray",
 )
-_p1 = _Struct("<I?").pack
+_t1 = _Template("I ?", -4)
 _u1 = _Struct("<I?").unpack_from
 
 
@@ -78,7 +78,7 @@ class Bool(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.data)
+            return _t1[0](256, m.data)
         except _FAULTS:
             return _plain(m, Bool)
 
@@ -90,7 +90,7 @@ class Bool(_Message):
             return Bool(data_2)
         except _FAULTS:
             return _explain(data, Bool)
-_p2 = _Struct("<IB").pack
+_t2 = _Template("I B", -4)
 _u2 = _Struct("<IB").unpack_from
 
 
@@ -110,7 +110,7 @@ class Byte(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _t2[0](256, m.data)
         except _FAULTS:
             return _plain(m, Byte)
 
@@ -122,7 +122,7 @@ class Byte(_Message):
             return Byte(data_2)
         except _FAULTS:
             return _explain(data, Byte)
-_t1 = _Template("I I $ I I", -4)
+_t3 = _Template("I I $ I I", -4)
 _u3 = _Struct("<2I").unpack_from
 
 
@@ -148,7 +148,7 @@ class MultiArrayDimension(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.label]
-            return _t1[n1](256, n1, b1, m.size, m.stride)
+            return _t3[n1](256, n1, b1, m.size, m.stride)
         except _FAULTS:
             return _plain(m, MultiArrayDimension)
 
@@ -164,9 +164,9 @@ class MultiArrayDimension(_Message):
             return MultiArrayDimension(label, size, stride)
         except _FAULTS:
             return _explain(data, MultiArrayDimension)
-_p3 = _Struct("<2I").pack
-_t2 = _Template("I $ I I", 0)
-_p4 = _Struct("<I").pack
+_p1 = _Struct("<2I").pack
+_t4 = _Template("I $ I I", 0)
+_p2 = _Struct("<I").pack
 _u4 = _Struct("<I").unpack_from
 
 
@@ -195,13 +195,11 @@ class MultiArrayLayout(_Message):
         try:
             dim = m.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
-            out.append(_p4(m.data_offset))
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+            out.append(_p2(m.data_offset))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MultiArrayLayout)
@@ -249,17 +247,15 @@ class ByteMultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ByteMultiArray)
@@ -306,7 +302,7 @@ class Char(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _t2[0](256, m.data)
         except _FAULTS:
             return _plain(m, Char)
 
@@ -318,7 +314,7 @@ class Char(_Message):
             return Char(data_2)
         except _FAULTS:
             return _explain(data, Char)
-_p5 = _Struct("<I4f").pack
+_p3 = _Struct("<I4f").pack
 _u5 = _Struct("<I4f").unpack_from
 
 
@@ -344,7 +340,7 @@ class ColorRGBA(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p5(256, m.r, m.g, m.b, m.a)
+            return _p3(256, m.r, m.g, m.b, m.a)
         except _FAULTS:
             return _plain(m, ColorRGBA)
 
@@ -356,7 +352,7 @@ class ColorRGBA(_Message):
             return ColorRGBA(r_2, g_2, b_2, a_2)
         except _FAULTS:
             return _explain(data, ColorRGBA)
-_p6 = _Struct("<IiI").pack
+_p4 = _Struct("<IiI").pack
 _u6 = _Struct("<IiI").unpack_from
 
 
@@ -377,7 +373,7 @@ class Duration(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             data_2 = m.data
-            return _p6(256, data_2.sec, data_2.nanosec)
+            return _p4(256, data_2.sec, data_2.nanosec)
         except _FAULTS:
             return _plain(m, Duration)
 
@@ -389,7 +385,7 @@ class Duration(_Message):
             return Duration(builtin_interfaces_msg_Duration(sec, nanosec))
         except _FAULTS:
             return _explain(data, Duration)
-_p7 = _Struct("<Ix").pack
+_t5 = _Template("I x", -4)
 _u7 = _Struct("<Ix").unpack_from
 
 
@@ -404,7 +400,7 @@ class Empty(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p7(256)
+            return _t5[0](256)
         except _FAULTS:
             return _plain(m, Empty)
 
@@ -416,7 +412,7 @@ class Empty(_Message):
             return Empty()
         except _FAULTS:
             return _explain(data, Empty)
-_p8 = _Struct("<If").pack
+_p5 = _Struct("<If").pack
 _u8 = _Struct("<If").unpack_from
 
 
@@ -436,7 +432,7 @@ class Float32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p8(256, m.data)
+            return _p5(256, m.data)
         except _FAULTS:
             return _plain(m, Float32)
 
@@ -472,17 +468,15 @@ class Float32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "f":
                 data_2 = _numbers(data_2, "f")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float32MultiArray)
@@ -511,7 +505,7 @@ class Float32MultiArray(_Message):
             return Float32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float32MultiArray)
-_p9 = _Struct("<Id").pack
+_p6 = _Struct("<Id").pack
 _u9 = _Struct("<Id").unpack_from
 
 
@@ -531,7 +525,7 @@ class Float64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p9(256, m.data)
+            return _p6(256, m.data)
         except _FAULTS:
             return _plain(m, Float64)
 
@@ -544,6 +538,7 @@ class Float64(_Message):
         except _FAULTS:
             return _explain(data, Float64)
 _d2 = _empty("d")
+_t6 = _Template("I $ I I", None, 8)
 
 
 class Float64MultiArray(_Message):
@@ -567,18 +562,19 @@ class Float64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
+            out = [_p1(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                f4, p5 = _t6[p2, n3]
+                out.append(f4(n3, b3, dim_one.size, dim_one.stride))
+                p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "d":
                 data_2 = _numbers(data_2, "d")
-            n4 = len(data_2)
-            p5 = 0 if n4 else p2
-            out += (_p3(layout.data_offset, n4), (_PADDING[-(p2) & 7] if n4 else b""), data_2)
+            n6 = len(data_2)
+            p7 = 0 if n6 else p2
+            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float64MultiArray)
@@ -607,7 +603,7 @@ class Float64MultiArray(_Message):
             return Float64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float64MultiArray)
-_t3 = _Template("I i I I $", -4)
+_t7 = _Template("I i I I $", -4, 4)
 _u10 = _Struct("<Ii2I").unpack_from
 
 
@@ -633,7 +629,8 @@ class Header(_Sequenced):
         try:
             stamp = m.stamp
             n1, b1 = _texts[m.frame_id]
-            return _t3[n1](256, stamp.sec, stamp.nanosec, n1, b1)
+            f2, p3 = _t7[n1]
+            return f2(256, stamp.sec, stamp.nanosec, n1, b1)
         except _FAULTS:
             return _plain(m, Header)
 
@@ -648,7 +645,7 @@ class Header(_Sequenced):
             return Header(builtin_interfaces_msg_Time(sec, nanosec), frame_id)
         except _FAULTS:
             return _explain(data, Header)
-_p10 = _Struct("<Ih").pack
+_t8 = _Template("I h", -4)
 _u11 = _Struct("<Ih").unpack_from
 
 
@@ -668,7 +665,7 @@ class Int16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p10(256, m.data)
+            return _t8[0](256, m.data)
         except _FAULTS:
             return _plain(m, Int16)
 
@@ -704,17 +701,15 @@ class Int16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "h":
                 data_2 = _numbers(data_2, "h")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int16MultiArray)
@@ -743,7 +738,7 @@ class Int16MultiArray(_Message):
             return Int16MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int16MultiArray)
-_p11 = _Struct("<Ii").pack
+_p7 = _Struct("<Ii").pack
 _u12 = _Struct("<Ii").unpack_from
 
 
@@ -763,7 +758,7 @@ class Int32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p11(256, m.data)
+            return _p7(256, m.data)
         except _FAULTS:
             return _plain(m, Int32)
 
@@ -799,17 +794,15 @@ class Int32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "i":
                 data_2 = _numbers(data_2, "i")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int32MultiArray)
@@ -838,7 +831,7 @@ class Int32MultiArray(_Message):
             return Int32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int32MultiArray)
-_p12 = _Struct("<Iq").pack
+_p8 = _Struct("<Iq").pack
 _u13 = _Struct("<Iq").unpack_from
 
 
@@ -858,7 +851,7 @@ class Int64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p12(256, m.data)
+            return _p8(256, m.data)
         except _FAULTS:
             return _plain(m, Int64)
 
@@ -894,18 +887,19 @@ class Int64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
+            out = [_p1(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                f4, p5 = _t6[p2, n3]
+                out.append(f4(n3, b3, dim_one.size, dim_one.stride))
+                p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "q":
                 data_2 = _numbers(data_2, "q")
-            n4 = len(data_2)
-            p5 = 0 if n4 else p2
-            out += (_p3(layout.data_offset, n4), (_PADDING[-(p2) & 7] if n4 else b""), data_2)
+            n6 = len(data_2)
+            p7 = 0 if n6 else p2
+            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int64MultiArray)
@@ -934,7 +928,7 @@ class Int64MultiArray(_Message):
             return Int64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int64MultiArray)
-_p13 = _Struct("<Ib").pack
+_t9 = _Template("I b", -4)
 _u14 = _Struct("<Ib").unpack_from
 
 
@@ -954,7 +948,7 @@ class Int8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p13(256, m.data)
+            return _t9[0](256, m.data)
         except _FAULTS:
             return _plain(m, Int8)
 
@@ -990,17 +984,15 @@ class Int8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int8MultiArray)
@@ -1029,7 +1021,7 @@ class Int8MultiArray(_Message):
             return Int8MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int8MultiArray)
-_t4 = _Template("I I $", -4)
+_t10 = _Template("I I $", -4, 4)
 
 
 class String(_Message):
@@ -1051,7 +1043,8 @@ class String(_Message):
             b1 = m.data.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t4[n1](256, n1, b1)
+            f2, p3 = _t10[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, String)
 
@@ -1085,7 +1078,7 @@ class Time(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             data_2 = m.data
-            return _p6(256, data_2.sec, data_2.nanosec)
+            return _p4(256, data_2.sec, data_2.nanosec)
         except _FAULTS:
             return _plain(m, Time)
 
@@ -1097,7 +1090,7 @@ class Time(_Message):
             return Time(builtin_interfaces_msg_Time(sec, nanosec))
         except _FAULTS:
             return _explain(data, Time)
-_p14 = _Struct("<IH").pack
+_t11 = _Template("I H", -4)
 _u15 = _Struct("<IH").unpack_from
 
 
@@ -1117,7 +1110,7 @@ class UInt16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p14(256, m.data)
+            return _t11[0](256, m.data)
         except _FAULTS:
             return _plain(m, UInt16)
 
@@ -1153,17 +1146,15 @@ class UInt16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "H":
                 data_2 = _numbers(data_2, "H")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt16MultiArray)
@@ -1210,7 +1201,7 @@ class UInt32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256, m.data)
+            return _p1(256, m.data)
         except _FAULTS:
             return _plain(m, UInt32)
 
@@ -1246,17 +1237,15 @@ class UInt32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "I":
                 data_2 = _numbers(data_2, "I")
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt32MultiArray)
@@ -1285,7 +1274,7 @@ class UInt32MultiArray(_Message):
             return UInt32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, UInt32MultiArray)
-_p15 = _Struct("<IQ").pack
+_p9 = _Struct("<IQ").pack
 _u16 = _Struct("<IQ").unpack_from
 
 
@@ -1305,7 +1294,7 @@ class UInt64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p15(256, m.data)
+            return _p9(256, m.data)
         except _FAULTS:
             return _plain(m, UInt64)
 
@@ -1341,18 +1330,19 @@ class UInt64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
+            out = [_p1(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                f4, p5 = _t6[p2, n3]
+                out.append(f4(n3, b3, dim_one.size, dim_one.stride))
+                p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "Q":
                 data_2 = _numbers(data_2, "Q")
-            n4 = len(data_2)
-            p5 = 0 if n4 else p2
-            out += (_p3(layout.data_offset, n4), (_PADDING[-(p2) & 7] if n4 else b""), data_2)
+            n6 = len(data_2)
+            p7 = 0 if n6 else p2
+            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt64MultiArray)
@@ -1399,7 +1389,7 @@ class UInt8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _t2[0](256, m.data)
         except _FAULTS:
             return _plain(m, UInt8)
 
@@ -1434,17 +1424,15 @@ class UInt8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p3(256, n1)]
-            p2 = 4
+            out = [_p1(256, n1)]
             for dim_one in dim:
-                n3, b3 = _texts[dim_one.label]
-                out.append(_t2[n3](n3, b3, dim_one.size, dim_one.stride))
-                p2 = (p2 + n3 + 7 & -4)
+                n2, b2 = _texts[dim_one.label]
+                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
-            n4 = len(data_2)
-            out += (_p3(layout.data_offset, n4), data_2)
+            n3 = len(data_2)
+            out += (_p1(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt8MultiArray)

@@ -23,7 +23,7 @@ __all__ = (
     "TriggerRequest",
     "TriggerResponse",
 )
-_p1 = _Struct("<Ix").pack
+_t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
 
@@ -38,7 +38,7 @@ class EmptyRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, EmptyRequest)
 
@@ -63,7 +63,7 @@ class EmptyResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, EmptyResponse)
 
@@ -88,7 +88,7 @@ class Empty(_Service):
         "# Do the thing that the service is named after. No argument and no result.\n"
         "---\n"
     )
-_p2 = _Struct("<I?").pack
+_t2 = _Template("I ?", -4)
 _u2 = _Struct("<I?").unpack_from
 
 
@@ -108,7 +108,7 @@ class SetBoolRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _t2[0](256, m.data)
         except _FAULTS:
             return _plain(m, SetBoolRequest)
 
@@ -120,7 +120,7 @@ class SetBoolRequest(_Message):
             return SetBoolRequest(data_2)
         except _FAULTS:
             return _explain(data, SetBoolRequest)
-_t1 = _Template("I ? I $", -4)
+_t3 = _Template("I ? I $", -4, 4)
 _u3 = _Struct("<I?3xI").unpack_from
 
 
@@ -143,7 +143,8 @@ class SetBoolResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, m.success, n1, b1)
+            f2, p3 = _t3[n1]
+            return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, SetBoolResponse)
 
@@ -188,7 +189,7 @@ class TriggerRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, TriggerRequest)
 
@@ -221,7 +222,8 @@ class TriggerResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, m.success, n1, b1)
+            f2, p3 = _t3[n1]
+            return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, TriggerResponse)
 

@@ -21,8 +21,9 @@ from rosz.msgs.std_msgs.msg import Header
 __all__ = (
     "DisparityImage",
 )
-_t1 = _Template("I i I I $ i I I $ I I I $ B I I", -4)
-_t2 = _Template("f f I I I I ? f f f", None)
+_t1 = _Template("I i I I $ i I I $ I I", -4)
+_t2 = _Template("I $ B I I", 0)
+_t3 = _Template("f f I I I I ? f f f", None)
 _u1 = _Struct("<Ii2I").unpack_from
 _u2 = _Struct("<i2I").unpack_from
 _u3 = _Struct("<3I").unpack_from
@@ -78,13 +79,12 @@ class DisparityImage(_Message):
             stamp_2 = header_2.stamp
             n2, b2 = _texts[header_2.frame_id]
             n3, b3 = _texts[image.encoding]
-            p4 = ((n1 + 7 & -4) + n2 + 15 & -4) + n3 + 4
             data_2 = image.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
-            n5 = len(data_2)
+            n4 = len(data_2)
             valid_window = m.valid_window
-            return b"".join((_t1[n1, n2, n3](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, image.height, image.width, n3, b3, image.is_bigendian, image.step, n5), data_2, _t2[(p4 + 4 & -4) + n5 & 7](m.f, m.t, valid_window.x_offset, valid_window.y_offset, valid_window.height, valid_window.width, valid_window.do_rectify, m.min_disparity, m.max_disparity, m.delta_d)))
+            return b"".join((_t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, image.height, image.width), _t2[n3](n3, b3, image.is_bigendian, image.step, n4), data_2, _t3[n4 & 3](m.f, m.t, valid_window.x_offset, valid_window.y_offset, valid_window.height, valid_window.width, valid_window.do_rectify, m.min_disparity, m.max_disparity, m.delta_d)))
         except _FAULTS:
             return _plain(m, DisparityImage)
 

@@ -57,7 +57,7 @@ class tfMessage(_Message):
                 transform = transforms_one.transform
                 translation = transform.translation
                 rotation = transform.rotation
-                out.append(_t1[p2 & 7, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
+                out.append(_t1[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
                 p2 = 0
             return b"".join(out)
         except _FAULTS:

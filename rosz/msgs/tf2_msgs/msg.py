@@ -22,7 +22,7 @@ __all__ = (
     "TF2Error",
     "TFMessage",
 )
-_t1 = _Template("I B I $", -4)
+_t1 = _Template("I B I $", -4, 4)
 _u1 = _Struct("<IB3xI").unpack_from
 
 
@@ -62,7 +62,8 @@ class TF2Error(_Message):
             b1 = m.error_string.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, m.error, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, m.error, n1, b1)
         except _FAULTS:
             return _plain(m, TF2Error)
 
@@ -113,7 +114,7 @@ class TFMessage(_Message):
                 transform = transforms_one.transform
                 translation = transform.translation
                 rotation = transform.rotation
-                out.append(_t2[p2 & 7, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
+                out.append(_t2[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
                 p2 = 0
             return b"".join(out)
         except _FAULTS:

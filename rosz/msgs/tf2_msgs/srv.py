@@ -17,7 +17,7 @@ __all__ = (
     "FrameGraphRequest",
     "FrameGraphResponse",
 )
-_p1 = _Struct("<Ix").pack
+_t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
 
@@ -32,7 +32,7 @@ class FrameGraphRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, FrameGraphRequest)
 
@@ -44,7 +44,7 @@ class FrameGraphRequest(_Message):
             return FrameGraphRequest()
         except _FAULTS:
             return _explain(data, FrameGraphRequest)
-_t1 = _Template("I I $", -4)
+_t2 = _Template("I I $", -4, 4)
 _u2 = _Struct("<2I").unpack_from
 
 
@@ -63,7 +63,8 @@ class FrameGraphResponse(_Message):
             b1 = m.frame_yaml.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t2[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, FrameGraphResponse)
 

@@ -39,7 +39,7 @@ __all__ = (
     "MuxSelectRequest",
     "MuxSelectResponse",
 )
-_t1 = _Template("I I $", -4)
+_t1 = _Template("I I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 
 
@@ -62,7 +62,8 @@ class DemuxAddRequest(_Message):
             b1 = m.topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, DemuxAddRequest)
 
@@ -77,7 +78,7 @@ class DemuxAddRequest(_Message):
             return DemuxAddRequest(topic)
         except _FAULTS:
             return _explain(data, DemuxAddRequest)
-_p1 = _Struct("<Ix").pack
+_t2 = _Template("I x", -4)
 _u2 = _Struct("<Ix").unpack_from
 
 
@@ -92,7 +93,7 @@ class DemuxAddResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, DemuxAddResponse)
 
@@ -140,7 +141,8 @@ class DemuxDeleteRequest(_Message):
             b1 = m.topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, DemuxDeleteRequest)
 
@@ -168,7 +170,7 @@ class DemuxDeleteResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, DemuxDeleteResponse)
 
@@ -208,7 +210,7 @@ class DemuxListRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, DemuxListRequest)
 
@@ -221,7 +223,7 @@ class DemuxListRequest(_Message):
         except _FAULTS:
             return _explain(data, DemuxListRequest)
 _s1 = _StringList()
-_p2 = _Struct("<I").pack
+_p1 = _Struct("<I").pack
 _u3 = _Struct("<I").unpack_from
 
 
@@ -239,8 +241,8 @@ class DemuxListResponse(_Message):
         try:
             topics, k = m.topics, _s1.written
             b1 = k[1] if topics == k[0] else _s1.put(topics)
-            n2 = len(b1)
-            return b"".join((_p2(256), b1))
+            n1 = len(b1)
+            return b"".join((_p1(256), b1))
         except _FAULTS:
             return _plain(m, DemuxListResponse)
 
@@ -293,7 +295,8 @@ class DemuxSelectRequest(_Message):
             b1 = m.topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, DemuxSelectRequest)
 
@@ -325,7 +328,8 @@ class DemuxSelectResponse(_Message):
             b1 = m.prev_topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, DemuxSelectResponse)
 
@@ -377,7 +381,8 @@ class MuxAddRequest(_Message):
             b1 = m.topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, MuxAddRequest)
 
@@ -405,7 +410,7 @@ class MuxAddResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, MuxAddResponse)
 
@@ -453,7 +458,8 @@ class MuxDeleteRequest(_Message):
             b1 = m.topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, MuxDeleteRequest)
 
@@ -481,7 +487,7 @@ class MuxDeleteResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, MuxDeleteResponse)
 
@@ -521,7 +527,7 @@ class MuxListRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, MuxListRequest)
 
@@ -550,8 +556,8 @@ class MuxListResponse(_Message):
         try:
             topics, k = m.topics, _s2.written
             b1 = k[1] if topics == k[0] else _s2.put(topics)
-            n2 = len(b1)
-            return b"".join((_p2(256), b1))
+            n1 = len(b1)
+            return b"".join((_p1(256), b1))
         except _FAULTS:
             return _plain(m, MuxListResponse)
 
@@ -604,7 +610,8 @@ class MuxSelectRequest(_Message):
             b1 = m.topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, MuxSelectRequest)
 
@@ -636,7 +643,8 @@ class MuxSelectResponse(_Message):
             b1 = m.prev_topic.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, MuxSelectResponse)
 

@@ -118,8 +118,8 @@ class JointTrajectoryPoint(_Message):
         except _FAULTS:
             return _explain(data, JointTrajectoryPoint)
 _s1 = _StringList()
-_t1 = _Template("I i I I $ |4", -4)
-_t2 = _Template("I", None)
+_t1 = _Template("I i I I $ |4", -4, 8)
+_t2 = _Template("I", None, 8)
 _u4 = _Struct("<Ii2I").unpack_from
 
 
@@ -148,35 +148,37 @@ class JointTrajectory(_Message):
             n1, b1 = _texts[header.frame_id]
             joint_names, k = m.joint_names, _s1.written
             b2 = k[1] if joint_names == k[0] else _s1.put(joint_names)
-            n3 = len(b2)
+            n2 = len(b2)
+            f3, p4 = _t1[n1]
             points = m.points
-            n4 = len(points)
-            out = [_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1), b2, _t2[(n1 + 7 & -4) + n3 & 7](n4)]
-            p5 = ((n1 + 7 & -4) + n3 + 3 & -4) + 4
+            n5 = len(points)
+            f6, p7 = _t2[p4 + n2 & 7]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5)]
+            p8 = p7
             for points_one in points:
                 positions = points_one.positions
                 if type(positions) is not _array or positions.typecode != "d":
                     positions = _numbers(positions, "d")
-                n6 = len(positions)
-                p7 = 0 if n6 else p5 + 4
+                n9 = len(positions)
+                p10 = 0 if n9 else p8 + 4
                 velocities = points_one.velocities
                 if type(velocities) is not _array or velocities.typecode != "d":
                     velocities = _numbers(velocities, "d")
-                n8 = len(velocities)
-                p9 = 0 if n8 else p7 + n6 * 8 + 4
+                n11 = len(velocities)
+                p12 = 0 if n11 else p10 + n9 * 8 + 4
                 accelerations = points_one.accelerations
                 if type(accelerations) is not _array or accelerations.typecode != "d":
                     accelerations = _numbers(accelerations, "d")
-                n10 = len(accelerations)
-                p11 = 0 if n10 else p9 + n8 * 8 + 4
+                n13 = len(accelerations)
+                p14 = 0 if n13 else p12 + n11 * 8 + 4
                 effort = points_one.effort
                 if type(effort) is not _array or effort.typecode != "d":
                     effort = _numbers(effort, "d")
-                n12 = len(effort)
-                p13 = 0 if n12 else p11 + n10 * 8 + 4
+                n15 = len(effort)
+                p16 = 0 if n15 else p14 + n13 * 8 + 4
                 time_from_start = points_one.time_from_start
-                out += (_p2(n6), (_PADDING[-(p5 + 4) & 7] if n6 else b""), positions, _p2(n8), (_PADDING[-(p7 + n6 * 8 + 4) & 7] if n8 else b""), velocities, _p2(n10), (_PADDING[-(p9 + n8 * 8 + 4) & 7] if n10 else b""), accelerations, _p2(n12), (_PADDING[-(p11 + n10 * 8 + 4) & 7] if n12 else b""), effort, _p3(time_from_start.sec, time_from_start.nanosec))
-                p5 = p13 + n12 * 8
+                out += (_p2(n9), (_PADDING[-(p8 + 4) & 7] if n9 else b""), positions, _p2(n11), (_PADDING[-(p10 + n9 * 8 + 4) & 7] if n11 else b""), velocities, _p2(n13), (_PADDING[-(p12 + n11 * 8 + 4) & 7] if n13 else b""), accelerations, _p2(n15), (_PADDING[-(p14 + n13 * 8 + 4) & 7] if n15 else b""), effort, _p3(time_from_start.sec, time_from_start.nanosec))
+                p8 = p16 + n15 * 8 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, JointTrajectory)
@@ -315,24 +317,26 @@ class MultiDOFJointTrajectory(_Message):
             n1, b1 = _texts[header.frame_id]
             joint_names, k = m.joint_names, _s2.written
             b2 = k[1] if joint_names == k[0] else _s2.put(joint_names)
-            n3 = len(b2)
+            n2 = len(b2)
+            f3, p4 = _t1[n1]
             points = m.points
-            n4 = len(points)
-            out = [_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1), b2, _t2[(n1 + 7 & -4) + n3 & 7](n4)]
-            p5 = ((n1 + 7 & -4) + n3 + 3 & -4) + 4
+            n5 = len(points)
+            f6, p7 = _t2[p4 + n2 & 7]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5)]
+            p8 = p7
             for points_one in points:
                 transforms = points_one.transforms
-                n6 = len(transforms)
-                p7 = 0 if n6 else p5 + 4
+                n9 = len(transforms)
+                p10 = 0 if n9 else p8 + 4
                 velocities = points_one.velocities
-                n8 = len(velocities)
-                p9 = 0 if n8 else p7 + n6 * 56 + 4
+                n11 = len(velocities)
+                p12 = 0 if n11 else p10 + n9 * 56 + 4
                 accelerations = points_one.accelerations
-                n10 = len(accelerations)
-                p11 = 0 if n10 else p9 + n8 * 48 + 4
+                n13 = len(accelerations)
+                p14 = 0 if n13 else p12 + n11 * 48 + 4
                 time_from_start = points_one.time_from_start
-                out += (_p2(n6), (_PADDING[-(p5 + 4) & 7] if n6 else b""), b"".join([_p4(e_translation.x, e_translation.y, e_translation.z, e_rotation.x, e_rotation.y, e_rotation.z, e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]), _p2(n8), (_PADDING[-(p7 + n6 * 56 + 4) & 7] if n8 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in velocities for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p2(n10), (_PADDING[-(p9 + n8 * 48 + 4) & 7] if n10 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in accelerations for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p3(time_from_start.sec, time_from_start.nanosec))
-                p5 = p11 + n10 * 48
+                out += (_p2(n9), (_PADDING[-(p8 + 4) & 7] if n9 else b""), b"".join([_p4(e_translation.x, e_translation.y, e_translation.z, e_rotation.x, e_rotation.y, e_rotation.z, e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]), _p2(n11), (_PADDING[-(p10 + n9 * 56 + 4) & 7] if n11 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in velocities for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p2(n13), (_PADDING[-(p12 + n11 * 48 + 4) & 7] if n13 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in accelerations for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p3(time_from_start.sec, time_from_start.nanosec))
+                p8 = p14 + n13 * 48 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MultiDOFJointTrajectory)

@@ -9,12 +9,13 @@ from rosz.message import Message as _Message
 from struct import Struct as _Struct
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import Template as _Template
 
 __all__ = (
     "Color",
     "Pose",
 )
-_p1 = _Struct("<I3B").pack
+_t1 = _Template("I B B B", -4)
 _u1 = _Struct("<I3B").unpack_from
 
 
@@ -38,7 +39,7 @@ class Color(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.r, m.g, m.b)
+            return _t1[0](256, m.r, m.g, m.b)
         except _FAULTS:
             return _plain(m, Color)
 
@@ -50,7 +51,7 @@ class Color(_Message):
             return Color(r_2, g_2, b_2)
         except _FAULTS:
             return _explain(data, Color)
-_p2 = _Struct("<I5f").pack
+_p1 = _Struct("<I5f").pack
 _u2 = _Struct("<I5f").unpack_from
 
 
@@ -78,7 +79,7 @@ class Pose(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.x, m.y, m.theta, m.linear_velocity, m.angular_velocity)
+            return _p1(256, m.x, m.y, m.theta, m.linear_velocity, m.angular_velocity)
         except _FAULTS:
             return _plain(m, Pose)
 

@@ -30,7 +30,7 @@ __all__ = (
     "TeleportRelativeRequest",
     "TeleportRelativeResponse",
 )
-_t1 = _Template("I I $", -4)
+_t1 = _Template("I I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 
 
@@ -51,7 +51,8 @@ class KillRequest(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, KillRequest)
 
@@ -66,7 +67,7 @@ class KillRequest(_Message):
             return KillRequest(name)
         except _FAULTS:
             return _explain(data, KillRequest)
-_p1 = _Struct("<Ix").pack
+_t2 = _Template("I x", -4)
 _u2 = _Struct("<Ix").unpack_from
 
 
@@ -81,7 +82,7 @@ class KillResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, KillResponse)
 
@@ -108,7 +109,7 @@ class Kill(_Service):
         "string name\n"
         "---\n"
     )
-_p2 = _Struct("<I5B").pack
+_t3 = _Template("I B B B B B", -4)
 _u3 = _Struct("<I5B").unpack_from
 
 
@@ -136,7 +137,7 @@ class SetPenRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.r, m.g, m.b, m.width, m.off)
+            return _t3[0](256, m.r, m.g, m.b, m.width, m.off)
         except _FAULTS:
             return _plain(m, SetPenRequest)
 
@@ -161,7 +162,7 @@ class SetPenResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, SetPenResponse)
 
@@ -192,7 +193,7 @@ class SetPen(_Service):
         "uint8 off    # 1 to stop drawing, 0 to draw\n"
         "---\n"
     )
-_t2 = _Template("I f f f I $", -4)
+_t4 = _Template("I f f f I $", -4, 4)
 _u4 = _Struct("<I3fI").unpack_from
 
 
@@ -219,7 +220,8 @@ class SpawnRequest(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t2[n1](256, m.x, m.y, m.theta, n1, b1)
+            f2, p3 = _t4[n1]
+            return f2(256, m.x, m.y, m.theta, n1, b1)
         except _FAULTS:
             return _plain(m, SpawnRequest)
 
@@ -249,7 +251,8 @@ class SpawnResponse(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t1[n1](256, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, SpawnResponse)
 
@@ -283,7 +286,7 @@ class Spawn(_Service):
         "---\n"
         "string name    # the name it got\n"
     )
-_p3 = _Struct("<I3f").pack
+_p1 = _Struct("<I3f").pack
 _u5 = _Struct("<I3f").unpack_from
 
 
@@ -307,7 +310,7 @@ class TeleportAbsoluteRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256, m.x, m.y, m.theta)
+            return _p1(256, m.x, m.y, m.theta)
         except _FAULTS:
             return _plain(m, TeleportAbsoluteRequest)
 
@@ -332,7 +335,7 @@ class TeleportAbsoluteResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, TeleportAbsoluteResponse)
 
@@ -361,7 +364,7 @@ class TeleportAbsolute(_Service):
         "float32 theta  # rad, counter-clockwise from the x axis\n"
         "---\n"
     )
-_p4 = _Struct("<I2f").pack
+_p2 = _Struct("<I2f").pack
 _u6 = _Struct("<I2f").unpack_from
 
 
@@ -383,7 +386,7 @@ class TeleportRelativeRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p4(256, m.linear, m.angular)
+            return _p2(256, m.linear, m.angular)
         except _FAULTS:
             return _plain(m, TeleportRelativeRequest)
 
@@ -408,7 +411,7 @@ class TeleportRelativeResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t2[0](256)
         except _FAULTS:
             return _plain(m, TeleportRelativeResponse)
 

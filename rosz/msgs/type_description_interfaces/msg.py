@@ -21,7 +21,7 @@ __all__ = (
     "TypeDescription",
     "TypeSource",
 )
-_t1 = _Template("I B Q Q I $", -4)
+_t1 = _Template("I B Q Q I $", -4, 8)
 _u1 = _Struct("<IB7x2QI").unpack_from
 
 
@@ -240,7 +240,8 @@ class FieldType(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             if n1 > 256: raise ValueError
-            return _t1[n1](256, m.type_id, m.capacity, m.string_capacity, n1, b1)
+            f2, p3 = _t1[n1]
+            return f2(256, m.type_id, m.capacity, m.string_capacity, n1, b1)
         except _FAULTS:
             return _plain(m, FieldType)
 
@@ -256,7 +257,8 @@ class FieldType(_Message):
             return FieldType(type_id, capacity, string_capacity, nested_type_name)
         except _FAULTS:
             return _explain(data, FieldType)
-_t2 = _Template("I I $ B Q Q I $ I $", -4)
+_t2 = _Template("I I $ B Q Q I $", -4, 8)
+_t3 = _Template("I $", None, 8)
 _u2 = _Struct("<2I").unpack_from
 _u3 = _Struct("<2QI").unpack_from
 _u4 = _Struct("<I").unpack_from
@@ -291,7 +293,9 @@ class Field(_Message):
             b3 = m.default_value.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            return _t2[n1, n2, n3](256, n1, b1, type_2.type_id, type_2.capacity, type_2.string_capacity, n2, b2, n3, b3)
+            f4, p5 = _t2[n1, n2]
+            f6, p7 = _t3[p5, n3]
+            return b"".join((f4(256, n1, b1, type_2.type_id, type_2.capacity, type_2.string_capacity, n2, b2), f6(n3, b3)))
         except _FAULTS:
             return _plain(m, Field)
 
@@ -318,8 +322,8 @@ class Field(_Message):
             return Field(name, FieldType(type_id, capacity, string_capacity, nested_type_name), default_value)
         except _FAULTS:
             return _explain(data, Field)
-_t3 = _Template("I I $ I", -4)
-_t4 = _Template("I $ B Q Q I $ I $", None)
+_t4 = _Template("I I $ I", -4, 8)
+_t5 = _Template("I $ B Q Q I $", None, 8)
 
 
 class IndividualTypeDescription(_Message):
@@ -346,20 +350,23 @@ class IndividualTypeDescription(_Message):
             if n1 > 256: raise ValueError
             fields = m.fields
             n2 = len(fields)
-            out = [_t3[n1](256, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            f3, p4 = _t4[n1]
+            out = [f3(256, n1, b1, n2)]
+            p5 = p4
             for fields_one in fields:
-                n4, b4 = _texts[fields_one.name]
+                n6, b6 = _texts[fields_one.name]
                 type_2 = fields_one.type
-                b5 = type_2.nested_type_name.encode()
-                if 0 in b5: raise ValueError
-                n5 = len(b5) + 1
-                if n5 > 256: raise ValueError
-                b6 = fields_one.default_value.encode()
-                if 0 in b6: raise ValueError
-                n6 = len(b6) + 1
-                out.append(_t4[p3 & 7, n4, n5, n6](n4, b4, type_2.type_id, type_2.capacity, type_2.string_capacity, n5, b5, n6, b6))
-                p3 = (n5 + 7 & -4) + n6 + 4
+                b7 = type_2.nested_type_name.encode()
+                if 0 in b7: raise ValueError
+                n7 = len(b7) + 1
+                if n7 > 256: raise ValueError
+                b8 = fields_one.default_value.encode()
+                if 0 in b8: raise ValueError
+                n8 = len(b8) + 1
+                f9, p10 = _t5[p5, n6, n7]
+                f11, p12 = _t3[p10, n8]
+                out += (f9(n6, b6, type_2.type_id, type_2.capacity, type_2.string_capacity, n7, b7), f11(n8, b8))
+                p5 = p12
             return b"".join(out)
         except _FAULTS:
             return _plain(m, IndividualTypeDescription)
@@ -399,7 +406,7 @@ class IndividualTypeDescription(_Message):
             return IndividualTypeDescription(type_name, fields)
         except _FAULTS:
             return _explain(data, IndividualTypeDescription)
-_t5 = _Template("I I $ I $", -4)
+_t6 = _Template("I I $ I $", -4, 4)
 
 
 class KeyValue(_Message):
@@ -424,7 +431,8 @@ class KeyValue(_Message):
             b2 = m.value.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t5[n1, n2](256, n1, b1, n2, b2)
+            f3, p4 = _t6[n1, n2]
+            return f3(256, n1, b1, n2, b2)
         except _FAULTS:
             return _plain(m, KeyValue)
 
@@ -444,8 +452,8 @@ class KeyValue(_Message):
             return KeyValue(key, value)
         except _FAULTS:
             return _explain(data, KeyValue)
-_t6 = _Template("I", None)
-_t7 = _Template("I $ I", None)
+_t7 = _Template("I", None, 8)
+_t8 = _Template("I $ I", None, 8)
 
 
 class TypeDescription(_Message):
@@ -475,46 +483,53 @@ class TypeDescription(_Message):
             if n1 > 256: raise ValueError
             fields = type_description.fields
             n2 = len(fields)
-            out = [_t3[n1](256, n1, b1, n2)]
-            p3 = (n1 + 7 & -4) + 4
+            f3, p4 = _t4[n1]
+            out = [f3(256, n1, b1, n2)]
+            p5 = p4
             for fields_one in fields:
-                n4, b4 = _texts[fields_one.name]
+                n6, b6 = _texts[fields_one.name]
                 type_2 = fields_one.type
-                b5 = type_2.nested_type_name.encode()
-                if 0 in b5: raise ValueError
-                n5 = len(b5) + 1
-                if n5 > 256: raise ValueError
-                b6 = fields_one.default_value.encode()
-                if 0 in b6: raise ValueError
-                n6 = len(b6) + 1
-                out.append(_t4[p3 & 7, n4, n5, n6](n4, b4, type_2.type_id, type_2.capacity, type_2.string_capacity, n5, b5, n6, b6))
-                p3 = (n5 + 7 & -4) + n6 + 4
+                b7 = type_2.nested_type_name.encode()
+                if 0 in b7: raise ValueError
+                n7 = len(b7) + 1
+                if n7 > 256: raise ValueError
+                b8 = fields_one.default_value.encode()
+                if 0 in b8: raise ValueError
+                n8 = len(b8) + 1
+                f9, p10 = _t5[p5, n6, n7]
+                f11, p12 = _t3[p10, n8]
+                out += (f9(n6, b6, type_2.type_id, type_2.capacity, type_2.string_capacity, n7, b7), f11(n8, b8))
+                p5 = p12
             referenced_type_descriptions = m.referenced_type_descriptions
-            n7 = len(referenced_type_descriptions)
-            out.append(_t6[p3 & 7](n7))
-            p8 = (p3 + 3 & -4) + 4
+            n13 = len(referenced_type_descriptions)
+            f14, p15 = _t7[p5]
+            out.append(f14(n13))
+            p16 = p15
             for referenced_type_descriptions_one in referenced_type_descriptions:
-                b9 = referenced_type_descriptions_one.type_name.encode()
-                if 0 in b9: raise ValueError
-                n9 = len(b9) + 1
-                if n9 > 256: raise ValueError
+                b17 = referenced_type_descriptions_one.type_name.encode()
+                if 0 in b17: raise ValueError
+                n17 = len(b17) + 1
+                if n17 > 256: raise ValueError
                 fields_2 = referenced_type_descriptions_one.fields
-                n10 = len(fields_2)
-                out.append(_t7[p8 & 7, n9](n9, b9, n10))
-                p11 = ((p8 + 3 & -4) + n9 + 7 & -4) + 4
+                n18 = len(fields_2)
+                f19, p20 = _t8[p16, n17]
+                out.append(f19(n17, b17, n18))
+                p21 = p20
                 for fields_one_2 in fields_2:
-                    n12, b12 = _texts[fields_one_2.name]
+                    n22, b22 = _texts[fields_one_2.name]
                     type_3 = fields_one_2.type
-                    b13 = type_3.nested_type_name.encode()
-                    if 0 in b13: raise ValueError
-                    n13 = len(b13) + 1
-                    if n13 > 256: raise ValueError
-                    b14 = fields_one_2.default_value.encode()
-                    if 0 in b14: raise ValueError
-                    n14 = len(b14) + 1
-                    out.append(_t4[p11 & 7, n12, n13, n14](n12, b12, type_3.type_id, type_3.capacity, type_3.string_capacity, n13, b13, n14, b14))
-                    p11 = (n13 + 7 & -4) + n14 + 4
-                p8 = p11
+                    b23 = type_3.nested_type_name.encode()
+                    if 0 in b23: raise ValueError
+                    n23 = len(b23) + 1
+                    if n23 > 256: raise ValueError
+                    b24 = fields_one_2.default_value.encode()
+                    if 0 in b24: raise ValueError
+                    n24 = len(b24) + 1
+                    f25, p26 = _t5[p21, n22, n23]
+                    f27, p28 = _t3[p26, n24]
+                    out += (f25(n22, b22, type_3.type_id, type_3.capacity, type_3.string_capacity, n23, b23), f27(n24, b24))
+                    p21 = p28
+                p16 = p21
             return b"".join(out)
         except _FAULTS:
             return _plain(m, TypeDescription)
@@ -589,7 +604,8 @@ class TypeDescription(_Message):
             return TypeDescription(IndividualTypeDescription(type_name, fields), referenced_type_descriptions)
         except _FAULTS:
             return _explain(data, TypeDescription)
-_t8 = _Template("I I $ I $ I $", -4)
+_t9 = _Template("I I $", -4, 4)
+_t10 = _Template("I $ I $", None, 4)
 
 
 class TypeSource(_Message):
@@ -616,11 +632,12 @@ class TypeSource(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             n2, b2 = _texts[m.encoding]
-            b3 = m.raw_file_contents.encode()
-            if 0 in b3: raise ValueError
-            n3 = len(b3) + 1
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + n3 + 4
-            return _t8[n1, n2, n3](256, n1, b1, n2, b2, n3, b3)
+            f3, p4 = _t9[n1]
+            b5 = m.raw_file_contents.encode()
+            if 0 in b5: raise ValueError
+            n5 = len(b5) + 1
+            f6, p7 = _t10[p4, n2, n5]
+            return b"".join((f3(256, n1, b1), f6(n2, b2, n5, b5)))
         except _FAULTS:
             return _plain(m, TypeSource)
 

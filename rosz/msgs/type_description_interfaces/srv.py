@@ -25,7 +25,8 @@ __all__ = (
     "GetTypeDescriptionRequest",
     "GetTypeDescriptionResponse",
 )
-_t1 = _Template("I I $ I $ ?", -4)
+_t1 = _Template("I I $", -4, 4)
+_t2 = _Template("I $ ?", None, 4)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<I").unpack_from
 _u3 = _Struct("<?").unpack_from
@@ -57,7 +58,9 @@ class GetTypeDescriptionRequest(_Message):
             b2 = m.type_hash.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t1[n1, n2](256, n1, b1, n2, b2, m.include_type_sources)
+            f3, p4 = _t1[n1]
+            f5, p6 = _t2[p4, n2]
+            return b"".join((f3(256, n1, b1), f5(n2, b2, m.include_type_sources)))
         except _FAULTS:
             return _plain(m, GetTypeDescriptionRequest)
 
@@ -77,12 +80,12 @@ class GetTypeDescriptionRequest(_Message):
             return GetTypeDescriptionRequest(type_name, type_hash, include_type_sources)
         except _FAULTS:
             return _explain(data, GetTypeDescriptionRequest)
-_t2 = _Template("I ? I $ I $ I", -4)
-_t3 = _Template("I $ B Q Q I $ I $", None)
-_t4 = _Template("I", None)
-_t5 = _Template("I $ I", None)
-_t6 = _Template("I $ I $ I $", None)
-_t7 = _Template("I $ I $", None)
+_t3 = _Template("I ? I $", -4, 8)
+_t4 = _Template("I $ I", None, 8)
+_t5 = _Template("I $ B Q Q I $", None, 8)
+_t6 = _Template("I $", None, 8)
+_t7 = _Template("I", None, 8)
+_t8 = _Template("I $ I $", None, 8)
 _u4 = _Struct("<I?3xI").unpack_from
 _u5 = _Struct("<2QI").unpack_from
 
@@ -118,75 +121,86 @@ class GetTypeDescriptionResponse(_Message):
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
             if n2 > 256: raise ValueError
+            f3, p4 = _t3[n1]
             fields = type_description_2.fields
-            n3 = len(fields)
-            out = [_t2[n1, n2](256, m.successful, n1, b1, n2, b2, n3)]
-            p4 = ((n1 + 3 & -4) + n2 + 7 & -4) + 4
+            n5 = len(fields)
+            f6, p7 = _t4[p4, n2]
+            out = [f3(256, m.successful, n1, b1), f6(n2, b2, n5)]
+            p8 = p7
             for fields_one in fields:
-                n5, b5 = _texts[fields_one.name]
+                n9, b9 = _texts[fields_one.name]
                 type_2 = fields_one.type
-                b6 = type_2.nested_type_name.encode()
-                if 0 in b6: raise ValueError
-                n6 = len(b6) + 1
-                if n6 > 256: raise ValueError
-                b7 = fields_one.default_value.encode()
-                if 0 in b7: raise ValueError
-                n7 = len(b7) + 1
-                out.append(_t3[p4 & 7, n5, n6, n7](n5, b5, type_2.type_id, type_2.capacity, type_2.string_capacity, n6, b6, n7, b7))
-                p4 = (n6 + 7 & -4) + n7 + 4
-            referenced_type_descriptions = type_description.referenced_type_descriptions
-            n8 = len(referenced_type_descriptions)
-            out.append(_t4[p4 & 7](n8))
-            p9 = (p4 + 3 & -4) + 4
-            for referenced_type_descriptions_one in referenced_type_descriptions:
-                b10 = referenced_type_descriptions_one.type_name.encode()
+                b10 = type_2.nested_type_name.encode()
                 if 0 in b10: raise ValueError
                 n10 = len(b10) + 1
                 if n10 > 256: raise ValueError
+                b11 = fields_one.default_value.encode()
+                if 0 in b11: raise ValueError
+                n11 = len(b11) + 1
+                f12, p13 = _t5[p8, n9, n10]
+                f14, p15 = _t6[p13, n11]
+                out += (f12(n9, b9, type_2.type_id, type_2.capacity, type_2.string_capacity, n10, b10), f14(n11, b11))
+                p8 = p15
+            referenced_type_descriptions = type_description.referenced_type_descriptions
+            n16 = len(referenced_type_descriptions)
+            f17, p18 = _t7[p8]
+            out.append(f17(n16))
+            p19 = p18
+            for referenced_type_descriptions_one in referenced_type_descriptions:
+                b20 = referenced_type_descriptions_one.type_name.encode()
+                if 0 in b20: raise ValueError
+                n20 = len(b20) + 1
+                if n20 > 256: raise ValueError
                 fields_2 = referenced_type_descriptions_one.fields
-                n11 = len(fields_2)
-                out.append(_t5[p9 & 7, n10](n10, b10, n11))
-                p12 = ((p9 + 3 & -4) + n10 + 7 & -4) + 4
+                n21 = len(fields_2)
+                f22, p23 = _t4[p19, n20]
+                out.append(f22(n20, b20, n21))
+                p24 = p23
                 for fields_one_2 in fields_2:
-                    n13, b13 = _texts[fields_one_2.name]
+                    n25, b25 = _texts[fields_one_2.name]
                     type_3 = fields_one_2.type
-                    b14 = type_3.nested_type_name.encode()
-                    if 0 in b14: raise ValueError
-                    n14 = len(b14) + 1
-                    if n14 > 256: raise ValueError
-                    b15 = fields_one_2.default_value.encode()
-                    if 0 in b15: raise ValueError
-                    n15 = len(b15) + 1
-                    out.append(_t3[p12 & 7, n13, n14, n15](n13, b13, type_3.type_id, type_3.capacity, type_3.string_capacity, n14, b14, n15, b15))
-                    p12 = (n14 + 7 & -4) + n15 + 4
-                p9 = p12
+                    b26 = type_3.nested_type_name.encode()
+                    if 0 in b26: raise ValueError
+                    n26 = len(b26) + 1
+                    if n26 > 256: raise ValueError
+                    b27 = fields_one_2.default_value.encode()
+                    if 0 in b27: raise ValueError
+                    n27 = len(b27) + 1
+                    f28, p29 = _t5[p24, n25, n26]
+                    f30, p31 = _t6[p29, n27]
+                    out += (f28(n25, b25, type_3.type_id, type_3.capacity, type_3.string_capacity, n26, b26), f30(n27, b27))
+                    p24 = p31
+                p19 = p24
             type_sources = m.type_sources
-            n16 = len(type_sources)
-            out.append(_t4[p9 & 7](n16))
-            p17 = (p9 + 3 & -4) + 4
+            n32 = len(type_sources)
+            f33, p34 = _t7[p19]
+            out.append(f33(n32))
+            p35 = p34
             for type_sources_one in type_sources:
-                b18 = type_sources_one.type_name.encode()
-                if 0 in b18: raise ValueError
-                n18 = len(b18) + 1
-                n19, b19 = _texts[type_sources_one.encoding]
-                p20 = ((p17 + 3 & -4) + n18 + 7 & -4) + n19 + 4
-                b21 = type_sources_one.raw_file_contents.encode()
-                if 0 in b21: raise ValueError
-                n21 = len(b21) + 1
-                out.append(_t6[p17 & 7, n18, n19, n21](n18, b18, n19, b19, n21, b21))
-                p17 = (p20 + 3 & -4) + n21 + 4
+                b36 = type_sources_one.type_name.encode()
+                if 0 in b36: raise ValueError
+                n36 = len(b36) + 1
+                n37, b37 = _texts[type_sources_one.encoding]
+                f38, p39 = _t6[p35, n36]
+                b40 = type_sources_one.raw_file_contents.encode()
+                if 0 in b40: raise ValueError
+                n40 = len(b40) + 1
+                f41, p42 = _t8[p39, n37, n40]
+                out += (f38(n36, b36), f41(n37, b37, n40, b40))
+                p35 = p42
             extra_information = m.extra_information
-            n22 = len(extra_information)
-            out.append(_t4[p17 & 7](n22))
-            p23 = (p17 + 3 & -4) + 4
+            n43 = len(extra_information)
+            f44, p45 = _t7[p35]
+            out.append(f44(n43))
+            p46 = p45
             for extra_information_one in extra_information:
-                n24, b24 = _texts[extra_information_one.key]
-                b25 = extra_information_one.value.encode()
-                if 0 in b25: raise ValueError
-                n25 = len(b25) + 1
-                p26 = ((p23 + 3 & -4) + n24 + 7 & -4) + n25 + 4
-                out.append(_t7[p23 & 7, n24, n25](n24, b24, n25, b25))
-                p23 = p26
+                n47, b47 = _texts[extra_information_one.key]
+                b48 = extra_information_one.value.encode()
+                if 0 in b48: raise ValueError
+                n48 = len(b48) + 1
+                f49, p50 = _t8[p46, n47, n48]
+                out.append(f49(n47, b47, n48, b48))
+                p46 = p50
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetTypeDescriptionResponse)

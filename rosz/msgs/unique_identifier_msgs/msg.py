@@ -10,13 +10,14 @@ from rosz.message import Message as _Message
 from struct import Struct as _Struct
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import octets as _octets
 
 __all__ = (
     "UUID",
 )
 _z1 = bytes(16)
-_p1 = _Struct("<I16s").pack
+_t1 = _Template("I 16s", -4)
 _u1 = _Struct("<I16s").unpack_from
 
 
@@ -39,7 +40,7 @@ class UUID(_Message):
             uuid = m.uuid
             if type(uuid) is not bytes or len(uuid) != 16:
                 uuid = bytes(_octets(uuid, 16))
-            return _p1(256, uuid)
+            return _t1[0](256, uuid)
         except _FAULTS:
             return _plain(m, UUID)
 

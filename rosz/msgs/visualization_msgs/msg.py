@@ -156,7 +156,8 @@ class ImageMarker(_Message):
             return ImageMarker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action, Point(x_2, y_2, z_2), scale, ColorRGBA(r_2, g_2, b_2, a_2), filled, ColorRGBA(r_3, g_3, b_3, a_3), Duration(sec_2, nanosec_2), points, outline_colors)
         except _FAULTS:
             return _explain(data, ImageMarker)
-_t2 = _Template("I I I I $ I $ B", -4)
+_t2 = _Template("I I I I $", -4, 4)
+_t3 = _Template("I $ B", None, 4)
 _u5 = _Struct("<4I").unpack_from
 
 
@@ -199,7 +200,9 @@ class MenuEntry(_Message):
             b2 = m.command.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            return _t2[n1, n2](256, m.id, m.parent_id, n1, b1, n2, b2, m.command_type)
+            f3, p4 = _t2[n1]
+            f5, p6 = _t3[p4, n2]
+            return b"".join((f3(256, m.id, m.parent_id, n1, b1), f5(n2, b2, m.command_type)))
         except _FAULTS:
             return _plain(m, MenuEntry)
 
@@ -253,7 +256,7 @@ class UVCoordinate(_Message):
             return UVCoordinate(u_2, v_2)
         except _FAULTS:
             return _explain(data, UVCoordinate)
-_t3 = _Template("I I $ I", -4)
+_t4 = _Template("I I $ I", -4)
 _u7 = _Struct("<2I").unpack_from
 
 
@@ -282,7 +285,7 @@ class MeshFile(_Message):
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n2 = len(data_2)
-            return b"".join((_t3[n1](256, n1, b1, n2), data_2))
+            return b"".join((_t4[n1](256, n1, b1, n2), data_2))
         except _FAULTS:
             return _plain(m, MeshFile)
 
@@ -302,11 +305,13 @@ class MeshFile(_Message):
             return MeshFile(filename, data_2)
         except _FAULTS:
             return _explain(data, MeshFile)
-_t4 = _Template("I i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", -4)
-_t5 = _Template("I $ i I I $ I $ I", 4)
+_t5 = _Template("I i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", -4)
+_t6 = _Template("I $ i I", 4, 8)
+_t7 = _Template("I $ I $ I", None, 8)
 _p5 = _Struct("<2f").pack
-_t6 = _Template("I", None)
-_t7 = _Template("I $ I $ I $ I", 0)
+_t8 = _Template("I", None, 8)
+_t9 = _Template("I $", None, 8)
+_t10 = _Template("I $ I", None, 8)
 _p6 = _Struct("<?").pack
 _u8 = _Struct("<10d4fiI?3xI").unpack_from
 _u9 = _Struct("<i2I").unpack_from
@@ -436,31 +441,34 @@ class Marker(_Message):
             header_2 = texture.header
             stamp_2 = header_2.stamp
             n6, b6 = _texts[header_2.frame_id]
-            n7, b7 = _texts[texture.format]
-            p8 = ((n5 + 3 & -4) + n6 + 15 & -4) + n7 + 4
+            f7, p8 = _t6[n5]
+            n9, b9 = _texts[texture.format]
             data_2 = texture.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
-            n9 = len(data_2)
+            n10 = len(data_2)
+            f11, p12 = _t7[p8, n6, n9]
             uv_coordinates = m.uv_coordinates
-            n10 = len(uv_coordinates)
-            p11 = ((p8 + 3 & -4) + n9 + 7 & -4) + n10 * 8 + 4
-            b12 = m.text.encode()
-            if 0 in b12: raise ValueError
-            n12 = len(b12) + 1
-            b13 = m.mesh_resource.encode()
-            if 0 in b13: raise ValueError
-            n13 = len(b13) + 1
+            n13 = len(uv_coordinates)
+            f14, p15 = _t8[p12 + n10 & 7]
+            b16 = m.text.encode()
+            if 0 in b16: raise ValueError
+            n16 = len(b16) + 1
+            b17 = m.mesh_resource.encode()
+            if 0 in b17: raise ValueError
+            n17 = len(b17) + 1
+            f18, p19 = _t9[p15 + n13 * 8 & 7, n16]
             mesh_file = m.mesh_file
-            b14 = mesh_file.filename.encode()
-            if 0 in b14: raise ValueError
-            n14 = len(b14) + 1
-            p15 = ((p11 + n12 + 7 & -4) + n13 + 7 & -4) + n14 + 4
+            b20 = mesh_file.filename.encode()
+            if 0 in b20: raise ValueError
+            n20 = len(b20) + 1
+            f21, p22 = _t9[p19, n17]
             data_3 = mesh_file.data
             if type(data_3) is not bytes:
                 data_3 = _octets(data_3)
-            n16 = len(data_3)
-            return b"".join((_t4[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, m.id, m.type, m.action, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, m.frame_locked, n3), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n4), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), _t5[n5, n6, n7](n5, b5, stamp_2.sec, stamp_2.nanosec, n6, b6, n7, b7, n9), data_2, _t6[(p8 + 3 & -4) + n9 + 4 & 7](n10), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), _t7[n12, n13, n14](n12, b12, n13, b13, n14, b14, n16), data_3, _p6(m.mesh_use_embedded_materials)))
+            n23 = len(data_3)
+            f24, p25 = _t10[p22, n20]
+            return b"".join((_t5[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, m.id, m.type, m.action, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, m.frame_locked, n3), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n4), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f7(n5, b5, stamp_2.sec, stamp_2.nanosec), f11(n6, b6, n9, b9, n10), data_2, f14(n13), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f18(n16, b16), f21(n17, b17), f24(n20, b20, n23), data_3, _p6(m.mesh_use_embedded_materials)))
         except _FAULTS:
             return _plain(m, Marker)
 
@@ -534,9 +542,9 @@ class Marker(_Message):
             return Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), Vector3(x_4, y_4, z_4), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_2, nanosec_2), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials)
         except _FAULTS:
             return _explain(data, Marker)
-_t8 = _Template("I I $ d d d d B B ? I", -4)
-_t9 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
-_t10 = _Template("? I $", None)
+_t11 = _Template("I I $ d d d d B B ? I", -4)
+_t12 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
+_t13 = _Template("? I $", None, 8)
 _u11 = _Struct("<4d2B?xI").unpack_from
 
 
@@ -609,14 +617,13 @@ class InteractiveMarkerControl(_Message):
             orientation = m.orientation
             markers = m.markers
             n2 = len(markers)
-            out = [_t8[n1](256, n1, b1, orientation.x, orientation.y, orientation.z, orientation.w, m.orientation_mode, m.interaction_mode, m.always_visible, n2)]
+            out = [_t11[n1](256, n1, b1, orientation.x, orientation.y, orientation.z, orientation.w, m.orientation_mode, m.interaction_mode, m.always_visible, n2)]
             p3 = 0
             for markers_one in markers:
                 header = markers_one.header
                 stamp = header.stamp
                 n4, b4 = _texts[header.frame_id]
                 n5, b5 = _texts[markers_one.ns]
-                p6 = ((p3 + 3 & -4) + n4 + 15 & -4) + n5 + 4
                 pose = markers_one.pose
                 position = pose.position
                 orientation_2 = pose.orientation
@@ -624,46 +631,50 @@ class InteractiveMarkerControl(_Message):
                 color = markers_one.color
                 lifetime = markers_one.lifetime
                 points = markers_one.points
-                n7 = len(points)
+                n6 = len(points)
                 colors = markers_one.colors
-                n8 = len(colors)
-                b9 = markers_one.texture_resource.encode()
-                if 0 in b9: raise ValueError
-                n9 = len(b9) + 1
+                n7 = len(colors)
+                b8 = markers_one.texture_resource.encode()
+                if 0 in b8: raise ValueError
+                n8 = len(b8) + 1
                 texture = markers_one.texture
                 header_2 = texture.header
                 stamp_2 = header_2.stamp
-                n10, b10 = _texts[header_2.frame_id]
-                n11, b11 = _texts[texture.format]
-                p12 = ((n9 + 3 & -4) + n10 + 15 & -4) + n11 + 4
+                n9, b9 = _texts[header_2.frame_id]
+                f10, p11 = _t6[n8]
+                n12, b12 = _texts[texture.format]
                 data_2 = texture.data
                 if type(data_2) is not bytes:
                     data_2 = _octets(data_2)
                 n13 = len(data_2)
+                f14, p15 = _t7[p11, n9, n12]
                 uv_coordinates = markers_one.uv_coordinates
-                n14 = len(uv_coordinates)
-                p15 = ((p12 + 3 & -4) + n13 + 7 & -4) + n14 * 8 + 4
-                b16 = markers_one.text.encode()
-                if 0 in b16: raise ValueError
-                n16 = len(b16) + 1
-                b17 = markers_one.mesh_resource.encode()
-                if 0 in b17: raise ValueError
-                n17 = len(b17) + 1
+                n16 = len(uv_coordinates)
+                f17, p18 = _t8[p15 + n13 & 7]
+                b19 = markers_one.text.encode()
+                if 0 in b19: raise ValueError
+                n19 = len(b19) + 1
+                b20 = markers_one.mesh_resource.encode()
+                if 0 in b20: raise ValueError
+                n20 = len(b20) + 1
+                f21, p22 = _t9[p18 + n16 * 8 & 7, n19]
                 mesh_file = markers_one.mesh_file
-                b18 = mesh_file.filename.encode()
-                if 0 in b18: raise ValueError
-                n18 = len(b18) + 1
-                p19 = ((p15 + n16 + 7 & -4) + n17 + 7 & -4) + n18 + 4
+                b23 = mesh_file.filename.encode()
+                if 0 in b23: raise ValueError
+                n23 = len(b23) + 1
+                f24, p25 = _t9[p22, n20]
                 data_3 = mesh_file.data
                 if type(data_3) is not bytes:
                     data_3 = _octets(data_3)
-                n20 = len(data_3)
-                out += (_t9[p3 & 7, n4, n5](stamp.sec, stamp.nanosec, n4, b4, n5, b5, markers_one.id, markers_one.type, markers_one.action, position.x, position.y, position.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n7), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n8), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), _t5[n9, n10, n11](n9, b9, stamp_2.sec, stamp_2.nanosec, n10, b10, n11, b11, n13), data_2, _t6[(p12 + 3 & -4) + n13 + 4 & 7](n14), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), _t7[n16, n17, n18](n16, b16, n17, b17, n18, b18, n20), data_3, _p6(markers_one.mesh_use_embedded_materials))
-                p3 = (p19 + 3 & -4) + n20 + 5
-            b21 = m.description.encode()
-            if 0 in b21: raise ValueError
-            n21 = len(b21) + 1
-            out.append(_t10[p3 & 7, n21](m.independent_marker_orientation, n21, b21))
+                n26 = len(data_3)
+                f27, p28 = _t10[p25, n23]
+                out += (_t12[p3, n4, n5](stamp.sec, stamp.nanosec, n4, b4, n5, b5, markers_one.id, markers_one.type, markers_one.action, position.x, position.y, position.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n6), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n7), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f10(n8, b8, stamp_2.sec, stamp_2.nanosec), f14(n9, b9, n12, b12, n13), data_2, f17(n16), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f21(n19, b19), f24(n20, b20), f27(n23, b23, n26), data_3, _p6(markers_one.mesh_use_embedded_materials))
+                p3 = p28 + n26 + 1 & 7
+            b29 = m.description.encode()
+            if 0 in b29: raise ValueError
+            n29 = len(b29) + 1
+            f30, p31 = _t13[p3, n29]
+            out.append(f30(m.independent_marker_orientation, n29, b29))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, InteractiveMarkerControl)
@@ -757,9 +768,11 @@ class InteractiveMarkerControl(_Message):
             return InteractiveMarkerControl(name, Quaternion(x_2, y_2, z_2, w_2), orientation_mode, interaction_mode, always_visible, markers, independent_marker_orientation, description)
         except _FAULTS:
             return _explain(data, InteractiveMarkerControl)
-_t11 = _Template("I i I I $ d d d d d d d I $ I $ f I", -4)
-_t12 = _Template("I I I $ I $ B", None)
-_t13 = _Template("I $ d d d d B B ? I", None)
+_t14 = _Template("I i I I $ d d d d d d d I $", -4, 8)
+_t15 = _Template("I $ f I", None, 8)
+_t16 = _Template("I I I $", None, 8)
+_t17 = _Template("I $ B", None, 8)
+_t18 = _Template("I $ d d d d B B ? I", None)
 _u12 = _Struct("<7dI").unpack_from
 _u13 = _Struct("<fI").unpack_from
 _u14 = _Struct("<3I").unpack_from
@@ -805,37 +818,40 @@ class InteractiveMarker(_Message):
             b3 = m.description.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
+            f4, p5 = _t14[n1, n2]
             menu_entries = m.menu_entries
-            n4 = len(menu_entries)
-            out = [_t11[n1, n2, n3](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2, b2, n3, b3, m.scale, n4)]
-            p5 = ((n2 + 7 & -4) + n3 + 7 & -4)
+            n6 = len(menu_entries)
+            f7, p8 = _t15[p5, n3]
+            out = [f4(256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2, b2), f7(n3, b3, m.scale, n6)]
+            p9 = p8
             for menu_entries_one in menu_entries:
-                b6 = menu_entries_one.title.encode()
-                if 0 in b6: raise ValueError
-                n6 = len(b6) + 1
-                b7 = menu_entries_one.command.encode()
-                if 0 in b7: raise ValueError
-                n7 = len(b7) + 1
-                p8 = ((p5 + 3 & -4) + n6 + 15 & -4) + n7 + 4
-                out.append(_t12[p5 & 7, n6, n7](menu_entries_one.id, menu_entries_one.parent_id, n6, b6, n7, b7, menu_entries_one.command_type))
-                p5 = p8 + 1
+                b10 = menu_entries_one.title.encode()
+                if 0 in b10: raise ValueError
+                n10 = len(b10) + 1
+                b11 = menu_entries_one.command.encode()
+                if 0 in b11: raise ValueError
+                n11 = len(b11) + 1
+                f12, p13 = _t16[p9, n10]
+                f14, p15 = _t17[p13, n11]
+                out += (f12(menu_entries_one.id, menu_entries_one.parent_id, n10, b10), f14(n11, b11, menu_entries_one.command_type))
+                p9 = p15
             controls = m.controls
-            n9 = len(controls)
-            out.append(_t6[p5 & 7](n9))
-            p10 = (p5 + 3 & -4) + 4
+            n16 = len(controls)
+            f17, p18 = _t8[p9]
+            out.append(f17(n16))
+            p19 = p18
             for controls_one in controls:
-                n11, b11 = _texts[controls_one.name]
+                n20, b20 = _texts[controls_one.name]
                 orientation_2 = controls_one.orientation
                 markers = controls_one.markers
-                n12 = len(markers)
-                out.append(_t13[p10 & 7, n11](n11, b11, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n12))
-                p13 = 0
+                n21 = len(markers)
+                out.append(_t18[p19, n20](n20, b20, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n21))
+                p22 = 0
                 for markers_one in markers:
                     header_2 = markers_one.header
                     stamp_2 = header_2.stamp
-                    n14, b14 = _texts[header_2.frame_id]
-                    n15, b15 = _texts[markers_one.ns]
-                    p16 = ((p13 + 3 & -4) + n14 + 15 & -4) + n15 + 4
+                    n23, b23 = _texts[header_2.frame_id]
+                    n24, b24 = _texts[markers_one.ns]
                     pose_2 = markers_one.pose
                     position_2 = pose_2.position
                     orientation_3 = pose_2.orientation
@@ -843,47 +859,51 @@ class InteractiveMarker(_Message):
                     color = markers_one.color
                     lifetime = markers_one.lifetime
                     points = markers_one.points
-                    n17 = len(points)
+                    n25 = len(points)
                     colors = markers_one.colors
-                    n18 = len(colors)
-                    b19 = markers_one.texture_resource.encode()
-                    if 0 in b19: raise ValueError
-                    n19 = len(b19) + 1
+                    n26 = len(colors)
+                    b27 = markers_one.texture_resource.encode()
+                    if 0 in b27: raise ValueError
+                    n27 = len(b27) + 1
                     texture = markers_one.texture
                     header_3 = texture.header
                     stamp_3 = header_3.stamp
-                    n20, b20 = _texts[header_3.frame_id]
-                    n21, b21 = _texts[texture.format]
-                    p22 = ((n19 + 3 & -4) + n20 + 15 & -4) + n21 + 4
+                    n28, b28 = _texts[header_3.frame_id]
+                    f29, p30 = _t6[n27]
+                    n31, b31 = _texts[texture.format]
                     data_2 = texture.data
                     if type(data_2) is not bytes:
                         data_2 = _octets(data_2)
-                    n23 = len(data_2)
+                    n32 = len(data_2)
+                    f33, p34 = _t7[p30, n28, n31]
                     uv_coordinates = markers_one.uv_coordinates
-                    n24 = len(uv_coordinates)
-                    p25 = ((p22 + 3 & -4) + n23 + 7 & -4) + n24 * 8 + 4
-                    b26 = markers_one.text.encode()
-                    if 0 in b26: raise ValueError
-                    n26 = len(b26) + 1
-                    b27 = markers_one.mesh_resource.encode()
-                    if 0 in b27: raise ValueError
-                    n27 = len(b27) + 1
+                    n35 = len(uv_coordinates)
+                    f36, p37 = _t8[p34 + n32 & 7]
+                    b38 = markers_one.text.encode()
+                    if 0 in b38: raise ValueError
+                    n38 = len(b38) + 1
+                    b39 = markers_one.mesh_resource.encode()
+                    if 0 in b39: raise ValueError
+                    n39 = len(b39) + 1
+                    f40, p41 = _t9[p37 + n35 * 8 & 7, n38]
                     mesh_file = markers_one.mesh_file
-                    b28 = mesh_file.filename.encode()
-                    if 0 in b28: raise ValueError
-                    n28 = len(b28) + 1
-                    p29 = ((p25 + n26 + 7 & -4) + n27 + 7 & -4) + n28 + 4
+                    b42 = mesh_file.filename.encode()
+                    if 0 in b42: raise ValueError
+                    n42 = len(b42) + 1
+                    f43, p44 = _t9[p41, n39]
                     data_3 = mesh_file.data
                     if type(data_3) is not bytes:
                         data_3 = _octets(data_3)
-                    n30 = len(data_3)
-                    out += (_t9[p13 & 7, n14, n15](stamp_2.sec, stamp_2.nanosec, n14, b14, n15, b15, markers_one.id, markers_one.type, markers_one.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n17), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n18), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), _t5[n19, n20, n21](n19, b19, stamp_3.sec, stamp_3.nanosec, n20, b20, n21, b21, n23), data_2, _t6[(p22 + 3 & -4) + n23 + 4 & 7](n24), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), _t7[n26, n27, n28](n26, b26, n27, b27, n28, b28, n30), data_3, _p6(markers_one.mesh_use_embedded_materials))
-                    p13 = (p29 + 3 & -4) + n30 + 5
-                b31 = controls_one.description.encode()
-                if 0 in b31: raise ValueError
-                n31 = len(b31) + 1
-                out.append(_t10[p13 & 7, n31](controls_one.independent_marker_orientation, n31, b31))
-                p10 = (p13 + 4 & -4) + n31 + 4
+                    n45 = len(data_3)
+                    f46, p47 = _t10[p44, n42]
+                    out += (_t12[p22, n23, n24](stamp_2.sec, stamp_2.nanosec, n23, b23, n24, b24, markers_one.id, markers_one.type, markers_one.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n25), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n26), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f29(n27, b27, stamp_3.sec, stamp_3.nanosec), f33(n28, b28, n31, b31, n32), data_2, f36(n35), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f40(n38, b38), f43(n39, b39), f46(n42, b42, n45), data_3, _p6(markers_one.mesh_use_embedded_materials))
+                    p22 = p47 + n45 + 1 & 7
+                b48 = controls_one.description.encode()
+                if 0 in b48: raise ValueError
+                n48 = len(b48) + 1
+                f49, p50 = _t13[p22, n48]
+                out.append(f49(controls_one.independent_marker_orientation, n48, b48))
+                p19 = p50
             return b"".join(out)
         except _FAULTS:
             return _plain(m, InteractiveMarker)
@@ -1016,7 +1036,8 @@ class InteractiveMarker(_Message):
             return InteractiveMarker(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name, description, scale, menu_entries, controls)
         except _FAULTS:
             return _explain(data, InteractiveMarker)
-_t14 = _Template("I i I I $ I $ I $ I $ B d d d d d d d I d d d ?", -4)
+_t19 = _Template("I i I I $ I $", -4, 8)
+_t20 = _Template("I $ B d d d d d d d I d d d ?", None)
 _u15 = _Struct("<7dI4x3d?").unpack_from
 
 
@@ -1077,15 +1098,16 @@ class InteractiveMarkerFeedback(_Message):
             b3 = m.marker_name.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            p4 = ((n1 + 7 & -4) + n2 + 7 & -4) + n3 + 4
-            b5 = m.control_name.encode()
-            if 0 in b5: raise ValueError
-            n5 = len(b5) + 1
+            f4, p5 = _t19[n1, n2]
+            b6 = m.control_name.encode()
+            if 0 in b6: raise ValueError
+            n6 = len(b6) + 1
+            f7, p8 = _t9[p5, n3]
             pose = m.pose
             position = pose.position
             orientation = pose.orientation
             mouse_point = m.mouse_point
-            return _t14[n1, n2, n3, n5](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, n3, b3, n5, b5, m.event_type, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, m.menu_entry_id, mouse_point.x, mouse_point.y, mouse_point.z, m.mouse_point_valid)
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2), f7(n3, b3), _t20[p8, n6](n6, b6, m.event_type, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, m.menu_entry_id, mouse_point.x, mouse_point.y, mouse_point.z, m.mouse_point_valid)))
         except _FAULTS:
             return _plain(m, InteractiveMarkerFeedback)
 
@@ -1117,8 +1139,8 @@ class InteractiveMarkerFeedback(_Message):
             return InteractiveMarkerFeedback(Header(Time(sec, nanosec), frame_id), client_id, marker_name, control_name, event_type, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), menu_entry_id, Point(x_4, y_4, z_4), mouse_point_valid)
         except _FAULTS:
             return _explain(data, InteractiveMarkerFeedback)
-_t15 = _Template("I I $ Q I", -4)
-_t16 = _Template("i I I $ d d d d d d d I $ I $ f I", None)
+_t21 = _Template("I I $ Q I", -4)
+_t22 = _Template("i I I $ d d d d d d d I $", None, 8)
 _u16 = _Struct("<QI").unpack_from
 
 
@@ -1147,7 +1169,7 @@ class InteractiveMarkerInit(_Message):
             n1 = len(b1) + 1
             markers = m.markers
             n2 = len(markers)
-            out = [_t15[n1](256, n1, b1, m.seq_num, n2)]
+            out = [_t21[n1](256, n1, b1, m.seq_num, n2)]
             p3 = 4
             for markers_one in markers:
                 header = markers_one.header
@@ -1160,37 +1182,40 @@ class InteractiveMarkerInit(_Message):
                 b6 = markers_one.description.encode()
                 if 0 in b6: raise ValueError
                 n6 = len(b6) + 1
+                f7, p8 = _t22[p3, n4, n5]
                 menu_entries = markers_one.menu_entries
-                n7 = len(menu_entries)
-                out.append(_t16[p3 & 7, n4, n5, n6](stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n5, b5, n6, b6, markers_one.scale, n7))
-                p8 = ((n5 + 7 & -4) + n6 + 7 & -4)
+                n9 = len(menu_entries)
+                f10, p11 = _t15[p8, n6]
+                out += (f7(stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n5, b5), f10(n6, b6, markers_one.scale, n9))
+                p12 = p11
                 for menu_entries_one in menu_entries:
-                    b9 = menu_entries_one.title.encode()
-                    if 0 in b9: raise ValueError
-                    n9 = len(b9) + 1
-                    b10 = menu_entries_one.command.encode()
-                    if 0 in b10: raise ValueError
-                    n10 = len(b10) + 1
-                    p11 = ((p8 + 3 & -4) + n9 + 15 & -4) + n10 + 4
-                    out.append(_t12[p8 & 7, n9, n10](menu_entries_one.id, menu_entries_one.parent_id, n9, b9, n10, b10, menu_entries_one.command_type))
-                    p8 = p11 + 1
+                    b13 = menu_entries_one.title.encode()
+                    if 0 in b13: raise ValueError
+                    n13 = len(b13) + 1
+                    b14 = menu_entries_one.command.encode()
+                    if 0 in b14: raise ValueError
+                    n14 = len(b14) + 1
+                    f15, p16 = _t16[p12, n13]
+                    f17, p18 = _t17[p16, n14]
+                    out += (f15(menu_entries_one.id, menu_entries_one.parent_id, n13, b13), f17(n14, b14, menu_entries_one.command_type))
+                    p12 = p18
                 controls = markers_one.controls
-                n12 = len(controls)
-                out.append(_t6[p8 & 7](n12))
-                p13 = (p8 + 3 & -4) + 4
+                n19 = len(controls)
+                f20, p21 = _t8[p12]
+                out.append(f20(n19))
+                p22 = p21
                 for controls_one in controls:
-                    n14, b14 = _texts[controls_one.name]
+                    n23, b23 = _texts[controls_one.name]
                     orientation_2 = controls_one.orientation
                     markers_2 = controls_one.markers
-                    n15 = len(markers_2)
-                    out.append(_t13[p13 & 7, n14](n14, b14, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n15))
-                    p16 = 0
+                    n24 = len(markers_2)
+                    out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n24))
+                    p25 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
                         stamp_2 = header_2.stamp
-                        n17, b17 = _texts[header_2.frame_id]
-                        n18, b18 = _texts[markers_one_2.ns]
-                        p19 = ((p16 + 3 & -4) + n17 + 15 & -4) + n18 + 4
+                        n26, b26 = _texts[header_2.frame_id]
+                        n27, b27 = _texts[markers_one_2.ns]
                         pose_2 = markers_one_2.pose
                         position_2 = pose_2.position
                         orientation_3 = pose_2.orientation
@@ -1198,48 +1223,52 @@ class InteractiveMarkerInit(_Message):
                         color = markers_one_2.color
                         lifetime = markers_one_2.lifetime
                         points = markers_one_2.points
-                        n20 = len(points)
+                        n28 = len(points)
                         colors = markers_one_2.colors
-                        n21 = len(colors)
-                        b22 = markers_one_2.texture_resource.encode()
-                        if 0 in b22: raise ValueError
-                        n22 = len(b22) + 1
+                        n29 = len(colors)
+                        b30 = markers_one_2.texture_resource.encode()
+                        if 0 in b30: raise ValueError
+                        n30 = len(b30) + 1
                         texture = markers_one_2.texture
                         header_3 = texture.header
                         stamp_3 = header_3.stamp
-                        n23, b23 = _texts[header_3.frame_id]
-                        n24, b24 = _texts[texture.format]
-                        p25 = ((n22 + 3 & -4) + n23 + 15 & -4) + n24 + 4
+                        n31, b31 = _texts[header_3.frame_id]
+                        f32, p33 = _t6[n30]
+                        n34, b34 = _texts[texture.format]
                         data_2 = texture.data
                         if type(data_2) is not bytes:
                             data_2 = _octets(data_2)
-                        n26 = len(data_2)
+                        n35 = len(data_2)
+                        f36, p37 = _t7[p33, n31, n34]
                         uv_coordinates = markers_one_2.uv_coordinates
-                        n27 = len(uv_coordinates)
-                        p28 = ((p25 + 3 & -4) + n26 + 7 & -4) + n27 * 8 + 4
-                        b29 = markers_one_2.text.encode()
-                        if 0 in b29: raise ValueError
-                        n29 = len(b29) + 1
-                        b30 = markers_one_2.mesh_resource.encode()
-                        if 0 in b30: raise ValueError
-                        n30 = len(b30) + 1
+                        n38 = len(uv_coordinates)
+                        f39, p40 = _t8[p37 + n35 & 7]
+                        b41 = markers_one_2.text.encode()
+                        if 0 in b41: raise ValueError
+                        n41 = len(b41) + 1
+                        b42 = markers_one_2.mesh_resource.encode()
+                        if 0 in b42: raise ValueError
+                        n42 = len(b42) + 1
+                        f43, p44 = _t9[p40 + n38 * 8 & 7, n41]
                         mesh_file = markers_one_2.mesh_file
-                        b31 = mesh_file.filename.encode()
-                        if 0 in b31: raise ValueError
-                        n31 = len(b31) + 1
-                        p32 = ((p28 + n29 + 7 & -4) + n30 + 7 & -4) + n31 + 4
+                        b45 = mesh_file.filename.encode()
+                        if 0 in b45: raise ValueError
+                        n45 = len(b45) + 1
+                        f46, p47 = _t9[p44, n42]
                         data_3 = mesh_file.data
                         if type(data_3) is not bytes:
                             data_3 = _octets(data_3)
-                        n33 = len(data_3)
-                        out += (_t9[p16 & 7, n17, n18](stamp_2.sec, stamp_2.nanosec, n17, b17, n18, b18, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n20), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n21), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), _t5[n22, n23, n24](n22, b22, stamp_3.sec, stamp_3.nanosec, n23, b23, n24, b24, n26), data_2, _t6[(p25 + 3 & -4) + n26 + 4 & 7](n27), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), _t7[n29, n30, n31](n29, b29, n30, b30, n31, b31, n33), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
-                        p16 = (p32 + 3 & -4) + n33 + 5
-                    b34 = controls_one.description.encode()
-                    if 0 in b34: raise ValueError
-                    n34 = len(b34) + 1
-                    out.append(_t10[p16 & 7, n34](controls_one.independent_marker_orientation, n34, b34))
-                    p13 = (p16 + 4 & -4) + n34 + 4
-                p3 = p13
+                        n48 = len(data_3)
+                        f49, p50 = _t10[p47, n45]
+                        out += (_t12[p25, n26, n27](stamp_2.sec, stamp_2.nanosec, n26, b26, n27, b27, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n28), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f32(n30, b30, stamp_3.sec, stamp_3.nanosec), f36(n31, b31, n34, b34, n35), data_2, f39(n38), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41), f46(n42, b42), f49(n45, b45, n48), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
+                        p25 = p50 + n48 + 1 & 7
+                    b51 = controls_one.description.encode()
+                    if 0 in b51: raise ValueError
+                    n51 = len(b51) + 1
+                    f52, p53 = _t13[p25, n51]
+                    out.append(f52(controls_one.independent_marker_orientation, n51, b51))
+                    p22 = p53
+                p3 = p22
             return b"".join(out)
         except _FAULTS:
             return _plain(m, InteractiveMarkerInit)
@@ -1383,7 +1412,6 @@ class InteractiveMarkerInit(_Message):
             return InteractiveMarkerInit(server_id, seq_num, markers)
         except _FAULTS:
             return _explain(data, InteractiveMarkerInit)
-_t17 = _Template("I i I I $ d d d d d d d I $", -4)
 
 
 class InteractiveMarkerPose(_Message):
@@ -1413,7 +1441,8 @@ class InteractiveMarkerPose(_Message):
             position = pose.position
             orientation = pose.orientation
             n2, b2 = _texts[m.name]
-            return _t17[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2, b2)
+            f3, p4 = _t14[n1, n2]
+            return f3(256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2, b2)
         except _FAULTS:
             return _plain(m, InteractiveMarkerPose)
 
@@ -1433,10 +1462,9 @@ class InteractiveMarkerPose(_Message):
             return InteractiveMarkerPose(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name)
         except _FAULTS:
             return _explain(data, InteractiveMarkerPose)
-_t18 = _Template("I I $ Q B I", -4)
-_t19 = _Template("i I I $ d d d d d d d I $", None)
+_t23 = _Template("I I $ Q B I", -4)
 _s1 = _StringList()
-_t20 = _Template("|4", None)
+_t24 = _Template("|4", None, 8)
 _u17 = _Struct("<QB3xI").unpack_from
 
 
@@ -1481,7 +1509,7 @@ class InteractiveMarkerUpdate(_Message):
             n1 = len(b1) + 1
             markers = m.markers
             n2 = len(markers)
-            out = [_t18[n1](256, n1, b1, m.seq_num, m.type, n2)]
+            out = [_t23[n1](256, n1, b1, m.seq_num, m.type, n2)]
             p3 = 0
             for markers_one in markers:
                 header = markers_one.header
@@ -1494,37 +1522,40 @@ class InteractiveMarkerUpdate(_Message):
                 b6 = markers_one.description.encode()
                 if 0 in b6: raise ValueError
                 n6 = len(b6) + 1
+                f7, p8 = _t22[p3, n4, n5]
                 menu_entries = markers_one.menu_entries
-                n7 = len(menu_entries)
-                out.append(_t16[p3 & 7, n4, n5, n6](stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n5, b5, n6, b6, markers_one.scale, n7))
-                p8 = ((n5 + 7 & -4) + n6 + 7 & -4)
+                n9 = len(menu_entries)
+                f10, p11 = _t15[p8, n6]
+                out += (f7(stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n5, b5), f10(n6, b6, markers_one.scale, n9))
+                p12 = p11
                 for menu_entries_one in menu_entries:
-                    b9 = menu_entries_one.title.encode()
-                    if 0 in b9: raise ValueError
-                    n9 = len(b9) + 1
-                    b10 = menu_entries_one.command.encode()
-                    if 0 in b10: raise ValueError
-                    n10 = len(b10) + 1
-                    p11 = ((p8 + 3 & -4) + n9 + 15 & -4) + n10 + 4
-                    out.append(_t12[p8 & 7, n9, n10](menu_entries_one.id, menu_entries_one.parent_id, n9, b9, n10, b10, menu_entries_one.command_type))
-                    p8 = p11 + 1
+                    b13 = menu_entries_one.title.encode()
+                    if 0 in b13: raise ValueError
+                    n13 = len(b13) + 1
+                    b14 = menu_entries_one.command.encode()
+                    if 0 in b14: raise ValueError
+                    n14 = len(b14) + 1
+                    f15, p16 = _t16[p12, n13]
+                    f17, p18 = _t17[p16, n14]
+                    out += (f15(menu_entries_one.id, menu_entries_one.parent_id, n13, b13), f17(n14, b14, menu_entries_one.command_type))
+                    p12 = p18
                 controls = markers_one.controls
-                n12 = len(controls)
-                out.append(_t6[p8 & 7](n12))
-                p13 = (p8 + 3 & -4) + 4
+                n19 = len(controls)
+                f20, p21 = _t8[p12]
+                out.append(f20(n19))
+                p22 = p21
                 for controls_one in controls:
-                    n14, b14 = _texts[controls_one.name]
+                    n23, b23 = _texts[controls_one.name]
                     orientation_2 = controls_one.orientation
                     markers_2 = controls_one.markers
-                    n15 = len(markers_2)
-                    out.append(_t13[p13 & 7, n14](n14, b14, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n15))
-                    p16 = 0
+                    n24 = len(markers_2)
+                    out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n24))
+                    p25 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
                         stamp_2 = header_2.stamp
-                        n17, b17 = _texts[header_2.frame_id]
-                        n18, b18 = _texts[markers_one_2.ns]
-                        p19 = ((p16 + 3 & -4) + n17 + 15 & -4) + n18 + 4
+                        n26, b26 = _texts[header_2.frame_id]
+                        n27, b27 = _texts[markers_one_2.ns]
                         pose_2 = markers_one_2.pose
                         position_2 = pose_2.position
                         orientation_3 = pose_2.orientation
@@ -1532,66 +1563,73 @@ class InteractiveMarkerUpdate(_Message):
                         color = markers_one_2.color
                         lifetime = markers_one_2.lifetime
                         points = markers_one_2.points
-                        n20 = len(points)
+                        n28 = len(points)
                         colors = markers_one_2.colors
-                        n21 = len(colors)
-                        b22 = markers_one_2.texture_resource.encode()
-                        if 0 in b22: raise ValueError
-                        n22 = len(b22) + 1
+                        n29 = len(colors)
+                        b30 = markers_one_2.texture_resource.encode()
+                        if 0 in b30: raise ValueError
+                        n30 = len(b30) + 1
                         texture = markers_one_2.texture
                         header_3 = texture.header
                         stamp_3 = header_3.stamp
-                        n23, b23 = _texts[header_3.frame_id]
-                        n24, b24 = _texts[texture.format]
-                        p25 = ((n22 + 3 & -4) + n23 + 15 & -4) + n24 + 4
+                        n31, b31 = _texts[header_3.frame_id]
+                        f32, p33 = _t6[n30]
+                        n34, b34 = _texts[texture.format]
                         data_2 = texture.data
                         if type(data_2) is not bytes:
                             data_2 = _octets(data_2)
-                        n26 = len(data_2)
+                        n35 = len(data_2)
+                        f36, p37 = _t7[p33, n31, n34]
                         uv_coordinates = markers_one_2.uv_coordinates
-                        n27 = len(uv_coordinates)
-                        p28 = ((p25 + 3 & -4) + n26 + 7 & -4) + n27 * 8 + 4
-                        b29 = markers_one_2.text.encode()
-                        if 0 in b29: raise ValueError
-                        n29 = len(b29) + 1
-                        b30 = markers_one_2.mesh_resource.encode()
-                        if 0 in b30: raise ValueError
-                        n30 = len(b30) + 1
+                        n38 = len(uv_coordinates)
+                        f39, p40 = _t8[p37 + n35 & 7]
+                        b41 = markers_one_2.text.encode()
+                        if 0 in b41: raise ValueError
+                        n41 = len(b41) + 1
+                        b42 = markers_one_2.mesh_resource.encode()
+                        if 0 in b42: raise ValueError
+                        n42 = len(b42) + 1
+                        f43, p44 = _t9[p40 + n38 * 8 & 7, n41]
                         mesh_file = markers_one_2.mesh_file
-                        b31 = mesh_file.filename.encode()
-                        if 0 in b31: raise ValueError
-                        n31 = len(b31) + 1
-                        p32 = ((p28 + n29 + 7 & -4) + n30 + 7 & -4) + n31 + 4
+                        b45 = mesh_file.filename.encode()
+                        if 0 in b45: raise ValueError
+                        n45 = len(b45) + 1
+                        f46, p47 = _t9[p44, n42]
                         data_3 = mesh_file.data
                         if type(data_3) is not bytes:
                             data_3 = _octets(data_3)
-                        n33 = len(data_3)
-                        out += (_t9[p16 & 7, n17, n18](stamp_2.sec, stamp_2.nanosec, n17, b17, n18, b18, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n20), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n21), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), _t5[n22, n23, n24](n22, b22, stamp_3.sec, stamp_3.nanosec, n23, b23, n24, b24, n26), data_2, _t6[(p25 + 3 & -4) + n26 + 4 & 7](n27), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), _t7[n29, n30, n31](n29, b29, n30, b30, n31, b31, n33), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
-                        p16 = (p32 + 3 & -4) + n33 + 5
-                    b34 = controls_one.description.encode()
-                    if 0 in b34: raise ValueError
-                    n34 = len(b34) + 1
-                    out.append(_t10[p16 & 7, n34](controls_one.independent_marker_orientation, n34, b34))
-                    p13 = (p16 + 4 & -4) + n34 + 4
-                p3 = p13
+                        n48 = len(data_3)
+                        f49, p50 = _t10[p47, n45]
+                        out += (_t12[p25, n26, n27](stamp_2.sec, stamp_2.nanosec, n26, b26, n27, b27, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n28), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f32(n30, b30, stamp_3.sec, stamp_3.nanosec), f36(n31, b31, n34, b34, n35), data_2, f39(n38), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41), f46(n42, b42), f49(n45, b45, n48), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
+                        p25 = p50 + n48 + 1 & 7
+                    b51 = controls_one.description.encode()
+                    if 0 in b51: raise ValueError
+                    n51 = len(b51) + 1
+                    f52, p53 = _t13[p25, n51]
+                    out.append(f52(controls_one.independent_marker_orientation, n51, b51))
+                    p22 = p53
+                p3 = p22
             poses = m.poses
-            n35 = len(poses)
-            out.append(_t6[p3 & 7](n35))
-            p36 = (p3 + 3 & -4) + 4
+            n54 = len(poses)
+            f55, p56 = _t8[p3]
+            out.append(f55(n54))
+            p57 = p56
             for poses_one in poses:
                 header_4 = poses_one.header
                 stamp_4 = header_4.stamp
-                n37, b37 = _texts[header_4.frame_id]
+                n58, b58 = _texts[header_4.frame_id]
                 pose_3 = poses_one.pose
                 position_3 = pose_3.position
                 orientation_4 = pose_3.orientation
-                n38, b38 = _texts[poses_one.name]
-                out.append(_t19[p36 & 7, n37, n38](stamp_4.sec, stamp_4.nanosec, n37, b37, position_3.x, position_3.y, position_3.z, orientation_4.x, orientation_4.y, orientation_4.z, orientation_4.w, n38, b38))
-                p36 = n38 + 4
+                n59, b59 = _texts[poses_one.name]
+                f60, p61 = _t22[p57, n58, n59]
+                out.append(f60(stamp_4.sec, stamp_4.nanosec, n58, b58, position_3.x, position_3.y, position_3.z, orientation_4.x, orientation_4.y, orientation_4.z, orientation_4.w, n59, b59))
+                p57 = p61
             erases, k = m.erases, _s1.written
-            b39 = k[1] if erases == k[0] else _s1.put(erases)
-            n40 = len(b39)
-            out += (_t20[p36 & 7](), b39)
+            b62 = k[1] if erases == k[0] else _s1.put(erases)
+            n62 = len(b62)
+            f63, p64 = _t24[p57]
+            out += (f63(), b62)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, InteractiveMarkerUpdate)
@@ -1786,7 +1824,6 @@ class MarkerArray(_Message):
                 stamp = header.stamp
                 n3, b3 = _texts[header.frame_id]
                 n4, b4 = _texts[markers_one.ns]
-                p5 = ((p2 + 3 & -4) + n3 + 15 & -4) + n4 + 4
                 pose = markers_one.pose
                 position = pose.position
                 orientation = pose.orientation
@@ -1794,42 +1831,45 @@ class MarkerArray(_Message):
                 color = markers_one.color
                 lifetime = markers_one.lifetime
                 points = markers_one.points
-                n6 = len(points)
+                n5 = len(points)
                 colors = markers_one.colors
-                n7 = len(colors)
-                b8 = markers_one.texture_resource.encode()
-                if 0 in b8: raise ValueError
-                n8 = len(b8) + 1
+                n6 = len(colors)
+                b7 = markers_one.texture_resource.encode()
+                if 0 in b7: raise ValueError
+                n7 = len(b7) + 1
                 texture = markers_one.texture
                 header_2 = texture.header
                 stamp_2 = header_2.stamp
-                n9, b9 = _texts[header_2.frame_id]
-                n10, b10 = _texts[texture.format]
-                p11 = ((n8 + 3 & -4) + n9 + 15 & -4) + n10 + 4
+                n8, b8 = _texts[header_2.frame_id]
+                f9, p10 = _t6[n7]
+                n11, b11 = _texts[texture.format]
                 data_2 = texture.data
                 if type(data_2) is not bytes:
                     data_2 = _octets(data_2)
                 n12 = len(data_2)
+                f13, p14 = _t7[p10, n8, n11]
                 uv_coordinates = markers_one.uv_coordinates
-                n13 = len(uv_coordinates)
-                p14 = ((p11 + 3 & -4) + n12 + 7 & -4) + n13 * 8 + 4
-                b15 = markers_one.text.encode()
-                if 0 in b15: raise ValueError
-                n15 = len(b15) + 1
-                b16 = markers_one.mesh_resource.encode()
-                if 0 in b16: raise ValueError
-                n16 = len(b16) + 1
+                n15 = len(uv_coordinates)
+                f16, p17 = _t8[p14 + n12 & 7]
+                b18 = markers_one.text.encode()
+                if 0 in b18: raise ValueError
+                n18 = len(b18) + 1
+                b19 = markers_one.mesh_resource.encode()
+                if 0 in b19: raise ValueError
+                n19 = len(b19) + 1
+                f20, p21 = _t9[p17 + n15 * 8 & 7, n18]
                 mesh_file = markers_one.mesh_file
-                b17 = mesh_file.filename.encode()
-                if 0 in b17: raise ValueError
-                n17 = len(b17) + 1
-                p18 = ((p14 + n15 + 7 & -4) + n16 + 7 & -4) + n17 + 4
+                b22 = mesh_file.filename.encode()
+                if 0 in b22: raise ValueError
+                n22 = len(b22) + 1
+                f23, p24 = _t9[p21, n19]
                 data_3 = mesh_file.data
                 if type(data_3) is not bytes:
                     data_3 = _octets(data_3)
-                n19 = len(data_3)
-                out += (_t9[p2 & 7, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, markers_one.id, markers_one.type, markers_one.action, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n6), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n7), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), _t5[n8, n9, n10](n8, b8, stamp_2.sec, stamp_2.nanosec, n9, b9, n10, b10, n12), data_2, _t6[(p11 + 3 & -4) + n12 + 4 & 7](n13), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), _t7[n15, n16, n17](n15, b15, n16, b16, n17, b17, n19), data_3, _p6(markers_one.mesh_use_embedded_materials))
-                p2 = (p18 + 3 & -4) + n19 + 5
+                n25 = len(data_3)
+                f26, p27 = _t10[p24, n22]
+                out += (_t12[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, markers_one.id, markers_one.type, markers_one.action, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n5), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n6), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f9(n7, b7, stamp_2.sec, stamp_2.nanosec), f13(n8, b8, n11, b11, n12), data_2, f16(n15), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f20(n18, b18), f23(n19, b19), f26(n22, b22, n25), data_3, _p6(markers_one.mesh_use_embedded_materials))
+                p2 = p27 + n25 + 1 & 7
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MarkerArray)

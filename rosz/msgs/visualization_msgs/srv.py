@@ -35,7 +35,7 @@ __all__ = (
     "GetInteractiveMarkersRequest",
     "GetInteractiveMarkersResponse",
 )
-_p1 = _Struct("<Ix").pack
+_t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
 
@@ -50,7 +50,7 @@ class GetInteractiveMarkersRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256)
+            return _t1[0](256)
         except _FAULTS:
             return _plain(m, GetInteractiveMarkersRequest)
 
@@ -62,20 +62,24 @@ class GetInteractiveMarkersRequest(_Message):
             return GetInteractiveMarkersRequest()
         except _FAULTS:
             return _explain(data, GetInteractiveMarkersRequest)
-_p2 = _Struct("<IQI").pack
-_t1 = _Template("i I I $ d d d d d d d I $ I $ f I", None)
-_t2 = _Template("I I I $ I $ B", None)
-_t3 = _Template("I", None)
-_t4 = _Template("I $ d d d d B B ? I", None)
-_p3 = _Struct("<3d").pack
-_t5 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
-_p4 = _Struct("<4f").pack
-_p5 = _Struct("<I").pack
-_t6 = _Template("I $ i I I $ I $ I", 4)
-_p6 = _Struct("<2f").pack
-_t7 = _Template("I $ I $ I $ I", 0)
-_p7 = _Struct("<?").pack
-_t8 = _Template("? I $", None)
+_p1 = _Struct("<IQI").pack
+_t2 = _Template("i I I $ d d d d d d d I $", None, 8)
+_t3 = _Template("I $ f I", None, 8)
+_t4 = _Template("I I I $", None, 8)
+_t5 = _Template("I $ B", None, 8)
+_t6 = _Template("I", None, 8)
+_t7 = _Template("I $ d d d d B B ? I", None)
+_p2 = _Struct("<3d").pack
+_t8 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
+_p3 = _Struct("<4f").pack
+_p4 = _Struct("<I").pack
+_t9 = _Template("I $ i I", 4, 8)
+_t10 = _Template("I $ I $ I", None, 8)
+_p5 = _Struct("<2f").pack
+_t11 = _Template("I $", None, 8)
+_t12 = _Template("I $ I", None, 8)
+_p6 = _Struct("<?").pack
+_t13 = _Template("? I $", None, 8)
 _u2 = _Struct("<IQI").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 _u4 = _Struct("<7dI").unpack_from
@@ -109,7 +113,7 @@ class GetInteractiveMarkersResponse(_Message):
         try:
             markers = m.markers
             n1 = len(markers)
-            out = [_p2(256, m.sequence_number, n1)]
+            out = [_p1(256, m.sequence_number, n1)]
             p2 = 4
             for markers_one in markers:
                 header = markers_one.header
@@ -122,37 +126,40 @@ class GetInteractiveMarkersResponse(_Message):
                 b5 = markers_one.description.encode()
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
+                f6, p7 = _t2[p2, n3, n4]
                 menu_entries = markers_one.menu_entries
-                n6 = len(menu_entries)
-                out.append(_t1[p2 & 7, n3, n4, n5](stamp.sec, stamp.nanosec, n3, b3, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n4, b4, n5, b5, markers_one.scale, n6))
-                p7 = ((n4 + 7 & -4) + n5 + 7 & -4)
+                n8 = len(menu_entries)
+                f9, p10 = _t3[p7, n5]
+                out += (f6(stamp.sec, stamp.nanosec, n3, b3, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n4, b4), f9(n5, b5, markers_one.scale, n8))
+                p11 = p10
                 for menu_entries_one in menu_entries:
-                    b8 = menu_entries_one.title.encode()
-                    if 0 in b8: raise ValueError
-                    n8 = len(b8) + 1
-                    b9 = menu_entries_one.command.encode()
-                    if 0 in b9: raise ValueError
-                    n9 = len(b9) + 1
-                    p10 = ((p7 + 3 & -4) + n8 + 15 & -4) + n9 + 4
-                    out.append(_t2[p7 & 7, n8, n9](menu_entries_one.id, menu_entries_one.parent_id, n8, b8, n9, b9, menu_entries_one.command_type))
-                    p7 = p10 + 1
+                    b12 = menu_entries_one.title.encode()
+                    if 0 in b12: raise ValueError
+                    n12 = len(b12) + 1
+                    b13 = menu_entries_one.command.encode()
+                    if 0 in b13: raise ValueError
+                    n13 = len(b13) + 1
+                    f14, p15 = _t4[p11, n12]
+                    f16, p17 = _t5[p15, n13]
+                    out += (f14(menu_entries_one.id, menu_entries_one.parent_id, n12, b12), f16(n13, b13, menu_entries_one.command_type))
+                    p11 = p17
                 controls = markers_one.controls
-                n11 = len(controls)
-                out.append(_t3[p7 & 7](n11))
-                p12 = (p7 + 3 & -4) + 4
+                n18 = len(controls)
+                f19, p20 = _t6[p11]
+                out.append(f19(n18))
+                p21 = p20
                 for controls_one in controls:
-                    n13, b13 = _texts[controls_one.name]
+                    n22, b22 = _texts[controls_one.name]
                     orientation_2 = controls_one.orientation
                     markers_2 = controls_one.markers
-                    n14 = len(markers_2)
-                    out.append(_t4[p12 & 7, n13](n13, b13, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n14))
-                    p15 = 0
+                    n23 = len(markers_2)
+                    out.append(_t7[p21, n22](n22, b22, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n23))
+                    p24 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
                         stamp_2 = header_2.stamp
-                        n16, b16 = _texts[header_2.frame_id]
-                        n17, b17 = _texts[markers_one_2.ns]
-                        p18 = ((p15 + 3 & -4) + n16 + 15 & -4) + n17 + 4
+                        n25, b25 = _texts[header_2.frame_id]
+                        n26, b26 = _texts[markers_one_2.ns]
                         pose_2 = markers_one_2.pose
                         position_2 = pose_2.position
                         orientation_3 = pose_2.orientation
@@ -160,48 +167,52 @@ class GetInteractiveMarkersResponse(_Message):
                         color = markers_one_2.color
                         lifetime = markers_one_2.lifetime
                         points = markers_one_2.points
-                        n19 = len(points)
+                        n27 = len(points)
                         colors = markers_one_2.colors
-                        n20 = len(colors)
-                        b21 = markers_one_2.texture_resource.encode()
-                        if 0 in b21: raise ValueError
-                        n21 = len(b21) + 1
+                        n28 = len(colors)
+                        b29 = markers_one_2.texture_resource.encode()
+                        if 0 in b29: raise ValueError
+                        n29 = len(b29) + 1
                         texture = markers_one_2.texture
                         header_3 = texture.header
                         stamp_3 = header_3.stamp
-                        n22, b22 = _texts[header_3.frame_id]
-                        n23, b23 = _texts[texture.format]
-                        p24 = ((n21 + 3 & -4) + n22 + 15 & -4) + n23 + 4
+                        n30, b30 = _texts[header_3.frame_id]
+                        f31, p32 = _t9[n29]
+                        n33, b33 = _texts[texture.format]
                         data_2 = texture.data
                         if type(data_2) is not bytes:
                             data_2 = _octets(data_2)
-                        n25 = len(data_2)
+                        n34 = len(data_2)
+                        f35, p36 = _t10[p32, n30, n33]
                         uv_coordinates = markers_one_2.uv_coordinates
-                        n26 = len(uv_coordinates)
-                        p27 = ((p24 + 3 & -4) + n25 + 7 & -4) + n26 * 8 + 4
-                        b28 = markers_one_2.text.encode()
-                        if 0 in b28: raise ValueError
-                        n28 = len(b28) + 1
-                        b29 = markers_one_2.mesh_resource.encode()
-                        if 0 in b29: raise ValueError
-                        n29 = len(b29) + 1
+                        n37 = len(uv_coordinates)
+                        f38, p39 = _t6[p36 + n34 & 7]
+                        b40 = markers_one_2.text.encode()
+                        if 0 in b40: raise ValueError
+                        n40 = len(b40) + 1
+                        b41 = markers_one_2.mesh_resource.encode()
+                        if 0 in b41: raise ValueError
+                        n41 = len(b41) + 1
+                        f42, p43 = _t11[p39 + n37 * 8 & 7, n40]
                         mesh_file = markers_one_2.mesh_file
-                        b30 = mesh_file.filename.encode()
-                        if 0 in b30: raise ValueError
-                        n30 = len(b30) + 1
-                        p31 = ((p27 + n28 + 7 & -4) + n29 + 7 & -4) + n30 + 4
+                        b44 = mesh_file.filename.encode()
+                        if 0 in b44: raise ValueError
+                        n44 = len(b44) + 1
+                        f45, p46 = _t11[p43, n41]
                         data_3 = mesh_file.data
                         if type(data_3) is not bytes:
                             data_3 = _octets(data_3)
-                        n32 = len(data_3)
-                        out += (_t5[p15 & 7, n16, n17](stamp_2.sec, stamp_2.nanosec, n16, b16, n17, b17, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n19), b"".join([_p3(e.x, e.y, e.z) for e in points]), _p5(n20), b"".join([_p4(e.r, e.g, e.b, e.a) for e in colors]), _t6[n21, n22, n23](n21, b21, stamp_3.sec, stamp_3.nanosec, n22, b22, n23, b23, n25), data_2, _t3[(p24 + 3 & -4) + n25 + 4 & 7](n26), b"".join([_p6(e.u, e.v) for e in uv_coordinates]), _t7[n28, n29, n30](n28, b28, n29, b29, n30, b30, n32), data_3, _p7(markers_one_2.mesh_use_embedded_materials))
-                        p15 = (p31 + 3 & -4) + n32 + 5
-                    b33 = controls_one.description.encode()
-                    if 0 in b33: raise ValueError
-                    n33 = len(b33) + 1
-                    out.append(_t8[p15 & 7, n33](controls_one.independent_marker_orientation, n33, b33))
-                    p12 = (p15 + 4 & -4) + n33 + 4
-                p2 = p12
+                        n47 = len(data_3)
+                        f48, p49 = _t12[p46, n44]
+                        out += (_t8[p24, n25, n26](stamp_2.sec, stamp_2.nanosec, n25, b25, n26, b26, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n27), b"".join([_p2(e.x, e.y, e.z) for e in points]), _p4(n28), b"".join([_p3(e.r, e.g, e.b, e.a) for e in colors]), f31(n29, b29, stamp_3.sec, stamp_3.nanosec), f35(n30, b30, n33, b33, n34), data_2, f38(n37), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f42(n40, b40), f45(n41, b41), f48(n44, b44, n47), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
+                        p24 = p49 + n47 + 1 & 7
+                    b50 = controls_one.description.encode()
+                    if 0 in b50: raise ValueError
+                    n50 = len(b50) + 1
+                    f51, p52 = _t13[p24, n50]
+                    out.append(f51(controls_one.independent_marker_orientation, n50, b50))
+                    p21 = p52
+                p2 = p21
             return b"".join(out)
         except _FAULTS:
             return _plain(m, GetInteractiveMarkersResponse)
