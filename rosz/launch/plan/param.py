@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import Any, Literal
 
 from rosz import names
@@ -90,7 +89,7 @@ def _output(tag: Tag, context: LaunchContext) -> str:
     try:
         data = context.run(words)
     except OSError as error:
-        tag.fail(f"'{shlex.join(words)}' cannot be started: {error.strerror}", "command")
+        tag.fail(f"'{' '.join(words)}' cannot be started: {error.strerror}", "command")
     except LaunchError as error:
         tag.fail(str(error), "command")
     return _text(tag, data, "command", newlines=False)

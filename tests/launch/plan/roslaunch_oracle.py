@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
+from rosz import names
 from rosz.errors import RoszError
 from rosz.launch.plan import (
     NodePlan,
@@ -247,15 +248,18 @@ def differences(ours: Mapping[str, Any], real: Mapping[str, Any]) -> list[str]:
 
 def _comparable(key: str, ours: Any, real: Any) -> tuple[Any, Any]:
     """Bring two reports into a form in which they must be equal."""
-    if key == "complaints":
-        return bool(ours), bool(ours or real)  # rosz warns about more
-    if key == "file_list":
-        return sorted(ours.split()), sorted(set(real.split()))
-    if key == "setup":
-        return ours, [[*words[:-1], words[-1].rstrip("/") or "/"] for words in real]
     if key in {"ros_args", "dump"} and real is None:
-        return None, None  # roslaunch stumbles over binary values, and args that are not given
-    if key == "dump" and "&id" in real:
-        # PyYAML writes aliases wherever two parameters came from one anchor.
-        return yaml.safe_load(ours), yaml.safe_load(real)
+        # roslaunch stumbles over binary values, and over args that are not given
+        ours = None
+    elif key == "dump" and "&id" in real:
+        # PyYAML writes aliases wherever two parameters came from one anchor
+        ours, real = yaml.safe_load(ours), yaml.safe_load(real)
+    elif key == "complaints":
+        ours, real = bool(ours), bool(ours or real)  # rosz warns about more
+    elif key == "file_list":
+        ours, real = sorted(ours.split()), sorted(set(real.split()))
+    elif key == "clear":
+        real = [names.canonical(name) for name in real]
+    elif key == "setup":
+        real = [[*words[:-1], names.canonical(words[-1])] for words in real]
     return ours, real

@@ -1,0 +1,65 @@
+"""Any bytes are a plan or a refusal with a place, and nothing else."""
+
+from __future__ import annotations
+
+import random
+
+from corpus import FILES, VALID
+from fake_outside import Outside
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rosz.errors import LaunchFileError
+from rosz.launch.plan import LaunchText, Plan, describe_args, plan
+
+SEEDS = [case.path.read_bytes() for case in VALID if "pass_all" not in case.name]
+PIECES = [
+    *(b"<", b">", b"/>", b'"', b"'", b"&amp;", b"&#0;", b"<!--", b"-->", b"<![CDATA[", b"]]>"),
+    *(b"$(", b")", b"$(arg ", b"$(eval ", b"$(find robot)", b"~", b"//", b"\x00", b"\xff", b"\n"),
+    *(b"<group ns='a'>", b"</group>", b"<rosparam>", b"</rosparam>", b"<node ", b" name='", b"="),
+    *(b"[1, {a: ", b"!!binary ", b"&a [*a]", b"1e999", b"-", b"<launch>", b"</launch>"),
+]
+
+
+def read(data: bytes) -> Plan | LaunchFileError:
+    outside = Outside({str(path): path.read_text() for path in FILES.rglob("*.yaml")})
+    try:
+        found = plan([LaunchText(data)], {"foo": "1"}, outside)
+    except LaunchFileError as error:
+        return error
+    describe_args([LaunchText(data)], {"foo": "1"}, outside)
+    return found
+
+
+@given(data=st.binary(max_size=80) | st.lists(st.sampled_from(PIECES), max_size=30).map(b"".join))
+@settings(max_examples=200, deadline=None)
+def test_any_bytes(data: bytes) -> None:
+    found = read(data)
+    assert isinstance(found, Plan) or found.path
+
+
+@given(seed=st.sampled_from(SEEDS), chance=st.integers(0, 2**32))
+@settings(max_examples=400, deadline=None)
+def test_damaged_launch_files(seed: bytes, chance: int) -> None:
+    dice = random.Random(chance)
+    data = bytearray(seed)
+    for _ in range(dice.randint(1, 4)):
+        start = dice.randrange(len(data) + 1)
+        end = start + dice.choice([0, 0, 1, 5])
+        data[start:end] = dice.choice([b"", *PIECES])
+    found = read(bytes(data))
+    if isinstance(found, LaunchFileError) and found.path == "<stdin>":
+        assert found.line >= 0
+        assert found.line <= data.count(b"\n") + 2
+
+
+@given(text=st.text(alphabet="$()argevl findo'\\\" /~1.", max_size=40))
+@settings(max_examples=300, deadline=None)
+def test_any_value(text: str) -> None:
+    from xml.sax.saxutils import quoteattr
+
+    body = f'<launch><arg name="a" value="b"/><param name="p" value={quoteattr(text)}/></launch>'
+    found = read(body.encode())
+    if isinstance(found, LaunchFileError):
+        assert found.line == 1
+        assert 30 <= found.column <= len(body)
