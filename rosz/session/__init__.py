@@ -1,8 +1,9 @@
 """The network edge: sessions, and all that is declared on them. Nothing else imports zenoh."""
 
 from rosz.session.config import SessionConfig
+from rosz.session.declared import Closable, RawPublisher
 from rosz.session.samples import Query, Reply, Sample
-from rosz.session.session import Closable, RawPublisher, Session, Target
+from rosz.session.session import Session, Target
 from rosz.session.stamp import HybridClock, Stamp
 
 __all__ = (

@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import zenoh
 import zenoh.ext
 
-from rosz.errors import ClosedError, TransportError, WaitTimeout
+from rosz.errors import ClosedError, WaitTimeout
 from rosz.session.calls import wait_for_calls
 from rosz.session.config import SessionConfig, overrides, zenoh_settings
+from rosz.session.declared import Closable, Declared, RawPublisher, direct, mapped
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.stamp import HybridClock, Stamp
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-__all__ = ("Closable", "RawPublisher", "Session", "Target")
+__all__ = ("Session", "Target")
 
 Target = Literal["all", "all_complete", "best"]
 
@@ -39,45 +39,6 @@ _REPLY_MARGIN = 1.0
 """Seconds given to Zenoh's own query timeout to report before a wait ends by itself."""
 
 
-class Closable(Protocol):
-    """Something declared on the session."""
-
-    def close(self) -> None:
-        """Undeclare it; again is no error."""
-
-
-@contextmanager
-def _mapped(what: str) -> Iterator[None]:
-    """Turn Zenoh's errors into ours, naming what was attempted."""
-    try:
-        yield
-    except zenoh.ZError as error:
-        text = str(error).partition(" at ")[0].strip()
-        if "closed" in text.lower():
-            raise ClosedError(f"cannot {what}: the session is closed") from error
-        raise TransportError(f"cannot {what}: {text}") from error
-
-
-def _direct(callback: Callable[[Any], None]) -> Any:
-    """Have a callback run right on Zenoh's thread instead of a Python thread per declaration."""
-    return zenoh.handlers.Callback(callback, indirect=False)
-
-
-class _Declared:
-    """One declaration, undeclared at most once."""
-
-    def __init__(self, what: str, entity: Any) -> None:
-        self._what = what
-        self._entity: Any = entity
-
-    def close(self) -> None:
-        """Undeclare it; again is no error."""
-        entity, self._entity = self._entity, None
-        if entity is not None:
-            with _mapped(f"undeclare {self._what}"):
-                entity.undeclare()
-
-
 class _ClosedSession:
     """Stands for the session once it is closed, so that no call reaches Zenoh any more."""
 
@@ -86,30 +47,6 @@ class _ClosedSession:
 
 
 _CLOSED = _ClosedSession()
-
-
-class RawPublisher(_Declared):
-    """A declared publisher of bytes."""
-
-    def __init__(self, key: str, entity: Any) -> None:
-        super().__init__(f"publisher '{key}'", entity)
-        self.key = key
-        self._put = entity.put
-
-    def put(self, payload: bytes, attachment: bytes) -> None:
-        """Send one sample.
-
-        Raises:
-            ClosedError: The publisher or the session is closed.
-            TransportError: It cannot be sent.
-        """
-        if self._entity is None:
-            raise ClosedError(f"cannot publish on '{self.key}': the publisher is closed")
-        try:
-            self._put(payload, attachment=attachment)
-        except zenoh.ZError:
-            with _mapped(f"publish on '{self.key}'"):
-                raise
 
 
 class Session:
@@ -134,7 +71,7 @@ class Session:
                 a configuration value is refused.
             UsageError: The override text is malformed.
         """
-        with _mapped("read the Zenoh configuration"):
+        with mapped("read the Zenoh configuration"):
             if config.config_file:
                 settings = zenoh.Config.from_file(config.config_file)
             else:
@@ -142,7 +79,7 @@ class Session:
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
         where = ", ".join(settings_endpoints(config))
-        with _mapped(f"open a session ({where})"):
+        with mapped(f"open a session ({where})"):
             return cls(zenoh.open(settings))
 
     def stamp(self) -> Stamp:
@@ -163,7 +100,7 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        with _mapped(f"write '{key}'"):
+        with mapped(f"write '{key}'"):
             self._raw.put(
                 key,
                 payload,
@@ -181,7 +118,7 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        with _mapped(f"delete '{key}'"):
+        with mapped(f"delete '{key}'"):
             self._raw.delete(
                 key,
                 attachment=attachment,
@@ -213,7 +150,7 @@ class Session:
         """
         congestion = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
         reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
-        with _mapped(f"publish on '{key}'"):
+        with mapped(f"publish on '{key}'"):
             if not cache:
                 plain = self._raw.declare_publisher(
                     key, congestion_control=congestion, reliability=reliability, express=express
@@ -258,8 +195,8 @@ class Session:
             TransportError: The key is malformed.
         """
         origin = zenoh.Locality.REMOTE if remote_only else None
-        handler = _direct(lambda raw: callback(Sample(raw)))
-        with _mapped(f"subscribe to '{key}'"):
+        handler = direct(lambda raw: callback(Sample(raw)))
+        with mapped(f"subscribe to '{key}'"):
             if not history:
                 entity: Any = self._raw.declare_subscriber(key, handler, allowed_origin=origin)
             else:
@@ -276,7 +213,7 @@ class Session:
                     else None,
                     subscriber_detection=True,
                 )
-        return _Declared(f"subscriber '{key}'", entity)
+        return Declared(f"subscriber '{key}'", entity)
 
     def queryable(
         self, key: str, callback: Callable[[Query], None], *, complete: bool = False
@@ -292,11 +229,11 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        with _mapped(f"serve '{key}'"):
+        with mapped(f"serve '{key}'"):
             entity = self._raw.declare_queryable(
-                key, _direct(lambda raw: callback(Query(raw))), complete=complete
+                key, direct(lambda raw: callback(Query(raw))), complete=complete
             )
-        return _Declared(f"queryable '{key}'", entity)
+        return Declared(f"queryable '{key}'", entity)
 
     def get_async(
         self,
@@ -331,7 +268,7 @@ class Session:
         handler: Any = zenoh.handlers.Callback(
             lambda raw: on_reply(Reply(raw)), on_done, indirect=False
         )
-        with _mapped(f"ask '{key}'"):
+        with mapped(f"ask '{key}'"):
             self._raw.get(
                 f"{key}?{parameters}" if parameters else key,
                 handler,
@@ -389,8 +326,8 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        with _mapped(f"declare token '{key}'"):
-            return _Declared(f"token '{key}'", self._raw.liveliness().declare_token(key))
+        with mapped(f"declare token '{key}'"):
+            return Declared(f"token '{key}'", self._raw.liveliness().declare_token(key))
 
     def tokens(self, key: str, callback: Callable[[str, bool], None]) -> Closable:
         """Watch liveliness tokens, those that exist already first.
@@ -407,9 +344,9 @@ class Session:
         def deliver(raw: zenoh.Sample) -> None:
             callback(str(raw.key_expr), raw.kind == zenoh.SampleKind.PUT)
 
-        with _mapped(f"watch tokens '{key}'"):
-            entity = self._raw.liveliness().declare_subscriber(key, _direct(deliver), history=True)
-        return _Declared(f"watch of tokens '{key}'", entity)
+        with mapped(f"watch tokens '{key}'"):
+            entity = self._raw.liveliness().declare_subscriber(key, direct(deliver), history=True)
+        return Declared(f"watch of tokens '{key}'", entity)
 
     def live_tokens(self, key: str, timeout: float) -> list[str]:
         """Return the keys of all liveliness tokens that match, sorted.
@@ -427,7 +364,7 @@ class Session:
             if sample is not None:
                 found.add(str(sample.key_expr))
 
-        with _mapped(f"look for tokens '{key}'"):
+        with mapped(f"look for tokens '{key}'"):
             self._raw.liveliness().get(
                 key, zenoh.handlers.Callback(collect, done.set, indirect=False), timeout=timeout
             )

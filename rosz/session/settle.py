@@ -17,7 +17,8 @@ from rosz.errors import RoszError
 from rosz.session.samples import Query
 
 if TYPE_CHECKING:
-    from rosz.session.session import Closable, Session
+    from rosz.session.declared import Closable
+    from rosz.session.session import Session
 
 __all__ = ("serve_links", "settle")
 

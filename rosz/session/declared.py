@@ -1,0 +1,80 @@
+"""What is declared on a session, and how Zenoh's errors are told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, Protocol
+
+import zenoh
+
+from rosz.errors import ClosedError, TransportError
+
+__all__ = ("Closable", "Declared", "RawPublisher", "direct", "mapped")
+
+
+class Closable(Protocol):
+    """Something declared on the session."""
+
+    def close(self) -> None:
+        """Undeclare it; again is no error."""
+
+
+@contextmanager
+def mapped(what: str) -> Iterator[None]:
+    """Turn Zenoh's errors into ours, naming what was attempted."""
+    try:
+        yield
+    except zenoh.ZError as error:
+        text = str(error).partition(" at ")[0].strip()
+        if "closed" in text.lower():
+            raise ClosedError(f"cannot {what}: the session is closed") from error
+        raise TransportError(f"cannot {what}: {text}") from error
+
+
+def direct(callback: Callable[[Any], None]) -> Any:
+    """Have a callback run right on Zenoh's thread instead of a Python thread per declaration."""
+    return zenoh.handlers.Callback(callback, indirect=False)
+
+
+class Declared:
+    """One declaration, undeclared at most once."""
+
+    def __init__(self, what: str, entity: Any) -> None:
+        self._what = what
+        self._entity: Any = entity
+
+    def close(self) -> None:
+        """Undeclare it; again, or after the session, is no error.
+
+        Nobody may be inside another method of it meanwhile.
+        """
+        entity, self._entity = self._entity, None
+        if entity is not None:
+            # The session may end right now and take the declaration along.
+            with suppress(ClosedError), mapped(f"undeclare {self._what}"):
+                entity.undeclare()
+
+
+class RawPublisher(Declared):
+    """A declared publisher of bytes."""
+
+    def __init__(self, key: str, entity: Any) -> None:
+        super().__init__(f"publisher '{key}'", entity)
+        self.key = key
+        self._put = entity.put
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Send one sample.
+
+        Raises:
+            ClosedError: The publisher or the session is closed.
+            TransportError: It cannot be sent.
+        """
+        if self._entity is None:
+            raise ClosedError(f"cannot publish on '{self.key}': the publisher is closed")
+        try:
+            self._put(payload, attachment=attachment)
+        except zenoh.ZError:
+            with mapped(f"publish on '{self.key}'"):
+                raise

@@ -1,0 +1,212 @@
+"""A network for one test alone, and programs on it, which end with the test."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from textwrap import dedent
+from typing import Any, TypeVar
+
+import pytest
+
+from rosz.environment import Environment
+from rosz.node import Context, Node
+from rosz.session import Session, SessionConfig
+
+__all__ = ("PATIENCE", "Network", "Program", "eventually", "repeats")
+
+PATIENCE = 15.0
+"""Seconds after which something that should happen at once counts as never happening."""
+
+T = TypeVar("T", bound="Any")
+_ROOT = Path(__file__).parent.parent
+
+
+def repeats(usual: int, full: int) -> int:
+    """Return how often to try something that may go wrong rarely: ``ROSZ_TEST_FULL=1`` asks for
+    the full count."""
+    return full if os.environ.get("ROSZ_TEST_FULL", "") not in {"", "0"} else usual
+
+
+def eventually(condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> None:
+    """Wait for something that tells nobody when it comes about."""
+    deadline = time.monotonic() + timeout
+    pause = threading.Event()
+    while not condition():
+        if time.monotonic() > deadline:
+            pytest.fail(f"{what}: not within {timeout:g} s")
+        pause.wait(0.002)
+
+
+class Program:
+    """A Python program whose output can be waited for.
+
+    Args:
+        command: What to run.
+        variables: The environment.
+    """
+
+    def __init__(self, command: Sequence[str], variables: dict[str, str]) -> None:
+        self.lines: list[str] = []
+        self._changed = threading.Condition()
+        self._ended = False
+        self.process = subprocess.Popen(
+            command,
+            env=variables,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            bufsize=1,
+            start_new_session=True,
+        )
+        self.pid = self.process.pid
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            with self._changed:
+                self.lines.append(line.rstrip("\n"))
+                self._changed.notify_all()
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
+
+    @property
+    def output(self) -> str:
+        """All that it wrote so far, to either stream."""
+        with self._changed:
+            return "\n".join(self.lines)
+
+    def wait_for(self, text: str, timeout: float = PATIENCE) -> str:
+        """Wait for a line with a text in it, and return the first such line."""
+
+        def found() -> list[str]:
+            return [line for line in self.lines if text in line]
+
+        with self._changed:
+            self._changed.wait_for(lambda: found() or self._ended, timeout)
+            lines = found()
+        if not lines:
+            pytest.fail(f"no line with '{text}' from the program, only:\n{self.output}")
+        return lines[0]
+
+    def say(self, line: str) -> None:
+        """Write a line to its standard input."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + "\n")
+
+    def send(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        self.process.send_signal(number)
+
+    def kill(self) -> None:
+        """End it without its doing."""
+        self.process.kill()
+        self.process.wait()
+
+    def exit_code(self, timeout: float = PATIENCE) -> int:
+        """Wait for its end, and return its exit code."""
+        try:
+            code = self.process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.process.send_signal(signal.SIGABRT)  # faulthandler tells where it stands
+            self._reader.join(5)
+            pytest.fail(f"the program did not end within {timeout:g} s:\n{self.output}")
+        self._reader.join(timeout)
+        return code
+
+    def close(self) -> None:
+        """Leave nothing of it behind."""
+        if self.process.poll() is None:
+            os.killpg(self.pid, signal.SIGKILL)
+        self.process.wait()
+        self._reader.join(PATIENCE)
+        for stream in (self.process.stdin, self.process.stdout):
+            if stream is not None:
+                stream.close()
+
+
+class Network:
+    """A meeting point and a domain that nobody else has.
+
+    Attributes:
+        folder: For files of the test; short enough for unix sockets.
+        rendezvous: Where its sessions meet.
+        domain: Its ROS domain.
+    """
+
+    def __init__(self, domain: int = 42) -> None:
+        self.folder = Path(tempfile.mkdtemp(prefix="rosz-"))
+        self.rendezvous = f"unixsock-stream/{self.folder}/z.sock"
+        self.domain = domain
+        self._open: list[Any] = []
+
+    def environment(self, **changes: Any) -> Environment:
+        """Return settings for this network."""
+        settings: dict[str, Any] = {
+            "domain": self.domain,
+            "rendezvous": self.rendezvous,
+            "home": self.folder,
+            "log_dir": self.folder / "log",
+        }
+        return Environment(**(settings | changes))
+
+    def context(self, argv: Sequence[str] = (), **changes: Any) -> Context:
+        """Return a context with a session of its own."""
+        return self._keep(Context(self.environment(**changes), argv))
+
+    def node(self, name: str = "node", *, argv: Sequence[str] = (), **options: Any) -> Node:
+        """Return a node on a session of its own, as if in another process."""
+        if "context" not in options:
+            options["context"] = self.context(argv)
+        return self._keep(Node(name, **options))
+
+    def session(self, config: SessionConfig | None = None) -> Session:
+        """Return a bare session."""
+        return self._keep(Session.open(config or SessionConfig.node(self.environment())))
+
+    def variables(self, **changes: str) -> dict[str, str]:
+        """Return environment variables for a program on this network."""
+        return {
+            "PATH": os.environ.get("PATH", ""),
+            "HOME": str(self.folder),
+            "PYTHONPATH": str(_ROOT),
+            "PYTHONUNBUFFERED": "1",
+            "PYTHONFAULTHANDLER": "1",
+            "PYTHONWARNINGS": "error",
+            "ROS_DOMAIN_ID": str(self.domain),
+            "ROSZ_RENDEZVOUS": self.rendezvous,
+            **changes,
+        }
+
+    def program(self, script: str, *argv: str, **variables: str) -> Program:
+        """Start a Python program.
+
+        Args:
+            script: Its text; indentation common to all lines is taken off.
+            argv: Its arguments.
+            variables: Environment variables, beside those of the network.
+        """
+        command = [sys.executable, "-c", dedent(script), *argv]
+        return self._keep(Program(command, self.variables(**variables)))
+
+    def _keep(self, thing: T) -> T:
+        self._open.append(thing)
+        return thing
+
+    def close(self) -> None:
+        """End all that was started here, the newest first."""
+        while self._open:
+            self._open.pop().close()
+        shutil.rmtree(self.folder, ignore_errors=True)
