@@ -19,7 +19,7 @@ from rosz.errors import UsageError
 __all__ = ("SessionConfig", "zenoh_settings")
 
 _RETRY_FIRST_MS = 100
-_RETRY_LONGEST_MS = 1000
+_RETRY_LONGEST_MS = 500
 _LEASE_MS = 60_000
 _EPHEMERAL = "tcp/127.0.0.1:0"
 
@@ -52,6 +52,11 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
     shared_memory: int = 0
     config_file: str = ""
     override: str = ""
+
+    @property
+    def endpoints(self) -> list[str]:
+        """All endpoints that opening a session involves, each once."""
+        return list(dict.fromkeys((self.rendezvous, *self.connect, *self.listen)))
 
     @classmethod
     def node(cls, env: Environment) -> SessionConfig:
