@@ -55,6 +55,11 @@ class Console:
         elif self.log is not None:
             self.log.write("INFO", text)
 
+    def close(self) -> None:
+        """Close the log; again is no error."""
+        if self.log is not None:
+            self.log.close()
+
     def _print(self, stream: TextIO, text: str, colour: str, level: str) -> None:
         if text and self.log is not None:
             self.log.write(level, text)

@@ -17,13 +17,13 @@ import msgspec
 
 from rosz.launch.run.command import TAG
 
-__all__ = ("Census", "Usage", "family", "kill_family", "reap_group", "usage")
+__all__ = ("Census", "Usage", "family", "group_lives", "kill_family", "usage")
 
 _PROC = Path("/proc")
 _TICKS = os.sysconf("SC_CLK_TCK")
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _CENSUS_SECONDS = 0.05
-_UTIME, _STIME, _RSS = 11, 12, 21  # fields of /proc/PID/stat after the name of the program
+_STATE, _GROUP, _UTIME, _STIME, _RSS = 0, 2, 11, 12, 21
 
 
 class Usage(msgspec.Struct, frozen=True):
@@ -40,11 +40,36 @@ class Usage(msgspec.Struct, frozen=True):
     memory: int = 0
 
 
-def reap_group(group: int) -> None:
-    """Take the end of adopted processes of a group, whose leader has been reaped."""
+def group_lives(group: int) -> bool:
+    """Tell whether a process group, whose leader has been reaped, has members that run.
+
+    Those that have ended, and that whoever adopted them is slow to reap, do not count.
+    """
     with suppress(ChildProcessError):
         while os.waitpid(-group, os.WNOHANG)[0]:
             pass
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    pids = _processes()
+    return not pids or any(_runs_in(pid, group) for pid in pids)
+
+
+def _runs_in(pid: str, group: int) -> bool:
+    try:
+        fields = _stat(pid)
+    except OSError:  # it ended meanwhile
+        return False
+    return int(fields[_GROUP]) == group and fields[_STATE] not in {"Z", "X"}
+
+
+def _stat(pid: str) -> list[str]:
+    """Return the fields of ``/proc/PID/stat`` behind the name of the program."""
+    text = Path(_PROC, pid, "stat").read_text(errors="replace")
+    return text.rpartition(")")[2].split()
 
 
 def family(tag: str) -> dict[int, str]:
@@ -104,8 +129,7 @@ def usage(tag: str) -> dict[str, Usage]:
     totals: dict[str, Usage] = {}
     for pid, mark in family(tag).items():
         with suppress(OSError, IndexError, ValueError):  # it ended meanwhile
-            text = Path(_PROC, str(pid), "stat").read_text(errors="replace")
-            fields = text.rpartition(")")[2].split()
+            fields = _stat(str(pid))
             before = totals.get(mark, Usage())
             totals[mark] = Usage(
                 before.processes + 1,

@@ -16,7 +16,7 @@ import msgspec
 from rosz.errors import LaunchError
 from rosz.launch.plan.model import MachinePlan, NodePlan
 from rosz.launch.run.command import TAG, Command, Workplace
-from rosz.launch.run.family import Census, reap_group
+from rosz.launch.run.family import Census, group_lives
 from rosz.launch.run.folder import RunFolder
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.output import Output, Streams
@@ -117,13 +117,8 @@ class LocalChild:
             return False
         if self._process.poll() is None:
             return True
-        reap_group(self.pid)
-        try:
-            os.killpg(self.pid, 0)
-        except ProcessLookupError:
-            self._group_gone = True  # for good: another process may get the number next
-        except PermissionError:
-            return True
+        # Gone is for good: another process may get the number next.
+        self._group_gone = not group_lives(self.pid)
         return not self._group_gone
 
     def _strays(self) -> list[int]:

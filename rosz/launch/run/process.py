@@ -249,8 +249,8 @@ class Process:
         if self.child is None or not self.child.remains():
             return
         if not first:
+            self.killed = number is signal.SIGKILL
             self._listener.escalating(self, number)
-        self.killed = self.killed or (number is signal.SIGKILL and not first)
         self.child.signal(number)
 
     def _look(self, patience: float) -> None:

@@ -136,34 +136,38 @@ class Runner:
             ParamError: A parameter is not acceptable.
             UsageError: The options do not fit the plan.
         """
-        console = self._console
         output = Output(self._loop)
         try:
-            fresh = self._find_run()
-            folder = self._make_folder()
-            self._introduce()
-            hosts = self._hosts(
-                LocalHost(
-                    self._loop,
-                    output,
-                    self._workplace,
-                    folder=folder,
-                    tag=self._tag,
-                    prefixed=self._options.prefixed,
-                )
-            )
-            if fresh:
-                console.strong(f"setting {RUN_ID} to {self.run_id}")
-            extra = core_params(self.run_id) if fresh else {}
-            store = self._network.store
-            carry_out(self._plan, store, console, {**extra, **launch_uri(os.getpid())})
-            supervisor = self._supervisor(hosts, folder)
+            supervisor = self._prepare(output)
             self._supervise(supervisor)
+            output.close()
+            self._conclude(supervisor)
         finally:
             output.close()
             self._loop.close()
-        self._conclude(supervisor)
+            self._console.close()
         return 1 if supervisor.failed else 0
+
+    def _prepare(self, output: Output) -> Supervisor:
+        """Do all that comes before the first process."""
+        console, network = self._console, self._network
+        fresh = self._find_run()
+        folder = self._make_folder()
+        self._introduce()
+        local = LocalHost(
+            self._loop,
+            output,
+            self._workplace,
+            folder=folder,
+            tag=self._tag,
+            prefixed=self._options.prefixed,
+        )
+        hosts = self._hosts(local)
+        if fresh:
+            console.strong(f"setting {RUN_ID} to {self.run_id}")
+        extra = core_params(self.run_id) if fresh else {}
+        carry_out(self._plan, network.store, console, {**extra, **launch_uri(os.getpid())})
+        return self._supervisor(hosts, folder)
 
     def _find_run(self) -> bool:
         """Find out which run this is; tell whether it is a new one."""
@@ -260,5 +264,3 @@ class Runner:
         if text:
             console.error(text)
         console.strong("done")
-        if console.log is not None:
-            console.log.close()

@@ -1,0 +1,111 @@
+"""Launches as processes of their own, for tests of output and signals."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rosz.launch.plan.model import NodePlan, Plan
+
+from .scene import PATIENCE, alive
+
+PROGRAM = Path(__file__).with_name("program.py")
+ROOT = Path(__file__).parents[3]
+
+
+class Outside:
+    """A running launch, whose output is read as it comes.
+
+    Args:
+        process: The launch.
+        reading: Descriptor of its output.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes], reading: int) -> None:
+        self.process = process
+        self.text = ""
+        self._reading = reading
+
+    def expect(self, pattern: str) -> re.Match[str]:
+        """Read until a pattern has been seen."""
+        deadline = time.monotonic() + PATIENCE
+        while (found := re.search(pattern, self.text)) is None:
+            left = deadline - time.monotonic()
+            ready, _, _ = select.select([self._reading], [], [], max(0.0, left))
+            assert ready, f"no {pattern!r} in:\n{self.text}"
+            assert self._read(), f"output ended without {pattern!r}:\n{self.text}"
+        return found
+
+    def _read(self) -> bool:
+        try:
+            data = os.read(self._reading, 65536)
+        except OSError:  # a terminal whose other side is gone
+            data = b""
+        self.text += data.decode(errors="replace")
+        return bool(data)
+
+    def finish(self) -> int:
+        """Read to the end, and return the exit code."""
+        code = self.process.wait(PATIENCE)
+        while select.select([self._reading], [], [], 1.0)[0] and self._read():
+            pass
+        return code
+
+    def pids(self) -> list[int]:
+        """Return the process ids of all that was started."""
+        return [int(pid) for pid in re.findall(r"started with pid \[(\d+)\]", self.text)]
+
+
+@contextmanager
+def outside(
+    folder: Path,
+    *nodes: NodePlan,
+    options: str = "{}",
+    terminal: bool = False,
+    prefix: tuple[str, ...] = (),
+    separate: bool = False,
+) -> Iterator[Outside]:
+    """Run a launch in a process of its own, and leave nothing of it behind.
+
+    Args:
+        folder: Where it keeps what it writes.
+        nodes: What to run.
+        options: As JSON.
+        terminal: Whether it writes to a terminal.
+        prefix: What to put before its command.
+        separate: Whether its errors go elsewhere than its output: to ``FOLDER/err``.
+    """
+    plan = folder / "plan.json"
+    plan.write_bytes(Plan(nodes=nodes).to_json())
+    ours, theirs = os.openpty() if terminal else os.pipe()
+    command = [*prefix, sys.executable, str(PROGRAM), str(folder), str(plan), options]
+    err = (folder / "err").open("wb") if separate else None
+    process = subprocess.Popen(
+        command,
+        stdin=theirs if terminal else subprocess.DEVNULL,
+        stdout=theirs,
+        stderr=err or theirs,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    os.close(theirs)
+    if err is not None:
+        err.close()
+    running = Outside(process, ours)
+    try:
+        yield running
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+        for pid in running.pids():
+            if alive(pid):
+                with suppress(ProcessLookupError):
+                    os.killpg(pid, 9)
+        os.close(ours)

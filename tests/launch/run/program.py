@@ -1,0 +1,54 @@
+"""A launch as a process of its own: ``program.py FOLDER PLAN.json [OPTIONS.json]``."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from rosz.environment import Environment
+from rosz.errors import ParamNotFound
+from rosz.launch.plan.model import Condition, Plan
+from rosz.launch.run import Network, Options, Runner, Workplace
+from rosz.packages import PackageIndex
+
+
+class NoStore:
+    """Parameters that are written and never read."""
+
+    def get(self, name: str) -> Any:
+        raise ParamNotFound(name)
+
+    def has(self, name: str) -> bool:
+        return not name
+
+    def write(self, values: Mapping[str, Any], deleted: Iterable[str] = ()) -> None:
+        del values, deleted
+
+    def dump(self, name: str) -> str:
+        return name
+
+
+class Never:
+    """Conditions that never hold."""
+
+    def holds(self, condition: Condition) -> bool:
+        return not str(condition)
+
+
+def main() -> int:
+    folder = Path(sys.argv[1])
+    plan = msgspec.json.decode(Path(sys.argv[2]).read_bytes(), type=Plan)
+    options = msgspec.json.decode(sys.argv[3].encode() if sys.argv[3:] else b"{}", type=Options)
+    environment = Environment(home=folder / "home", log_dir=folder / "log")
+    workplace = Workplace(PackageIndex([]), environment, dict(os.environ), str(folder))
+    network = Network(store=NoStore(), readiness=Never())
+    return Runner(plan, workplace, network, options, out=sys.stdout, err=sys.stderr).run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,110 @@
+"""Descendants are known by their mark, wherever they moved."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from rosz.launch.run.family import Census, family, group_lives, kill_family, usage
+
+from .scene import alive, wait_until
+
+
+@pytest.fixture
+def tag() -> str:
+    return secrets.token_hex(8)
+
+
+@pytest.fixture
+def parent(tag: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A process with a child that moved into a session of its own."""
+    process = subprocess.Popen(
+        ["sh", "-c", "setsid sleep 600 & echo up; wait"],
+        env={**os.environ, "ROSZ_LAUNCH": f"{tag}:1"},
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
+    with process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"up\n"
+        yield process
+        kill_family(tag)
+
+
+def test_all_descendants_are_found(tag: str, parent: subprocess.Popen[bytes]) -> None:
+    wait_until(lambda: len(family(tag)) == 2, "both processes")
+    assert parent.pid in family(tag)
+    assert family(f"{tag}:1") == family(tag)
+    assert family(f"{tag}:11") == {}
+    assert family(tag[:-1]) == {}
+    assert set(family(tag).values()) == {f"{tag}:1"}
+
+
+def test_all_descendants_are_killed(tag: str, parent: subprocess.Popen[bytes]) -> None:
+    wait_until(lambda: len(family(tag)) == 2, "both processes")
+    pids = list(family(tag))
+    kill_family(tag)
+    parent.wait(10)
+    wait_until(lambda: not any(map(alive, pids)), "end of both")
+
+
+def test_marks_of_an_inner_launch_belong_to_the_outer(tag: str) -> None:
+    environ = {**os.environ, "ROSZ_LAUNCH": f"{tag}:3:abc:1"}
+    with subprocess.Popen(["sleep", "600"], env=environ) as inner:
+        assert Census(tag).below(f"{tag}:3") == [inner.pid]
+        assert Census(tag).below(f"{tag}:3:abc") == [inner.pid]
+        assert Census(tag).below(f"{tag}:1") == []
+        kill_family(f"{tag}:3")
+        assert inner.wait(10) == -signal.SIGKILL
+
+
+def test_usage_is_counted_per_mark(tag: str) -> None:
+    environ = {**os.environ, "ROSZ_LAUNCH": f"{tag}:7"}
+    script = "x = bytearray(50_000_000)\nwhile True: pass"
+    with subprocess.Popen([sys.executable, "-S", "-c", script], env=environ) as busy:
+        wait_until(
+            lambda: f"{tag}:7" in usage(tag) and usage(tag)[f"{tag}:7"].cpu > 0.05, "some work"
+        )
+        used = usage(tag)[f"{tag}:7"]
+        busy.kill()
+    assert used.processes == 1
+    assert 50_000_000 < used.memory < 200_000_000
+
+
+HOLDS_A_ZOMBIE = """
+import os, subprocess, sys
+leader = subprocess.Popen(["cat"], stdin=subprocess.PIPE, process_group=0)
+zombie = subprocess.Popen(["true"], process_group=leader.pid)
+os.waitid(os.P_PID, zombie.pid, os.WEXITED | os.WNOWAIT)
+print(leader.pid, flush=True)
+input()
+leader.stdin.close()
+leader.wait()
+print("over", flush=True)
+input()
+"""
+
+
+def test_a_group_of_zombies_does_not_live() -> None:
+    """As where whoever adopts orphans is slow to reap them, or never does."""
+    with subprocess.Popen(
+        [sys.executable, "-S", "-c", HOLDS_A_ZOMBIE],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as holder:
+        assert holder.stdin is not None
+        assert holder.stdout is not None
+        group = int(holder.stdout.readline())
+        assert group_lives(group)
+        print(file=holder.stdin, flush=True)
+        assert holder.stdout.readline() == "over\n"
+        os.killpg(group, 0)
+        assert not group_lives(group)
+        print(file=holder.stdin, flush=True)

@@ -1,0 +1,174 @@
+"""What nodes write reaches the screen whole and in order, with or without their names."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+from .outside import outside
+from .scene import alive, program, shell, wait_until
+
+CHATTER = (
+    "import sys, time\n"
+    "for i in range(200):\n"
+    "    sys.stdout.write(sys.argv[1] * 40); sys.stdout.flush()\n"
+    "    sys.stdout.write('.\\n'); sys.stdout.flush()\n"
+)
+
+
+def test_screen_shows_lines_as_they_are(tmp_path: Path) -> None:
+    node = shell("n", "echo one; echo two >&2; printf three", output="screen")
+    with outside(tmp_path, node) as run:
+        assert run.finish() == 0
+    assert "\none\ntwo\nthree" in run.text
+    assert run.text.index("three") < run.text.index("[n-1] process has finished cleanly")
+
+
+def test_streams_stay_apart(tmp_path: Path) -> None:
+    node = shell("n", "echo one; echo two >&2", output="screen")
+    with outside(tmp_path, node, separate=True) as run:
+        assert run.finish() == 0
+    assert "\none\n" in run.text
+    assert "\ntwo\n" not in run.text
+    assert (tmp_path / "err").read_text() == "two\n"
+
+
+def test_log_goes_to_a_file_and_errors_to_the_screen(tmp_path: Path) -> None:
+    with outside(tmp_path, shell("a/b", "echo one; echo two >&2", namespace="/ns")) as run:
+        assert run.finish() == 0
+    assert "\none\n" not in run.text
+    assert "\ntwo\n" in run.text
+    assert (tmp_path / "log/latest/ns-a-b-1-stdout.log").read_text() == "one\n"
+
+
+def test_a_respawned_node_goes_on_with_its_file(tmp_path: Path) -> None:
+    with outside(tmp_path, shell("n", "echo one", respawn=True, respawn_max=2)) as run:
+        assert run.finish() == 0
+    assert (tmp_path / "log/latest/n-1-stdout.log").read_text() == "one\none\none\n"
+
+
+def test_screen_and_log_can_be_forced(tmp_path: Path) -> None:
+    nodes = shell("a", "echo one"), shell("b", "echo two", output="screen")
+    with outside(tmp_path, *nodes, options='{"screen": true}') as run:
+        run.finish()
+    assert "\none\n" in run.text
+    with outside(tmp_path, *nodes, options='{"log": true}') as run:
+        run.finish()
+    assert "\ntwo\n" not in run.text
+
+
+def test_a_prefix_names_the_node_on_each_line(tmp_path: Path) -> None:
+    node = shell("n", "printf 'one\\ntwo\\n\\nlast'; echo oh >&2", output="screen")
+    with outside(tmp_path, node, options='{"prefixed": true}') as run:
+        run.finish()
+    lines = [line for line in run.text.splitlines() if line.startswith("[n-1] ")]
+    assert lines[:4] == ["[n-1] one", "[n-1] two", "[n-1] ", "[n-1] lastoh"]
+
+
+def test_lines_of_two_nodes_are_never_mixed(tmp_path: Path) -> None:
+    nodes = [program(c, sys.executable, "-S", "-c", CHATTER, c, output="screen") for c in "abcd"]
+    with outside(tmp_path, *nodes) as run:
+        assert run.finish() == 0
+    for c in "abcd":
+        assert len(re.findall(rf"^{c * 40}\.$", run.text, re.MULTILINE)) == 200
+
+
+def test_an_unfinished_line_is_shown(tmp_path: Path) -> None:
+    node = shell("n", "printf 'password: '; exec sleep 600", output="screen")
+    with outside(tmp_path, node) as run:
+        run.expect(r"password: $")
+
+
+def test_much_output_arrives_whole(tmp_path: Path) -> None:
+    node = shell("n", "seq 200000; seq 3 >&2", output="screen")
+    with outside(tmp_path, node, separate=True) as run:
+        run.expect(r"done\n$")
+        assert run.finish() == 0
+    numbers = [line for line in run.text.splitlines() if line.isdigit()]
+    assert numbers == [str(i) for i in range(1, 200001)]
+
+
+def test_a_line_without_end_does_not_fill_memory(tmp_path: Path) -> None:
+    node = shell("n", "head -c 3000000 /dev/zero | tr '\\0' x", output="screen")
+    with outside(tmp_path, node) as run:
+        run.expect(r"done\n$")
+        assert run.finish() == 0
+    assert run.text.count("x") >= 3000000
+
+
+def test_nodes_of_a_terminal_have_a_terminal(tmp_path: Path) -> None:
+    script = "test -t 1 && test -t 2 && echo both are; stty size <&1; printf '\\033[32mgreen\\n'"
+    with outside(tmp_path, shell("n", script, output="screen"), terminal=True) as run:
+        run.finish()
+    assert "both are\r\n" in run.text
+    assert "\033[32mgreen\r\n" in run.text
+    assert "\033[1mprocess[n-1]: started with pid" in run.text
+
+
+def test_no_colours_without_a_terminal(tmp_path: Path) -> None:
+    with outside(tmp_path, shell("n", "exit 3")) as run:
+        run.finish()
+    assert "\033" not in run.text
+
+
+def test_deaths_are_red_on_a_terminal(tmp_path: Path) -> None:
+    with outside(tmp_path, shell("n", "exit 3"), terminal=True) as run:
+        run.finish()
+    assert "\033[31m[n-1] process has died [pid " in run.text
+
+
+def test_python_writes_at_once_where_output_is_piped(tmp_path: Path) -> None:
+    script = "import time; print('early'); time.sleep(600)"
+    node = program("n", sys.executable, "-S", "-c", script, output="screen")
+    with outside(tmp_path, node) as run:
+        run.expect("early\n")
+
+
+def test_nodes_outlive_a_killed_launch(tmp_path: Path) -> None:
+    node = shell("n", "while :; do echo tick; sleep 0.05; done", output="screen")
+    with outside(tmp_path, node) as run:
+        run.expect("tick\n")
+        run.process.send_signal(signal.SIGKILL)
+        run.process.wait()
+        seen = run.text.count("tick")
+        run.expect(rf"(tick\n(.*\n)*){{{seen + 5}}}")
+        (pid,) = run.pids()
+        assert alive(pid)
+        os.killpg(pid, signal.SIGKILL)
+        assert run.finish() == -signal.SIGKILL
+        wait_until(lambda: not _relays_of(run._reading), "end of the relay")
+
+
+def _relays_of(pipe: int) -> list[str]:
+    """Return the relays that write to a pipe."""
+    name = f"pipe:[{os.fstat(pipe).st_ino}]"
+    found = []
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError):
+            if b"relay.py" in (entry / "cmdline").read_bytes():
+                found += [entry.name] if str((entry / "fd/1").readlink()) == name else []
+    return found
+
+
+def test_a_relay_is_found_while_it_runs(tmp_path: Path) -> None:
+    with outside(tmp_path, shell("n", "echo hello; exec sleep 600", output="screen")) as run:
+        run.expect("hello")
+        assert len(_relays_of(run._reading)) == 1
+
+
+def test_a_relay_whose_screen_is_gone_lets_nodes_go_on(tmp_path: Path) -> None:
+    count = tmp_path / "count"
+    script = f"while :; do echo tick; echo >> {count}; done"
+    with outside(tmp_path, shell("n", script, output="screen"), terminal=True) as run:
+        run.expect("\ntick\r\n")
+        os.close(run._reading)
+        run._reading = os.open(os.devnull, os.O_RDONLY)
+        wait_until(count.exists, "count")
+        before = count.stat().st_size
+        wait_until(lambda: count.stat().st_size > before + 20000, "ticks")
+        run.process.send_signal(signal.SIGTERM)
+        assert run.process.wait(10) == 0

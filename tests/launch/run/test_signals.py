@@ -1,0 +1,116 @@
+"""Whatever ends a launch from outside, its nodes end with it; but not when it is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from .outside import outside
+from .scene import alive, program, shell, wait_until
+
+SLEEPERS = [
+    shell(name, "trap 'exit 0' INT; echo up; while :; do sleep 0.02; done") for name in "abc"
+]
+STUBBORN = program(
+    "mule",
+    sys.executable,
+    "-S",
+    "-c",
+    "import signal, time\n"
+    "for s in (signal.SIGINT, signal.SIGTERM): signal.signal(s, signal.SIG_IGN)\n"
+    "print('up', flush=True)\n"
+    "time.sleep(600)\n",
+    output="screen",
+)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_all(tmp_path: Path, number: int) -> None:
+    with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+        run.expect(r"(up\n(.*\n)*){3}")
+        begin = time.monotonic()
+        run.process.send_signal(number)
+        assert run.finish() == 0
+        assert time.monotonic() - begin < 2.0
+    assert not any(map(alive, run.pids()))
+    assert run.text.endswith("done\n")
+
+
+def test_a_second_signal_kills(tmp_path: Path) -> None:
+    with outside(tmp_path, STUBBORN) as run:
+        run.expect("up\n")
+        run.process.send_signal(signal.SIGINT)
+        run.expect("killing on exit")
+        begin = time.monotonic()
+        run.process.send_signal(signal.SIGINT)
+        assert run.finish() == 0
+        assert time.monotonic() - begin < 2.0
+    assert not any(map(alive, run.pids()))
+    (log,) = (tmp_path / "log/latest").glob("roslaunch-*.log")
+    assert "the stacks of all threads:\n" in log.read_text()
+    assert "most recent call first" in log.read_text()
+
+
+def test_a_closed_terminal_ends_all(tmp_path: Path) -> None:
+    # setsid -c makes the terminal the controlling one, so that closing it hangs the launch up.
+    with outside(tmp_path, *SLEEPERS, terminal=True, prefix=("setsid", "-c", "-w")) as run:
+        run.expect(r"process\[c-3\]: started with pid \[\d+\]")
+        os.close(run._reading)
+        run._reading = os.open(os.devnull, os.O_RDONLY)
+        run.process.wait(10)
+    wait_until(lambda: not any(map(alive, run.pids())), "end of all nodes")
+
+
+def test_nohup_is_honoured(tmp_path: Path) -> None:
+    with outside(tmp_path, *SLEEPERS, options='{"screen": true}', prefix=("nohup",)) as run:
+        run.expect(r"(up\n(.*\n)*){3}")
+        run.process.send_signal(signal.SIGHUP)
+        run.process.send_signal(signal.SIGTERM)
+        assert run.finish() == 0
+        assert run.text.count("killing on exit") == 3
+
+
+def test_a_killed_launch_leaves_its_nodes_running(tmp_path: Path) -> None:
+    with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+        run.expect(r"(up\n(.*\n)*){3}")
+        run.process.kill()
+        run.process.wait()
+        assert all(map(alive, run.pids()))
+
+
+def test_a_killed_node_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
+    with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+        run.expect(r"(up\n(.*\n)*){3}")
+        first, *rest = run.pids()
+        os.kill(first, signal.SIGKILL)
+        run.expect(r"\[a-1\] process has died \[pid \d+, exit code -9,")
+        assert all(map(alive, rest))
+        run.process.send_signal(signal.SIGINT)
+        assert run.finish() == 0
+
+
+def test_stubborn_nodes_are_gone_within_the_time_outs(tmp_path: Path) -> None:
+    options = '{"timeouts": {"sigint": 0.5, "sigterm": 0.3}}'
+    with outside(tmp_path, STUBBORN, options=options) as run:
+        run.expect("up\n")
+        begin = time.monotonic()
+        run.process.send_signal(signal.SIGINT)
+        assert run.finish() == 0
+        assert 0.8 <= time.monotonic() - begin < 1.8
+    assert not any(map(alive, run.pids()))
+
+
+def test_an_ignored_sigint_of_the_shell_does_not_reach_nodes(tmp_path: Path) -> None:
+    """A launch in the background of a script starts with SIGINT ignored; its nodes must not."""
+    script = 'trap "" INT; exec "$@"'
+    node = shell("n", "echo up; exec sleep 600", output="screen")
+    with outside(tmp_path, node, prefix=("sh", "-c", script, "sh")) as run:
+        run.expect("up\n")
+        run.process.send_signal(signal.SIGINT)
+        assert run.finish() == 0
+    assert "escalating" not in run.text
