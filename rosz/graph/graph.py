@@ -1,16 +1,18 @@
 """The live view of a domain.
 
 Zenoh's thread only queues what it sees. One thread of the graph applies it, wakes waiters and runs
-listeners, so a listener may take its time and may call anything.
+listeners. A listener that waits for the graph applies what comes meanwhile itself, so it may call
+anything; but all others wait for it, so what takes long belongs on another thread.
 """
 
 from __future__ import annotations
 
+import itertools
 import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, DecodeError, WaitTimeout, near_miss
@@ -52,9 +54,12 @@ class Graph:
         self._session = session
         self._tokens: dict[str, Token] = {}
         self._processes: dict[str, ProcessToken] = {}
+        self._view: View | None = None
         self._changed = threading.Condition()
+        self._numbers = itertools.count()
         self._listeners: dict[int, GraphListener] = {}
         self._process_listeners: dict[int, ProcessListener] = {}
+        self._complained: set[str] = set()
         self._events: SimpleQueue[tuple[str, bool] | Callable[[], None] | None] = SimpleQueue()
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="rosz-graph", daemon=True)
@@ -67,37 +72,39 @@ class Graph:
     def view(self) -> View:
         """Return what is known at this moment."""
         with self._changed:
-            return View(self._tokens.values())
+            if self._view is None:
+                self._view = View(self._tokens.values(), self._processes.values())
+            return self._view
 
     def processes(self) -> list[ProcessToken]:
         """Return the rosz nodes with their processes, sorted by name; ROS 2 tells none."""
-        with self._changed:
-            return sorted(self._processes.values(), key=lambda process: process.node)
+        return self.view().processes()
 
     def refresh(self, timeout: float = 2.0) -> View:
-        """Ask the network for all tokens, and return them with what is known already.
+        """Ask the network for all tokens, for who cannot wait for them to come by themselves.
 
         Args:
             timeout: Seconds.
+
+        Returns:
+            What is known, with what the answers add.
 
         Raises:
             ClosedError: The session is closed.
             WaitTimeout: No end of answers.
         """
-        for space in (tokens_key(self.domain), processes_key(self.domain)):
-            for key in self._session.live_tokens(space, timeout):
-                self._events.put((key, True))
-        self._drain(timeout)
-        return self.view()
-
-    def _drain(self, timeout: float) -> None:
-        """Wait until everything queued so far has been applied."""
-        if threading.current_thread() is self._thread:
-            return
-        done = threading.Event()
-        self._events.put(done.set)
-        if not done.wait(timeout):
-            raise WaitTimeout("turn of the graph thread", timeout, "a listener blocks it")
+        asked = [
+            *self._session.live_tokens(tokens_key(self.domain), timeout),
+            *self._session.live_tokens(processes_key(self.domain), timeout),
+        ]
+        with self._changed:
+            tokens, processes = dict(self._tokens), dict(self._processes)
+        # Not for good: one that ended meanwhile may never be told to have gone.
+        for key in asked:
+            known: dict[str, Any] = processes if key.startswith(OWN_SPACE) else tokens
+            if key not in known and (token := self._parse(key)) is not None:
+                known[key] = token
+        return View(tokens.values(), processes.values())
 
     def listen(self, listener: GraphListener, *, history: bool = True) -> Callable[[], None]:
         """Have every change told, in order, on the graph's thread.
@@ -109,23 +116,14 @@ class Graph:
         Returns:
             A function that ends it.
         """
-        key = id(listener)
+        number = next(self._numbers)
 
         def begin() -> None:
-            if history:
-                for token in list(self._tokens.values()):
-                    _tell(listener, token, token.node_name, alive=True)
-            self._listeners[key] = listener
+            self._listeners[number] = listener
+            for token in list(self._tokens.values()) if history else ():
+                self._tell(self._listeners, number, token, alive=True)
 
-        if threading.current_thread() is self._thread:
-            begin()
-        else:
-            self._events.put(begin)
-        return lambda: self._events.put(lambda: self._forget(key))
-
-    def _forget(self, key: int) -> None:
-        self._listeners.pop(key, None)
-        self._process_listeners.pop(key, None)
+        return self._enlist(begin, self._listeners, number)
 
     def listen_to_processes(self, listener: ProcessListener) -> Callable[[], None]:
         """Have rosz nodes told as they come and go, those that are alive first.
@@ -136,15 +134,20 @@ class Graph:
         Returns:
             A function that ends it.
         """
-        key = id(listener)
+        number = next(self._numbers)
 
         def begin() -> None:
+            self._process_listeners[number] = listener
             for process in list(self._processes.values()):
-                _tell(listener, process, process.node, alive=True)
-            self._process_listeners[key] = listener
+                self._tell(self._process_listeners, number, process, alive=True)
 
+        return self._enlist(begin, self._process_listeners, number)
+
+    def _enlist(
+        self, begin: Callable[[], None], listeners: dict[int, Any], number: int
+    ) -> Callable[[], None]:
         self._events.put(begin)
-        return lambda: self._events.put(lambda: self._forget(key))
+        return lambda: self._events.put(lambda: listeners.pop(number, None) and None)
 
     def wait_for(
         self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
@@ -165,23 +168,38 @@ class Graph:
             ClosedError: The graph was closed meanwhile.
         """
         deadline = time.monotonic() + timeout
+        wait = self._apply_next if threading.current_thread() is self._thread else self._sleep
+        while not condition(view := self.view()):
+            left = deadline - time.monotonic()
+            if self._closed:
+                raise ClosedError(f"the wait for {what} ended: shutting down")
+            if left <= 0:
+                raise WaitTimeout(what, timeout, hint)
+            wait(view, left)
+        return view
+
+    def _sleep(self, seen: View, timeout: float) -> None:
+        """Wait until the view is another than the one that was looked at."""
         with self._changed:
-            while True:
-                view = View(self._tokens.values())
-                if condition(view):
-                    return view
-                left = deadline - time.monotonic()
-                if left <= 0:
-                    raise WaitTimeout(what, timeout, hint)
-                if self._closed:
-                    raise ClosedError(f"the wait for {what} ended: shutting down")
-                self._changed.wait(left)
+            self._changed.wait_for(lambda: self._view is not seen or self._closed, timeout)
+
+    def _apply_next(self, _seen: View, timeout: float) -> None:
+        """Do the graph thread's work on that very thread, which is in a listener that waits."""
+        try:
+            event = self._events.get(timeout=timeout)
+        except Empty:
+            return
+        if event is None:
+            self._events.put(None)
+        else:
+            self._do(event)
 
     def wait_for_node(self, name: str, timeout: float) -> View:
         """Wait for a node of that full name.
 
         Raises:
             WaitTimeout: It did not appear in time.
+            ClosedError: The graph was closed meanwhile.
         """
         return self._wait_for_name(
             lambda view: name in view.nodes(), timeout, f"node '{name}'", name, View.nodes
@@ -192,6 +210,7 @@ class Graph:
 
         Raises:
             WaitTimeout: None appeared in time.
+            ClosedError: The graph was closed meanwhile.
         """
         return self._wait_for_name(
             lambda view: bool(view.publishers(name)),
@@ -206,6 +225,7 @@ class Graph:
 
         Raises:
             WaitTimeout: Nobody did in time.
+            ClosedError: The graph was closed meanwhile.
         """
         return self._wait_for_name(
             lambda view: bool(view.servers(name)),
@@ -220,6 +240,7 @@ class Graph:
 
         Raises:
             WaitTimeout: It had fewer when the time was over.
+            ClosedError: The graph was closed meanwhile.
         """
         return self.wait_for(
             lambda view: len(view.subscriptions(topic)) >= count,
@@ -243,34 +264,66 @@ class Graph:
 
     def _run(self) -> None:
         while (event := self._events.get()) is not None:
-            if isinstance(event, tuple):
-                self._apply(*event)
-            else:
-                event()
+            self._do(event)
+
+    def _do(self, event: tuple[str, bool] | Callable[[], None]) -> None:
+        if isinstance(event, tuple):
+            self._apply(*event)
+        else:
+            event()
 
     def _apply(self, key: str, alive: bool) -> None:
         ours = key.startswith(OWN_SPACE)
         known: dict[str, Any] = self._processes if ours else self._tokens
         if alive == (key in known):
             return
-        if alive:
-            try:
-                token: Token | ProcessToken = parse_process(key) if ours else parse_token(key)
-            except DecodeError as error:
-                _log.warning("ignoring a foreign liveliness token: %s", error)
-                return
+        token = self._parse(key) if alive else known[key]
+        if token is None:
+            return
         with self._changed:
             if alive:
                 known[key] = token
             else:
-                token = known.pop(key)
+                del known[key]
+            self._view = None
             self._changed.notify_all()
-        if isinstance(token, ProcessToken):
-            for tell in list(self._process_listeners.values()):
-                _tell(tell, token, token.node, alive=alive)
-        else:
-            for listener in list(self._listeners.values()):
-                _tell(listener, token, token.node_name, alive=alive)
+        listeners: dict[int, Any] = self._process_listeners if ours else self._listeners
+        for number in list(listeners):
+            self._tell(listeners, number, token, alive=alive)
+
+    def _parse(self, key: str) -> Token | ProcessToken | None:
+        """Read a token; one that is damaged is told of, once per kind of damage."""
+        try:
+            return parse_process(key) if key.startswith(OWN_SPACE) else parse_token(key)
+        except DecodeError as error:
+            if error.type_name not in self._complained:
+                self._complained.add(error.type_name)
+                _log.warning(
+                    "ignoring foreign tokens with a damaged %s (told once): %.300s",
+                    error.type_name,
+                    error.reason,
+                )
+            return None
+
+    def _tell(
+        self,
+        listeners: dict[int, Callable[[Any, bool], None]],
+        number: int,
+        token: Token | ProcessToken,
+        *,
+        alive: bool,
+    ) -> None:
+        listener = listeners.get(number)
+        if listener is None:
+            return
+        try:
+            listener(token, alive)
+        except ClosedError as error:
+            # What a listener tries while all is being shut down is no fault of its.
+            if not self._closed:
+                _log.exception("a graph listener failed", exc_info=error)
+        except Exception:  # noqa: BLE001  # the callback boundary
+            _log.exception("a graph listener failed on %s", token)
 
     def close(self) -> None:
         """Stop following; waiters are woken with `ClosedError`. Again is no error."""
@@ -282,10 +335,3 @@ class Graph:
         for watch in self._watches:
             watch.close()
         self._events.put(None)
-
-
-def _tell(listener: Callable[[Any, bool], None], token: object, node: str, *, alive: bool) -> None:
-    try:
-        listener(token, alive)
-    except Exception:  # noqa: BLE001  # the callback boundary
-        _log.exception("a graph listener failed on node '%s'", node)

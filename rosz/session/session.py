@@ -78,8 +78,7 @@ class Session:
                 settings = zenoh.Config.from_json5(json.dumps(zenoh_settings(config)))
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
-        where = ", ".join(settings_endpoints(config))
-        with mapped(f"open a session ({where})"):
+        with mapped(f"open a session ({', '.join(config.endpoints)})"):
             return cls(zenoh.open(settings))
 
     def stamp(self) -> Stamp:
@@ -404,8 +403,3 @@ class Session:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def settings_endpoints(config: SessionConfig) -> list[str]:
-    """Return all endpoints that opening a session involves."""
-    return list(dict.fromkeys((config.rendezvous, *config.connect, *config.listen)))
