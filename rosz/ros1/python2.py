@@ -20,7 +20,6 @@ _MESSAGES = (
     (re.compile(r"parameters cannot be parenthesized"), "a tuple among the parameters"),
 )
 _LINES = (
-    (re.compile(r"^\s*print\s*>>"), "print to a file without parentheses"),
     (re.compile(r"^\s*print\s+[^(=\s]"), "print without parentheses"),
     (re.compile(r"^\s*raise\s+[\w.]+\s*,"), "'raise Error, text'"),
     (re.compile(r"^\s*except\s+[^:]+,\s*\w+\s*:"), "'except Error, name'"),

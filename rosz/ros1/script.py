@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import builtins
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType, TracebackType
@@ -43,8 +44,10 @@ class Script:
             __cached__=None,
             __loader__=SourceFileLoader("__main__", str(self._file)),
         )
-        sys.excepthook = _trimming(sys.excepthook, self._main)
-        self._code = _compile(self._file)
+        if "__annotations__" in vars(sys.modules["__main__"]):  # up to Python 3.13
+            self._main.__annotations__ = {}
+        with _shown_without_rosz(self._main):
+            self._code = _compile(self._file)
 
     def run(self, arguments: Sequence[str]) -> None:
         """Run it as the main module of this process; it may raise or exit as it likes.
@@ -59,7 +62,8 @@ class Script:
         else:
             sys.path[0] = folder
         sys.modules["__main__"] = self._main
-        exec(self._code, self._main.__dict__)  # noqa: S102  # the user's own program
+        with _shown_without_rosz(self._main):
+            exec(self._code, self._main.__dict__)  # noqa: S102  # the user's own program
 
 
 def _compile(file: Path) -> CodeType:
@@ -74,6 +78,16 @@ def _compile(file: Path) -> CodeType:
         if plain is None:
             raise
         raise plain from None
+
+
+@contextmanager
+def _shown_without_rosz(main: ModuleType) -> Iterator[None]:
+    """Have an exception that nobody catches shown from the script's first line on."""
+    try:
+        yield
+    except BaseException:
+        sys.excepthook = _trimming(sys.excepthook, main)
+        raise
 
 
 def _trimming(show: _Hook, main: ModuleType) -> _Hook:

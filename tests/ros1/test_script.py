@@ -1,0 +1,180 @@
+"""A script under ``python -m rosz.ros1`` cannot tell that it was not run by the interpreter."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def run(
+    folder: Path, script: str | bytes, *args: str, safe: bool = True, name: str = "node.py"
+) -> subprocess.CompletedProcess[str]:
+    path = folder / name
+    path.write_bytes(script if isinstance(script, bytes) else script.encode())
+    return subprocess.run(
+        [sys.executable, *(["-P"] if safe else []), "-m", "rosz.ros1", str(path), *args],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT), "HOME": str(folder)},
+        timeout=30,
+        check=False,
+    )
+
+
+def plain(folder: Path, *args: str, name: str = "node.py") -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(folder / name), *args],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        timeout=30,
+        check=False,
+    )
+
+
+SAME: dict[str, str | bytes] = {
+    "what it knows of itself": """
+import sys
+print(sys.argv, sys.path[0], __name__, __file__, __spec__, __package__, __doc__)
+print(sys.modules['__main__'].__dict__ is globals(), __builtins__, __loader__.path)
+print(sorted(globals()))
+""",
+    "a docstring": "'''doc'''\nprint(__doc__)\n",
+    "a return code": "import sys\nsys.exit(7)\n",
+    "a return text": "import sys\nsys.exit('no more')\n",
+    "an exception": "def f(x):\n    return 1 / x\n\nf(0)\n",
+    "a chain of exceptions": (
+        "try:\n    1 / 0\nexcept ZeroDivisionError as e:\n    raise KeyError('x') from e\n"
+    ),
+    "an exception of its own": "class Odd(Exception): pass\nraise Odd('so')\n",
+    "a hook of its own": (
+        "import sys\nsys.excepthook = lambda k, e, t: print('hook', k, e, t.tb_lineno)\n1 / 0\n"
+    ),
+    "an end by signal": "import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n",
+    "an interrupt": "raise KeyboardInterrupt\n",
+    "atexit": "import atexit\nx = 5\natexit.register(lambda: print('bye', x))\n",
+    "a module beside it": "import neighbour\nprint(neighbour.__file__)\n",
+    "pickling": (
+        "import pickle\nclass A:\n    def __eq__(self, o): return True\n"
+        "print(pickle.loads(pickle.dumps(A())) == A(), pickle.dumps(A())[:40])\n"
+    ),
+    "multiprocessing": (
+        "import multiprocessing as m\n\ndef f(x): return x * x\n\n"
+        "if __name__ == '__main__':\n    with m.get_context('spawn').Pool(1) as p:\n"
+        "        print(p.map(f, [1, 2, 3]))\n"
+    ),
+    "dataclasses": (
+        "from __future__ import annotations\nimport dataclasses, typing\n\n@dataclasses.dataclass\n"
+        "class P:\n    x: int\n\nprint(P(1), typing.get_type_hints(P))\n"
+    ),
+    "a syntax error": "x = (1,\n",
+    "another encoding": "# -*- coding: latin-1 -*-\nprint(ascii('\xe9'))\n".encode("latin-1"),
+    "no future of ours": "def f(x: undefined_name): pass\n",
+}
+
+
+@pytest.mark.parametrize("what", SAME)
+def test_it_is_as_if_run_by_the_interpreter(tmp_path: Path, what: str) -> None:
+    (tmp_path / "neighbour.py").write_text("")
+    ours = run(tmp_path, SAME[what], "a", "b:=c", "-x")
+    expected = plain(tmp_path, "a", "b:=c", "-x")
+    assert (ours.returncode, ours.stdout, ours.stderr) == (
+        expected.returncode,
+        expected.stdout,
+        expected.stderr,
+    )
+
+
+def test_the_folder_of_a_link_is_that_of_its_target(tmp_path: Path) -> None:
+    real = tmp_path / "real"
+    real.mkdir()
+    (real / "node.py").write_text("import sys\nprint(sys.path[0], sys.argv[0])\n")
+    (tmp_path / "link").symlink_to(real / "node.py")
+    script = (real / "node.py").read_text()
+    ours = run(tmp_path, script, name="link")
+    assert ours.stdout == plain(tmp_path, name="link").stdout
+
+
+def test_without_safe_path_the_working_folder_is_not_searched(tmp_path: Path) -> None:
+    assert str(tmp_path) in run(tmp_path, "import sys; print(sys.path)", safe=True).stdout
+    shown = run(tmp_path, "import sys; print(sys.path[0])", safe=False)
+    assert shown.stdout == f"{tmp_path}\n"
+
+
+def test_ros_names_can_be_imported(tmp_path: Path) -> None:
+    done = run(tmp_path, "from std_msgs.msg import String\nprint(String(data='x').data)\n")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "x\n", "")
+
+
+PYTHON_2 = {
+    'import sys\nprint "hello"\n': ":2:1: this is Python 2 (print without parentheses); convert",
+    "print x\n": ":1:1: this is Python 2 (print without parentheses); convert",
+    "try:\n  pass\nexcept OSError, e:\n  pass\n": ":3:8: this is Python 2 ('except Error, name')",
+    "raise ValueError, 'x'\n": ":1:17: this is Python 2 ('raise Error, text'); convert",
+    "x = 0777\n": ":1:5: this is Python 2 (an octal number such as 0777); convert",
+    "x = 10L\n": ":1:6: this is Python 2 (a long number such as 10L); convert",
+    "x = `1`\n": ":1:5: this is Python 2 (backticks for repr()); convert",
+    "x = 1 <> 2\n": ":1:7: this is Python 2 ('<>' for '!='); convert",
+    "x = ur'a'\n": ":1:7: this is Python 2 (a text such as ur''); convert",
+    "def f(a, (b, c)): pass\n": ":1:10: this is Python 2 (a tuple among the parameters); convert",
+    "exec 'x'\n": ":1:1: this is Python 2 (exec without parentheses); convert",
+}
+
+
+@pytest.mark.parametrize("script", PYTHON_2)
+def test_python_2_is_named_in_one_line(tmp_path: Path, script: str) -> None:
+    done = run(tmp_path, script)
+    path = tmp_path / "node.py"
+    assert done.stderr.startswith(f"rosz: {path}{PYTHON_2[script]}")
+    assert done.stderr.endswith(f"with: 2to3 -w {path} (or futurize -w {path})\n")
+    assert done.stderr.count("\n") == 1
+    assert done.returncode == 1
+
+
+def test_tabs_and_spaces_are_named_in_one_line(tmp_path: Path) -> None:
+    done = run(tmp_path, "def f():\n\tif 1:\n        return 2\n")
+    assert done.stderr == (
+        f"rosz: {tmp_path}/node.py:3:1: indented by tabs and spaces in turn, as Python 2 allowed;"
+        f" write 8 columns for each tab with: expand -i -t 8 {tmp_path}/node.py\n"
+    )
+    assert done.returncode == 1
+
+
+HINTS = {
+    "raw_input()\n": "'raw_input' is Python 2; Python 3 has 'input'",
+    "import Queue\n": "module 'Queue' is Python 2; Python 3 has 'queue'",
+    "{}.iteritems()\n": "'iteritems' is Python 2; Python 3 has items()",
+    "{}.has_key(1)\n": "'has_key' is Python 2; Python 3 has 'key in dict'",
+}
+
+
+@pytest.mark.parametrize("script", HINTS)
+def test_names_of_python_2_are_explained_behind_the_traceback(tmp_path: Path, script: str) -> None:
+    done = run(tmp_path, script)
+    expected = plain(tmp_path)
+    assert done.stderr == f"{expected.stderr}rosz: {HINTS[script]}\n"
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize("name", ["print_input", "xrange2"])
+def test_other_names_are_not(tmp_path: Path, name: str) -> None:
+    assert "rosz:" not in run(tmp_path, f"{name}()\n").stderr
+
+
+def test_errors_of_use(tmp_path: Path) -> None:
+    command = [sys.executable, "-P", "-m", "rosz.ros1"]
+    environ = {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, capture_output=True, env=environ, timeout=30, check=False)
+    assert (done.returncode, done.stderr[:6]) == (2, b"usage:")
+    gone = str(tmp_path / "gone.py")
+    done = subprocess.run(
+        [*command, gone], capture_output=True, env=environ, timeout=30, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.decode() == f"rosz: cannot run '{gone}': No such file or directory\n"
