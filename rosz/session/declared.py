@@ -78,3 +78,15 @@ class RawPublisher(Declared):
         except zenoh.ZError:
             with mapped(f"publish on '{self.key}'"):
                 raise
+
+    @property
+    def matched(self) -> bool:
+        """Whether anybody is known to subscribe to what a publisher without cache sends.
+
+        Raises:
+            ClosedError: The publisher or the session is closed.
+        """
+        if self._entity is None:
+            raise ClosedError(f"nobody hears '{self.key}': the publisher is closed")
+        with mapped(f"look for subscribers of '{self.key}'"):
+            return bool(self._entity.matching_status.matching)

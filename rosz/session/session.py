@@ -33,6 +33,7 @@ _TARGETS = {
     "all_complete": zenoh.QueryTarget.ALL_COMPLETE,
     "best": zenoh.QueryTarget.BEST_MATCHING,
 }
+_CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 _HEARTBEAT_SECONDS = 0.5
 _CALLS_END_BY = 1.0
 _REPLY_MARGIN = 1.0
@@ -92,8 +93,16 @@ class Session:
         *,
         attachment: bytes | None = None,
         stamp: Stamp | None = None,
+        block: bool = True,
     ) -> None:
-        """Write a value; waits for a slow link rather than drop it.
+        """Write a value.
+
+        Args:
+            key: Key.
+            payload: The value.
+            attachment: Sent beside it.
+            stamp: When it was written.
+            block: Whether to wait for a slow link rather than drop the value.
 
         Raises:
             ClosedError: The session is closed.
@@ -105,7 +114,7 @@ class Session:
                 payload,
                 attachment=attachment,
                 timestamp=None if stamp is None else to_timestamp(stamp),
-                congestion_control=zenoh.CongestionControl.BLOCK,
+                congestion_control=_CONGESTION[block],
             )
 
     def delete(
@@ -147,7 +156,7 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        congestion = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
+        congestion = _CONGESTION[block]
         reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
         with mapped(f"publish on '{key}'"):
             if not cache:

@@ -7,8 +7,10 @@ meets for *their* links, and is settled once it has all of them itself.
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -20,15 +22,89 @@ if TYPE_CHECKING:
     from rosz.session.declared import Closable
     from rosz.session.session import Session
 
-__all__ = ("serve_links", "settle")
+__all__ = ("Settling", "serve_links")
 
 _SPACE = "@rosz/links"
 _POLL = 0.002
 _ASK_TIMEOUT = 0.5
 
+_log = logging.getLogger("rosz.session")
+
+
+class Settling:
+    """A session on its way to all its neighbours; others are told of its own links meanwhile.
+
+    Args:
+        session: It.
+        timeout: Seconds after which it counts as settled, come what may; 0 if it is already.
+        stop: Ends the waiting when set.
+
+    Attributes:
+        settled: Set in the end.
+    """
+
+    def __init__(self, session: Session, timeout: float, stop: threading.Event) -> None:
+        self.settled = threading.Event()
+        self._session = session
+        self._timeout = timeout
+        self._stop = stop
+        self._lock = threading.Lock()
+        self._waiting: list[Callable[[], None]] = []
+        if timeout:
+            threading.Thread(target=self._run, name="rosz-settle", daemon=True).start()
+        else:
+            self.settled.set()
+
+    def when_settled(self, callback: Callable[[], None]) -> None:
+        """Have a function called when it is, or at once if it is already."""
+        with self._lock:
+            if not self.settled.is_set():
+                self._waiting.append(callback)
+                return
+        callback()
+
+    def _run(self) -> None:
+        try:
+            self._settle()
+        except RoszError as error:
+            if not self._stop.is_set():
+                _log.warning("cannot tell whether all peers are linked: %s", error)
+        finally:
+            with self._lock:
+                self.settled.set()
+            for callback in self._waiting:
+                _attempt(callback)
+
+    def _settle(self) -> None:
+        deadline = time.monotonic() + self._timeout
+        while time.monotonic() < deadline and not self._stop.wait(_POLL):
+            if self._session.peers() and self._neighbours() <= self._linked():
+                return
+
+    def _linked(self) -> set[str]:
+        return {self._session.zid, *self._session.peers()}
+
+    def _neighbours(self) -> set[str]:
+        """Return everybody that those who are linked to this session are linked to."""
+        found: set[str] = set()
+        for reply in self._session.get(f"{_SPACE}/*", timeout=_ASK_TIMEOUT):
+            if reply.ok:
+                try:
+                    found.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
+                except msgspec.DecodeError as error:
+                    _log.warning("no list of links from '%.100s': %s", reply.key, error)
+        return found
+
+
+def _attempt(callback: Callable[[], None]) -> None:
+    try:
+        callback()
+    except RoszError as error:
+        _log.warning("cannot send what was held: %s", error)
+
 
 def serve_links(session: Session) -> Closable:
-    """Tell others whom this session is linked to."""
+    """Tell others whom a session is linked to."""
 
     def answer(query: Query) -> None:
         # Zenoh forbids calls into the session on its own threads.
@@ -43,29 +119,3 @@ def _answer(session: Session, query: Query) -> None:
             query.reply(f"{_SPACE}/{session.zid}", msgspec.msgpack.encode(session.peers()))
         except RoszError:
             return  # the session closed meanwhile; whoever asked sees that it is gone
-
-
-def settle(session: Session, *, timeout: float, stop: threading.Event) -> bool:
-    """Wait until the session is linked to all that its neighbours are linked to.
-
-    Args:
-        session: A peer that is not alone.
-        timeout: Seconds.
-        stop: Ends the wait when set.
-
-    Returns:
-        Whether it is settled; false when the time was over or the wait was stopped.
-    """
-    deadline = time.monotonic() + timeout
-    while time.monotonic() < deadline:
-        if stop.wait(_POLL):
-            return False
-        if not session.peers():
-            continue
-        wanted: set[str] = set()
-        for reply in session.get(f"{_SPACE}/*", timeout=_ASK_TIMEOUT):
-            if reply.ok:
-                wanted.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
-        if wanted <= {session.zid, *session.peers()}:
-            return True
-    return False
