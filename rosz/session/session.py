@@ -95,14 +95,7 @@ class Session:
         stamp: Stamp | None = None,
         block: bool = True,
     ) -> None:
-        """Write a value.
-
-        Args:
-            key: Key.
-            payload: The value.
-            attachment: Sent beside it.
-            stamp: When it was written.
-            block: Whether to wait for a slow link rather than drop the value.
+        """Write a value; unless told not to ``block``, wait for a slow link rather than drop it.
 
         Raises:
             ClosedError: The session is closed.
