@@ -1,8 +1,9 @@
 """ROS 1's arithmetic for times and durations (genpy, ``rospy.Time`` and ``rospy.Duration``).
 
 The classes here have no fields of their own: they are bases of the generated messages
-builtin_interfaces/Time and Duration, whose fields ``sec`` and ``nanosec`` they also offer as ``secs``
-and ``nsecs``. Results are in normal form: nanoseconds from 0 to 999 999 999, the sign in the seconds.
+builtin_interfaces/Time and Duration, whose fields ``sec`` and ``nanosec`` they also offer as
+``secs`` and ``nsecs``. Results are in normal form: nanoseconds from 0 to 999 999 999, the sign in
+the seconds.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class ClassicConstructor(msgspec.StructMeta):
     ``Time(1.5)``, ``Time(1, 500)`` and ``Time(secs=1)``; the result is in normal form.
     """
 
-    def __call__(cls, secs: float = 0, nsecs: int = 0) -> Any:
+    def __call__(cls, secs: float = 0, nsecs: int = 0) -> Any:  # noqa: N805  # a metaclass
         """Build a time or duration.
 
         Raises:
@@ -201,8 +202,10 @@ class DurationValue(_Value):
 
     def __init_subclass__(cls, **options: object) -> None:
         super().__init_subclass__(**options)
-        if _Value._duration_class is None:
-            _Value._duration_class = cls  # the message class: what a difference of times is
+        shared = _Value
+        if shared._duration_class is None:  # noqa: SLF001  # of this module
+            # The message class comes first: it is what a difference of times is.
+            shared._duration_class = cls  # noqa: SLF001
 
     def _comparable(self, other: object) -> int | None:
         return other.to_nsec() if isinstance(other, DurationValue) else None

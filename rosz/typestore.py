@@ -1,7 +1,7 @@
 """Types by name: the shipped classes, and those of any package on the package path.
 
-A package that rosz does not ship is compiled when the first of its types is asked for, whole, into a
-module like the shipped ones. The generated source is kept in a cache folder under a name made of
+A package that rosz does not ship is compiled when the first of its types is asked for, whole, into
+a module like the shipped ones. The generated source is kept in a cache folder under a name made of
 what it was generated from, so that other processes need not generate it again; tracebacks show its
 lines. Where the folder cannot be written, the source lives in memory only.
 """
@@ -14,7 +14,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Sequence
 from functools import cached_property
 from importlib import import_module
 from importlib.abc import Loader
@@ -29,12 +29,12 @@ import rosz.message
 import rosz.msgs
 from rosz.errors import PackageNotFound, TypeNotFound, near_miss
 from rosz.idl.catalog import Catalog, Definition
-from rosz.idl.generate import Folders, shipped_module
-from rosz.idl.module import message_module, service_module
+from rosz.idl.generate import Folders, generate, shipped_module
+from rosz.idl.module import MARKER, message_module, service_module
 from rosz.message import Message, Service
 from rosz.packages import PackageIndex
 
-__all__ = ("Kind", "TypeStore")
+__all__ = ("Kind", "TypeStore", "is_generated", "shipped_packages")
 
 Kind: TypeAlias = Literal["msg", "srv"]
 
@@ -105,11 +105,15 @@ class TypeStore:
 
     def packages(self, kind: Kind | None = None) -> list[str]:
         """Return the names of all packages that have types, or types of one kind, sorted."""
-        known = set(_shipped_packages())
+        known = set(shipped_packages())
         if self._packages is not None:
             known |= set(self._packages.names())
         kinds: tuple[Kind, ...] = ("msg", "srv") if kind is None else (kind,)
         return sorted(p for p in known if any(self._bases(p, each) for each in kinds))
+
+    def has(self, package: str, kind: Kind) -> bool:
+        """Tell whether a package has types of a kind."""
+        return bool(_shipped(package, kind) or self._folders.names(package, kind))
 
     def definition(self, name: str) -> Definition:
         """Return the text of a type and where it is.
@@ -121,8 +125,8 @@ class TypeStore:
             TypeNotFound: There is no such type.
             DefinitionError: The file cannot be read.
         """
-        package, kind, base = name.split("/")
-        if base in _shipped(package, kind):
+        package, _, base = name.split("/")
+        if _is_shipped(name):
             cls = getattr(import_module(shipped_module(name)), base)
             return Definition(cls._text, f"<{name}>")
         if self._folder(package) is None:
@@ -141,6 +145,50 @@ class TypeStore:
             self._modules.setdefault(key, self._make(package, kind))
         return self._modules[key]
 
+    def sources(self, packages: Sequence[str]) -> dict[str, dict[str, str]]:
+        """Generate importable modules of packages, and of those that they depend on.
+
+        What rosz ships is imported from there and not generated again.
+
+        Args:
+            packages: Names of packages on the package path.
+
+        Returns:
+            Sources by package and file name; the folders of the packages belong side by side into a
+            folder on Python's path.
+
+        Raises:
+            PackageNotFound: There is no such package.
+            TypeNotFound: A package has no types of its own.
+            DefinitionError: A definition is not well-formed, or refers to what is not there.
+        """
+        done: dict[str, dict[str, str]] = {}
+        rest = list(packages)
+        while rest:
+            package = rest.pop(0)
+            if package in done:
+                continue
+            messages, services = (self._own_names(package, kind) for kind in ("msg", "srv"))
+            if not messages and not services:
+                raise TypeNotFound(package, self._why_not(package, "msg", ""))
+            done[package] = generate(package, messages, services, self._catalog, self._place)
+            specs = [self._catalog.message(name) for name in messages]
+            for name in services:
+                service = self._catalog.service(name)
+                specs += [service.request, service.response]
+            below = {name for spec in specs for name in self._catalog.below(spec)}
+            rest += sorted({name.partition("/")[0] for name in below if not _is_shipped(name)})
+        return done
+
+    def _place(self, name: str) -> str:
+        """Return the module that generated code imports a class from."""
+        package, kind, _ = name.split("/")
+        return shipped_module(name) if _is_shipped(name) else f"{package}.{kind}"
+
+    def _own_names(self, package: str, kind: str) -> list[str]:
+        """List the full names of a package's types that rosz does not ship."""
+        return [name for name in self._folders.names(package, kind) if not _is_shipped(name)]
+
     def _class(self, name: str, kind: Kind) -> Any:
         match = _NAME.fullmatch(name)
         if match is None or match[2] not in (None, kind):
@@ -157,7 +205,7 @@ class TypeStore:
         if bases:
             hint = near_miss(base, bases) or f"; it has {', '.join(bases[:8])}"
             return f"package '{package}' has no such {kind}{hint}"
-        if package in _shipped_packages() or self._folder(package) is not None:
+        if package in shipped_packages() or self._folder(package) is not None:
             return f"package '{package}' has no {kind} at all"
         return f"there is no package '{package}'{self._near(package)}"
 
@@ -185,7 +233,7 @@ class TypeStore:
 
     def _make(self, package: str, kind: Kind) -> ModuleType:
         shipped = _shipped(package, kind)
-        more = [base for base in self._bases(package, kind) if base not in shipped]
+        more = self._own_names(package, kind)
         if not shipped and not more:
             raise TypeNotFound(f"{package}/{kind}", self._why_not(package, kind, ""))
         if not more:
@@ -198,8 +246,7 @@ class TypeStore:
             compiled.__all__ = tuple(sorted({*ours.__all__, *compiled.__all__}))  # type: ignore[attr-defined]
         return compiled
 
-    def _compile(self, package: str, kind: Kind, bases: list[str]) -> ModuleType:
-        names = [f"{package}/{kind}/{base}" for base in bases]
+    def _compile(self, package: str, kind: Kind, names: list[str]) -> ModuleType:
         digest = hashlib.sha256(self._generation)
         for name in names:
             definition = self.definition(name)
@@ -243,7 +290,7 @@ class TypeStore:
             return None
 
     def _keep(self, stem: str, source: str) -> Path | None:
-        """Write a source into the cache, whole or not at all; several processes may do so at once."""
+        """Write a source into the cache, whole or not at all: others may do so at the same time."""
         if self._cache is None:
             return None
         file = self._cache / f"{stem}.py"
@@ -268,7 +315,7 @@ class TypeStore:
         return sys.modules.setdefault(name, module)  # where pickle looks for the classes
 
     def _type_of(self, name: str, type_hash: str, md5: str) -> type[Message]:
-        """Return a class that a generated module builds on, if it is the one it was generated for."""
+        """Return a class that a generated module builds on, if it is still the same."""
         cls = self.message(name)
         if (cls._type_hash, cls._md5sum) != (type_hash, md5):
             raise _StaleError(name)
@@ -282,7 +329,7 @@ class _TextLoader(Loader):
         self._source = source
         self._name = name
 
-    def create_module(self, spec: ModuleSpec) -> None:  # noqa: ARG002
+    def create_module(self, spec: ModuleSpec) -> None:
         """Leave the making of the module to the import system."""
 
     def exec_module(self, module: ModuleType) -> None:
@@ -292,19 +339,34 @@ class _TextLoader(Loader):
         exec(compile(self._source, self._name, "exec"), module.__dict__)  # noqa: S102  # our own
 
 
+def is_generated(file: str) -> bool:
+    """Tell whether a file is a module that rosz generated."""
+    try:
+        with Path(file).open("rb") as opened:
+            return opened.read(len(MARKER)) == MARKER.encode()
+    except OSError:
+        return False
+
+
 def _injected(_name: str) -> None:
     """Tell the generator that the module gets its classes from ``_type_of``."""
 
 
 def _shipped(package: str, kind: str) -> tuple[str, ...]:
-    if package not in _shipped_packages():
+    if package not in shipped_packages():
         return ()
     index = import_module(f"rosz.msgs.{package}")
     names: tuple[str, ...] = index.MESSAGES if kind == "msg" else index.SERVICES
     return names
 
 
-def _shipped_packages() -> frozenset[str]:
+def _is_shipped(name: str) -> bool:
+    package, kind, base = name.split("/")
+    return base in _shipped(package, kind)
+
+
+def shipped_packages() -> frozenset[str]:
+    """Return the names of the packages whose classes come with rosz."""
     return frozenset(
         entry.name
         for folder in rosz.msgs.__path__

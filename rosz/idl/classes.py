@@ -134,7 +134,7 @@ def _field(field: Field, module: Module) -> str:
 
 
 def _annotation(kind: FieldType, module: Module) -> str:
-    element = _PYTHON.get(kind.base, "int") if kind.primitive else module.cls(kind.base)
+    element = _python(kind) if kind.primitive else module.cls(kind.base)
     if kind.shape == "one":
         return element
     if kind.base in OCTETS:
@@ -143,36 +143,41 @@ def _annotation(kind: FieldType, module: Module) -> str:
 
 
 def _default(field: Field, module: Module) -> str:
-    kind = field.type
+    if isinstance(field.default, tuple):
+        return _default_list(field.type, field.default)
     if field.default is not None:
-        given = field.default if isinstance(field.default, tuple) else None
-        return _literal(field.default) if given is None else _default_list(kind, given, module)
-    if kind.shape == "one":
-        if not kind.primitive:
-            return f"_field(default_factory={module.cls(kind.base)})"
-        return {"str": '""', "float": "0.0", "bool": "False"}.get(
-            _PYTHON.get(kind.base, "int"), "0"
-        )
+        return _literal(field.default)
+    if field.type.shape == "one":
+        return _zero(field.type, module)
+    return _zeros(field.type, module)
+
+
+def _zero(kind: FieldType, module: Module) -> str:
+    if not kind.primitive:
+        return f"_field(default_factory={module.cls(kind.base)})"
+    return {"str": '""', "float": "0.0", "bool": "False", "int": "0"}[_python(kind)]
+
+
+def _zeros(kind: FieldType, module: Module) -> str:
     fixed = kind.size if kind.shape == "fixed" else 0
     if kind.base in OCTETS:
         return module.define("_z", f"bytes({fixed})") if fixed else 'b""'
     if kind.base in ARRAYS:
-        code = ARRAYS[kind.base]
-        maker = (
-            f'{module.use("zeros")}("{code}", {fixed})'
-            if fixed
-            else f'{module.use("empty")}("{code}")'
-        )
-        return f"_field(default_factory={module.define('_d', maker)})"
+        maker, size = ("zeros", f", {fixed}") if fixed else ("empty", "")
+        make = f'{module.use(maker)}("{ARRAYS[kind.base]}"{size})'
+        return f"_field(default_factory={module.define('_d', make)})"
     if not fixed:
         return "[]"
     if kind.primitive:
-        one = {"bool": "False"}.get(kind.base, '""')
-        return f"_field(default_factory=lambda: [{one}] * {fixed})"
+        return f"_field(default_factory=lambda: [{_zero(kind, module)}] * {fixed})"
     return f"_field(default_factory=lambda: [{module.cls(kind.base)}() for _ in range({fixed})])"
 
 
-def _default_list(kind: FieldType, values: tuple[Scalar, ...], module: Module) -> str:
+def _python(kind: FieldType) -> str:
+    return _PYTHON.get(kind.base, "int")
+
+
+def _default_list(kind: FieldType, values: tuple[Scalar, ...]) -> str:
     listed = f"[{', '.join(_literal(value) for value in values)}]"
     if kind.base in OCTETS:
         return repr(bytes(int(value) & 0xFF for value in values))

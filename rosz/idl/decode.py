@@ -2,8 +2,8 @@
 
 ``p`` is the position in the bytes, header included; as far as it is a constant it is not even a
 variable. Fields of fixed size, counts and lengths gather in *runs*, each unpacked by one call of
-``struct``. A slice may run over the end of damaged bytes without notice, so the position is compared
-with their length once, at the end.
+``struct``. A slice may run over the end of damaged bytes without notice, so the position is
+compared with their length once, at the end.
 """
 
 from __future__ import annotations
@@ -209,10 +209,7 @@ class Decoder:
         before = self._phase
         if padding == 0:
             return self._start()
-        if padding is None:
-            aligned = self._aligned(alignment)
-        else:
-            aligned = self._at(padding)
+        aligned = self._aligned(alignment) if padding is None else self._at(padding)
         self._phase = self._phase.aligned(alignment)
         if count.isdigit():
             self._emit(f"q = {aligned}")
@@ -322,9 +319,9 @@ class Decoder:
         phase = self._phase
         while True:
             trial = Decoder(self._spec, self._catalog, Module([]))
-            trial._base, trial._phase = "p", phase  # noqa: SLF001  # one of its own kind
-            trial._one(element_of(kind), "e")  # noqa: SLF001
-            met = phase.meet(trial._phase)  # noqa: SLF001
+            trial._base, trial._phase = "p", phase
+            trial._one(element_of(kind), "e")
+            met = phase.meet(trial._phase)
             if met == phase:
                 return phase
             phase = met

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from rosz.errors import DefinitionError, TypeNotFound, near_miss
 from rosz.idl.catalog import Catalog, Definition
 from rosz.idl.module import MARKER, index_module, message_module, service_module
 
-__all__ = ("Folders", "generate", "read_definition", "shipped_module", "stale", "write")
+__all__ = (
+    "Folders",
+    "generate",
+    "read_definition",
+    "shipped_module",
+    "shipped_sources",
+    "stale",
+    "write",
+)
 
 
 def read_definition(file: Path) -> Definition:
@@ -72,14 +80,19 @@ def shipped_module(name: str) -> str:
 
 
 def generate(
-    package: str, folders: Folders, catalog: Catalog, place: Callable[[str], str | None]
+    package: str,
+    messages: Sequence[str],
+    services: Sequence[str],
+    catalog: Catalog,
+    place: Callable[[str], str | None],
 ) -> dict[str, str]:
     """Generate the modules of one package.
 
     Args:
         package: Its name.
-        folders: Where its definitions are.
-        catalog: All definitions that they refer to.
+        messages: Full names of its messages.
+        services: Full names of its services.
+        catalog: All definitions, those that they refer to among them.
         place: Module of a type's class by the type's full name, for imports.
 
     Returns:
@@ -88,15 +101,37 @@ def generate(
     Raises:
         DefinitionError: A definition is not well-formed, or refers to what is not there.
     """
-    messages = [catalog.message(name) for name in folders.names(package, "msg")]
-    services = [catalog.service(name) for name in folders.names(package, "srv")]
-    index = index_module(package, [m.name for m in messages], [s.name for s in services])
-    files = {"__init__.py": index}
+    files = {"__init__.py": index_module(package, messages, services)}
     if messages:
-        files["msg.py"] = message_module(messages, catalog, place, package)
+        specs = [catalog.message(name) for name in messages]
+        files["msg.py"] = message_module(specs, catalog, place, package)
     if services:
-        files["srv.py"] = service_module(services, catalog, place, package)
+        halves = [catalog.service(name) for name in services]
+        files["srv.py"] = service_module(halves, catalog, place, package)
     return files
+
+
+def shipped_sources(interfaces: Path) -> dict[str, dict[str, str]]:
+    """Generate the modules of ``rosz.msgs``.
+
+    Args:
+        interfaces: The folder with the packages that rosz ships.
+
+    Returns:
+        Sources by package and file name.
+
+    Raises:
+        DefinitionError: A definition is not well-formed, or refers to what is not there.
+    """
+    packages = sorted(file.parent.name for file in interfaces.glob("*/package.xml"))
+    folders = Folders(lambda name: interfaces / name if name in packages else None)
+    catalog = Catalog(folders.find)
+    named = {p: (folders.names(p, "msg"), folders.names(p, "srv")) for p in packages}
+    return {
+        package: generate(package, messages, services, catalog, shipped_module)
+        for package, (messages, services) in named.items()
+        if messages or services
+    }
 
 
 def stale(files: dict[str, str], folder: Path) -> Iterator[str]:

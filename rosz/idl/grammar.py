@@ -1,9 +1,9 @@
 """The grammar of .msg, .srv and .action texts, ROS 1's and ROS 2's together.
 
-A line is blank, a comment, a constant ``TYPE NAME=VALUE``, or a field ``TYPE NAME [DEFAULT]``. Names
-of types are resolved here as far as one text allows: ``time``, ``duration`` and ``Header`` stand for
-the types they mean, and a bare name for one of the same package. Whether they exist is the
-catalog's business.
+A line is blank, a comment, a constant ``TYPE NAME=VALUE``, or a field ``TYPE NAME [DEFAULT]``.
+Names of types are resolved here as far as one text allows: ``time``, ``duration`` and ``Header``
+stand for the types they mean, and a bare name for one of the same package. Whether they exist is
+the catalog's business.
 """
 
 from __future__ import annotations

@@ -127,7 +127,8 @@ def _assemble(
     origin: str,
 ) -> str:
     body = "\n".join(blocks)
-    imports = [line for name, line in _ALWAYS.items() if name in _words(body)]
+    used = _words(body)
+    imports = [line for name, line in _ALWAYS.items() if name in used]
     imports += (
         f"from rosz.message.runtime import {name} as _{name}" for name in sorted(module.runtime)
     )
@@ -137,22 +138,14 @@ def _assemble(
         if where is None:
             spec = catalog.message(full)
             identity = f'"{message_hash(spec, catalog)}", "{message_md5(spec, catalog)}"'
-            late.append(f'{name} = _type_of("{full}", {identity})  # noqa: F821')
+            late.append(f'{name} = _type_of("{full}", {identity})')
             continue
         plain = class_name(full)
         alias = "" if name == plain else f" as {name}"
         imports.append(f"from {where} import {plain}{alias}")
-    listed = "".join(f'\n    "{name}",' for name in names)
     head = [f"{MARKER}; do not edit.", f'"""The {origin}."""', ""]
-    head += [
-        "from __future__ import annotations",
-        "",
-        *imports,
-        "",
-        f"__all__ = ({listed}\n)",
-        "",
-        *late,
-    ]
+    head += ["from __future__ import annotations", "", *sorted(imports), ""]
+    head += ["__all__ = (", *(f'    "{name}",' for name in names), ")", "", *late, ""]
     return "\n".join(head) + body + "\n"
 
 

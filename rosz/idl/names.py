@@ -1,4 +1,4 @@
-"""Names in generated modules: attributes of fields, classes, and what is defined once per module."""
+"""Names in generated modules: of attributes, classes, variables, module-level values."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def attribute(name: str) -> str:
 
 def class_name(name: str) -> str:
     """Return the class of a full type name: ``Twist``, ``SetBoolRequest``, ``SetBool``."""
-    package, kind, base = name.split("/")
+    _, kind, base = name.split("/")
     for part in ("Request", "Response"):
         if kind == "srv" and base.endswith(f"_{part}"):
             return base.removesuffix(f"_{part}") + part

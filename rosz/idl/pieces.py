@@ -1,4 +1,4 @@
-"""Gathers what an encoder writes: runs of fields, pieces for the join, and where the next byte goes.
+"""Gathers what an encoder writes: runs of fields, pieces for the join, the offset so far.
 
 An offset is known as well as it can be when the code is generated (:class:`Phase`). Where that does
 not settle the padding, the generated code looks the packer of a run up by the offset at run time,
@@ -198,10 +198,11 @@ class Pieces:
         if run[0] == ("I", HEADER):
             start = "-4"
         keys = ", ".join(lengths if known else [self._start.key(self.full), *lengths])
-        make = self.module.use("Template")
         if not followed:
+            make = self.module.use("Template")
             name = self.module.define("_t", f'{make}("{codes}", {start})')
             return f"{name}[{keys}]"
+        make = self.module.use("Stride")
         name = self.module.define("_t", f'{make}("{codes}", {start}, {self.full})')
         pack, offset = self.fresh("f"), self.fresh("p")
         self.emit(f"{pack}, {offset} = {name}[{keys}]")

@@ -50,7 +50,8 @@ Bytes: TypeAlias = bytes | bytearray | memoryview | Array[int]
 class Writable(Protocol):
     """What :meth:`Message.serialize` writes to."""
 
-    def write(self, data: bytes, /) -> object: ...
+    def write(self, data: bytes, /) -> object:
+        """Take bytes."""
 
 
 class _Derived(Generic[_T]):
@@ -75,13 +76,13 @@ def _has_header(cls: type[Message]) -> bool:
     return issubclass(first[0][1], Sequenced)
 
 
-def _full_text(cls: type[Message] | type[Service]) -> str:
+def _full_text(cls: type[Message | Service]) -> str:
     parts = [cls._text]
     parts += (f"{_RULE}\nMSG: {below._type}\n{below._text}" for below in _below(cls))
     return "\n".join(parts)
 
 
-def _below(cls: type[Message] | type[Service]) -> list[type[Message]]:
+def _below(cls: type[Message | Service]) -> list[type[Message]]:
     """List the message types that a definition needs, each once, as genmsg orders them."""
     tops = (cls.Request, cls.Response) if issubclass(cls, Service) else (cls,)
     found: dict[type[Message], None] = {}
@@ -198,6 +199,8 @@ class Sequenced(Message, kw_only=True):
     def __init_subclass__(cls, **options: object) -> None:
         super().__init_subclass__(**options)
         cls.__slots__ = ("seq", *cls.__slots__)
+
+    __hash__ = None  # type: ignore[assignment]
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):

@@ -25,6 +25,7 @@ _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
 _SIZES = {name: struct.calcsize(code) for name, code in SCALAR_CODES.items()}
 _BYTES = frozenset({"byte", "char"})
 _FEW = 60
+_LEAST_BYTE = -0x80
 
 _FAULTS = (struct.error, AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
 
@@ -53,11 +54,11 @@ def decode_plainly(data: bytes, cls: type[_T]) -> _T:
     type_name: str = cls._type  # type: ignore[attr-defined]
     order = _ORDERS.get(data[:2])
     if len(data) < len(_HEADER):
-        raise DecodeError(type_name, 0, f"expected a header of 4 bytes, got {len(data)}")
+        raise DecodeError(type_name, 0, f"expected a header of 4 bytes, got {len(data)}") from None
     if order is None:
         raise DecodeError(
             type_name, 0, f"expected encapsulation 0x0000 or 0x0001 (CDR), got 0x{data[:2].hex()}"
-        )
+        ) from None
     message: _T = _Reader(type_name, data, order).message(cls, "")
     return message
 
@@ -76,7 +77,7 @@ class _Writer:
 
     def _refuse(self, path: str, expected: str, value: object, why: str = "") -> NoReturn:
         reason = f"expected {expected}, got {_shown(value)}{': ' + why if why else ''}"
-        raise EncodeError(self._type, path, reason)
+        raise EncodeError(self._type, path, reason) from None
 
     def _put(self, code: str, *values: object) -> None:
         packed = struct.pack("<" + code, *values)
@@ -97,7 +98,7 @@ class _Writer:
     def _field(self, slot: Slot, value: Any, path: str) -> None:
         if slot.shape == "one":
             self._one(slot, value, path)
-        elif isinstance(slot.kind, str) and slot.kind in ARRAY_CODES | _OCTET_CODES:
+        elif isinstance(slot.kind, str) and slot.kind in _BLOCKS:
             self._block(slot, value, path)
         else:
             self._list(slot, value, path)
@@ -168,9 +169,9 @@ class _Writer:
             except _FAULTS as fault:
                 why = "" if isinstance(fault, TypeError) else str(fault)
                 self._refuse(f"{path}[{index}]", kind, number, why)
-        if kind in OCTETS:
-            return b"".join(packed)
-        self._refuse(path, f"a sequence of {kind}", value, str(error))
+        if kind not in OCTETS:
+            self._refuse(path, f"a sequence of {kind}", value, str(error))
+        return b"".join(packed)
 
     def _list(self, slot: Slot, value: Any, path: str) -> None:
         if isinstance(value, str | bytes | dict | set) or not hasattr(value, "__len__"):
@@ -181,7 +182,7 @@ class _Writer:
             self._one(slot, element, f"{path}[{index}]")
 
 
-_OCTET_CODES = {kind: "B" for kind in (*OCTETS, "bool")}
+_BLOCKS = frozenset({*ARRAY_CODES, *OCTETS, "bool"})
 
 
 def _number(kind: str, value: Any) -> Any:
@@ -203,7 +204,7 @@ def _number(kind: str, value: Any) -> Any:
     number = value.__index__() if hasattr(value, "__index__") else None
     if number is None:
         raise TypeError(f"'{type(value).__name__}' is no integer")
-    signed_byte = kind == "byte" and -0x80 <= number < 0  # ROS 1's byte is an int8
+    signed_byte = kind == "byte" and _LEAST_BYTE <= number < 0  # ROS 1's byte is an int8
     return number + 0x100 if signed_byte else number
 
 
@@ -217,7 +218,8 @@ class _Reader:
         self._at = len(_HEADER)
 
     def _refuse(self, path: str, reason: str) -> NoReturn:
-        raise DecodeError(self._type, self._at, f"{path}: {reason}" if path else reason)
+        text = f"{path}: {reason}" if path else reason
+        raise DecodeError(self._type, self._at, text) from None
 
     def _take(self, size: int, path: str, what: str, alignment: int = 1) -> bytes:
         start = self._at + (len(_HEADER) - self._at) % alignment

@@ -11,7 +11,7 @@ import struct
 from array import array
 from collections.abc import Callable
 from struct import Struct
-from typing import Any
+from typing import Any, TypeVar
 
 from rosz.message.base import Message, Sequenced, Service
 from rosz.message.numbers import flags, numbers, octets
@@ -24,6 +24,7 @@ __all__ = (
     "Message",
     "Sequenced",
     "Service",
+    "Stride",
     "StringList",
     "Template",
     "Texts",
@@ -53,6 +54,8 @@ FAULTS = (
 )
 """What wrong values and damaged bytes make the generated code raise."""
 
+_T = TypeVar("_T")
+
 PADDING = tuple(bytes(n) for n in range(8))
 
 texts = Texts()
@@ -62,7 +65,7 @@ _MOST_SHAPES = 4096
 _LONGEST_SHAPE = 1024
 
 
-class Template(dict[Any, Any]):
+class _Shapes(dict[Any, _T]):
     """Packers of one run of fields with strings in it, by the lengths of these strings.
 
     With the lengths known, the whole run has a fixed layout, so one call of ``struct`` packs it.
@@ -72,19 +75,19 @@ class Template(dict[Any, Any]):
             ``|4`` for padding.
         start: Offset of the run from the end of the header modulo 8, -4 for the header itself, or
             None where it varies: then it leads the key.
-        full: Where it is given, entries are pairs: the packer, and the offset behind the run modulo
-            this number.
     """
 
-    __slots__ = ("_codes", "_full", "_start")
+    __slots__ = ("_codes", "_start")
 
-    def __init__(self, codes: str, start: int | None, full: int = 0) -> None:
+    def __init__(self, codes: str, start: int | None) -> None:
         super().__init__()
         self._codes = codes.split()
         self._start = start
-        self._full = full
 
-    def __missing__(self, key: Any) -> Any:
+    def _entry(self, pack: Callable[..., bytes], end: int) -> _T:
+        raise NotImplementedError(end)
+
+    def __missing__(self, key: Any) -> _T:
         numbers = list(key) if isinstance(key, tuple) else [key]
         offset = numbers.pop(0) if self._start is None else self._start
         layout = ["<"]
@@ -97,13 +100,40 @@ class Template(dict[Any, Any]):
             padding = -offset % alignment
             offset += padding + struct.calcsize("<" + one)
             layout.append(f"{padding}x{one}" if padding else one)
-        pack = Struct("".join(layout)).pack
-        entry = (pack, offset % self._full) if self._full else pack
+        entry = self._entry(Struct("".join(layout)).pack, offset)
         if offset <= _LONGEST_SHAPE:
             if len(self) >= _MOST_SHAPES:
                 self.clear()
             self[key] = entry
         return entry
+
+
+class Template(_Shapes[Callable[..., bytes]]):
+    """Packers alone; the offset behind the run does not matter, or is known."""
+
+    __slots__ = ()
+
+    def _entry(self, pack: Callable[..., bytes], end: int) -> Callable[..., bytes]:  # noqa: ARG002
+        return pack
+
+
+class Stride(_Shapes[tuple[Callable[..., bytes], int]]):
+    """Packers with the offset behind the run, modulo the largest alignment in the message.
+
+    Args:
+        codes: As of any run.
+        start: As of any run.
+        full: The modulus.
+    """
+
+    __slots__ = ("_full",)
+
+    def __init__(self, codes: str, start: int | None, full: int) -> None:
+        super().__init__(codes, start)
+        self._full = full
+
+    def _entry(self, pack: Callable[..., bytes], end: int) -> tuple[Callable[..., bytes], int]:
+        return pack, end % self._full
 
 
 def read_flags(octets: bytes) -> list[bool]:

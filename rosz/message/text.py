@@ -1,7 +1,7 @@
 """Messages as the YAML text that ``rostopic echo`` and ``print`` show.
 
-Line for line what genpy's ``strify_message`` makes of the same values, so that scripts which read it
-keep working.
+Line for line what genpy's ``strify_message`` makes of the same values, so that scripts which read
+it keep working.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class _Writer:
         self._filter = field_filter
         self._width = width
 
-    def value(self, value: Any, indent: str) -> str:
+    def value(self, value: Any, indent: str) -> str:  # noqa: PLR0911  # one per sort of value
         if isinstance(value, bool):
             return str(value)
         if isinstance(value, int | float):

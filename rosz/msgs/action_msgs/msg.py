@@ -3,23 +3,24 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import octets as _octets
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "GoalInfo",
     "GoalStatus",
     "GoalStatusArray",
 )
+
 _p1 = _Struct("<I16siI").pack
 _u1 = _Struct("<I16siI").unpack_from
 

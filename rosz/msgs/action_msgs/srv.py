@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import octets as _octets
 from rosz.msgs.action_msgs.msg import GoalInfo
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "CancelGoal",
     "CancelGoalRequest",
     "CancelGoalResponse",
 )
+
 _p1 = _Struct("<I16siI").pack
 _u1 = _Struct("<I16siI").unpack_from
 

@@ -3,24 +3,26 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "GoalID",
     "GoalStatus",
     "GoalStatusArray",
 )
-_t1 = _Template("I i I I $", -4, 4)
+
+_t1 = _Stride("I i I I $", -4, 4)
 _u1 = _Struct("<Ii2I").unpack_from
 
 
@@ -64,8 +66,8 @@ class GoalID(_Message):
             return GoalID(Time(sec, nanosec), id_2)
         except _FAULTS:
             return _explain(data, GoalID)
-_t2 = _Template("I i I I $ B", -4, 4)
-_t3 = _Template("I $", None, 4)
+_t2 = _Stride("I i I I $ B", -4, 4)
+_t3 = _Stride("I $", None, 4)
 _u2 = _Struct("<I").unpack_from
 
 
@@ -143,7 +145,7 @@ class GoalStatus(_Message):
         except _FAULTS:
             return _explain(data, GoalStatus)
 _t4 = _Template("I i I I $ I", -4)
-_t5 = _Template("i I I $ B", None, 4)
+_t5 = _Stride("i I I $ B", None, 4)
 _u3 = _Struct("<i2I").unpack_from
 
 

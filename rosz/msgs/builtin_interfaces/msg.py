@@ -3,19 +3,20 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.time import DurationValue as _DurationValue
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.time import TimeValue as _TimeValue
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
+from rosz.time import DurationValue as _DurationValue
+from rosz.time import TimeValue as _TimeValue
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Duration",
     "Time",
 )
+
 _p1 = _Struct("<IiI").pack
 _u1 = _Struct("<IiI").unpack_from
 

@@ -3,24 +3,26 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "DiagnosticArray",
     "DiagnosticStatus",
     "KeyValue",
 )
-_t1 = _Template("I I $ I $", -4, 4)
+
+_t1 = _Stride("I I $ I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<I").unpack_from
 
@@ -68,9 +70,9 @@ class KeyValue(_Message):
             return KeyValue(key, value)
         except _FAULTS:
             return _explain(data, KeyValue)
-_t2 = _Template("I B I $ I $", -4, 4)
+_t2 = _Stride("I B I $ I $", -4, 4)
 _t3 = _Template("I $ I", None)
-_t4 = _Template("I $ I $", None, 4)
+_t4 = _Stride("I $ I $", None, 4)
 _u3 = _Struct("<IB3xI").unpack_from
 
 
@@ -167,7 +169,7 @@ class DiagnosticStatus(_Message):
         except _FAULTS:
             return _explain(data, DiagnosticStatus)
 _t5 = _Template("I i I I $ I", -4)
-_t6 = _Template("B I $ I $", None, 4)
+_t6 = _Stride("B I $ I $", None, 4)
 _u4 = _Struct("<Ii2I").unpack_from
 
 

@@ -3,17 +3,18 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.diagnostic_msgs.msg import DiagnosticStatus
 from rosz.msgs.diagnostic_msgs.msg import KeyValue
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "AddDiagnostics",
@@ -23,7 +24,8 @@ __all__ = (
     "SelfTestRequest",
     "SelfTestResponse",
 )
-_t1 = _Template("I I $", -4, 4)
+
+_t1 = _Stride("I I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 
 
@@ -62,7 +64,7 @@ class AddDiagnosticsRequest(_Message):
             return AddDiagnosticsRequest(load_namespace)
         except _FAULTS:
             return _explain(data, AddDiagnosticsRequest)
-_t2 = _Template("I ? I $", -4, 4)
+_t2 = _Stride("I ? I $", -4, 4)
 _u2 = _Struct("<I?3xI").unpack_from
 
 
@@ -146,9 +148,9 @@ class SelfTestRequest(_Message):
         except _FAULTS:
             return _explain(data, SelfTestRequest)
 _t4 = _Template("I I $ B I", -4)
-_t5 = _Template("B I $ I $", None, 4)
+_t5 = _Stride("B I $ I $", None, 4)
 _t6 = _Template("I $ I", None)
-_t7 = _Template("I $ I $", None, 4)
+_t7 = _Stride("I $ I $", None, 4)
 _u4 = _Struct("<I").unpack_from
 
 

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "BoolParameter",
@@ -25,7 +26,8 @@ __all__ = (
     "SensorLevels",
     "StrParameter",
 )
-_t1 = _Template("I I $ ?", -4, 4)
+
+_t1 = _Stride("I I $ ?", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<?").unpack_from
 
@@ -104,7 +106,7 @@ class IntParameter(_Message):
             return IntParameter(name, value)
         except _FAULTS:
             return _explain(data, IntParameter)
-_t3 = _Template("I I $ I $", -4, 4)
+_t3 = _Stride("I I $ I $", -4, 4)
 _u4 = _Struct("<I").unpack_from
 
 
@@ -235,13 +237,13 @@ class GroupState(_Message):
         except _FAULTS:
             return _explain(data, GroupState)
 _p1 = _Struct("<2I").pack
-_t6 = _Template("I $ ?", None, 8)
-_t7 = _Template("I", None, 8)
-_t8 = _Template("I $ i", None, 8)
+_t6 = _Stride("I $ ?", None, 8)
+_t7 = _Stride("I", None, 8)
+_t8 = _Stride("I $ i", None, 8)
 _p2 = _Struct("<I").pack
-_t9 = _Template("I $ I $", None, 8)
+_t9 = _Stride("I $ I $", None, 8)
 _t10 = _Template("I $ d", None)
-_t11 = _Template("I $ ? i i", None, 8)
+_t11 = _Stride("I $ ? i i", None, 8)
 
 
 class Config(_Message):
@@ -396,8 +398,8 @@ class Config(_Message):
         except _FAULTS:
             return _explain(data, Config)
 _t12 = _Template("I I $ I $ I", -4)
-_t13 = _Template("I $", 0, 4)
-_t14 = _Template("I $", None, 4)
+_t13 = _Stride("I $", 0, 4)
+_t14 = _Stride("I $", None, 4)
 
 
 class ParamDescription(_Message):
@@ -565,9 +567,9 @@ class Group(_Message):
             return Group(name, type_2, parameters, parent, id_2)
         except _FAULTS:
             return _explain(data, Group)
-_t17 = _Template("I $ I $ I", None, 8)
-_t18 = _Template("I $", None, 8)
-_t19 = _Template("i i", None, 8)
+_t17 = _Stride("I $ I $ I", None, 8)
+_t18 = _Stride("I $", None, 8)
+_t19 = _Stride("i i", None, 8)
 
 
 class ConfigDescription(_Message):

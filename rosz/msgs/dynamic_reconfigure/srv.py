@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.dynamic_reconfigure.msg import BoolParameter
 from rosz.msgs.dynamic_reconfigure.msg import Config
@@ -19,20 +18,23 @@ from rosz.msgs.dynamic_reconfigure.msg import DoubleParameter
 from rosz.msgs.dynamic_reconfigure.msg import GroupState
 from rosz.msgs.dynamic_reconfigure.msg import IntParameter
 from rosz.msgs.dynamic_reconfigure.msg import StrParameter
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Reconfigure",
     "ReconfigureRequest",
     "ReconfigureResponse",
 )
+
 _p1 = _Struct("<2I").pack
-_t1 = _Template("I $ ?", None, 8)
-_t2 = _Template("I", None, 8)
-_t3 = _Template("I $ i", None, 8)
+_t1 = _Stride("I $ ?", None, 8)
+_t2 = _Stride("I", None, 8)
+_t3 = _Stride("I $ i", None, 8)
 _p2 = _Struct("<I").pack
-_t4 = _Template("I $ I $", None, 8)
+_t4 = _Stride("I $ I $", None, 8)
 _t5 = _Template("I $ d", None)
-_t6 = _Template("I $ ? i i", None, 8)
+_t6 = _Stride("I $ ? i i", None, 8)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<I").unpack_from
 _u3 = _Struct("<?").unpack_from

@@ -3,25 +3,26 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
+from array import array as _array
+from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Bytes as _Bytes
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import pack_wide as _pack_wide
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import read_wide as _read_wide
 from rosz.message.runtime import texts as _texts
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Bool",
@@ -54,6 +55,7 @@ __all__ = (
     "UInt8MultiArray",
     "WString",
 )
+
 _t1 = _Template("I ?", -4)
 _u1 = _Struct("<I?").unpack_from
 
@@ -463,7 +465,7 @@ class Float64(_Message):
         except _FAULTS:
             return _explain(data, Float64)
 _d2 = _empty("d")
-_t6 = _Template("I $ I I", None, 8)
+_t6 = _Stride("I $ I I", None, 8)
 
 
 class Float64MultiArray(_Message):
@@ -904,7 +906,7 @@ class Int8MultiArray(_Message):
             return Int8MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int8MultiArray)
-_t9 = _Template("I I $", -4, 4)
+_t9 = _Stride("I I $", -4, 4)
 
 
 class String(_Message):

@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "AddTwoInts",
@@ -23,6 +24,7 @@ __all__ = (
     "TriggerRequest",
     "TriggerResponse",
 )
+
 _p1 = _Struct("<I2q").pack
 _u1 = _Struct("<I2q").unpack_from
 
@@ -134,7 +136,7 @@ class SetBoolRequest(_Message):
             return SetBoolRequest(data_2)
         except _FAULTS:
             return _explain(data, SetBoolRequest)
-_t2 = _Template("I ? I $", -4, 4)
+_t2 = _Stride("I ? I $", -4, 4)
 _u4 = _Struct("<I?3xI").unpack_from
 
 

@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Array as _Array
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
 from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Array as _Array
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import texts as _texts
@@ -21,6 +20,8 @@ from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion
 from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.unique_identifier_msgs.msg import UUID
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "BoundingBox",
@@ -40,6 +41,7 @@ __all__ = (
     "RouteSegment",
     "WayPoint",
 )
+
 _p1 = _Struct("<I3d").pack
 _u1 = _Struct("<I3d").unpack_from
 
@@ -196,7 +198,7 @@ class GeoPoseStamped(_Message):
             return GeoPoseStamped(Header(Time(sec, nanosec), frame_id), GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2)))
         except _FAULTS:
             return _explain(data, GeoPoseStamped)
-_t2 = _Template("I i I I $ I", -4, 8)
+_t2 = _Stride("I i I I $ I", -4, 8)
 _t3 = _Template("i I I $ d d d d d d d", None)
 _u6 = _Struct("<I").unpack_from
 _u7 = _Struct("<i2I").unpack_from
@@ -402,7 +404,7 @@ class GeoPoseWithCovarianceStamped(_Message):
             return GeoPoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id), GeoPoseWithCovariance(GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2)), covariance))
         except _FAULTS:
             return _explain(data, GeoPoseWithCovarianceStamped)
-_t5 = _Template("I I $ I $", -4, 4)
+_t5 = _Stride("I I $ I $", -4, 4)
 _u9 = _Struct("<2I").unpack_from
 
 
@@ -450,7 +452,7 @@ class KeyValue(_Message):
         except _FAULTS:
             return _explain(data, KeyValue)
 _p4 = _Struct("<I16s3dI").pack
-_t6 = _Template("I $ I $", None, 8)
+_t6 = _Stride("I $ I $", None, 8)
 _u10 = _Struct("<I16s3dI").unpack_from
 
 
@@ -521,7 +523,7 @@ class WayPoint(_Message):
 _p5 = _Struct("<I16sI").pack
 _p6 = _Struct("<16s").pack
 _p7 = _Struct("<I").pack
-_t7 = _Template("I $ I $", None, 4)
+_t7 = _Stride("I $ I $", None, 4)
 _u11 = _Struct("<I16sI").unpack_from
 _u12 = _Struct("<16s").unpack_from
 
@@ -606,8 +608,8 @@ class MapFeature(_Message):
             return _explain(data, MapFeature)
 _t8 = _Template("I i I I $ 16s d d d d d d I", -4)
 _t9 = _Template("16s d d d I", None)
-_t10 = _Template("I", None, 8)
-_t11 = _Template("16s I", None, 8)
+_t10 = _Stride("I", None, 8)
+_t11 = _Stride("16s I", None, 8)
 _u13 = _Struct("<6dI").unpack_from
 _u14 = _Struct("<3dI").unpack_from
 
@@ -1097,7 +1099,7 @@ class RouteSegment(_Message):
             return RouteSegment(UUID(uuid), UUID(uuid_2), UUID(uuid_3), props)
         except _FAULTS:
             return _explain(data, RouteSegment)
-_t13 = _Template("16s 16s 16s I", None, 8)
+_t13 = _Stride("16s 16s 16s I", None, 8)
 _u16 = _Struct("<16s16s16s").unpack_from
 
 

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Time
@@ -29,6 +28,8 @@ from rosz.msgs.geographic_msgs.msg import WayPoint
 from rosz.msgs.geometry_msgs.msg import Quaternion
 from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.unique_identifier_msgs.msg import UUID
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "GetGeoPath",
@@ -44,6 +45,7 @@ __all__ = (
     "UpdateGeographicMapRequest",
     "UpdateGeographicMapResponse",
 )
+
 _p1 = _Struct("<I6d").pack
 _u1 = _Struct("<I6d").unpack_from
 
@@ -80,8 +82,8 @@ class GetGeoPathRequest(_Message):
             return GetGeoPathRequest(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2))
         except _FAULTS:
             return _explain(data, GetGeoPathRequest)
-_t1 = _Template("I ? I $ i I", -4, 8)
-_t2 = _Template("I $ I", None, 8)
+_t1 = _Stride("I ? I $ i I", -4, 8)
+_t2 = _Stride("I $ I", None, 8)
 _t3 = _Template("i I I $ d d d d d d d", None)
 _t4 = _Template("16s 16s 16s d", None)
 _u2 = _Struct("<I?3xI").unpack_from
@@ -258,9 +260,9 @@ class GetGeographicMapRequest(_Message):
             return _explain(data, GetGeographicMapRequest)
 _t6 = _Template("I $ 16s d d d d d d I", None)
 _t7 = _Template("16s d d d I", None)
-_t8 = _Template("I $ I $", None, 8)
-_t9 = _Template("I", None, 8)
-_t10 = _Template("16s I", None, 8)
+_t8 = _Stride("I $ I $", None, 8)
+_t9 = _Stride("I", None, 8)
+_t10 = _Stride("16s I", None, 8)
 _p2 = _Struct("<16s").pack
 _p3 = _Struct("<I").pack
 _u10 = _Struct("<16s").unpack_from
@@ -530,7 +532,7 @@ class GetRoutePlanRequest(_Message):
             return _explain(data, GetRoutePlanRequest)
 _t12 = _Template("I ? I $ i I", -4)
 _t13 = _Template("I $ 16s I", 0)
-_t14 = _Template("I $ I $", None, 4)
+_t14 = _Stride("I $ I $", None, 4)
 
 
 class GetRoutePlanResponse(_Message):
@@ -860,7 +862,7 @@ class UpdateGeographicMapRequest(_Message):
             return UpdateGeographicMapRequest(GeographicMapChanges(Header(Time(sec, nanosec), frame_id), GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3), deletes))
         except _FAULTS:
             return _explain(data, UpdateGeographicMapRequest)
-_t16 = _Template("I ? I $", -4, 4)
+_t16 = _Stride("I ? I $", -4, 4)
 
 
 class UpdateGeographicMapResponse(_Message):

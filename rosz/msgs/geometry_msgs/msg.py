@@ -3,23 +3,24 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Array as _Array
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
 from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
 from itertools import starmap as _starmap
+from msgspec import field as _field
+from rosz.message import Array as _Array
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import texts as _texts
 from rosz.message.runtime import zeros as _zeros
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Accel",
@@ -55,6 +56,7 @@ __all__ = (
     "Wrench",
     "WrenchStamped",
 )
+
 _p1 = _Struct("<I3d").pack
 _u1 = _Struct("<I3d").unpack_from
 
@@ -555,7 +557,7 @@ class PolygonInstance(_Message):
             return PolygonInstance(Polygon(points), id_2)
         except _FAULTS:
             return _explain(data, PolygonInstance)
-_t5 = _Template("I i I I $ I", -4, 8)
+_t5 = _Stride("I i I I $ I", -4, 8)
 _u11 = _Struct("<I").unpack_from
 
 
@@ -1281,7 +1283,7 @@ class Vector3Stamped(_Message):
             return Vector3Stamped(Header(Time(sec, nanosec), frame_id), Vector3(x_2, y_2, z_2))
         except _FAULTS:
             return _explain(data, Vector3Stamped)
-_t10 = _Template("I i I I $ I $", -4, 8)
+_t10 = _Stride("I i I I $ I $", -4, 8)
 _t11 = _Template("I $ d d d d d d", None)
 
 

@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import texts as _texts
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "State",
@@ -19,7 +19,8 @@ __all__ = (
     "TransitionDescription",
     "TransitionEvent",
 )
-_t1 = _Template("I B I $", -4, 4)
+
+_t1 = _Stride("I B I $", -4, 4)
 _u1 = _Struct("<IB3xI").unpack_from
 
 
@@ -192,8 +193,8 @@ class Transition(_Message):
             return Transition(id_2, label)
         except _FAULTS:
             return _explain(data, Transition)
-_t2 = _Template("I B I $ B I $ B", -4, 4)
-_t3 = _Template("I $", None, 4)
+_t2 = _Stride("I B I $ B I $ B", -4, 4)
+_t3 = _Stride("I $", None, 4)
 _u2 = _Struct("<I").unpack_from
 
 
@@ -252,8 +253,8 @@ class TransitionDescription(_Message):
             return TransitionDescription(Transition(id_2, label), State(id_3, label_2), State(id_4, label_3))
         except _FAULTS:
             return _explain(data, TransitionDescription)
-_t4 = _Template("I Q B I $ B I $ B", -4, 8)
-_t5 = _Template("I $", None, 8)
+_t4 = _Stride("I Q B I $ B I $ B", -4, 8)
+_t5 = _Stride("I $", None, 8)
 _u3 = _Struct("<IQB3xI").unpack_from
 
 

@@ -3,19 +3,20 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.lifecycle_msgs.msg import State
 from rosz.msgs.lifecycle_msgs.msg import Transition
 from rosz.msgs.lifecycle_msgs.msg import TransitionDescription
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "ChangeState",
@@ -31,7 +32,8 @@ __all__ = (
     "GetStateRequest",
     "GetStateResponse",
 )
-_t1 = _Template("I B I $", -4, 4)
+
+_t1 = _Stride("I B I $", -4, 4)
 _u1 = _Struct("<IB3xI").unpack_from
 
 
@@ -141,7 +143,7 @@ class GetAvailableStatesRequest(_Message):
         except _FAULTS:
             return _explain(data, GetAvailableStatesRequest)
 _p1 = _Struct("<2I").pack
-_t4 = _Template("B I $", None, 4)
+_t4 = _Stride("B I $", None, 4)
 _u4 = _Struct("<2I").unpack_from
 _u5 = _Struct("<I").unpack_from
 
@@ -229,8 +231,8 @@ class GetAvailableTransitionsRequest(_Message):
             return GetAvailableTransitionsRequest()
         except _FAULTS:
             return _explain(data, GetAvailableTransitionsRequest)
-_t5 = _Template("B I $ B I $ B", None, 4)
-_t6 = _Template("I $", None, 4)
+_t5 = _Stride("B I $ B I $ B", None, 4)
+_t6 = _Stride("I $", None, 4)
 
 
 class GetAvailableTransitionsResponse(_Message):

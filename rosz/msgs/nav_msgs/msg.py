@@ -3,19 +3,18 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Array as _Array
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
 from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
 from itertools import starmap as _starmap
+from msgspec import field as _field
+from rosz.message import Array as _Array
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import texts as _texts
@@ -31,6 +30,8 @@ from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.geometry_msgs.msg import TwistWithCovariance
 from rosz.msgs.geometry_msgs.msg import Vector3
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "GetMapAction",
@@ -46,6 +47,7 @@ __all__ = (
     "Odometry",
     "Path",
 )
+
 _t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
@@ -73,7 +75,7 @@ class GetMapGoal(_Message):
             return GetMapGoal()
         except _FAULTS:
             return _explain(data, GetMapGoal)
-_t2 = _Template("I i I I $ i I I $ x", -4, 4)
+_t2 = _Stride("I i I I $ i I I $ x", -4, 4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 
@@ -287,8 +289,8 @@ class GetMapResult(_Message):
             return GetMapResult(OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2))
         except _FAULTS:
             return _explain(data, GetMapResult)
-_t4 = _Template("I i I I $ i I I $ B", -4, 8)
-_t5 = _Template("I $ i I", None, 8)
+_t4 = _Stride("I i I I $ i I I $ B", -4, 8)
+_t5 = _Stride("I $ i I", None, 8)
 _t6 = _Template("I $ i I f I I d d d d d d d I", None)
 _u7 = _Struct("<I").unpack_from
 
@@ -404,8 +406,8 @@ class GetMapFeedback(_Message):
             return GetMapFeedback()
         except _FAULTS:
             return _explain(data, GetMapFeedback)
-_t7 = _Template("I i I I $ i I I $ B", -4, 4)
-_t8 = _Template("I $ x", None, 4)
+_t7 = _Stride("I i I I $ i I I $ B", -4, 4)
+_t8 = _Stride("I $ x", None, 4)
 
 
 class GetMapActionFeedback(_Message):
@@ -469,10 +471,10 @@ class GetMapActionFeedback(_Message):
             return GetMapActionFeedback(Header(Time(sec, nanosec), frame_id), GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text), GetMapFeedback())
         except _FAULTS:
             return _explain(data, GetMapActionFeedback)
-_t9 = _Template("I i I I $ i I I $ x i I", -4, 8)
-_t10 = _Template("I $ i I I $ B", None, 8)
-_t11 = _Template("i I I $ i I I $ B", None, 8)
-_t12 = _Template("I $ x", None, 8)
+_t9 = _Stride("I i I I $ i I I $ x i I", -4, 8)
+_t10 = _Stride("I $ i I I $ B", None, 8)
+_t11 = _Stride("i I I $ i I I $ B", None, 8)
+_t12 = _Stride("I $ x", None, 8)
 
 
 class GetMapAction(_Message):
@@ -615,7 +617,7 @@ class GetMapAction(_Message):
             return GetMapAction(GetMapActionGoal(Header(Time(sec, nanosec), frame_id), GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal()), GetMapActionResult(Header(Time(sec_3, nanosec_3), frame_id_2), GoalStatus(GoalID(Time(sec_4, nanosec_4), id_3), status, text), GetMapResult(OccupancyGrid(Header(Time(sec_5, nanosec_5), frame_id_3), MapMetaData(Time(sec_6, nanosec_6), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2))), GetMapActionFeedback(Header(Time(sec_7, nanosec_7), frame_id_4), GoalStatus(GoalID(Time(sec_8, nanosec_8), id_4), status_2, text_2), GetMapFeedback()))
         except _FAULTS:
             return _explain(data, GetMapAction)
-_t13 = _Template("I i I I $ f f I", -4, 8)
+_t13 = _Stride("I i I I $ f f I", -4, 8)
 _p2 = _Struct("<3d").pack
 _u8 = _Struct("<2fI").unpack_from
 _i1 = _Struct("<3d").iter_unpack
@@ -745,7 +747,7 @@ class Odometry(_Message):
             return Odometry(Header(Time(sec, nanosec), frame_id), child_frame_id, PoseWithCovariance(Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), covariance), TwistWithCovariance(Twist(Vector3(x_4, y_4, z_4), Vector3(x_5, y_5, z_5)), covariance_2))
         except _FAULTS:
             return _explain(data, Odometry)
-_t15 = _Template("I i I I $ I", -4, 8)
+_t15 = _Stride("I i I I $ I", -4, 8)
 _t16 = _Template("i I I $ d d d d d d d", None)
 
 

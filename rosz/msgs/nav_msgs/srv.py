@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from array import array as _array
+from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
-from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import texts as _texts
@@ -27,6 +26,8 @@ from rosz.msgs.nav_msgs.msg import MapMetaData
 from rosz.msgs.nav_msgs.msg import OccupancyGrid
 from rosz.msgs.nav_msgs.msg import Path
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "GetMap",
@@ -42,6 +43,7 @@ __all__ = (
     "SetMapRequest",
     "SetMapResponse",
 )
+
 _t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
@@ -196,7 +198,7 @@ class GetPlanRequest(_Message):
             return GetPlanRequest(PoseStamped(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2), Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3))), tolerance)
         except _FAULTS:
             return _explain(data, GetPlanRequest)
-_t4 = _Template("I i I I $ I", -4, 8)
+_t4 = _Stride("I i I I $ I", -4, 8)
 _t5 = _Template("i I I $ d d d d d d d", None)
 _u7 = _Struct("<I").unpack_from
 _u8 = _Struct("<i2I").unpack_from
@@ -279,7 +281,7 @@ class GetPlan(_Service):
         "---\n"
         "Path plan  # empty if there is none\n"
     )
-_t6 = _Template("I I $", -4, 4)
+_t6 = _Stride("I I $", -4, 4)
 _u10 = _Struct("<2I").unpack_from
 
 

@@ -3,21 +3,20 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
+from array import array as _array
+from itertools import starmap as _starmap
+from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Bytes as _Bytes
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
-from itertools import starmap as _starmap
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import flags as _flags
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
@@ -25,6 +24,8 @@ from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import read_flags as _read_flags
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Time
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "FloatingPointRange",
@@ -41,6 +42,7 @@ __all__ = (
     "SetLoggerLevelsResult",
     "SetParametersResult",
 )
+
 _p1 = _Struct("<I3d").pack
 _u1 = _Struct("<I3d").unpack_from
 
@@ -175,7 +177,7 @@ class ListParametersResult(_Message):
             return ListParametersResult(names, prefixes)
         except _FAULTS:
             return _explain(data, ListParametersResult)
-_t2 = _Template("I i I B I $ I $", -4, 4)
+_t2 = _Stride("I i I B I $ I $", -4, 4)
 _t3 = _Template("I $ I $ I", None)
 _u4 = _Struct("<IiIB3xI").unpack_from
 
@@ -312,8 +314,8 @@ class LoggerLevel(_Message):
             return _explain(data, LoggerLevel)
 _d1 = _empty("q")
 _d2 = _empty("d")
-_t5 = _Template("I B ? q d I $ I", -4, 8)
-_t6 = _Template("I", None, 8)
+_t5 = _Stride("I B ? q d I $ I", -4, 8)
+_t6 = _Stride("I", None, 8)
 _s3 = _StringList()
 _u6 = _Struct("<IB?6xqdI").unpack_from
 
@@ -419,7 +421,7 @@ class ParameterValue(_Message):
             return ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value)
         except _FAULTS:
             return _explain(data, ParameterValue)
-_t7 = _Template("I I $ B ? q d I $ I", -4, 8)
+_t7 = _Stride("I I $ B ? q d I $ I", -4, 8)
 _s4 = _StringList()
 _u7 = _Struct("<B?").unpack_from
 _u8 = _Struct("<qdI").unpack_from
@@ -517,8 +519,8 @@ class Parameter(_Message):
             return Parameter(name, ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value))
         except _FAULTS:
             return _explain(data, Parameter)
-_t8 = _Template("I I $ B I $", -4, 8)
-_t9 = _Template("I $ ? ? I", None, 8)
+_t8 = _Stride("I I $ B I $", -4, 8)
+_t9 = _Stride("I $ ? ? I", None, 8)
 _p4 = _Struct("<3d").pack
 _p5 = _Struct("<2qQ").pack
 _u9 = _Struct("<2?").unpack_from
@@ -613,8 +615,8 @@ class ParameterDescriptor(_Message):
             return ParameterDescriptor(name, type_2, description, additional_constraints, read_only, dynamic_typing, floating_point_range, integer_range)
         except _FAULTS:
             return _explain(data, ParameterDescriptor)
-_t10 = _Template("I i I I $ I", -4, 8)
-_t11 = _Template("I $ B ? q d I $ I", None, 8)
+_t10 = _Stride("I i I I $ I", -4, 8)
+_t11 = _Stride("I $ B ? q d I $ I", None, 8)
 _s5 = _StringList()
 _s6 = _StringList()
 _s7 = _StringList()
@@ -898,7 +900,7 @@ class ParameterEvent(_Message):
         except _FAULTS:
             return _explain(data, ParameterEvent)
 _p6 = _Struct("<2I").pack
-_t12 = _Template("I $ B I $", None, 8)
+_t12 = _Stride("I $ B I $", None, 8)
 
 
 class ParameterEventDescriptors(_Message):
@@ -1151,7 +1153,7 @@ class ParameterType(_Message):
             return ParameterType()
         except _FAULTS:
             return _explain(data, ParameterType)
-_t14 = _Template("I ? I $", -4, 4)
+_t14 = _Stride("I ? I $", -4, 4)
 _u12 = _Struct("<I?3xI").unpack_from
 
 

@@ -3,20 +3,19 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
+from array import array as _array
+from itertools import starmap as _starmap
+from msgspec import field as _field
 from rosz.message import Bytes as _Bytes
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
-from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
-from itertools import starmap as _starmap
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import flags as _flags
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
@@ -32,6 +31,8 @@ from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor
 from rosz.msgs.rcl_interfaces.msg import ParameterValue
 from rosz.msgs.rcl_interfaces.msg import SetLoggerLevelsResult
 from rosz.msgs.rcl_interfaces.msg import SetParametersResult
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "DescribeParameters",
@@ -59,6 +60,7 @@ __all__ = (
     "SetParametersRequest",
     "SetParametersResponse",
 )
+
 _s1 = _StringList()
 _p1 = _Struct("<I").pack
 _u1 = _Struct("<I").unpack_from
@@ -102,8 +104,8 @@ class DescribeParametersRequest(_Message):
         except _FAULTS:
             return _explain(data, DescribeParametersRequest)
 _p2 = _Struct("<2I").pack
-_t1 = _Template("I $ B I $", None, 8)
-_t2 = _Template("I $ ? ? I", None, 8)
+_t1 = _Stride("I $ B I $", None, 8)
+_t2 = _Stride("I $ ? ? I", None, 8)
 _p3 = _Struct("<3d").pack
 _p4 = _Struct("<2qQ").pack
 _u2 = _Struct("<2I").unpack_from
@@ -438,8 +440,8 @@ class GetParametersRequest(_Message):
             return GetParametersRequest(names)
         except _FAULTS:
             return _explain(data, GetParametersRequest)
-_t4 = _Template("B ? q d I $ I", None, 8)
-_t5 = _Template("I", None, 8)
+_t4 = _Stride("B ? q d I $ I", None, 8)
+_t5 = _Stride("I", None, 8)
 _s5 = _StringList()
 _u4 = _Struct("<B?").unpack_from
 _u5 = _Struct("<qdI").unpack_from
@@ -719,7 +721,7 @@ class SetLoggerLevelsRequest(_Message):
             return SetLoggerLevelsRequest(levels)
         except _FAULTS:
             return _explain(data, SetLoggerLevelsRequest)
-_t8 = _Template("? I $", None, 4)
+_t8 = _Stride("? I $", None, 4)
 _u7 = _Struct("<?").unpack_from
 
 
@@ -785,7 +787,7 @@ class SetLoggerLevels(_Service):
         "---\n"
         "SetLoggerLevelsResult[] results  # in the order of levels\n"
     )
-_t9 = _Template("I $ B ? q d I $ I", None, 8)
+_t9 = _Stride("I $ B ? q d I $ I", None, 8)
 _s9 = _StringList()
 
 
@@ -1064,7 +1066,7 @@ class SetParametersAtomicallyRequest(_Message):
             return SetParametersAtomicallyRequest(parameters)
         except _FAULTS:
             return _explain(data, SetParametersAtomicallyRequest)
-_t10 = _Template("I ? I $", -4, 4)
+_t10 = _Stride("I ? I $", -4, 4)
 _u8 = _Struct("<I?3xI").unpack_from
 
 

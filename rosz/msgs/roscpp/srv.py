@@ -3,16 +3,17 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.roscpp.msg import Logger
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Empty",
@@ -25,6 +26,7 @@ __all__ = (
     "SetLoggerLevelRequest",
     "SetLoggerLevelResponse",
 )
+
 _t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
@@ -116,7 +118,7 @@ class GetLoggersRequest(_Message):
         except _FAULTS:
             return _explain(data, GetLoggersRequest)
 _p1 = _Struct("<2I").pack
-_t2 = _Template("I $ I $", None, 4)
+_t2 = _Stride("I $ I $", None, 4)
 _u2 = _Struct("<2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
@@ -186,8 +188,8 @@ class GetLoggers(_Service):
         "---\n"
         "Logger[] loggers\n"
     )
-_t3 = _Template("I I $", -4, 4)
-_t4 = _Template("I $", None, 4)
+_t3 = _Stride("I I $", -4, 4)
+_t4 = _Stride("I $", None, 4)
 
 
 class SetLoggerLevelRequest(_Message):

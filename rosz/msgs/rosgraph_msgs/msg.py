@@ -3,25 +3,27 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Duration
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Clock",
     "Log",
     "TopicStatistics",
 )
+
 _p1 = _Struct("<IiI").pack
 _u1 = _Struct("<IiI").unpack_from
 
@@ -55,8 +57,8 @@ class Clock(_Message):
             return Clock(Time(sec, nanosec))
         except _FAULTS:
             return _explain(data, Clock)
-_t1 = _Template("I i I I $ B I $", -4, 4)
-_t2 = _Template("I $", None, 4)
+_t1 = _Stride("I i I I $ B I $", -4, 4)
+_t2 = _Stride("I $", None, 4)
 _s1 = _StringList()
 _t3 = _Template("I $ I $ I", None)
 _u2 = _Struct("<Ii2I").unpack_from
@@ -163,7 +165,7 @@ class Log(_Message):
             return Log(Header(Time(sec, nanosec), frame_id), level, name, msg, file, function, line, topics)
         except _FAULTS:
             return _explain(data, Log)
-_t4 = _Template("I I $", -4, 4)
+_t4 = _Stride("I I $", -4, 4)
 _t5 = _Template("I $ i I i I i i i i I i I i I i I i I i I", None)
 _u4 = _Struct("<2I").unpack_from
 _u5 = _Struct("<iIiI4iIiIiIiIiIiI").unpack_from

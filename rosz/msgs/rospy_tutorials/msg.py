@@ -3,27 +3,28 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Array as _Array
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
 from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
+from rosz.message import Array as _Array
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Floats",
     "HeaderString",
 )
+
 _d1 = _empty("f")
 _p1 = _Struct("<2I").pack
 _u1 = _Struct("<2I").unpack_from
@@ -64,7 +65,7 @@ class Floats(_Message):
             return Floats(data_2)
         except _FAULTS:
             return _explain(data, Floats)
-_t1 = _Template("I i I I $ I $", -4, 4)
+_t1 = _Stride("I i I I $ I $", -4, 4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 

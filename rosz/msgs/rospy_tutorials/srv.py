@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "AddTwoInts",
@@ -19,6 +19,7 @@ __all__ = (
     "BadTwoIntsRequest",
     "BadTwoIntsResponse",
 )
+
 _p1 = _Struct("<I2q").pack
 _u1 = _Struct("<I2q").unpack_from
 

@@ -3,21 +3,20 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
+from array import array as _array
+from itertools import starmap as _starmap
+from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Bytes as _Bytes
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
-from itertools import starmap as _starmap
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import read_block as _read_block
@@ -31,6 +30,8 @@ from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.geometry_msgs.msg import Vector3
 from rosz.msgs.geometry_msgs.msg import Wrench
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "BatteryState",
@@ -61,11 +62,12 @@ __all__ = (
     "Temperature",
     "TimeReference",
 )
+
 _d1 = _empty("f")
 _t1 = _Template("I i I I $ f f f f f f f B B B ? I", -4)
 _p1 = _Struct("<I").pack
-_t2 = _Template("I $", 0, 4)
-_t3 = _Template("I $", None, 4)
+_t2 = _Stride("I $", 0, 4)
+_t3 = _Stride("I $", None, 4)
 _u1 = _Struct("<Ii2I").unpack_from
 _u2 = _Struct("<7f3B?I").unpack_from
 _u3 = _Struct("<I").unpack_from
@@ -264,7 +266,7 @@ class RegionOfInterest(_Message):
 _d2 = _empty("d")
 _d3 = _zeros("d", 9)
 _d4 = _zeros("d", 12)
-_t4 = _Template("I i I I $ I I I $ I", -4, 8)
+_t4 = _Stride("I i I I $ I I I $ I", -4, 8)
 _t5 = _Template("|8", None)
 _p3 = _Struct("<6I?").pack
 _u5 = _Struct("<3I").unpack_from
@@ -745,8 +747,8 @@ class Imu(_Message):
         except _FAULTS:
             return _explain(data, Imu)
 _s1 = _StringList()
-_t11 = _Template("I i I I $ |4", -4, 8)
-_t12 = _Template("I", None, 8)
+_t11 = _Stride("I i I I $ |4", -4, 8)
+_t12 = _Stride("I", None, 8)
 
 
 class JointState(_Message):
@@ -1811,7 +1813,7 @@ class Temperature(_Message):
             return Temperature(Header(Time(sec, nanosec), frame_id), temperature, variance)
         except _FAULTS:
             return _explain(data, Temperature)
-_t23 = _Template("I i I I $ i I I $", -4, 4)
+_t23 = _Stride("I i I I $ i I I $", -4, 4)
 _u20 = _Struct("<i2I").unpack_from
 
 

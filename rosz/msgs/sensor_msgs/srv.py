@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from array import array as _array
+from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
-from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import texts as _texts
@@ -21,13 +20,16 @@ from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.sensor_msgs.msg import CameraInfo
 from rosz.msgs.sensor_msgs.msg import RegionOfInterest
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "SetCameraInfo",
     "SetCameraInfoRequest",
     "SetCameraInfoResponse",
 )
-_t1 = _Template("I i I I $ I I I $ I", -4, 8)
+
+_t1 = _Stride("I i I I $ I I I $ I", -4, 8)
 _t2 = _Template("|8", None)
 _p1 = _Struct("<6I?").pack
 _u1 = _Struct("<Ii2I").unpack_from
@@ -107,7 +109,7 @@ class SetCameraInfoRequest(_Message):
             return SetCameraInfoRequest(CameraInfo(Header(Time(sec, nanosec), frame_id), height, width, distortion_model, d_2, k_2, r_2, p_2, binning_x, binning_y, RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify)))
         except _FAULTS:
             return _explain(data, SetCameraInfoRequest)
-_t3 = _Template("I ? I $", -4, 4)
+_t3 = _Stride("I ? I $", -4, 4)
 _u5 = _Struct("<I?3xI").unpack_from
 
 

@@ -3,20 +3,21 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Bytes as _Bytes
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
+from rosz.message import Bytes as _Bytes
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import octets as _octets
 from rosz.msgs.builtin_interfaces.msg import Time
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "ServiceEventInfo",
 )
+
 _z1 = bytes(16)
 _p1 = _Struct("<IB3xiI16s4xq").pack
 _u1 = _Struct("<IB3xiI16s4xq").unpack_from

@@ -3,24 +3,24 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Array as _Array
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
 from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
 from itertools import starmap as _starmap
+from msgspec import field as _field
+from rosz.message import Array as _Array
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import zeros as _zeros
 from rosz.msgs.geometry_msgs.msg import Point
 from rosz.msgs.geometry_msgs.msg import Point32
 from rosz.msgs.geometry_msgs.msg import Polygon
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Mesh",
@@ -28,6 +28,7 @@ __all__ = (
     "Plane",
     "SolidPrimitive",
 )
+
 _d1 = _zeros("I", 3)
 _p1 = _Struct("<I").pack
 _u1 = _Struct("<I").unpack_from

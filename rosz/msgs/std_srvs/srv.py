@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Empty",
@@ -23,6 +24,7 @@ __all__ = (
     "TriggerRequest",
     "TriggerResponse",
 )
+
 _t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
@@ -120,7 +122,7 @@ class SetBoolRequest(_Message):
             return SetBoolRequest(data_2)
         except _FAULTS:
             return _explain(data, SetBoolRequest)
-_t3 = _Template("I ? I $", -4, 4)
+_t3 = _Stride("I ? I $", -4, 4)
 _u3 = _Struct("<I?3xI").unpack_from
 
 

@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.sensor_msgs.msg import RegionOfInterest
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "DisparityImage",
 )
+
 _t1 = _Template("I i I I $ i I I $ I I", -4)
 _t2 = _Template("I $ B I I", 0)
 _t3 = _Template("f f I I I I ? f f f", None)

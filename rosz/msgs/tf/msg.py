@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion
@@ -17,10 +15,13 @@ from rosz.msgs.geometry_msgs.msg import Transform
 from rosz.msgs.geometry_msgs.msg import TransformStamped
 from rosz.msgs.geometry_msgs.msg import Vector3
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "tfMessage",
 )
+
 _p1 = _Struct("<2I").pack
 _t1 = _Template("i I I $ I $ d d d d d d d", None)
 _u1 = _Struct("<2I").unpack_from

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "DemuxAdd",
@@ -39,7 +40,8 @@ __all__ = (
     "MuxSelectRequest",
     "MuxSelectResponse",
 )
-_t1 = _Template("I I $", -4, 4)
+
+_t1 = _Stride("I I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 
 

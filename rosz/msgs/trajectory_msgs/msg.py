@@ -3,19 +3,17 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Array as _Array
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
 from array import array as _array
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
+from rosz.message import Array as _Array
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
-from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import texts as _texts
@@ -26,6 +24,8 @@ from rosz.msgs.geometry_msgs.msg import Transform
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.geometry_msgs.msg import Vector3
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "JointTrajectory",
@@ -33,6 +33,7 @@ __all__ = (
     "MultiDOFJointTrajectory",
     "MultiDOFJointTrajectoryPoint",
 )
+
 _d1 = _empty("d")
 _p1 = _Struct("<2I").pack
 _p2 = _Struct("<I").pack
@@ -118,8 +119,8 @@ class JointTrajectoryPoint(_Message):
         except _FAULTS:
             return _explain(data, JointTrajectoryPoint)
 _s1 = _StringList()
-_t1 = _Template("I i I I $ |4", -4, 8)
-_t2 = _Template("I", None, 8)
+_t1 = _Stride("I i I I $ |4", -4, 8)
+_t2 = _Stride("I", None, 8)
 _u4 = _Struct("<Ii2I").unpack_from
 
 

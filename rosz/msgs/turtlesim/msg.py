@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Color",
     "Pose",
 )
+
 _t1 = _Template("I B B B", -4)
 _u1 = _Struct("<I3B").unpack_from
 

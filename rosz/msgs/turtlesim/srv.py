@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import texts as _texts
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Kill",
@@ -30,7 +31,8 @@ __all__ = (
     "TeleportRelativeRequest",
     "TeleportRelativeResponse",
 )
-_t1 = _Template("I I $", -4, 4)
+
+_t1 = _Stride("I I $", -4, 4)
 _u1 = _Struct("<2I").unpack_from
 
 
@@ -193,7 +195,7 @@ class SetPen(_Service):
         "uint8 off    # 1 to stop drawing, 0 to draw\n"
         "---\n"
     )
-_t4 = _Template("I f f f I $", -4, 4)
+_t4 = _Stride("I f f f I $", -4, 4)
 _u4 = _Struct("<I3fI").unpack_from
 
 

@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
 from msgspec import field as _field
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import texts as _texts
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "Field",
@@ -21,7 +21,8 @@ __all__ = (
     "TypeDescription",
     "TypeSource",
 )
-_t1 = _Template("I B Q Q I $", -4, 8)
+
+_t1 = _Stride("I B Q Q I $", -4, 8)
 _u1 = _Struct("<IB7x2QI").unpack_from
 
 
@@ -257,8 +258,8 @@ class FieldType(_Message):
             return FieldType(type_id, capacity, string_capacity, nested_type_name)
         except _FAULTS:
             return _explain(data, FieldType)
-_t2 = _Template("I I $ B Q Q I $", -4, 8)
-_t3 = _Template("I $", None, 8)
+_t2 = _Stride("I I $ B Q Q I $", -4, 8)
+_t3 = _Stride("I $", None, 8)
 _u2 = _Struct("<2I").unpack_from
 _u3 = _Struct("<2QI").unpack_from
 _u4 = _Struct("<I").unpack_from
@@ -322,8 +323,8 @@ class Field(_Message):
             return Field(name, FieldType(type_id, capacity, string_capacity, nested_type_name), default_value)
         except _FAULTS:
             return _explain(data, Field)
-_t4 = _Template("I I $ I", -4, 8)
-_t5 = _Template("I $ B Q Q I $", None, 8)
+_t4 = _Stride("I I $ I", -4, 8)
+_t5 = _Stride("I $ B Q Q I $", None, 8)
 
 
 class IndividualTypeDescription(_Message):
@@ -406,7 +407,7 @@ class IndividualTypeDescription(_Message):
             return IndividualTypeDescription(type_name, fields)
         except _FAULTS:
             return _explain(data, IndividualTypeDescription)
-_t6 = _Template("I I $ I $", -4, 4)
+_t6 = _Stride("I I $ I $", -4, 4)
 
 
 class KeyValue(_Message):
@@ -452,8 +453,8 @@ class KeyValue(_Message):
             return KeyValue(key, value)
         except _FAULTS:
             return _explain(data, KeyValue)
-_t7 = _Template("I", None, 8)
-_t8 = _Template("I $ I", None, 8)
+_t7 = _Stride("I", None, 8)
+_t8 = _Stride("I $ I", None, 8)
 
 
 class TypeDescription(_Message):
@@ -604,8 +605,8 @@ class TypeDescription(_Message):
             return TypeDescription(IndividualTypeDescription(type_name, fields), referenced_type_descriptions)
         except _FAULTS:
             return _explain(data, TypeDescription)
-_t9 = _Template("I I $", -4, 4)
-_t10 = _Template("I $ I $", None, 4)
+_t9 = _Stride("I I $", -4, 4)
+_t10 = _Stride("I $ I $", None, 4)
 
 
 class TypeSource(_Message):

@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
 from rosz.message.runtime import encode_plainly as _plain
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.type_description_interfaces.msg import Field
 from rosz.msgs.type_description_interfaces.msg import FieldType
@@ -19,14 +17,17 @@ from rosz.msgs.type_description_interfaces.msg import IndividualTypeDescription
 from rosz.msgs.type_description_interfaces.msg import KeyValue
 from rosz.msgs.type_description_interfaces.msg import TypeDescription
 from rosz.msgs.type_description_interfaces.msg import TypeSource
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "GetTypeDescription",
     "GetTypeDescriptionRequest",
     "GetTypeDescriptionResponse",
 )
-_t1 = _Template("I I $", -4, 4)
-_t2 = _Template("I $ ?", None, 4)
+
+_t1 = _Stride("I I $", -4, 4)
+_t2 = _Stride("I $ ?", None, 4)
 _u1 = _Struct("<2I").unpack_from
 _u2 = _Struct("<I").unpack_from
 _u3 = _Struct("<?").unpack_from
@@ -80,12 +81,12 @@ class GetTypeDescriptionRequest(_Message):
             return GetTypeDescriptionRequest(type_name, type_hash, include_type_sources)
         except _FAULTS:
             return _explain(data, GetTypeDescriptionRequest)
-_t3 = _Template("I ? I $", -4, 8)
-_t4 = _Template("I $ I", None, 8)
-_t5 = _Template("I $ B Q Q I $", None, 8)
-_t6 = _Template("I $", None, 8)
-_t7 = _Template("I", None, 8)
-_t8 = _Template("I $ I $", None, 8)
+_t3 = _Stride("I ? I $", -4, 8)
+_t4 = _Stride("I $ I", None, 8)
+_t5 = _Stride("I $ B Q Q I $", None, 8)
+_t6 = _Stride("I $", None, 8)
+_t7 = _Stride("I", None, 8)
+_t8 = _Stride("I $ I $", None, 8)
 _u4 = _Struct("<I?3xI").unpack_from
 _u5 = _Struct("<2QI").unpack_from
 

@@ -3,18 +3,17 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message import Bytes as _Bytes
-from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message import Message as _Message
-from struct import Struct as _Struct
-from rosz.message.runtime import decode_plainly as _explain
-from msgspec import field as _field
-from rosz.message.runtime import encode_plainly as _plain
 from itertools import starmap as _starmap
+from msgspec import field as _field
+from rosz.message import Bytes as _Bytes
+from rosz.message import Message as _Message
+from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
+from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import Template as _Template
+from rosz.message.runtime import decode_plainly as _explain
+from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Duration
@@ -26,6 +25,8 @@ from rosz.msgs.geometry_msgs.msg import Vector3
 from rosz.msgs.sensor_msgs.msg import CompressedImage
 from rosz.msgs.std_msgs.msg import ColorRGBA
 from rosz.msgs.std_msgs.msg import Header
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "ImageMarker",
@@ -41,6 +42,7 @@ __all__ = (
     "MeshFile",
     "UVCoordinate",
 )
+
 _t1 = _Template("I i I I $ I $ i i i d d d f f f f f B f f f f i I I", -4)
 _p1 = _Struct("<3d").pack
 _p2 = _Struct("<4f").pack
@@ -156,8 +158,8 @@ class ImageMarker(_Message):
             return ImageMarker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action, Point(x_2, y_2, z_2), scale, ColorRGBA(r_2, g_2, b_2, a_2), filled, ColorRGBA(r_3, g_3, b_3, a_3), Duration(sec_2, nanosec_2), points, outline_colors)
         except _FAULTS:
             return _explain(data, ImageMarker)
-_t2 = _Template("I I I I $", -4, 4)
-_t3 = _Template("I $ B", None, 4)
+_t2 = _Stride("I I I I $", -4, 4)
+_t3 = _Stride("I $ B", None, 4)
 _u5 = _Struct("<4I").unpack_from
 
 
@@ -306,12 +308,12 @@ class MeshFile(_Message):
         except _FAULTS:
             return _explain(data, MeshFile)
 _t5 = _Template("I i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", -4)
-_t6 = _Template("I $ i I", 4, 8)
-_t7 = _Template("I $ I $ I", None, 8)
+_t6 = _Stride("I $ i I", 4, 8)
+_t7 = _Stride("I $ I $ I", None, 8)
 _p5 = _Struct("<2f").pack
-_t8 = _Template("I", None, 8)
-_t9 = _Template("I $", None, 8)
-_t10 = _Template("I $ I", None, 8)
+_t8 = _Stride("I", None, 8)
+_t9 = _Stride("I $", None, 8)
+_t10 = _Stride("I $ I", None, 8)
 _p6 = _Struct("<?").pack
 _u8 = _Struct("<10d4fiI?3xI").unpack_from
 _u9 = _Struct("<i2I").unpack_from
@@ -544,7 +546,7 @@ class Marker(_Message):
             return _explain(data, Marker)
 _t11 = _Template("I I $ d d d d B B ? I", -4)
 _t12 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
-_t13 = _Template("? I $", None, 8)
+_t13 = _Stride("? I $", None, 8)
 _u11 = _Struct("<4d2B?xI").unpack_from
 
 
@@ -768,10 +770,10 @@ class InteractiveMarkerControl(_Message):
             return InteractiveMarkerControl(name, Quaternion(x_2, y_2, z_2, w_2), orientation_mode, interaction_mode, always_visible, markers, independent_marker_orientation, description)
         except _FAULTS:
             return _explain(data, InteractiveMarkerControl)
-_t14 = _Template("I i I I $ d d d d d d d I $", -4, 8)
-_t15 = _Template("I $ f I", None, 8)
-_t16 = _Template("I I I $", None, 8)
-_t17 = _Template("I $ B", None, 8)
+_t14 = _Stride("I i I I $ d d d d d d d I $", -4, 8)
+_t15 = _Stride("I $ f I", None, 8)
+_t16 = _Stride("I I I $", None, 8)
+_t17 = _Stride("I $ B", None, 8)
 _t18 = _Template("I $ d d d d B B ? I", None)
 _u12 = _Struct("<7dI").unpack_from
 _u13 = _Struct("<fI").unpack_from
@@ -1036,7 +1038,7 @@ class InteractiveMarker(_Message):
             return InteractiveMarker(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name, description, scale, menu_entries, controls)
         except _FAULTS:
             return _explain(data, InteractiveMarker)
-_t19 = _Template("I i I I $ I $", -4, 8)
+_t19 = _Stride("I i I I $ I $", -4, 8)
 _t20 = _Template("I $ B d d d d d d d I d d d ?", None)
 _u15 = _Struct("<7dI4x3d?").unpack_from
 
@@ -1140,7 +1142,7 @@ class InteractiveMarkerFeedback(_Message):
         except _FAULTS:
             return _explain(data, InteractiveMarkerFeedback)
 _t21 = _Template("I I $ Q I", -4)
-_t22 = _Template("i I I $ d d d d d d d I $", None, 8)
+_t22 = _Stride("i I I $ d d d d d d d I $", None, 8)
 _u16 = _Struct("<QI").unpack_from
 
 
@@ -1464,7 +1466,7 @@ class InteractiveMarkerPose(_Message):
             return _explain(data, InteractiveMarkerPose)
 _t23 = _Template("I I $ Q B I", -4)
 _s1 = _StringList()
-_t24 = _Template("|4", None, 8)
+_t24 = _Stride("|4", None, 8)
 _u17 = _Struct("<QB3xI").unpack_from
 
 

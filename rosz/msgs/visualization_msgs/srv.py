@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-from typing import Any as _Any
-from rosz.message.runtime import FAULTS as _FAULTS
+from itertools import starmap as _starmap
 from rosz.message import Message as _Message
 from rosz.message import Service as _Service
-from struct import Struct as _Struct
+from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
-from itertools import starmap as _starmap
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Duration
@@ -29,12 +28,15 @@ from rosz.msgs.visualization_msgs.msg import Marker
 from rosz.msgs.visualization_msgs.msg import MenuEntry
 from rosz.msgs.visualization_msgs.msg import MeshFile
 from rosz.msgs.visualization_msgs.msg import UVCoordinate
+from struct import Struct as _Struct
+from typing import Any as _Any
 
 __all__ = (
     "GetInteractiveMarkers",
     "GetInteractiveMarkersRequest",
     "GetInteractiveMarkersResponse",
 )
+
 _t1 = _Template("I x", -4)
 _u1 = _Struct("<Ix").unpack_from
 
@@ -63,23 +65,23 @@ class GetInteractiveMarkersRequest(_Message):
         except _FAULTS:
             return _explain(data, GetInteractiveMarkersRequest)
 _p1 = _Struct("<IQI").pack
-_t2 = _Template("i I I $ d d d d d d d I $", None, 8)
-_t3 = _Template("I $ f I", None, 8)
-_t4 = _Template("I I I $", None, 8)
-_t5 = _Template("I $ B", None, 8)
-_t6 = _Template("I", None, 8)
+_t2 = _Stride("i I I $ d d d d d d d I $", None, 8)
+_t3 = _Stride("I $ f I", None, 8)
+_t4 = _Stride("I I I $", None, 8)
+_t5 = _Stride("I $ B", None, 8)
+_t6 = _Stride("I", None, 8)
 _t7 = _Template("I $ d d d d B B ? I", None)
 _p2 = _Struct("<3d").pack
 _t8 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
 _p3 = _Struct("<4f").pack
 _p4 = _Struct("<I").pack
-_t9 = _Template("I $ i I", 4, 8)
-_t10 = _Template("I $ I $ I", None, 8)
+_t9 = _Stride("I $ i I", 4, 8)
+_t10 = _Stride("I $ I $ I", None, 8)
 _p5 = _Struct("<2f").pack
-_t11 = _Template("I $", None, 8)
-_t12 = _Template("I $ I", None, 8)
+_t11 = _Stride("I $", None, 8)
+_t12 = _Stride("I $ I", None, 8)
 _p6 = _Struct("<?").pack
-_t13 = _Template("? I $", None, 8)
+_t13 = _Stride("? I $", None, 8)
 _u2 = _Struct("<IQI").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 _u4 = _Struct("<7dI").unpack_from

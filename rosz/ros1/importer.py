@@ -1,0 +1,241 @@
+"""Makes ROS 1's names importable: message packages, and the Python modules that rosz has for them.
+
+Two finders on ``sys.meta_path``. The first one stands in front and knows a name at a glance: what
+rosz ships (``std_msgs``, ``rospy``, …) and ``<package>.msg`` / ``<package>.srv`` of any package on
+the package path. The second one stands at the end, for packages that nothing else provides; only it
+searches the package path for a plain name.
+
+A name imported this way is the very module that rosz has, under one more name: ``std_msgs.msg`` is
+``rosz.msgs.std_msgs.msg``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+from rosz.environment import Environment, package_index
+from rosz.errors import RoszError
+from rosz.packages import PackageIndex
+from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages
+
+__all__ = ("MODULES", "install", "type_store", "uninstall")
+
+MODULES = (
+    "actionlib",
+    "diagnostic_updater",
+    "dynamic_reconfigure",
+    "genmsg",
+    "genpy",
+    "message_filters",
+    "rosgraph",
+    "roslaunch",
+    "roslib",
+    "rosmsg",
+    "rosnode",
+    "rosparam",
+    "rospkg",
+    "rospy",
+    "rosservice",
+    "rostest",
+    "rostopic",
+    "rosunit",
+    "tf",
+    "tf2_ros",
+)
+"""ROS 1's Python modules; those that lie beside this one are importable under their own names."""
+
+_KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
+_HERE = Path(__file__).parent
+
+
+def install(store: TypeStore | None = None, packages: PackageIndex | None = None) -> None:
+    """Make the names importable in this process; once is enough.
+
+    Args:
+        store: Where classes come from; by the process's environment when not given.
+        packages: Where packages are; by the process's environment when not given.
+    """
+    if any(isinstance(finder, _First) for finder in sys.meta_path):
+        return
+    types = _Types(store, packages)
+    sys.meta_path.insert(0, _First(types))
+    sys.meta_path.append(_Last(types))
+
+
+def uninstall() -> None:
+    """Take the names back; modules that are imported stay."""
+    sys.meta_path[:] = [one for one in sys.meta_path if not isinstance(one, _First | _Last)]
+
+
+def type_store() -> TypeStore:
+    """Return the store that imports take their classes from."""
+    install()
+    return next(one.types.store for one in sys.meta_path if isinstance(one, _First))
+
+
+class _Types:
+    """Packages and their types, looked at when they are needed."""
+
+    def __init__(self, store: TypeStore | None, packages: PackageIndex | None) -> None:
+        if store is not None:
+            self.store = store
+        if packages is not None:
+            self.packages = packages
+
+    @cached_property
+    def _environment(self) -> Environment:
+        return Environment.read()
+
+    @cached_property
+    def packages(self) -> PackageIndex:
+        return package_index(self._environment)
+
+    @cached_property
+    def store(self) -> TypeStore:
+        return TypeStore(self.packages, self._environment.home / "rosz")
+
+    def has(self, package: str, kind: Kind) -> bool:
+        return self.store.has(package, kind)
+
+    def folder(self, package: str) -> Path | None:
+        """Return the folder of a package that has types of its own."""
+        try:
+            if self.has(package, "msg") or self.has(package, "srv"):
+                return self.packages.find(package).path
+        except RoszError:  # an import of something else must not fail over a broken package
+            return None
+        return None
+
+
+class _Same(Loader):
+    """Gives a module that exists under another name."""
+
+    def __init__(self, load: Callable[[], ModuleType]) -> None:
+        self._load = load
+        self._spec: ModuleSpec | None = None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:  # noqa: ARG002
+        """Return the module."""
+        module = self._load()
+        self._spec = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Leave the module as it is; it has run."""
+        module.__spec__ = self._spec
+
+
+def _same(name: str, load: Callable[[], ModuleType]) -> ModuleSpec:
+    return ModuleSpec(name, _Same(load), is_package=True)
+
+
+class _First(MetaPathFinder):
+    def __init__(self, types: _Types) -> None:
+        self.types = types
+        self._shipped = shipped_packages()
+        self._modules = frozenset(
+            name
+            for name in MODULES
+            if (_HERE / name / "__init__.py").is_file() or (_HERE / f"{name}.py").is_file()
+        )
+
+    def find_spec(
+        self,
+        fullname: str,
+        path: Sequence[str] | None,
+        target: ModuleType | None = None,  # noqa: ARG002
+    ) -> ModuleSpec | None:
+        """Find what rosz has under a name."""
+        root, _, rest = fullname.partition(".")
+        if root == "rosz":
+            return self._ours(fullname)
+        first, _, inner = rest.partition(".")
+        if first in _KINDS:
+            return self._of_package(fullname, root, _KINDS[first], inner, path)
+        if root in self._modules:
+            return self._known(fullname, f"rosz.ros1.{fullname}")
+        if root in self._shipped and not rest:
+            return _same(fullname, lambda: import_module(f"rosz.msgs.{root}"))
+        return None
+
+    def _known(self, name: str, ours: str) -> ModuleSpec | None:
+        try:
+            module = import_module(ours)
+        except ModuleNotFoundError as error:
+            if error.name != ours:
+                raise
+            return None
+        return _same(name, lambda: module)
+
+    def _ours(self, name: str) -> ModuleSpec | None:
+        """Find ``rosz.msgs.<package>`` of a package that is compiled, for pickle."""
+        parts = name.split(".")
+        if parts[:2] != ["rosz", "msgs"] or len(parts) == 2 or parts[2] in self._shipped:  # noqa: PLR2004
+            return None
+        package = parts[2]
+        if len(parts) == 3 and self.types.folder(package) is not None:  # noqa: PLR2004
+            return ModuleSpec(name, None, is_package=True)
+        kind = _KINDS.get(parts[3]) if len(parts) == 4 else None  # noqa: PLR2004
+        if kind is None or not self.types.has(package, kind):
+            return None
+        return _same(name, lambda: self.types.store.module(package, kind))
+
+    def _of_package(
+        self, name: str, package: str, kind: Kind, inner: str, path: Sequence[str] | None
+    ) -> ModuleSpec | None:
+        """Find ``<package>.msg``, or ``<package>.msg._Type`` as genpy has it."""
+        if not self.types.has(package, kind):
+            return None
+        if not inner:
+            generated = None if package in self._shipped else PathFinder.find_spec(name, path)
+            if generated is not None and generated.origin and is_generated(generated.origin):
+                return generated
+            return _same(name, lambda: self.types.store.module(package, kind))
+        module = import_module(f"{package}.{kind}")
+        if not inner.startswith("_") or not hasattr(module, inner[1:]):
+            return None
+        return _same(name, lambda: _single(name, module, inner[1:]))
+
+
+class _Last(MetaPathFinder):
+    def __init__(self, types: _Types) -> None:
+        self._types = types
+
+    def find_spec(
+        self,
+        fullname: str,
+        path: Sequence[str] | None,
+        target: ModuleType | None = None,  # noqa: ARG002
+    ) -> ModuleSpec | None:
+        """Find a package of the package path that nothing else provides."""
+        if path is not None or "." in fullname:
+            return None
+        folder = self._types.folder(fullname)
+        if folder is None:
+            return None
+        # Where catkin looks for the Python modules of a package (catkin_python_setup).
+        code = folder / "src" / fullname
+        if (code / "__init__.py").is_file():
+            return spec_from_file_location(
+                fullname, code / "__init__.py", submodule_search_locations=[str(code)]
+            )
+        spec = ModuleSpec(fullname, None, is_package=True)
+        spec.submodule_search_locations = [str(code)] if code.is_dir() else []
+        return spec
+
+
+def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:
+    """Return a module with one type in it, and with the messages of a service."""
+    single = ModuleType(name)
+    for each in (type_name, f"{type_name}Request", f"{type_name}Response"):
+        if hasattr(module, each):
+            setattr(single, each, getattr(module, each))
+    return single
