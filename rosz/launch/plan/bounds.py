@@ -33,6 +33,7 @@ _METHODS: Mapping[type, frozenset[str]] = {
     list: frozenset({"copy", "count", "index"}),
     tuple: frozenset({"count", "index"}),
     dict: frozenset({"copy", "get", "items", "keys", "values"}),
+    range: frozenset({"count", "index"}),
     set: frozenset({"difference", "intersection", "issubset", "issuperset", "union"}),
     int: frozenset({"bit_length", "conjugate"}),
     float: frozenset({"hex", "is_integer"}),

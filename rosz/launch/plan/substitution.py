@@ -16,7 +16,6 @@ from typing import Any
 
 from rosz.errors import RoszError, near_miss
 from rosz.launch.plan.context import LaunchContext
-from rosz.launch.plan.expression import evaluate
 from rosz.launch.plan.fault import TextFault
 from rosz.launch.plan.scope import Scope
 from rosz.launch.plan.value import automatic
@@ -149,6 +148,8 @@ class Substitution:
         return built or os.path.join(folder, path)  # noqa: PTH118  # an absolute path wins, as ever
 
     def _evaluate(self, text: str, scope: Scope) -> str:
+        from rosz.launch.plan.expression import evaluate
+
         def arg(name: str) -> Any:
             return automatic(self._arg(name, scope))
 

@@ -10,16 +10,18 @@ from hypothesis import strategies as st
 
 _NAMES = ["a", "b", "c", "/g", "x/y", "~p", "n//m/"]
 _ARGS = ["foo", "bar", "baz"]
-_BASES = ["one", "two", "three", "four"]
+_MORE_ARGS = ["new", "newer", "newest", "latest", "foo"]
+_BASES = ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine"]
 _VALUES = [
     *("1", "-2", "3.5", "true", "False", "text", "", " padded ", "1e3", "a b", "0x1", "[1, 2]"),
     *("$(arg foo)", "$(arg bar)", "x$(arg baz)y", "$(optenv HOME)", "$(optenv ROSZ_NONE d e)"),
     *("$(find demo_robot)/config", "$(anon q)", "$(eval 1 + 2)", "$(eval foo)", "$(dirname)"),
-    *("$(eval arg('bar') * 2)", "$(env ROSZ_NONE)", "$$(arg foo)", "$(arg foo", "$(arg)", "$(nil)"),
+    *("$(eval arg('bar') * 2)", "$$(arg foo)", "$(arg foo"),
 ]
 _GIVEN = ["7", "true", "0", "word", "", "two words", "a:=b"]
-_BOOLS = ["true", "false", "1", "0", "$(arg bar)", "$(eval not true)", "TRUE", "nope"]
-_YAML = ["a: 1", "{b: [1, 2], c: {d: x}}", "[1, 2]", "", "3", "x: $(arg foo)", "'a/b': 1", "a: {}"]
+_CONDITIONS = ["true", "false", "1", "0", "$(eval not true)", "$(eval 1 < 2)", "TRUE"]
+_BOOLS = ["true", "false", "True", "FALSE", "$(eval not true)"]
+_YAML = ["a: 1", "{b: [1, 2], c: {d: x}}", "", "x: $(arg foo)", "'a/b': 1", "a: {}"]
 
 
 class Tree(msgspec.Struct, frozen=True):
@@ -47,43 +49,53 @@ def _tag(name: str, attributes: dict[str, str | None], body: str = "") -> str:
     return f"<{name}{written}>{body}</{name}>" if body else f"<{name}{written}/>"
 
 
-def _maybe(values: st.SearchStrategy[str]) -> st.SearchStrategy[str | None]:
+def _mostly(good: list[str], *bad: str) -> st.SearchStrategy[str]:
+    return st.sampled_from([*(good * 8), *bad])
+
+
+def _maybe(
+    values: st.SearchStrategy[str] | st.SearchStrategy[str | None],
+) -> st.SearchStrategy[str | None]:
     # Absent far more often than not, so that most files have something left after conditions.
     return st.one_of(st.none(), st.none(), st.none(), st.none(), values)
 
 
-_value = st.sampled_from(_VALUES)
+_value = _mostly(_VALUES, "$(env ROSZ_NONE)", "$(arg)", "$(nil)", "$(eval 1 / 0)")
 _plain = st.sampled_from(_VALUES[:17])
+_bool = _mostly(_BOOLS, "1", "")
 _condition = st.fixed_dictionaries(
-    {"if": _maybe(st.sampled_from(_BOOLS)), "unless": _maybe(st.sampled_from(_BOOLS[:3]))}
+    {
+        "if": _maybe(_mostly(_CONDITIONS, "$(arg bar)", "nope")),
+        "unless": _maybe(_maybe(_mostly(_CONDITIONS, ""))),
+    }
 )
-_ns = _maybe(st.sampled_from(["r", "/abs", "deep/er", "r//x/", "$(arg foo)", "~", ""]))
+_ns = _maybe(_mostly(["r", "/abs", "deep/er", "r//x/"], "$(arg foo)", "~", ""))
 
 
 @st.composite
 def _simple(draw: st.DrawFn, *, in_node: bool = False) -> str:
     kinds = ["param", "param", "rosparam", "remap", "env"]
-    kind = draw(st.sampled_from(kinds if in_node else [*kinds, "arg", "arg", "arg", "oddity"]))
+    kind = draw(st.sampled_from(kinds if in_node else [*kinds, "arg", "oddity"]))
     attributes: dict[str, str | None] = {}
     body = ""
     if kind == "param":
         attributes["name"] = draw(st.sampled_from(_NAMES))
         attributes["value"] = draw(_value)
-        attributes["type"] = draw(_maybe(st.sampled_from(["str", "int", "double", "bool", "yaml"])))
+        attributes["type"] = draw(_maybe(_mostly(["str", "string", "auto"], "int", "bool", "yaml")))
     elif kind == "rosparam":
         attributes["param"] = draw(_maybe(st.sampled_from(_NAMES)))
         attributes["ns"] = draw(_maybe(st.sampled_from(_NAMES)))
         attributes["subst_value"] = draw(_maybe(st.sampled_from(["true", "false"])))
         attributes["command"] = draw(_maybe(st.sampled_from(["load", "delete"])))
-        body = draw(st.sampled_from(_YAML))
+        body = draw(_mostly(_YAML, "[1, 2]", "3", "[", "1: 2"))
     elif kind == "remap":
         attributes["from"] = draw(st.sampled_from(_NAMES))
-        attributes["to"] = draw(st.sampled_from([*_NAMES, "$(arg foo)", ""]))
+        attributes["to"] = draw(_mostly(_NAMES, "$(arg foo)", ""))
     elif kind == "env":
         attributes["name"] = draw(st.sampled_from(["E", "F", "ROS_X"]))
         attributes["value"] = draw(_plain)
     elif kind == "arg":
-        attributes["name"] = draw(st.sampled_from(_ARGS))
+        attributes["name"] = draw(st.sampled_from(_MORE_ARGS))
         how = draw(st.sampled_from(["default", "default", "default", "value", "doc"]))
         attributes[how] = draw(_plain)
     else:
@@ -94,27 +106,26 @@ def _simple(draw: st.DrawFn, *, in_node: bool = False) -> str:
 @st.composite
 def _process(draw: st.DrawFn) -> str:
     test = draw(st.integers(0, 9)) == 0
-    bools = st.sampled_from(_BOOLS)
     attributes: dict[str, str | None] = {
         "pkg": "demo_nodes",
         "type": draw(st.sampled_from(["talker.py", "listener"])),
-        "name": draw(st.sampled_from([*_BASES, *_BASES, "$(anon z)", "$(arg foo)", ""])),
+        "name": draw(_mostly([*_BASES, "$(anon z)"], "$(arg foo)", "", "a/b")),
         "ns": draw(_ns),
-        "args": draw(_maybe(st.sampled_from(["-x 'a b'", "$(arg foo) $(anon q)", "open '"]))),
-        "clear_params": draw(_maybe(bools)),
-        "cwd": draw(_maybe(st.sampled_from(["node", "ROS_HOME", "elsewhere"]))),
+        "args": draw(_maybe(_mostly(["-x 'a b'", "$(arg foo) $(anon q)"], "open '"))),
+        "clear_params": draw(_maybe(_bool)),
+        "cwd": draw(_maybe(_mostly(["node", "ROS_HOME"], "elsewhere"))),
         "launch-prefix": draw(_maybe(st.sampled_from(["nice", "env X='1 2'"]))),
-        "machine": draw(_maybe(st.sampled_from(["m1", "m2"]))),
-        "required": draw(_maybe(bools)),
+        "machine": draw(_maybe(_maybe(st.sampled_from(["m1", "m2"])))),
+        "required": draw(_maybe(_bool)),
         **draw(_condition),
     }
     if test:
         attributes["test-name"] = draw(st.sampled_from(_BASES))
-        attributes["retry"] = draw(_maybe(st.sampled_from(["2", "x"])))
+        attributes["retry"] = draw(_maybe(_mostly(["2"], "x")))
     else:
-        attributes["output"] = draw(_maybe(st.sampled_from(["screen", "log", "both"])))
-        attributes["respawn"] = draw(_maybe(bools))
-        attributes["respawn_delay"] = draw(_maybe(st.sampled_from(["1", "0.5", "x"])))
+        attributes["output"] = draw(_maybe(_mostly(["screen", "log"], "both")))
+        attributes["respawn"] = draw(_maybe(_bool))
+        attributes["respawn_delay"] = draw(_maybe(_mostly(["1", "0.5"], "x")))
     body = "".join(draw(st.lists(_simple(in_node=True), max_size=4)))
     return _tag("test" if test else "node", attributes, body)
 
@@ -135,7 +146,7 @@ def _include(draw: st.DrawFn, target: str) -> str:
         "file": draw(st.sampled_from([target, f"$(dirname)/{target}"])),
         "ns": draw(_ns),
         "pass_all_args": draw(_maybe(st.sampled_from(["true", "false"]))),
-        "clear_params": draw(_maybe(st.sampled_from(_BOOLS))),
+        "clear_params": draw(_maybe(_bool)),
         **draw(_condition),
     }
     passed = draw(st.lists(st.sampled_from(_ARGS), max_size=2, unique=True))
@@ -162,7 +173,7 @@ def _body(draw: st.DrawFn, targets: tuple[str, ...], depth: int = 0) -> str:
             case _:
                 attributes = {
                     "ns": draw(_ns),
-                    "clear_params": draw(_maybe(st.sampled_from(_BOOLS))),
+                    "clear_params": draw(_maybe(_bool)),
                     **draw(_condition),
                 }
                 parts.append(_tag("group", attributes, draw(_body(targets, depth + 1))))
@@ -173,12 +184,11 @@ def _body(draw: st.DrawFn, targets: tuple[str, ...], depth: int = 0) -> str:
 def launch_trees(draw: st.DrawFn) -> Tree:
     """Return files that include later ones, and a command line."""
     names = ("main.launch", "second.launch", "third.launch")
-    defaults = draw(st.lists(st.sampled_from(_ARGS), max_size=3, unique=True))
-    head = "".join(_tag("arg", {"name": name, "default": "1"}) for name in defaults)
-    files = {
-        name: f"<launch>\n{head}\n{draw(_body(names[number + 1 :]))}\n</launch>\n"
-        for number, name in enumerate(names)
-    }
+    files = {}
+    for number, name in enumerate(names):
+        declared = draw(st.sampled_from([_ARGS, _ARGS, _ARGS, _ARGS[:2], []]))
+        head = "".join(_tag("arg", {"name": arg, "default": "1"}) for arg in declared)
+        files[name] = f"<launch>\n{head}\n{draw(_body(names[number + 1 :]))}\n</launch>\n"
     argv = draw(
         st.lists(
             st.builds("{}:={}".format, st.sampled_from([*_ARGS, "_p"]), st.sampled_from(_GIVEN)),

@@ -261,5 +261,9 @@ def _comparable(key: str, ours: Any, real: Any) -> tuple[Any, Any]:
     elif key == "clear":
         real = [names.canonical(name) for name in real]
     elif key == "setup":
-        real = [[*words[:-1], names.canonical(words[-1])] for words in real]
+        # a private name there is private to the rosparam that roslaunch runs
+        last = [words[-1].replace("~", "/rosparam/", 1) for words in real]
+        real = [
+            [*words[:-1], names.canonical(name)] for words, name in zip(real, last, strict=True)
+        ]
     return ours, real

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, event, given, settings
 from launch_trees import Tree, launch_trees
 from roslaunch_oracle import Roslaunch, Rosz, differences
 
-EXAMPLES = int(os.environ.get("ROSZ_LAUNCH_EXAMPLES", "300"))
+EXAMPLES = int(os.environ.get("ROSZ_LAUNCH_EXAMPLES", "150"))
 
 
 @settings(
