@@ -50,7 +50,9 @@ class Roslaunch:
                 env=dict(environ),
             )
         if not self._line():
-            pytest.skip(f"no roslaunch to compare with: {self._log.read_text().splitlines()[-1]}")
+            self.close()
+            reason = (self._log.read_text().splitlines() or ["it ended at once"])[-1]
+            pytest.skip(f"no roslaunch to compare with: {reason}")
 
     def _line(self) -> str:
         assert self._process.stdout is not None
