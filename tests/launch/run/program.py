@@ -1,4 +1,4 @@
-"""A launch as a process of its own: ``program.py FOLDER PLAN.json [OPTIONS.json]``."""
+"""A launch as a process of its own: ``program.py FOLDER PLAN.json [OPTIONS.json [PACKAGES]]``."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ def main() -> int:
     plan = msgspec.json.decode(Path(sys.argv[2]).read_bytes(), type=Plan)
     options = msgspec.json.decode(sys.argv[3].encode() if sys.argv[3:] else b"{}", type=Options)
     environment = Environment(home=folder / "home", log_dir=folder / "log")
-    workplace = Workplace(PackageIndex([]), environment, dict(os.environ), str(folder))
+    packages = PackageIndex([Path(root) for root in sys.argv[4:]])
+    workplace = Workplace(packages, environment, dict(os.environ), str(folder))
     network = Network(store=NoStore(), readiness=Never())
     return Runner(plan, workplace, network, options, out=sys.stdout, err=sys.stderr).run()
 

@@ -1,0 +1,218 @@
+"""Side by side with real roslaunch: the same launch file, the same words."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from rosz.launch.plan import SystemContext, plan
+from rosz.packages import PackageIndex
+
+from .outside import PROGRAM, ROOT
+from .scene import PATIENCE
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("roslaunch") is None, reason="roslaunch is not installed (python3-roslaunch)"
+)
+
+SCRIPTS = {
+    "quick": "#!/bin/sh\necho quick $*\n",
+    "broken": "#!/bin/sh\nsleep 0.3\nexit 3\n",
+    "crashing": "#!/bin/sh\nsleep 0.3\nkill -SEGV $$\n",
+    "lasting": "#!/bin/sh\necho lasting\nexec sleep 600\n",
+    "stubborn": "#!/usr/bin/python3 -S\n"
+    "import signal, time\n"
+    "for s in (signal.SIGINT, signal.SIGTERM): signal.signal(s, signal.SIG_IGN)\n"
+    "print('stubborn', flush=True)\n"
+    "time.sleep(600)\n",
+}
+
+ALL_FATES = """
+<launch>
+  <param name="text" value="a text of more than twenty characters"/>
+  <param name="short" value="x "/>
+  <rosparam>{list: [1, 2.5, true], nested: {odd: "a\\tb", one: 1}}</rosparam>
+  <group ns="space">
+    <node pkg="fates" type="quick" name="quick" output="screen" args="a 'b c'">
+      <remap from="x" to="/y"/>
+    </node>
+  </group>
+  <node pkg="fates" type="broken" name="broken"/>
+  <node pkg="fates" type="crashing" name="crashing" output="screen"/>
+  <node pkg="fates" type="absent" name="absent"/>
+  <node pkg="fates" type="lasting" name="lasting" output="screen"/>
+  <node pkg="fates" type="stubborn" name="stubborn" output="screen"/>
+</launch>
+"""
+SEEN = (
+    r"\[broken-\d\] process has died",
+    "quick a b c",
+    r"\[crashing-\d\] process has died",
+    "^lasting",
+    "^stubborn",
+)
+
+REQUIRED = """
+<launch>
+  <param name="text" value="any"/>
+  <node pkg="fates" type="lasting" name="lasting"/>
+  <node pkg="fates" type="broken" name="vital" required="true"
+        launch-prefix="sh -c 'sleep 0.5; exit 4'"/>
+</launch>
+"""
+
+# What only roslaunch says, about its master and its logs.
+THEIRS = re.compile(
+    r"\.\.\. logging to |Checking log |Press Ctrl-C|Done checking log|started roslaunch server"
+    r"|auto-starting new master|.*\bmaster\b|ROS_MASTER_URI|.*\brosout-|started core service"
+    r"|setting /run_id| \* /rosdistro| \* /rosversion|WARNING: Package name"
+)
+
+
+@pytest.fixture
+def packages(tmp_path: Path) -> Path:
+    package = tmp_path / "packages/fates"
+    package.mkdir(parents=True)
+    (package / "package.xml").write_text(
+        "<package format='2'><name>fates</name><version>0.0.1</version><description>d</description>"
+        "<maintainer email='a@b.c'>a</maintainer><license>MIT</license></package>"
+    )
+    for name, text in SCRIPTS.items():
+        (package / name).write_text(text)
+        (package / name).chmod(0o755)
+    return tmp_path / "packages"
+
+
+class Streams:
+    """The output of a process, line by line."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self.process = process
+        self.lines: list[tuple[str, str]] = []
+        self._changed = threading.Condition()
+        self._threads = [
+            threading.Thread(target=self._read, args=(name,)) for name in ("stdout", "stderr")
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def _read(self, name: str) -> None:
+        for line in getattr(self.process, name):
+            with self._changed:
+                self.lines.append((name, line))
+                self._changed.notify_all()
+
+    def expect(self, pattern: str) -> None:
+        def seen() -> bool:
+            return any(re.search(pattern, line) for _, line in self.lines)
+
+        with self._changed:
+            assert self._changed.wait_for(seen, PATIENCE), (pattern, self.lines)
+
+    def finish(self) -> None:
+        self.process.wait(PATIENCE)
+        for thread in self._threads:
+            thread.join(PATIENCE)
+
+    def text(self, name: str) -> str:
+        return "".join(line for stream, line in self.lines if stream == name)
+
+
+@contextmanager
+def started(command: list[str], folder: Path, packages: Path) -> Iterator[Streams]:
+    environ = {
+        **os.environ,
+        "HOME": str(folder),
+        "ROS_HOME": str(folder / "home"),
+        "ROS_LOG_DIR": str(folder / "log"),
+        "ROS_PACKAGE_PATH": str(packages),
+        "ROS_IP": "127.0.0.1",
+        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
+        "PYTHONPATH": str(ROOT) if command[0] == sys.executable else "",
+    }
+    with subprocess.Popen(
+        command, env=environ, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        streams = Streams(process)
+        try:
+            yield streams
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+            streams.finish()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def ours(folder: Path, packages: Path, options: str) -> list[str]:
+    index = PackageIndex([packages])
+    context = SystemContext(index, {}, folder, lambda base: base)
+    made = plan([folder / "test.launch"], {}, context)
+    (folder / "plan.json").write_bytes(made.to_json())
+    words = [str(folder), str(folder / "plan.json"), options, str(packages)]
+    return [sys.executable, str(PROGRAM), *words]
+
+
+def theirs(folder: Path, *options: str) -> list[str]:
+    return ["roslaunch", *options, str(folder / "test.launch")]
+
+
+def plain(text: str, folder: Path) -> list[str]:
+    """Return what was said without what differs from run to run, sorted."""
+    text = re.sub(r"\x1b\[\d*m|\x1b\]2;.*?\x07", "", text.partition("\nDIED\n")[0])
+    # roslaunch's threads print into each other's lines.
+    text = re.sub(r"(?=\[[\w/]+-\d+\] (?:killing|escalating|process has))", "\n", text)
+    text = re.sub(rf"{folder}/log/[0-9a-f-]+", "LOGS", text)
+    text = re.sub(r"pid \[?\d+\]?", "pid PID", text)
+    text = re.sub(r"(\w)-\d+(?=[\]*.])", r"\1-N", text)
+    text = re.sub(r"(cannot launch node of type \[.*?\]): .*", r"\1", text)
+    lines = [line.rstrip() for line in text.splitlines()]
+    return sorted(line for line in lines if line and not THEIRS.match(line))
+
+
+def test_all_fates(tmp_path: Path, packages: Path) -> None:
+    (tmp_path / "test.launch").write_text(ALL_FATES)
+    timeouts = ("--sigint-timeout=0.3", "--sigterm-timeout=0.2")
+    options = '{"timeouts": {"sigint": 0.3, "sigterm": 0.2}}'
+    said = []
+    for command in (theirs(tmp_path, *timeouts), ours(tmp_path, packages, options)):
+        with started(command, tmp_path, packages) as run:
+            for pattern in SEEN:
+                run.expect(pattern)
+            run.process.send_signal(signal.SIGINT)
+            run.finish()
+        said.append([plain(run.text(name), tmp_path) for name in ("stdout", "stderr")])
+    real, rosz = said
+    assert rosz[0] == real[0]
+    # The summary at the end says in other words what is left of the shutdown's errors.
+    ending = ("Shutdown errors:", " * process[")
+    assert rosz[1] == [line for line in real[1] if not line.startswith(ending)]
+
+
+def test_required(tmp_path: Path, packages: Path) -> None:
+    (tmp_path / "test.launch").write_text(REQUIRED)
+    said = []
+    for command in (theirs(tmp_path), ours(tmp_path, packages, "{}")):
+        with started(command, tmp_path, packages) as run:
+            run.finish()
+        said.append([plain(run.text(name), tmp_path) for name in ("stdout", "stderr")])
+    real, rosz = said
+    # roslaunch says that it kills the process that has just died, too.
+    assert rosz[0] == [line for line in real[0] if line != "[vital-N] killing on exit"]
+    assert rosz[1] == real[1]
