@@ -1,0 +1,69 @@
+"""``rosz run`` becomes the program, or says in one line why not."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from .command import package, rosz
+
+SHOW = "#!/bin/sh\necho $$ $PPID; printf '[%s]' \"$@\"; echo; pwd; env | grep ROS\nexit 7\n"
+PYTHON = "import sys, os\nprint(sys.argv[1:], sys.executable, os.getpid())\n"
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    package(tmp_path / "src", "demo", show=SHOW, node__py=PYTHON, odd="no first line\n")
+    (tmp_path / "src/demo/scripts/plain").write_text("")
+    return tmp_path
+
+
+def test_arguments_folder_and_exit_code_are_the_programs(workspace: Path) -> None:
+    words = ("-h", "--help", "a b", "x:=y", "_p:=1", "__name:=n", "--", "-x")
+    done = rosz(workspace, "run", "demo", "show", *words, variables={"ROS_NAMESPACE": "/ns"})
+    lines = done.stdout.splitlines()
+    assert lines[1] == "".join(f"[{word}]" for word in words)
+    assert lines[2] == str(workspace)
+    assert sorted(lines[3:]) == [f"ROSZ_PACKAGE_PATH={workspace}/src", "ROS_NAMESPACE=/ns"]
+    assert (done.returncode, done.stderr) == (7, "")
+
+
+def test_it_becomes_the_program(workspace: Path) -> None:
+    done = rosz(workspace, "run", "--debug", "demo", "node.py", "a")
+    assert done.stdout.startswith(f"['a'] {sys.executable} ")
+    script = workspace / "src/demo/scripts/node.py"
+    assert done.stderr == f"[rosz run] {sys.executable} -P -m rosz.ros1 {script} a\n"
+
+
+def test_a_prefix_stands_before_it(workspace: Path) -> None:
+    done = rosz(workspace, "run", "--prefix", "env X=1 sh", "demo", "show", "a")
+    assert done.returncode == 7
+    assert "[a]\n" in done.stdout
+
+
+ERRORS = {
+    ("demo", "shaw"): (1, "has no executable 'shaw'; did you mean 'show'?\n"),
+    ("demos", "show"): (1, "did you mean 'demo'?\n"),
+    ("demo", "plain"): (1, "is not executable; run: chmod +x {0}/src/demo/scripts/plain\n"),
+    ("demo", "odd"): (1, "Exec format error; if it is a script, its first line must name what"),
+    ("demo",): (2, "rosz: no executable of package 'demo' is given: node.py, odd, show\n"),
+    (): (2, "rosz: no package is given: rosz run PACKAGE EXECUTABLE [ARGS]\n"),
+    ("--nope",): (2, "rosz: No such option: --nope"),
+    ("demo", "scripts/shaw"): (1, "package 'demo' has no file '{0}/src/demo/scripts/shaw'"),
+}
+
+
+@pytest.mark.parametrize("words", ERRORS, ids=" ".join)
+def test_errors_are_one_line(workspace: Path, words: tuple[str, ...]) -> None:
+    done = rosz(workspace, "run", *words)
+    code, text = ERRORS[words]
+    assert text.format(workspace) in done.stderr
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (code, "", 1)
+
+
+def test_help(workspace: Path) -> None:
+    done = rosz(workspace, "run", "--help")
+    assert done.returncode == 0
+    assert "PACKAGE EXECUTABLE [ARGS]" in done.stdout
