@@ -1,4 +1,9 @@
-"""Subscriptions: a ring of the newest samples, and one thread that decodes and calls back."""
+"""Subscriptions: a ring of the newest samples, and a thread that decodes and calls back.
+
+With a callback the ring is Zenoh's own, which Python takes part in only when a sample's turn comes:
+from arrival to callback takes half the time of a ring in Python. What does not come through it,
+such as the history of latching publishers, has a ring and a thread here; callbacks take turns.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +24,7 @@ from rosz.wire import Kind, Token, unpack
 if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.node.node import Node
-    from rosz.session import Reply, Sample
+    from rosz.session import Reply, Ring, Sample
 
 __all__ = ("MessageInfo", "Subscription")
 
@@ -86,29 +91,48 @@ class Subscription(Endpoint, Generic[M]):
         self._last: dict[bytes, int] = {}
         self._reported: set[str] = set()
         self._async_wake: Callable[[], None] | None = None
+        self._turn = threading.Lock()
+        self._side: threading.Thread | None = None
         session = node.context.session
-        self._declared.append(
-            session.subscriber(
-                self.key,
-                self.deliver,
-                history=qos.depth if qos.latched else 0,
-                recover=qos.latched and qos.reliable,
+        history = qos.depth if qos.latched else 0
+        recover = qos.latched and qos.reliable
+        source: Ring | None = None
+        if callback is None or depth is None:
+            self._declared.append(
+                session.subscriber(self.key, self.deliver, history=history, recover=recover)
             )
-        )
+        else:
+            source = session.ring(self.key, depth, history=history, recover=recover)
+            self._declared.append(source)
         self._declared.append(
             Withdrawal(node.context.open_inbox(self.token.entity_id, self.deliver))
         )
         self._announce()
         if not qos.latched:
             self._declared.append(node.listen(self._look_for_history))
-        if callback is not None:
-            self._thread = threading.Thread(target=self._run, name=f"rosz-sub{topic}", daemon=True)
-            self._thread.start()
+        if source is not None:
+            threading.Thread(
+                target=self._run_ring, args=(source,), name=f"rosz-sub{topic}", daemon=True
+            ).start()
 
     def deliver(self, sample: Sample | Reply) -> None:
-        """Take a sample in; called on Zenoh's thread."""
+        """Take a sample in that does not come through Zenoh's own ring; called on its thread."""
         self._ring.append(sample)
+        if self._callback is not None and self._side is None:
+            self._side = threading.Thread(
+                target=self._run, name=f"rosz-sub{self.name}", daemon=True
+            )
+            self._side.start()
         self._signal()
+
+    def _run_ring(self, source: Ring) -> None:
+        while not self.closed:
+            try:
+                sample = source.take()
+            except ClosedError:
+                return
+            with self._turn:
+                self._dispatch(sample)
 
     def _signal(self) -> None:
         if self._wake.locked():
@@ -126,7 +150,8 @@ class Subscription(Endpoint, Generic[M]):
                     sample = self._ring.popleft()
                 except IndexError:
                     break
-                self._dispatch(sample)
+                with self._turn:
+                    self._dispatch(sample)
 
     def _dispatch(self, sample: Sample | Reply) -> None:
         taken = self._take(sample)

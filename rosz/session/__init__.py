@@ -1,7 +1,7 @@
 """The network edge: sessions, and all that is declared on them. Nothing else imports zenoh."""
 
 from rosz.session.config import SessionConfig
-from rosz.session.declared import Closable, RawPublisher
+from rosz.session.declared import Closable, RawPublisher, Ring
 from rosz.session.samples import Query, Reply, Sample
 from rosz.session.session import Session, Target
 from rosz.session.stamp import HybridClock, Stamp
@@ -12,6 +12,7 @@ __all__ = (
     "Query",
     "RawPublisher",
     "Reply",
+    "Ring",
     "Sample",
     "Session",
     "SessionConfig",

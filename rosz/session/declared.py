@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import zenoh
 
 from rosz.errors import ClosedError, TransportError
+from rosz.session.samples import Sample
 
-__all__ = ("Closable", "Declared", "RawPublisher", "direct", "mapped")
+__all__ = ("Closable", "Declared", "RawPublisher", "Ring", "direct", "mapped")
 
 
 class Closable(Protocol):
@@ -54,6 +55,26 @@ class Declared:
             # The session may end right now and take the declaration along.
             with suppress(ClosedError), mapped(f"undeclare {self._what}"):
                 entity.undeclare()
+
+
+class Ring(Declared):
+    """A subscriber that keeps the newest samples until they are taken."""
+
+    def __init__(self, key: str, entity: Any) -> None:
+        super().__init__(f"subscriber '{key}'", entity)
+        self._key = key
+        self._recv = entity.handler.recv
+
+    def take(self) -> Sample:
+        """Return the oldest sample that is kept, waiting for one until the ring is closed.
+
+        Raises:
+            ClosedError: The ring or the session was closed.
+        """
+        try:
+            return Sample(self._recv())
+        except zenoh.ZError as error:
+            raise ClosedError(f"the subscriber of '{self._key}' is closed") from error
 
 
 class RawPublisher(Declared):

@@ -17,7 +17,7 @@ import zenoh.ext
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.session.calls import wait_for_calls
 from rosz.session.config import SessionConfig, overrides, zenoh_settings
-from rosz.session.declared import Closable, Declared, RawPublisher, direct, mapped
+from rosz.session.declared import Closable, Declared, RawPublisher, Ring, direct, mapped
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.stamp import HybridClock, Stamp
 
@@ -43,11 +43,11 @@ _REPLY_MARGIN = 1.0
 class _ClosedSession:
     """Stands for the session once it is closed, so that no call reaches Zenoh any more."""
 
+    def __init__(self, why: str) -> None:
+        self._why = why
+
     def __getattr__(self, name: str) -> Any:
-        raise ClosedError(f"the session is closed: no {name.replace('_', ' ')} any more")
-
-
-_CLOSED = _ClosedSession()
+        raise ClosedError(f"no {name.replace('_', ' ')} any more: {self._why}")
 
 
 class Session:
@@ -197,24 +197,50 @@ class Session:
         """
         origin = zenoh.Locality.REMOTE if remote_only else None
         handler = direct(lambda raw: callback(Sample(raw)))
+        return Declared(
+            f"subscriber '{key}'", self._subscribe(key, handler, history, recover, origin)
+        )
+
+    def ring(self, key: str, depth: int, *, history: int = 0, recover: bool = False) -> Ring:
+        """Declare a subscriber that keeps the newest samples until somebody takes them.
+
+        This is the fastest way to a thread of one's own: what arrives does not wait for Python.
+
+        Args:
+            key: Key expression.
+            depth: Samples kept; a newer one pushes the oldest out.
+            history: Samples per publisher to ask the caches of transient-local publishers for.
+            recover: Whether to notice and fetch samples that were missed.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        handler = zenoh.handlers.RingChannel(depth)
+        return Ring(key, self._subscribe(key, handler, history, recover, None))
+
+    def _subscribe(
+        self,
+        key: str,
+        handler: Any,
+        history: int,
+        recover: bool,
+        origin: zenoh.Locality | None,
+    ) -> Any:
         with mapped(f"subscribe to '{key}'"):
             if not history:
-                entity: Any = self._raw.declare_subscriber(key, handler, allowed_origin=origin)
-            else:
-                entity = zenoh.ext.declare_advanced_subscriber(
-                    self._raw,
-                    key,
-                    handler,
-                    allowed_origin=origin,
-                    history=zenoh.ext.HistoryConfig(
-                        detect_late_publishers=True, max_samples=history
-                    ),
-                    recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
-                    if recover
-                    else None,
-                    subscriber_detection=True,
-                )
-        return Declared(f"subscriber '{key}'", entity)
+                return self._raw.declare_subscriber(key, handler, allowed_origin=origin)
+            return zenoh.ext.declare_advanced_subscriber(
+                self._raw,
+                key,
+                handler,
+                allowed_origin=origin,
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history),
+                recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
+                if recover
+                else None,
+                subscriber_detection=True,
+            )
 
     def queryable(
         self, key: str, callback: Callable[[Query], None], *, complete: bool = False
@@ -381,7 +407,20 @@ class Session:
     @property
     def closed(self) -> bool:
         """Whether the session has been closed."""
-        return self._raw is _CLOSED
+        return isinstance(self._raw, _ClosedSession)
+
+    def disown(self, why: str) -> None:
+        """Refuse everything from now on, leaving Zenoh alone: after a fork, in the child.
+
+        Args:
+            why: What the refusals say.
+        """
+        import ctypes
+
+        # Zenoh's threads are not here to answer: even to free the session would wait for ever.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._raw))
+        self._closing = threading.Lock()
+        self._raw = _ClosedSession(why)
 
     def close(self) -> None:
         """Close the session and all that is declared on it; again is no error.
@@ -390,9 +429,10 @@ class Session:
         ends while a thread is inside Zenoh is aborted by the runtime.
         """
         with self._closing:
-            raw, self._raw = self._raw, _CLOSED
-            if raw is not _CLOSED:
-                raw.close()
+            if self.closed:
+                return
+            raw, self._raw = self._raw, _ClosedSession("the session is closed")
+            raw.close()
         wait_for_calls(_CALLS_END_BY)
 
     def __enter__(self) -> Self:
