@@ -18,8 +18,7 @@ from rosz.errors import UsageError
 
 __all__ = ("SessionConfig", "zenoh_settings")
 
-_RETRY_FIRST_MS = 100
-_RETRY_LONGEST_MS = 500
+_RETRY_MS = 200
 _LEASE_MS = 60_000
 _EPHEMERAL = "tcp/127.0.0.1:0"
 
@@ -111,9 +110,9 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             "exit_on_failure": config.must_connect,
             "timeout_ms": int(config.open_timeout * 1000) if config.must_connect else 0,
             "retry": {
-                "period_init_ms": _RETRY_FIRST_MS,
-                "period_max_ms": _RETRY_LONGEST_MS,
-                "period_increase_factor": 2,
+                "period_init_ms": _RETRY_MS,
+                "period_max_ms": _RETRY_MS,
+                "period_increase_factor": 1,
             },
         },
         "listen": {"endpoints": listen, "exit_on_failure": must_listen, "timeout_ms": 0},

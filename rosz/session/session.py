@@ -7,8 +7,10 @@ back into the session; whoever needs more hands over to a thread of its own.
 from __future__ import annotations
 
 import json
+import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import zenoh
@@ -35,9 +37,27 @@ _TARGETS = {
 }
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 _HEARTBEAT_SECONDS = 0.5
+_RUNTIME = "ZENOH_RUNTIME"
 _CALLS_END_BY = 1.0
 _REPLY_MARGIN = 1.0
 """Seconds given to Zenoh's own query timeout to report before a wait ends by itself."""
+
+
+@contextmanager
+def _one_receiver() -> Iterator[None]:
+    """Have Zenoh receive on one thread, unless the user says otherwise.
+
+    Two hand a link's data to each other from core to core, which makes a round trip a quarter
+    longer. Zenoh reads this once, when the first session of the process opens.
+    """
+    given = _RUNTIME in os.environ
+    if not given:
+        os.environ[_RUNTIME] = "(rx: (worker_threads: 1))"
+    try:
+        yield
+    finally:
+        if not given:
+            os.environ.pop(_RUNTIME, None)
 
 
 class _ClosedSession:
@@ -80,7 +100,8 @@ class Session:
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
         with mapped(f"open a session ({', '.join(config.endpoints)})"):
-            return cls(zenoh.open(settings))
+            with _one_receiver():
+                return cls(zenoh.open(settings))
 
     def stamp(self) -> Stamp:
         """Return a new stamp, later than all that this session gave or was shown."""
