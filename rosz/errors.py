@@ -25,6 +25,7 @@ One root, so that ``except RoszError`` catches all that rosz reports and nothing
     ├── ServiceError                a service answered with an error, or nobody serves it
     │   └── ServiceNotFound
     ├── ParamError                  a parameter value or write is not acceptable
+    ├── StoreError                  a file of parameters cannot be used
     └── LaunchError                 a launch or a process in it failed
 
 Texts are lower case, quote the offending value, say what was expected and what to do next.
@@ -54,6 +55,7 @@ __all__ = (
     "ServiceError",
     "ServiceNotFound",
     "SourceError",
+    "StoreError",
     "TimeMovedBackwards",
     "TransportError",
     "TypeNotFound",
@@ -297,6 +299,10 @@ class ServiceNotFound(ServiceError):
 
 class ParamError(RoszError):
     """A parameter value or write that is not acceptable."""
+
+
+class StoreError(RoszError):
+    """A file of parameters that is damaged, in use, or cannot be read or written."""
 
 
 class LaunchError(RoszError):
