@@ -325,6 +325,11 @@ class Graph:
         except Exception:  # noqa: BLE001  # the callback boundary
             _log.exception("a graph listener failed on %s", token)
 
+    def disown(self) -> None:
+        """Know nothing and wait for nothing from now on: after a fork, in the child."""
+        self._changed = threading.Condition()
+        self._closed = True
+
     def close(self) -> None:
         """Stop following; waiters are woken with `ClosedError`. Again is no error."""
         with self._changed:

@@ -16,8 +16,9 @@ from rosz.errors import (
     near_miss,
 )
 from rosz.node.endpoint import Endpoint
+from rosz.node.mismatch import mismatch
 from rosz.qos import QoS
-from rosz.wire import Kind, pack
+from rosz.wire import Kind, Token, pack
 
 if TYPE_CHECKING:
     from rosz.message import Message
@@ -27,9 +28,13 @@ if TYPE_CHECKING:
 
 __all__ = ("Client",)
 
-_ATTEMPTS = 3
+_ATTEMPTS = 10
 _PAUSE = 0.02
+_AT_ONCE = 0.01
+"""Seconds within which a question that reaches nobody comes back."""
+
 _GRACE = 1.0
+"""Seconds given to a server that is there, but was not heard of yet."""
 
 
 class _Call:
@@ -64,7 +69,7 @@ class Client(Endpoint):
         self._sequence = 0
         self._lock = threading.Lock()
         self._calls: set[_Call] = set()
-        self._announce()
+        self.announce()
 
     def __call__(self, *args: Any, timeout: float | None = None, **fields: Any) -> Any:
         """Call with a request, or with the values of its fields; see `call`."""
@@ -90,23 +95,25 @@ class Client(Endpoint):
         Raises:
             EncodeError: A field of the request has a value that does not fit.
             ServiceNotFound: Nobody serves it.
-            ServiceError: The server answered with an error, or ended before it answered.
+            ServiceError: The server answered with an error, or ended before it answered. Of several
+                servers, all of which are asked, the first answer counts.
             WaitTimeout: There was no answer in time.
             ClosedError: The client or its context was closed meanwhile.
         """
         limit = self.timeout if timeout is None else timeout
         deadline = time.monotonic() + limit
         payload = self.service_type.Request._encode(request)
-        self._find_server(min(limit, _GRACE))
-        for attempt in range(_ATTEMPTS):
+        self._find_server(limit)
+        for _ in range(_ATTEMPTS):
+            began = time.monotonic()
             reply = self._attempt(payload, deadline, limit)
             if reply is not None:
                 return self._response(reply, limit)
-            if not self._servers():
+            # Nobody was asked: the way to a server may be a moment behind its token. But who was
+            # asked, and ended without an answer, may have done the work: it is not asked again.
+            if time.monotonic() - began > _AT_ONCE or not self._servers():
                 break
-            # Its token is here, but nobody was asked: the route is a moment behind the token.
-            if attempt < _ATTEMPTS - 1:
-                time.sleep(_PAUSE)
+            time.sleep(_PAUSE)
         raise ServiceError(f"service [{self.name}]: the server ended before it answered")
 
     def _attempt(self, payload: bytes, deadline: float, limit: float) -> Reply | None:
@@ -116,8 +123,7 @@ class Client(Endpoint):
             raise self._late(limit)
         call = _Call()
         with self._lock:
-            if self.closed:
-                raise ClosedError(f"cannot call '{self.name}': the client is closed")
+            self.ensure_open("call")
             self._calls.add(call)
             self._sequence += 1
             attachment = pack(self._sequence, time.time_ns(), self.gid)
@@ -157,32 +163,27 @@ class Client(Endpoint):
             f"answer of service '{self.name}'", limit, "the server is busy, stopped or out of reach"
         )
 
-    def _servers(self) -> list[str]:
-        """Return the nodes that serve this name with this type."""
+    def _servers(self) -> list[Token]:
+        """Return those that serve this name with this type."""
         view = self.node.context.graph.view()
-        return [
-            token.node_name
-            for token in view.servers(self.name)
-            if token.type_name == self.token.type_name
-        ]
+        return [token for token in view.servers(self.name) if self.matches(token)]
 
-    def _find_server(self, grace: float) -> None:
+    def _find_server(self, limit: float) -> None:
         """Make sure that somebody serves the name, waiting while the process is still joining."""
         if self._servers():
             return
+        self.ensure_open("call")
         context = self.node.context
-        if not context.settled.is_set():
-            context.settled.wait(grace)
+        context.settled.wait(min(limit, _GRACE))
         if self._servers():
             return
-        view = context.graph.refresh()
-        if self._servers():
+        view = context.graph.refresh(min(limit, _GRACE))
+        others = view.servers(self.name)
+        if any(map(self.matches, others)):
             return
-        others = {token.type_name for token in view.servers(self.name)}
         if others:
             raise ServiceNotFound(
-                f"service [{self.name}] is served with type '{', '.join(sorted(others))}',"
-                f" expected '{self.token.type_name}'"
+                f"service [{self.name}] is not available: {mismatch(self.token, others[0])}"
             )
         known = view.services()
         raise ServiceNotFound(
@@ -198,17 +199,31 @@ class Client(Endpoint):
 
         Raises:
             WaitTimeout: Nobody did in time.
+            ClosedError: The context was shut down meanwhile.
         """
-        self.node.context.graph.wait_for(
-            lambda view: any(
-                token.type_name == self.token.type_name for token in view.servers(self.name)
-            ),
-            timeout,
-            f"service '{self.name}' of type '{self.token.type_name}'",
-        )
+        graph = self.node.context.graph
+        what = f"service '{self.name}' of type '{self.token.type_name}'"
+        try:
+            graph.wait_for(
+                lambda view: any(map(self.matches, view.servers(self.name))), timeout, what
+            )
+        except WaitTimeout as error:
+            view = graph.view()
+            others = view.servers(self.name)
+            hint = (
+                mismatch(self.token, others[0])
+                if others
+                else near_miss(self.name, view.services()).removeprefix("; ")
+            )
+            raise WaitTimeout(what, timeout, hint) from error
 
     def _finish(self) -> None:
         with self._lock:
             calls = list(self._calls)
         for call in calls:
             call.cancel()
+
+    def disown(self, reason: str) -> None:
+        """Refuse everything from now on, touching neither threads nor links: after a fork."""
+        super().disown(reason)
+        self._lock = threading.Lock()

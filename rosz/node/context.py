@@ -7,30 +7,39 @@ import itertools
 import logging
 import os
 import threading
+import weakref
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 from rosz import remap
 from rosz.environment import Environment, package_index
-from rosz.errors import ClosedError, RoszError
+from rosz.errors import ClosedError
 from rosz.graph import Graph
+from rosz.node import signals
 from rosz.node.clock import Clock
-from rosz.session import Closable, Sample, Session, SessionConfig
+from rosz.node.inbox import Inbox
+from rosz.node.mismatch import MismatchWatch
+from rosz.session import Session, SessionConfig
 from rosz.session.probe import is_answered
-from rosz.session.settle import serve_links, settle
-from rosz.wire import own_key
+from rosz.session.settle import Settling, serve_links
 
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from rosz.node.endpoint import Endpoint
     from rosz.params.replica import Replica
     from rosz.typestore import TypeStore
 
 __all__ = ("Context",)
 
 _log = logging.getLogger("rosz.context")
-_CLOSED_BY = 2.0
+_FORKED = (
+    "this process was forked from one that uses rosz, and threads and links do not outlive a fork:"
+    " start the child first, or use the 'spawn' method of multiprocessing"
+)
+_CLOSED_BY = 10.0
+"""Seconds that whoever shuts down a second time waits for the first, and its hooks, to be done."""
 
 
 class Context:
@@ -46,8 +55,11 @@ class Context:
         graph: Who is alive.
         clock: ROS time.
         settled: Set when the process is linked to all its neighbours.
+        when_settled: Has a function called when it is, or at once if it is already.
+        inbox: What comes for single subscriptions of this process.
         reason: Why it was shut down, once it is.
         cooperative: Whether the program has shown that it asks for the end by itself.
+        forked: Whether this is the copy in a forked child, which can do nothing.
 
     Raises:
         TransportError: The session cannot be opened.
@@ -66,7 +78,6 @@ class Context:
         self.environment = environment or Environment.read()
         self.arguments = remap.parse(argv)
         self.domain = self.environment.domain
-        self._process = os.getpid()
         config = config or SessionConfig.node(self.environment)
         alone = config.mode == "peer" and not (
             config.connect or config.listen or config.multicast or is_answered(config.rendezvous)
@@ -83,67 +94,22 @@ class Context:
         self._closer: threading.Thread | None = None
         self.reason = ""
         self.cooperative = False
+        self.forked = False
         atexit.register(self.close)
-        self.settled = threading.Event()
-        self._when_settled: list[Callable[[], None]] = []
-        self._inbox: dict[int, Callable[[Sample], None]] = {}
+        self._endpoints: weakref.WeakSet[Endpoint] = weakref.WeakSet()
+        self._mismatches = MismatchWatch(self.graph, self.session.zid)
+        self.inbox = Inbox(self.session, self.domain)
+        settling = Settling(
+            self.session,
+            self.SETTLED_BY if config.mode == "peer" and not alone else 0,
+            self._flushed,
+        )
+        self.settled = settling.settled
+        self.when_settled = settling.when_settled
         if config.mode == "peer":
             self._links = serve_links(self.session)
-        if config.mode != "peer" or alone:
-            self.settled.set()
-        else:
-            threading.Thread(target=self._settle, name="rosz-settle", daemon=True).start()
-
-    def _settle(self) -> None:
-        try:
-            settle(self.session, timeout=self.SETTLED_BY, stop=self._flushed)
-        except RoszError as error:
-            if not self._flushed.is_set():
-                _log.warning("cannot tell whether all peers are linked: %s", error)
-        finally:
-            with self._lock:
-                waiting = self._when_settled
-                self._when_settled = []
-                self.settled.set()
-            for callback in waiting:
-                callback()
-
-    def when_settled(self, callback: Callable[[], None]) -> None:
-        """Have a function called when all neighbours are linked, or at once if they are."""
-        with self._lock:
-            if not self.settled.is_set():
-                self._when_settled.append(callback)
-                return
-        callback()
-
-    @cached_property
-    def _inbox_subscriber(self) -> Closable:
-        key = own_key(self.domain, "inbox", self.session.zid)
-        return self.session.subscriber(f"{key}/*", self._sort_inbox)
-
-    def _sort_inbox(self, sample: Sample) -> None:
-        deliver = self._inbox.get(int(sample.key.rpartition("/")[2]))
-        if deliver is not None:
-            deliver(sample)
-
-    def open_inbox(self, entity_id: int, deliver: Callable[[Sample], None]) -> Callable[[], None]:
-        """Take in what is addressed to one subscription alone.
-
-        Args:
-            entity_id: Number of the subscription.
-            deliver: Gets each sample, on a Zenoh thread.
-
-        Returns:
-            A function that ends it.
-        """
-        self._inbox[entity_id] = deliver
-        with self._lock:
-            self._inbox_subscriber  # noqa: B018  # declared on first use
-        return lambda: self._inbox.pop(entity_id, None) and None
-
-    def has_inbox(self, zid: str) -> bool:
-        """Tell whether a session takes in what is addressed to one of its subscriptions."""
-        return any(process.zid == zid for process in self.graph.processes())
+        reference = weakref.ref(self)
+        os.register_at_fork(after_in_child=lambda: _disown(reference()))
 
     def next_id(self) -> int:
         """Return a number for a node or endpoint, unique within the session.
@@ -151,16 +117,37 @@ class Context:
         Raises:
             ClosedError: The context is shut down, or this is a forked child of its process.
         """
-        if self._process != os.getpid():
-            raise ClosedError(
-                "this process was forked from one that uses rosz; threads and links do not outlive"
-                " a fork: start the child first, or use the 'spawn' method of multiprocessing"
-            )
+        self.check_open()
+        return next(self._ids)
+
+    def check_open(self) -> None:
+        """Refuse to begin something new at the end.
+
+        Raises:
+            ClosedError: The context is shut down, or this is a forked child of its process.
+        """
         if self._stopping.is_set():
             raise ClosedError(
                 f"the context is shut down{': ' + self.reason if self.reason else ''}"
             )
-        return next(self._ids)
+
+    def add_endpoint(self, endpoint: Endpoint, *, watch: bool = True) -> None:
+        """Take note of an endpoint of this process.
+
+        Args:
+            endpoint: It.
+            watch: Whether to tell of endpoints of the same name that it does not reach.
+        """
+        with self._lock:
+            self._endpoints.add(endpoint)
+            if watch:
+                self._mismatches.add(endpoint)
+
+    def remove_endpoint(self, endpoint: Endpoint) -> None:
+        """Forget an endpoint."""
+        with self._lock:
+            self._endpoints.discard(endpoint)
+            self._mismatches.remove(endpoint)
 
     @cached_property
     def params(self) -> Replica:
@@ -191,8 +178,13 @@ class Context:
 
         Returns:
             A function that takes the hook back.
+
+        Raises:
+            ClosedError: The end has begun already.
         """
         with self._lock:
+            if self._stopping.is_set():
+                raise ClosedError("the context is shut down: no hook will run")
             self._hooks.append(hook)
 
         def withdraw() -> None:
@@ -212,8 +204,10 @@ class Context:
                 self._stopping.set()
         if begun:
             # Whoever comes second, often the main thread on its way out, must not outrun the first.
-            if threading.current_thread() is not self._closer:
-                self._stopped.wait(_CLOSED_BY)
+            if threading.current_thread() is not self._closer and not self._stopped.wait(
+                _CLOSED_BY
+            ):
+                _log.warning("shutting down takes more than %g s: a hook blocks it", _CLOSED_BY)
             return
         with self._lock:
             hooks = self._hooks[::-1]
@@ -225,10 +219,27 @@ class Context:
             except Exception:  # noqa: BLE001  # the callback boundary
                 _log.exception("a shutdown hook failed")
         self._flushed.set()
-        self.graph.close()
-        self.session.close()
+        try:
+            self.graph.close()
+            self.session.close()
+        finally:
+            atexit.unregister(self.close)
+            self._stopped.set()
+
+    def disown(self) -> None:
+        """Refuse everything from now on, touching neither threads nor links: after a fork."""
         atexit.unregister(self.close)
-        self._stopped.set()
+        self.forked = True
+        self.reason = _FORKED
+        self._lock = threading.RLock()
+        self._stopping = self._flushed = self._stopped = threading.Event()
+        self._stopping.set()
+        self._closer = threading.current_thread()
+        self._hooks = []
+        self.session.disown(_FORKED)
+        self.graph.disown()
+        for endpoint in self._endpoints:
+            endpoint.disown(_FORKED)
 
     def wait_for_shutdown(self, timeout: float | None = None) -> bool:
         """Wait until the end has begun; any thread, any number of them.
@@ -255,3 +266,10 @@ class Context:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _disown(context: Context | None) -> None:
+    """Take a forked child's hands off what belongs to its parent."""
+    if context is not None:
+        signals.release()
+        context.disown()

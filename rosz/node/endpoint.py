@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Self
 
+from rosz.errors import ClosedError
 from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid
 
 if TYPE_CHECKING:
@@ -15,7 +16,15 @@ if TYPE_CHECKING:
     from rosz.qos import QoS
     from rosz.session import Closable
 
-__all__ = ("Endpoint", "Withdrawal")
+__all__ = ("OPPOSITE", "Endpoint", "Withdrawal")
+
+OPPOSITE = {
+    Kind.PUBLISHER: Kind.SUBSCRIPTION,
+    Kind.SUBSCRIPTION: Kind.PUBLISHER,
+    Kind.SERVICE: Kind.CLIENT,
+    Kind.CLIENT: Kind.SERVICE,
+}
+"""What each kind of endpoint talks with."""
 
 
 class Withdrawal:
@@ -48,6 +57,10 @@ class Endpoint:
         key: Key expression that its data travels on.
         token: How it is known to others.
         gid: 16 bytes that identify it.
+        closed: Whether it has been closed.
+
+    Raises:
+        ClosedError: The node or its context is closed.
     """
 
     def __init__(
@@ -77,11 +90,47 @@ class Endpoint:
         self._token_key = text
         self._declared: list[Closable] = []
         self._closing = threading.Lock()
+        self._why_closed = ""
         self.closed = False
 
-    def _announce(self) -> None:
-        """Make the endpoint known; what it needs must be declared before that."""
-        self._declared.append(self.node.context.session.token(self._token_key))
+    def announce(self, *, watch: bool = True) -> None:
+        """Make the endpoint known; what it needs must be declared before, so that others find it.
+
+        Args:
+            watch: Whether to tell of endpoints of the same name that it does not reach.
+
+        Raises:
+            ClosedError: The session is closed.
+        """
+        context = self.node.context
+        context.add_endpoint(self, watch=watch)
+        self._declared.append(context.session.token(self._token_key))
+
+    def also_close(self, part: Closable) -> None:
+        """Have something closed together with the endpoint."""
+        self._declared.append(part)
+
+    def matches(self, token: Token) -> bool:
+        """Tell whether this endpoint and another one reach each other."""
+        return (
+            token.kind is OPPOSITE[self.token.kind]
+            and token.name == self.name
+            and token.type_name == self.token.type_name
+            and token.type_hash == self.token.type_hash
+        )
+
+    def ensure_open(self, doing: str) -> None:
+        """Refuse a thing on a closed endpoint.
+
+        Args:
+            doing: What was wanted, such as ``publish on``.
+
+        Raises:
+            ClosedError: It is closed.
+        """
+        if self.closed:
+            why = self._why_closed or f"the {type(self).__name__.lower()} is closed"
+            raise ClosedError(f"cannot {doing} '{self.name}': {why}")
 
     def close(self) -> None:
         """Undeclare it, its token first; from any thread, again is no error."""
@@ -90,10 +139,22 @@ class Endpoint:
                 return
             self.closed = True
         self._finish()
-        if not self.node.context.session.closed:
+        context = self.node.context
+        context.remove_endpoint(self)
+        if not context.session.closed:
             for declared in reversed(self._declared):
                 declared.close()
         self.node.forget(self)
+
+    def disown(self, reason: str) -> None:
+        """Refuse everything from now on, touching neither threads nor links: after a fork.
+
+        Args:
+            reason: What the refusals say.
+        """
+        self._why_closed = reason
+        self._closing = threading.Lock()
+        self.closed = True
 
     def _finish(self) -> None:
         """End what the endpoint runs, before it is undeclared."""

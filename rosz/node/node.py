@@ -9,15 +9,16 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 
 from rosz import names
-from rosz.errors import ClosedError, UsageError
+from rosz.errors import ClosedError, RoszError, UsageError
 from rosz.node import control, signals
 from rosz.node.client import Client
 from rosz.node.console import DEFAULT_FORMAT
 from rosz.node.context import Context
-from rosz.node.endpoint import Endpoint, Withdrawal
+from rosz.node.endpoint import Withdrawal
+from rosz.node.generic import GenericSubscription
 from rosz.node.log import NodeLog
 from rosz.node.publisher import Publisher
 from rosz.node.rate import Rate
@@ -41,6 +42,8 @@ __all__ = ("Node",)
 M = TypeVar("M", bound="Message")
 P = TypeVar("P", bound="Closable")
 _SECOND = 1_000_000_000
+_ENDED_BY = 10.0
+"""Seconds that whoever ends a node a second time waits for the first, and its hooks, to be done."""
 
 
 class Node:
@@ -79,6 +82,12 @@ class Node:
             name = names.anonymous(name, socket.gethostname(), os.getpid(), milliseconds)
         names.check_base(name)
         self.context = context or Context(argv=sys.argv[1:] if argv is None else argv)
+        self._closed = threading.Event()
+        self._ended = threading.Event()
+        self._ending: threading.Thread | None = None
+        self._lock = threading.RLock()
+        self._parts: list[Closable] = []
+        self._hooks: list[Callable[[str], None]] = []
         try:
             self._begin(name, namespace)
         except BaseException:
@@ -97,11 +106,6 @@ class Node:
         self.base_name = names.basename(self.name)
         self.remaps = arguments.resolved_remaps(self.name)
         self.node_id = context.next_id()
-        self._parts: list[Closable] = []
-        self._lock = threading.RLock()
-        self._hooks: list[Callable[[str], None]] = []
-        self._closed = threading.Event()
-        self._withdraw = context.on_shutdown(self._end)
         environment = context.environment
         self.clock = context.clock.branch()
         self.log = NodeLog(
@@ -112,9 +116,14 @@ class Node:
             console_format=environment.console_format or DEFAULT_FORMAT,
             color=environment.color,
         )
-        self._set_initial_params()
-        self._announce()
-        control.attach(self)
+        self._withdraw = context.on_shutdown(self._end)
+        try:
+            self._set_initial_params()
+            self._announce()
+            control.attach(self)
+        except BaseException:
+            self._end("")
+            raise
         # Loading the message type takes longer than the rest of a start, and nobody waits for it.
         threading.Thread(target=self._open_rosout, name="rosz-rosout-open", daemon=True).start()
 
@@ -211,6 +220,7 @@ class Node:
             qos = QoS(depth=1, durability="transient_local") if latch else _queue(queue_size)
         return self.keep(Publisher(self, self.resolve(topic), message_type, qos))
 
+    @overload
     def subscription(
         self,
         topic: str,
@@ -221,12 +231,36 @@ class Node:
         qos: QoS | None = None,
         raw: bool = False,
         with_info: bool = False,
-    ) -> Subscription[M]:
+    ) -> Subscription[M]: ...
+    @overload
+    def subscription(
+        self,
+        topic: str,
+        message_type: None = None,
+        callback: Callable[..., Any] | None = None,
+        *,
+        queue_size: int = 10,
+        qos: QoS | None = None,
+        raw: bool = False,
+        with_info: bool = False,
+    ) -> GenericSubscription: ...
+    def subscription(
+        self,
+        topic: str,
+        message_type: type[M] | None = None,
+        callback: Callable[..., Any] | None = None,
+        *,
+        queue_size: int = 10,
+        qos: QoS | None = None,
+        raw: bool = False,
+        with_info: bool = False,
+    ) -> Subscription[M] | GenericSubscription:
         """Declare that this node listens to a topic.
 
         Args:
             topic: Name; resolved and remapped.
-            message_type: What is expected.
+            message_type: What is expected; when not given, whatever comes, by the definition that
+                is known here under the name of its type.
             callback: Gets each message, on a thread of the subscription, one at a time. Without
                 one, iterate over the subscription or call its ``get``.
             queue_size: The newest so many samples wait for their turn; older ones are dropped.
@@ -238,16 +272,13 @@ class Node:
             InvalidName: The name is not legal.
             ClosedError: The node is closed.
         """
-        return self.keep(
-            Subscription(
-                self,
-                self.resolve(topic),
-                message_type,
-                callback,
-                qos or _queue(queue_size),
-                raw=raw,
-                with_info=with_info,
+        name, qos = self.resolve(topic), qos or _queue(queue_size)
+        if message_type is None:
+            return self.keep(
+                GenericSubscription(self, name, callback, qos, raw=raw, with_info=with_info)
             )
+        return self.keep(
+            Subscription(self, name, message_type, callback, qos, raw=raw, with_info=with_info)
         )
 
     def service(
@@ -361,12 +392,19 @@ class Node:
         return Withdrawal(self.context.graph.listen(listener))
 
     def keep(self, part: P) -> P:
-        """Have something closed when the node ends, before what was declared earlier."""
-        with self._lock:
-            self._parts.append(part)
-        return part
+        """Have something closed when the node ends, before what was declared earlier.
 
-    def forget(self, part: Endpoint) -> None:
+        Raises:
+            ClosedError: The node is closed; the part is, too, now.
+        """
+        with self._lock:
+            if not self._closed.is_set():
+                self._parts.append(part)
+                return part
+        part.close()
+        raise ClosedError(f"node '{self.name}' is closed")
+
+    def forget(self, part: Closable) -> None:
         """Take note that a part has been closed by itself."""
         with self._lock:
             if part in self._parts:
@@ -383,22 +421,36 @@ class Node:
         self.shutdown()
 
     def _end(self, reason: str) -> None:
+        if self.context.forked:
+            return
         with self._lock:
-            if self._closed.is_set():
-                return
+            begun = self._closed.is_set()
             self._closed.set()
+            if not begun:
+                self._ending = threading.current_thread()
             hooks, parts = self._hooks[::-1], self._parts[::-1]
-        self._withdraw()
-        self.clock.close()
-        for hook in hooks:
-            try:
-                hook(reason)
-            except Exception:  # the callback boundary
-                self.log.exception("a shutdown hook failed")
-        self.log.flush()
-        for part in parts:
-            part.close()
-        self.log.close()
+        if begun:
+            # Whoever comes second, often the main thread on its way out, must not outrun the first.
+            if threading.current_thread() is not self._ending:
+                self._ended.wait(_ENDED_BY)
+            return
+        try:
+            self._withdraw()
+            self.clock.close()
+            for hook in hooks:
+                try:
+                    hook(reason)
+                except Exception:  # the callback boundary
+                    self.log.exception("a shutdown hook failed")
+            self.log.flush()
+            for part in parts:
+                try:
+                    part.close()
+                except RoszError:
+                    self.log.exception("a part of the node could not be closed")
+            self.log.close()
+        finally:
+            self._ended.set()
 
     def __enter__(self) -> Self:
         return self

@@ -25,30 +25,31 @@ class Pool:
         self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._lock = threading.Lock()
         self._threads = 0
-        self._idle = 0
+        self._unfinished = 0
 
     def run(self, job: Callable[[], None]) -> None:
         """Have a function run soon; it must not raise."""
         with self._lock:
             self._jobs.put(job)
-            if self._idle >= self._jobs.qsize() or self._threads == self._size:
+            self._unfinished += 1
+            # A job may wait for a later one, so each gets a thread as long as there are any left.
+            if self._threads >= min(self._unfinished, self._size):
                 return
             self._threads += 1
         threading.Thread(target=self._work, name=self._name, daemon=True).start()
 
     def _work(self) -> None:
         while True:
-            with self._lock:
-                self._idle += 1
             try:
                 job = self._jobs.get(timeout=_IDLE_SECONDS)
             except Empty:
                 with self._lock:
-                    self._idle -= 1
                     if self._jobs.empty():
                         self._threads -= 1
                         return
                 continue
-            with self._lock:
-                self._idle -= 1
-            job()
+            try:
+                job()
+            finally:
+                with self._lock:
+                    self._unfinished -= 1

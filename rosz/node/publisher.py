@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosz.errors import ClosedError, EncodeError
 from rosz.node.endpoint import Endpoint
+from rosz.node.inbox import address
+from rosz.node.pool import Pool
 from rosz.qos import QoS
-from rosz.wire import Kind, Token, own_key, pack
+from rosz.wire import Kind, Token, pack
 
 if TYPE_CHECKING:
     from rosz.message import Message
@@ -20,6 +22,8 @@ __all__ = ("Publisher", "SubscriberLink")
 
 M = TypeVar("M", bound="Message")
 _HELD_SAMPLES = 1000
+_UNNUMBERED = 0
+"""Sequence number of what goes to one subscription alone, and leaves no gap for the others."""
 
 
 class SubscriberLink(Generic[M]):
@@ -61,19 +65,16 @@ class Publisher(Endpoint, Generic[M]):
         self._encode: Callable[[Any], bytes] = message_type._encode
         self._sequence = 0
         self._ordered = threading.Lock()
+        self._blocks = qos.reliable and qos.history == "keep_all"
         self._raw = node.context.session.publisher(
             self.key,
             reliable=qos.reliable,
-            block=qos.reliable and qos.history == "keep_all",
+            block=self._blocks,
             cache=qos.depth if qos.latched else 0,
         )
         self._put = self._raw.put
-        # A cache answers who comes late, so only a publisher without one has to hold.
-        settled = node.context.settled
-        self._held: list[tuple[bytes, bytes]] | None = (
-            None if qos.latched or settled.is_set() else []
-        )
-        self._announce()
+        self._held: list[tuple[bytes, bytes]] | None = None if node.context.settled.is_set() else []
+        self.announce()
         if self._held is not None:
             node.context.when_settled(self._release)
 
@@ -85,7 +86,7 @@ class Publisher(Endpoint, Generic[M]):
             ClosedError: The publisher is closed.
         """
         if len(args) == 1 and not fields and isinstance(args[0], self.message_type):
-            message = args[0]
+            message: Any = args[0]
         else:
             message = self._build(args, fields)
         self.publish_raw(self._encode(message))
@@ -102,8 +103,7 @@ class Publisher(Endpoint, Generic[M]):
             if self._held is None:
                 self._put(payload, attachment)
                 return
-            if self.closed:
-                raise ClosedError(f"cannot publish on '{self.name}': the publisher is closed")
+            self.ensure_open("publish on")
             self._held.append((payload, attachment))
             del self._held[:-_HELD_SAMPLES]
 
@@ -114,18 +114,20 @@ class Publisher(Endpoint, Generic[M]):
             EncodeError: A field has a value that does not fit.
             ClosedError: The publisher is closed.
         """
-        if self.closed:
-            raise ClosedError(f"cannot publish on '{self.name}': the publisher is closed")
+        self.ensure_open("publish on")
         context = self.node.context
-        if not context.has_inbox(subscription.zid):
+        to_it_alone = address(subscription, context.graph.view())
+        if to_it_alone is None:
             self.publish(message)
             return
-        address = own_key(context.domain, "inbox", subscription.zid, str(subscription.entity_id))
+        attachment = pack(_UNNUMBERED, time.time_ns(), self.gid)
         context.session.put(
-            address, self._encode(message), attachment=pack(0, time.time_ns(), self.gid)
+            to_it_alone, self._encode(message), attachment=attachment, block=self._blocks
         )
 
-    def _build(self, args: tuple[Any, ...], fields: dict[str, Any]) -> M:
+    def _build(self, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
+        if len(args) == 1 and getattr(args[0], "_type_hash", "") == self.message_type._type_hash:
+            return args[0]  # the same type, compiled elsewhere
         try:
             return self.message_type(*args, **fields)
         except TypeError as error:
@@ -140,9 +142,8 @@ class Publisher(Endpoint, Generic[M]):
         """Send what was held, in order, and hold no more."""
         with self._ordered:
             held, self._held = self._held, None
-            if not self.closed or not self.node.context.session.closed:
-                for payload, attachment in held or ():
-                    self._put(payload, attachment)
+            for payload, attachment in held or ():
+                self._put(payload, attachment)
 
     def _finish(self) -> None:
         context = self.node.context
@@ -157,16 +158,7 @@ class Publisher(Endpoint, Generic[M]):
     def subscribers(self) -> list[Token]:
         """Return the subscriptions that this publisher reaches: same topic, type and hash."""
         view = self.node.context.graph.view()
-        return [token for token in view.subscriptions(self.name) if self.reaches(token)]
-
-    def reaches(self, token: Token) -> bool:
-        """Tell whether a subscription gets what is published here."""
-        return (
-            token.kind is Kind.SUBSCRIPTION
-            and token.name == self.name
-            and token.type_name == self.token.type_name
-            and token.type_hash == self.token.type_hash
-        )
+        return [token for token in view.subscriptions(self.name) if self.matches(token)]
 
     def wait_for_subscribers(self, count: int = 1, timeout: float = 10.0) -> None:
         """Wait until at least so many subscriptions are reached.
@@ -180,29 +172,46 @@ class Publisher(Endpoint, Generic[M]):
             ClosedError: The context was shut down meanwhile.
         """
         self.node.context.graph.wait_for(
-            lambda view: sum(map(self.reaches, view.subscriptions(self.name))) >= count,
+            lambda view: sum(map(self.matches, view.subscriptions(self.name))) >= count,
             timeout,
             f"{count} subscriber(s) of '{self.name}' with type '{self.token.type_name}'",
         )
 
     def on_connection(
         self,
-        connected: Callable[[SubscriberLink[M]], None] | None = None,
-        disconnected: Callable[[str], None] | None = None,
+        connected: Callable[[SubscriberLink[M]], object] | None = None,
+        disconnected: Callable[[str], object] | None = None,
     ) -> None:
         """Have subscriptions told as they come and go, those that exist already first.
+
+        Both run on a thread of their own, one at a time; what they raise is logged.
 
         Args:
             connected: Gets the link, whose ``publish`` reaches that subscription alone.
             disconnected: Gets the full name of the node.
         """
+        pool = Pool(1, f"rosz-links{self.name}")
+
+        def tell(token: Token, alive: bool) -> None:
+            if self.closed:
+                return
+            try:
+                if alive and connected is not None:
+                    connected(SubscriberLink(self, token))
+                elif not alive and disconnected is not None:
+                    disconnected(token.node_name)
+            except Exception as error:  # noqa: BLE001  # the callback boundary
+                if not (self.closed and isinstance(error, ClosedError)):
+                    self.node.log.report(f"connection callback of '{self.name}' failed", error)
 
         def changed(token: Token, alive: bool) -> None:
-            if not self.reaches(token):
-                return
-            if alive and connected is not None:
-                connected(SubscriberLink(self, token))
-            elif not alive and disconnected is not None:
-                disconnected(token.node_name)
+            if self.matches(token):
+                pool.run(lambda: tell(token, alive))
 
         self._declared.append(self.node.listen(changed))
+
+    def disown(self, reason: str) -> None:
+        """Refuse everything from now on, touching neither threads nor links: after a fork."""
+        super().disown(reason)
+        self._ordered = threading.Lock()
+        self._held = []

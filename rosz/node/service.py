@@ -51,7 +51,7 @@ class Service(Endpoint):
                 self.key, lambda query: self._pool.run(lambda: self._serve(query)), complete=True
             )
         )
-        self._announce()
+        self.announce()
 
     def _serve(self, query: Query) -> None:
         with query:
@@ -79,7 +79,7 @@ class Service(Endpoint):
         message = types.Request._decode(request)
         try:
             result = self._handler(message)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self.node.log.exception("handler of service '%s' failed", self.name)
             raise ServiceError(f"error processing request: {error}") from error
         try:

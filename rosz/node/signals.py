@@ -1,11 +1,12 @@
 """Ctrl-C and SIGTERM: the first asks politely, the second leaves.
 
 A program that asks whether it is shut down, or waits through rosz, is told in that way and ends by
-itself. One that never does, such as a loop around ``time.sleep``, gets ``KeyboardInterrupt``.
+itself. One that never does, such as a loop around ``time.sleep``, is interrupted by an exception.
 
 Python runs a signal's handler in the main thread between two steps, and one that comes right before
 that thread begins to wait for a lock is not seen until the wait ends. So a thread of its own is
-told as well, through a pipe that the interpreter writes to from the signal itself.
+told as well, through a pipe that the interpreter writes to from the signal itself, and acts. Where
+the pipe belongs to somebody else, such as an event loop, the handler has to.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rosz.node.context import Context
 
-__all__ = ("install",)
+__all__ = ("install", "release")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_FD = -1
@@ -30,70 +31,98 @@ _NO_FD = -1
 def install(context: Context) -> None:
     """Have signals shut a context down, where the program has not taken them itself.
 
-    Nothing happens outside the main thread, or for a signal that has another handler already.
+    Nothing happens outside the main thread, or for a signal that has another handler already. A
+    signal that finds all contexts shut down does what it would do without rosz.
     """
     if threading.current_thread() is not threading.main_thread():
         return
+    handlers = [signal.getsignal(number) for number in _SIGNALS]
+    for present in handlers:
+        if isinstance(present, _Handler):
+            present.add(context)
+            return
     defaults = (signal.default_int_handler, signal.SIG_DFL)
-    taken = [number for number in _SIGNALS if signal.getsignal(number) in defaults]
-    if not taken:
-        return
-    handler = _Handler(context)
-    for number in taken:
-        signal.signal(number, handler)
-    _Watcher(context, taken).start()
+    taken = [n for n, present in zip(_SIGNALS, handlers, strict=True) if present in defaults]
+    if taken:
+        handler = _Handler(taken)
+        handler.add(context)
+        for number in taken:
+            signal.signal(number, handler)
+
+
+def release() -> None:
+    """Give the signals back: in a forked child, whose pipe is still that of its parent."""
+    for number in _SIGNALS:
+        handler = signal.getsignal(number)
+        if isinstance(handler, _Handler):
+            handler.let_go(number)
 
 
 class _Handler:
-    """Runs in the main thread, between two of its steps."""
+    """Who is told of the signals of a process."""
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        self._seen = False
-
-    def __call__(self, number: int, _frame: FrameType | None) -> None:
-        if self._seen:
-            _leave(number)
-        self._seen = True
-        _shut_down(self._context, number)
-        if not self._context.cooperative:
-            raise KeyboardInterrupt
-
-
-class _Watcher(threading.Thread):
-    """Hears of signals while the main thread waits for a lock."""
-
-    def __init__(self, context: Context, numbers: list[signal.Signals]) -> None:
-        super().__init__(name="rosz-signal-watch", daemon=True)
-        self._context = context
+    def __init__(self, numbers: list[signal.Signals]) -> None:
         self._numbers = numbers
+        self._contexts: list[Context] = []
+        self._asked = False
         self._reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)
         previous = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
         if previous != _NO_FD:
             signal.set_wakeup_fd(previous)  # an event loop of the program has it; leave it there
+        threading.Thread(target=self._watch, name="rosz-signal-watch", daemon=True).start()
 
-    def run(self) -> None:
-        seen = False
+    def add(self, context: Context) -> None:
+        """Shut this context down, too."""
+        self._contexts = [*(c for c in self._contexts if not c.is_shutdown), context]
+        self._asked = False
+
+    def __call__(self, number: int, _frame: FrameType | None) -> None:
+        """Run in the main thread, between two of its steps."""
+        contexts = self._contexts
+        if not self._asked and all(context.is_shutdown for context in contexts):
+            self.let_go(number)
+            signal.raise_signal(number)
+            return
+        if not self._is_watching():
+            self._hear(number)
+        if not all(context.cooperative for context in contexts):
+            if number == signal.SIGINT:
+                raise KeyboardInterrupt
+            raise SystemExit(128 + number)
+
+    def let_go(self, number: int) -> None:
+        """Have a signal do what it would do without rosz."""
+        if self._is_watching():
+            signal.set_wakeup_fd(_NO_FD)
+        default = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+        signal.signal(number, default)
+
+    def _is_watching(self) -> bool:
+        own = self._writer.fileno()
+        present = signal.set_wakeup_fd(own, warn_on_full_buffer=False)
+        if present != own:
+            signal.set_wakeup_fd(present)
+        return present == own
+
+    def _watch(self) -> None:
         while data := self._reader.recv(64):
             for number in data:
-                if number not in self._numbers:
-                    continue
-                if seen:
-                    _leave(number)
-                seen = True
-                _shut_down(self._context, number)
+                if number in self._numbers:
+                    self._hear(number)
 
-
-def _shut_down(context: Context, number: int) -> None:
-    """Shut down on a thread: this one may hold a lock that is needed, or has to hear of more."""
-    reason = signal.Signals(number).name
-    threading.Thread(
-        target=context.shutdown, args=(reason,), name="rosz-signal", daemon=True
-    ).start()
-
-
-def _leave(number: int) -> None:
-    """End the process at once, telling where every thread stood."""
-    faulthandler.dump_traceback()
-    os._exit(128 + number)
+    def _hear(self, number: int) -> None:
+        if self._asked:
+            # End the process at once, telling where every thread stood.
+            faulthandler.dump_traceback()
+            os._exit(128 + number)
+        live = [context for context in self._contexts if not context.is_shutdown]
+        self._asked = bool(live)
+        for context in live:
+            # On another thread: this one may hold a lock that is needed, or has to hear of more.
+            threading.Thread(
+                target=context.shutdown,
+                args=(signal.Signals(number).name,),
+                name="rosz-signal",
+                daemon=True,
+            ).start()

@@ -1,0 +1,133 @@
+"""What samples of one topic and type become: messages, and where they come from."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rosz.errors import DecodeError
+from rosz.node.logger import NodeLogger
+from rosz.wire import unpack
+
+if TYPE_CHECKING:
+    from rosz.message import Message
+    from rosz.session import Reply, Sample
+
+__all__ = ("Channel", "MessageInfo", "Taken")
+
+_KINDS_OF_DAMAGE = 10
+_SENDERS = 1000
+
+
+class MessageInfo(msgspec.Struct, frozen=True):
+    """Where a message comes from.
+
+    Attributes:
+        source_time: Nanoseconds since the Unix epoch when it was published, by the sender's clock;
+            0 where unknown.
+        reception_time: Nanoseconds since the Unix epoch when it was dispatched here.
+        sequence: Number within its publisher, from 1; 0 where unknown, or for what was sent to this
+            subscription alone.
+        gid: 16 bytes that identify the publisher; empty where unknown.
+        lost: Samples of that publisher missing right before this one: lost, or pushed out of the
+            queue by newer ones.
+        type_name: ``pkg/msg/Name``.
+    """
+
+    source_time: int
+    reception_time: int
+    sequence: int
+    gid: bytes
+    lost: int
+    type_name: str
+
+
+Taken = tuple[Any, MessageInfo]
+"""A message with its info."""
+
+
+class Channel:
+    """Decodes samples, numbers them, and drops what is damaged or was there before.
+
+    Args:
+        topic: For the log.
+        type_name: ``pkg/msg/Name``.
+        message_type: Class to decode into; bytes are passed on as they are when not given.
+        log: Told of damage, once per kind.
+    """
+
+    def __init__(
+        self, topic: str, type_name: str, message_type: type[Message] | None, log: NodeLogger
+    ) -> None:
+        self._topic = topic
+        self._type_name = type_name
+        self._decode: Callable[[bytes], Any] | None = None
+        self._has_header = False
+        if message_type is not None:
+            self._decode = message_type._decode
+            self._has_header = message_type._has_header
+        self._log = log
+        self._last: dict[bytes, int] = {}
+        self._replayed: set[bytes] = set()
+        self._complained: set[str] = set()
+
+    def expect_replay(self, gid: bytes) -> None:
+        """Take note that samples of a publisher may come twice: live, and from its cache."""
+        self._replayed.add(gid)
+
+    def forget(self, gid: bytes) -> None:
+        """Take note that a publisher is gone."""
+        self._last.pop(gid, None)
+        self._replayed.discard(gid)
+
+    def take(self, sample: Sample | Reply) -> Taken | None:
+        """Decode one sample; ``None`` when it is damaged or was there before."""
+        try:
+            info = self._origin(sample.attachment)
+            if info is None:
+                return None
+            payload = sample.payload
+            message: Any = payload if self._decode is None else self._decode(payload)
+        except DecodeError as error:
+            self._complain(error)
+            return None
+        if self._has_header:
+            # ROS 1 code reads the sequence number from there.
+            message.header.seq = info.sequence
+        return message, info
+
+    def _origin(self, attachment: bytes | None) -> MessageInfo | None:
+        """Read the attachment, and count what is missing; ``None`` for a sample seen before."""
+        now = time.time_ns()
+        if attachment is None:
+            return MessageInfo(0, now, 0, b"", 0, self._type_name)
+        origin = unpack(attachment)
+        gid, sequence = origin.gid, origin.sequence
+        lost = 0
+        if sequence > 0:
+            last = self._last.get(gid)
+            if last is None:
+                self._make_room()
+            elif sequence <= last and gid in self._replayed:
+                return None
+            else:
+                lost = max(sequence - last - 1, 0)
+            self._last[gid] = sequence
+        return MessageInfo(origin.source_time, now, sequence, gid, lost, self._type_name)
+
+    def _make_room(self) -> None:
+        """Forget the oldest sender: those that are not in the graph are never told to have gone."""
+        if len(self._last) >= _SENDERS:
+            self._last.pop(next(iter(self._last)), None)
+
+    def _complain(self, error: DecodeError) -> None:
+        """Log damage once per kind, so that a broken sender does not fill the disk."""
+        kind = f"{error.type_name}: {error.reason}"
+        if kind not in self._complained and len(self._complained) < _KINDS_OF_DAMAGE:
+            self._complained.add(kind)
+            self._log.warning(
+                "dropping damaged samples on '%s' (told once): %.300s", self._topic, error
+            )
