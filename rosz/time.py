@@ -9,7 +9,7 @@ the seconds.
 from __future__ import annotations
 
 import numbers
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import msgspec
 
@@ -185,10 +185,15 @@ class TimeValue(_Value):
 
     __radd__ = __add__
 
-    def __sub__(self, other: object) -> Any:
+    @overload
+    def __sub__(self, other: TimeValue) -> DurationValue: ...
+    @overload
+    def __sub__(self, other: DurationValue) -> Self: ...
+    def __sub__(self, other: object) -> DurationValue | Self:
         if isinstance(other, TimeValue):
-            nanoseconds = normal(self.sec - other.sec, self.nanosec - other.nanosec)
-            return self._duration_class(*nanoseconds)
+            difference = normal(self.sec - other.sec, self.nanosec - other.nanosec)
+            duration: DurationValue = self._duration_class(*difference)
+            return duration
         if isinstance(other, DurationValue):
             return self._of(self.sec - other.sec, self.nanosec - other.nanosec)
         return NotImplemented
@@ -237,14 +242,22 @@ class DurationValue(_Value):
 
     __rmul__ = __mul__
 
-    def __floordiv__(self, divisor: object) -> Any:
+    @overload
+    def __floordiv__(self, divisor: float) -> Self: ...
+    @overload
+    def __floordiv__(self, divisor: DurationValue) -> int: ...
+    def __floordiv__(self, divisor: object) -> Self | int:
         if isinstance(divisor, numbers.Real):
             return self.from_sec(self.to_sec() // float(divisor))
         if isinstance(divisor, DurationValue):
             return int(self.to_sec() // divisor.to_sec())
         return NotImplemented
 
-    def __truediv__(self, divisor: object) -> Any:
+    @overload
+    def __truediv__(self, divisor: float) -> Self: ...
+    @overload
+    def __truediv__(self, divisor: DurationValue) -> float: ...
+    def __truediv__(self, divisor: object) -> Self | float:
         if isinstance(divisor, numbers.Real):
             return self.from_sec(self.to_sec() / float(divisor))
         if isinstance(divisor, DurationValue):

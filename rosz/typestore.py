@@ -169,8 +169,10 @@ class TypeStore:
             if package in done:
                 continue
             messages, services = (self._own_names(package, kind) for kind in ("msg", "srv"))
+            if self._folder(package) is None:
+                raise PackageNotFound(package, self.packages(), self._searched())
             if not messages and not services:
-                raise TypeNotFound(package, self._why_not(package, "msg", ""))
+                raise TypeNotFound(package, f"package '{package}' has no types of its own")
             done[package] = generate(package, messages, services, self._catalog, self._place)
             specs = [self._catalog.message(name) for name in messages]
             for name in services:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 
 import msgspec
 
-from rosz.errors import DefinitionError, TypeNotFound
+from rosz.errors import DefinitionError, TypeNotFound, near_miss
 from rosz.idl.grammar import parse_message, parse_service
-from rosz.idl.spec import Field, MessageSpec, ServiceSpec
+from rosz.idl.spec import PRIMITIVES, Field, MessageSpec, ServiceSpec
 
 __all__ = ("Catalog", "Definition")
 
@@ -99,8 +99,10 @@ class Catalog:
         try:
             return self._message(base)
         except TypeNotFound as error:
+            written = field.type.written
+            hint = "" if "/" in written else near_miss(written.lower(), PRIMITIVES)
             raise DefinitionError(
-                f"type '{field.type.written}' of field '{field.name}': {error}",
+                f"type '{written}' of field '{field.name}': {error}{hint}",
                 spec.path,
                 field.line,
                 field.column,

@@ -132,13 +132,11 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
         if parsed is None:
             continue
         if parsed.name in taken:
-            kind = "constant" if isinstance(parsed, Constant) else "field"
-            column = line.index(parsed.name, line.index(parsed.name)) + 1
             raise DefinitionError(
-                f"{kind} '{parsed.name}' has the name of line {taken[parsed.name]}",
+                f"'{parsed.name}' is declared already, in line {taken[parsed.name]}",
                 path,
                 number,
-                _name_column(line, parsed.name) or column,
+                _name_column(line, parsed.name),
             )
         taken[parsed.name] = number
         if isinstance(parsed, Constant):
@@ -149,7 +147,8 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
 
 
 def _name_column(line: str, name: str) -> int:
-    found = re.search(rf"\s({re.escape(name)})\b", line)
+    """Return the 1-based column of the name that a line declares."""
+    found = re.search(rf"[ \t]({re.escape(name)})\b", line)
     return found.start(1) + 1 if found else 0
 
 

@@ -36,6 +36,10 @@ class LiteralError(Exception):
         super().__init__(reason)
 
 
+class _RangeError(LiteralError):
+    """A number of the right sort that is too large or too small."""
+
+
 def read_constant(kind: str, line: str, start: int) -> tuple[Scalar, str]:
     """Read the value of a constant: what is right of its ``=``.
 
@@ -81,7 +85,13 @@ def read_default(field: FieldType, line: str, start: int) -> tuple[Value, int]:
     bare = _BARE.match(line, start)
     if bare is None:
         raise LiteralError(start, f"expected a default of type {field.base}")
-    return _scalar(field.base, bare[0], start), bare.end()
+    try:
+        return _scalar(field.base, bare[0], start), bare.end()
+    except _RangeError:
+        raise
+    except LiteralError as error:
+        reason = f"expected a default of type {field.base}, or a comment after '#', got '{bare[0]}'"
+        raise LiteralError(start, reason) from error
 
 
 def _list(field: FieldType, line: str, start: int) -> tuple[Value, int]:
@@ -174,7 +184,7 @@ def _scalar(kind: str, text: str, at: int) -> Scalar:
     value = _integer(text)
     low, high = _RANGES[kind]
     if not low <= value <= high:
-        raise LiteralError(at, f"{text} is outside the range of {kind} ({low} to {high})")
+        raise _RangeError(at, f"{text} is outside the range of {kind} ({low} to {high})")
     return value
 
 

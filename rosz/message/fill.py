@@ -1,0 +1,229 @@
+"""Setting fields of messages from what a person wrote: on a command line, in a launch file.
+
+Lenient where a person writes and strict where a mistake hides: fields may be left out and stand
+positionally in a list, times may be ``now``, headers ``auto``; but a name that is no field, or a
+value of another sort, is an error that names the field.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import keyword
+import math
+from collections.abc import Mapping
+from typing import Any, NoReturn
+
+from rosz.errors import EncodeError, near_miss
+from rosz.message.base import Message, Sequenced
+from rosz.message.numbers import numbers
+from rosz.message.schema import ARRAY_CODES, OCTETS, SCALAR_CODES, Slot, slots
+from rosz.time import DurationValue, TimeValue, normal
+
+__all__ = ("fill_message_args", "shown_name")
+
+_NOT_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
+_FLOATS = frozenset({"float32", "float64"})
+_TEXTS = frozenset({"string", "wstring"})
+_SIZES = {"?": 1, "b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8}
+_FEW = 60
+_SEQ = Slot("seq", "uint32", 0, "one", 0)
+
+
+def fill_message_args(msg: Message, msg_args: Any, keys: Mapping[str, Any] | None = None) -> None:
+    """Set fields of a message from what a command line gave, as genpy's function does.
+
+    Args:
+        msg: The message.
+        msg_args: A dict of fields; a list with one such dict; a list of all fields in order; or
+            None, which is an empty list.
+        keys: Values that names in the arguments stand for where a time, a duration or a message is
+            expected. With a ``now`` among them, ``auto`` is a header with that time.
+
+    Raises:
+        EncodeError: A name is no field of its message, a value does not fit its field, or there are
+            too many or too few.
+    """
+    if isinstance(msg_args, list) and len(msg_args) == 1 and isinstance(msg_args[0], dict):
+        msg_args = msg_args[0]
+    _Filler(msg._type, keys or {}).fill(msg, [] if msg_args is None else msg_args, "")
+
+
+def shown_name(slot: Slot) -> str:
+    """Return the name of a field as its definition has it: Python's words without the ``_``."""
+    bare = slot.name.removesuffix("_")
+    return bare if keyword.iskeyword(bare) else slot.name
+
+
+class _Filler:
+    def __init__(self, type_name: str, keys: Mapping[str, Any]) -> None:
+        self._type = type_name
+        self._keys = keys
+
+    def _refuse(self, path: str, expected: str, value: Any) -> NoReturn:
+        text = repr(value)
+        text = text if len(text) <= _FEW else text[: _FEW - 1] + "…"
+        given = f"{type(value).__name__} {text}" if value is not None else "nothing"
+        raise EncodeError(self._type, path, f"expected {expected}, got {given}")
+
+    def fill(self, message: Message, value: Any, path: str) -> None:
+        """Set the fields of a message from a dict or a list."""
+        cls = type(message)
+        prefix = f"{path}." if path else ""
+        if isinstance(value, dict):
+            for name, one in value.items():
+                slot = self._slot(cls, name, path)
+                member = "" if one is None and slot.kind in _TEXTS else one
+                setattr(message, slot.name, self._value(slot, member, f"{prefix}{name}", message))
+            return
+        if not isinstance(value, list | tuple):
+            self._refuse(path, f"{cls._type} as a dict or a list", value)
+        fields = self._positional(cls, len(value), path)
+        for slot, one in zip(fields, value, strict=True):
+            setattr(message, slot.name, self._value(slot, one, prefix + slot.name, message))
+
+    def _positional(self, cls: type[Message], count: int, path: str) -> list[Slot]:
+        fields = list(slots(cls))
+        if issubclass(cls, Sequenced) and count == len(fields) + 1:
+            return [_SEQ, *fields]  # as ROS 1 counts
+        if count != len(fields):
+            names = ", ".join(shown_name(slot) for slot in fields) or "none"
+            raise EncodeError(
+                self._type,
+                path,
+                f"expected {len(fields)} values for the fields of {cls._type} ({names}),"
+                f" got {count}",
+            )
+        return fields
+
+    def _slot(self, cls: type[Message], name: Any, path: str) -> Slot:
+        known = {shown_name(slot): slot for slot in slots(cls)}
+        if issubclass(cls, Sequenced):
+            known["seq"] = _SEQ
+        if issubclass(cls, TimeValue | DurationValue):
+            known |= {"secs": known["sec"], "nsecs": known["nanosec"]}
+        if name in known:
+            return known[name]
+        alias = getattr(cls, name, None) if isinstance(name, str) else None
+        if isinstance(alias, property) and name.lower() in known:  # CameraInfo.K
+            return known[name.lower()]
+        fields = near_miss(str(name), known) or f"; it has {', '.join(known) or 'no fields'}"
+        raise EncodeError(self._type, path, f"{cls._type} has no field '{name}'{fields}")
+
+    def _value(self, slot: Slot, value: Any, path: str, owner: Message) -> Any:
+        if slot.shape == "one":
+            return self._one(slot, value, path, getattr(owner, slot.name))
+        if isinstance(slot.kind, str) and slot.kind in OCTETS and isinstance(value, str):
+            value = self._base64(value, path)
+        if not isinstance(value, list | tuple | bytes | bytearray) and not hasattr(value, "tolist"):
+            self._refuse(path, f"a list of {_kind(slot)}", value)
+        if slot.shape == "fixed" and len(value) != slot.size:
+            self._refuse(path, f"{slot.size} elements", value)
+        if slot.shape == "bounded" and len(value) > slot.size:
+            self._refuse(path, f"at most {slot.size} elements", value)
+        return self._elements(slot, value, path)
+
+    def _elements(self, slot: Slot, value: Any, path: str) -> Any:
+        if isinstance(slot.kind, str) and slot.kind in OCTETS and isinstance(value, bytes):
+            return value
+        elements = [
+            self._one(slot, one, f"{path}[{index}]", None) for index, one in enumerate(value)
+        ]
+        if isinstance(slot.kind, str):
+            if slot.kind in OCTETS:
+                return bytes(element & 0xFF for element in elements)
+            if slot.kind in ARRAY_CODES:
+                return numbers(elements, ARRAY_CODES[slot.kind])
+        return elements
+
+    def _one(self, slot: Slot, value: Any, path: str, before: Any) -> Any:
+        kind = slot.kind
+        if not isinstance(kind, str):
+            return self._message(kind, value, path, before)
+        if kind in _TEXTS:
+            if isinstance(value, bool | int | float):
+                self._refuse(path, f"{kind} (quote it: \"'{value}'\")", value)
+            if not isinstance(value, str):
+                self._refuse(path, kind, value)
+            return value
+        if kind in _FLOATS:
+            return self._float(kind, value, path)
+        if kind == "bool":
+            if value not in (True, False, 0, 1) or isinstance(value, float):
+                self._refuse(path, kind, value)
+            return bool(value)
+        return self._integer(kind, value, path)
+
+    def _integer(self, kind: str, value: Any, path: str) -> int:
+        if isinstance(value, bytes) and len(value) == 1 and kind in OCTETS:
+            return value[0]
+        if not hasattr(value, "__index__"):
+            self._refuse(path, kind, value)
+        number: int = value.__index__()
+        bits = 8 * _SIZES[SCALAR_CODES[kind]]
+        signed = kind.startswith("int") or kind == "byte"
+        low = -(1 << bits - 1) if signed else 0
+        high = (1 << (bits if kind[0] == "u" or kind in OCTETS else bits - 1)) - 1
+        if not low <= number <= high:
+            self._refuse(path, f"{kind} ({low} to {high})", value)
+        return number
+
+    def _float(self, kind: str, value: Any, path: str) -> float:
+        if isinstance(value, str):
+            try:  # YAML 1.1 takes 1e-5 and inf for texts
+                return _NOT_FINITE[value] if value in _NOT_FINITE else float(value)
+            except ValueError:
+                self._refuse(path, kind, value)
+        if isinstance(value, bool) or not hasattr(value, "__float__"):
+            self._refuse(path, kind, value)
+        return float(value)
+
+    def _base64(self, value: str, path: str) -> bytes:
+        try:
+            octets = base64.b64decode(value, validate=True)
+        except binascii.Error:
+            self._refuse(path, "a list of octets, or Base64", value)
+        return octets
+
+    def _message(self, cls: Any, value: Any, path: str, before: Any) -> Message:
+        if isinstance(value, Message):
+            return value
+        if isinstance(value, str) and value:
+            return self._named(cls, value, path)
+        if isinstance(value, int) and issubclass(cls, TimeValue | DurationValue):
+            return self._build(cls, *normal(0, value))  # nanoseconds
+        if isinstance(value, float) and issubclass(cls, TimeValue | DurationValue):
+            self._refuse(path, "nanoseconds as an integer, {secs: …, nsecs: …} or 'now'", value)
+        message: Message = before if isinstance(before, cls) else cls()
+        self.fill(message, {} if value in (None, "") else value, path)
+        return message
+
+    def _named(self, cls: Any, name: str, path: str) -> Message:
+        """Return what a name stands for where a message is expected."""
+        now = self._keys.get("now")
+        if name == "now" and now is not None and issubclass(cls, TimeValue):
+            return self._time(cls, now)
+        if name == "auto" and now is not None and issubclass(cls, Sequenced):
+            header = self._build(cls)
+            stamp: Any = header
+            stamp.stamp = self._time(type(stamp.stamp), now)
+            return header
+        value = self._keys.get(name)
+        if not isinstance(value, Message):
+            known = sorted({*self._keys, *(("auto",) if now is not None else ())})
+            choice = f" or one of {', '.join(known)}" if known else ""
+            self._refuse(path, cls._type + choice, name)
+        return value
+
+    def _time(self, cls: Any, now: Any) -> Message:
+        time = now() if callable(now) else now
+        return self._build(cls, time.sec, time.nanosec)
+
+    def _build(self, cls: Any, *members: Any) -> Message:
+        message: Message = cls(*members)
+        return message
+
+
+def _kind(slot: Slot) -> str:
+    kind: str = slot.kind if isinstance(slot.kind, str) else slot.kind._type
+    return kind

@@ -1,0 +1,120 @@
+"""ROS 1's hashes against those in the message modules that ROS 1 installs."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from rosz.idl import message_md5, parse_service, service_md5
+from rosz.typestore import TypeStore
+
+from .definitions import catalog_of
+
+INSTALLED = Path("/usr/lib/python3/dist-packages")
+RULE = "=" * 80 + "\nMSG: "
+
+# Pinned, as ROS 1 has known them for ever.
+KNOWN = {
+    "std_msgs/String": "992ce8a1687cec8c8bd883ec73ca41d1",
+    "std_msgs/Header": "2176decaecbce78abc3b96ef049fabed",
+    "std_msgs/Empty": "d41d8cd98f00b204e9800998ecf8427e",
+    "std_msgs/Time": "cd7166c74c552c311fbcc2fe5a7bc289",
+    "geometry_msgs/Twist": "9f195f881246fdfa2798d1d3eebca84a",
+    "geometry_msgs/PoseStamped": "d3812c3cbc69362b77dc0b19b345f8f5",
+    "geometry_msgs/TransformStamped": "b5764a33bfeb3588febc2682852579b0",
+    "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
+    "sensor_msgs/Image": "060021388200f6f0f447d0fcd9c64743",
+    "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
+    "sensor_msgs/JointState": "3066dcd76a6cfaef579bd0f34173e9fd",
+    "sensor_msgs/PointCloud2": "1158d486dd51d683ce2f1be655c3c181",
+    "tf2_msgs/TFMessage": "94810edda583a504dfda3829e70d7eec",
+}
+
+
+@pytest.mark.parametrize(("name", "expected"), KNOWN.items())
+def test_shipped_messages(name: str, expected: str) -> None:
+    assert TypeStore().message(name)._md5sum == expected
+
+
+def test_shipped_services() -> None:
+    store = TypeStore()
+    assert store.service("std_srvs/SetBool")._md5sum == "09fb03525b03e7ea1fd3992bafd87e16"
+    assert store.service("std_srvs/Empty")._md5sum == "d41d8cd98f00b204e9800998ecf8427e"
+    assert store.service("rospy_tutorials/AddTwoInts")._md5sum == "6a2e34150c00229791cc89ff309fff21"
+
+
+def test_rule() -> None:
+    text = "# c\nint32 x 7\nuint8 A=007 # c\nstring S= a # b \n\nB[] b\ntime[] t\n"
+    text += "builtin_interfaces/Duration d"
+    ros1 = "uint8 A=007\nstring S=a # b\nint32 x\n{} b\ntime[] t\nduration d"
+    catalog = catalog_of(
+        {
+            "p/msg/A": text,
+            "p/msg/B": "",
+            "builtin_interfaces/msg/Time": "int32 sec",
+            "builtin_interfaces/msg/Duration": "int32 sec",
+        }
+    )
+    from hashlib import md5
+
+    inner = md5(b"").hexdigest()
+    expected = md5(ros1.format(inner).encode()).hexdigest()
+    assert message_md5(catalog.message("p/msg/A"), catalog) == expected
+
+
+def installed() -> list[tuple[str, str, str]]:
+    """Return the type, full text and hash of every message class that ROS 1 installed."""
+    found = []
+    for file in sorted(INSTALLED.glob("*/msg/_*.py")) + sorted(INSTALLED.glob("*/srv/_*.py")):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if not isinstance(node, ast.ClassDef):
+                continue
+            values = {
+                target.id: statement.value.value
+                for statement in node.body
+                if isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Constant)
+                for target in statement.targets
+                if isinstance(target, ast.Name)
+            }
+            if isinstance(values.get("_full_text"), str):
+                found.append((str(values["_type"]), values["_full_text"], str(values["_md5sum"])))
+    return found
+
+
+INSTALLED_TYPES = installed()
+
+
+def full(name: str) -> str:
+    return name if name.count("/") == 2 else name.replace("/", "/msg/")
+
+
+@pytest.mark.skipif(not INSTALLED_TYPES, reason="needs Debian's ROS 1 message packages")
+def test_every_installed_message() -> None:
+    assert len(INSTALLED_TYPES) > 100
+    for name, full_text, expected in INSTALLED_TYPES:
+        own, *below = (full_text + "\n").split(RULE)
+        texts = {full(name): own}
+        for part in below:
+            other, _, text = part.partition("\n")
+            texts[full(other)] = text
+        stamps = {"builtin_interfaces/msg/Time": "", "builtin_interfaces/msg/Duration": ""}
+        catalog = catalog_of({**stamps, **texts})
+        assert message_md5(catalog.message(full(name)), catalog) == expected, name
+
+
+@pytest.mark.skipif(not INSTALLED_TYPES, reason="needs Debian's ROS 1 message packages")
+def test_shipped_types_that_ros_1_has_too() -> None:
+    """Most of what both worlds have means the same in both, and hashes so."""
+    store = TypeStore()
+    both = {name: md5 for name, _, md5 in INSTALLED_TYPES if name in store.names("msg")}
+    different = {name for name, md5 in both.items() if store.message(name)._md5sum != md5}
+    assert len(both) > 100
+    assert len(different) < len(both) / 6
+
+
+def test_services_hash_both_halves() -> None:
+    catalog = catalog_of({})
+    spec = parse_service("p/srv/S", "int64 a\nint64 b\n---\nint64 sum")
+    assert service_md5(spec, catalog) == "6a2e34150c00229791cc89ff309fff21"
