@@ -99,9 +99,8 @@ class Session:
                 settings = zenoh.Config.from_json5(json.dumps(zenoh_settings(config)))
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
-        with mapped(f"open a session ({', '.join(config.endpoints)})"):
-            with _one_receiver():
-                return cls(zenoh.open(settings))
+        with mapped(f"open a session ({', '.join(config.endpoints)})"), _one_receiver():
+            return cls(zenoh.open(settings))
 
     def stamp(self) -> Stamp:
         """Return a new stamp, later than all that this session gave or was shown."""
@@ -237,7 +236,7 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        handler = zenoh.handlers.RingChannel(depth)
+        handler: Any = zenoh.handlers.RingChannel(depth)
         return Ring(key, self._subscribe(key, handler, history, recover, None))
 
     def _subscribe(
