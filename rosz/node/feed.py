@@ -21,8 +21,8 @@ __all__ = ("Feed", "Handler", "Take")
 Take = Callable[[Any], "Taken | None"]
 """Decodes a sample; ``None`` for one to leave out."""
 
-Handler = Callable[[Taken], None]
-"""Gets a message with its info, and must not raise."""
+Handler = Callable[[Take, Any], None]
+"""Gets a sample with what decodes it, and must not raise."""
 
 _FOREVER = threading.TIMEOUT_MAX / 2
 
@@ -61,14 +61,15 @@ class Feed:
             wake()
 
     def run(self, handle: Handler) -> None:
-        """Hand messages over until closed; the work of a dispatch thread."""
-        ring, bell = self._ring, self._bell
+        """Hand samples over until closed; the work of a dispatch thread."""
         while not self.closed:
-            bell.acquire()
-            while ring and not self.closed:
-                taken = self._pop()
-                if taken is not None:
-                    handle(taken)
+            self._bell.acquire()
+            while not self.closed:
+                try:
+                    take, sample = self._ring.popleft()
+                except IndexError:
+                    break
+                handle(take, sample)
         self._ring_bell()
 
     def _pop(self) -> Taken | None:

@@ -11,7 +11,7 @@ from rosz.errors import DecodeError, RoszError
 from rosz.node.channel import Channel, Taken
 from rosz.node.endpoint import Endpoint, Withdrawal
 from rosz.node.history import ask_for_history
-from rosz.node.reader import Reader, depth_of
+from rosz.node.reader import Reader
 from rosz.qos import QoS
 from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid, ros_type
 
@@ -59,9 +59,8 @@ class GenericSubscription(Reader[Any]):
         self._declared: list[Closable] = []
         node.context.check_open()
         key = endpoint_key(node.context.domain, topic, "*", "*")
-        self._declared.append(node.context.session.subscriber(key, self._deliver))
+        self._declared.append(self._subscribe(key, self._take))
         self._declared.append(node.listen(self._follow))
-        self._start()
 
     @property
     def types(self) -> list[str]:
@@ -71,9 +70,6 @@ class GenericSubscription(Reader[Any]):
     def publishers(self) -> list[Token]:
         """Return the publishers of the topic."""
         return self.node.context.graph.view().publishers(self.name)
-
-    def _deliver(self, sample: Sample | Reply) -> None:
-        self._feed.put(self._take, sample)
 
     def _take(self, sample: Sample | Reply) -> Taken | None:
         *_, dds, type_hash = sample.key.split("/")
@@ -125,7 +121,7 @@ class GenericSubscription(Reader[Any]):
         self._show(publisher, channel)
         if publisher.qos.latched:
             channel.expect_replay(sender)
-            ask_for_history(self.node, publisher, self._deliver, depth_of(self.qos))
+            ask_for_history(self.node, publisher, partial(self._put, channel.take), self._depth)
 
     def _show(self, publisher: Token, channel: Channel) -> None:
         """Announce a subscription of a publisher's type, with an address of its own."""
@@ -137,7 +133,7 @@ class GenericSubscription(Reader[Any]):
             if self.closed:
                 return
             self._faces[kind] = face
-        deliver = partial(self._feed.put, channel.take)
+        deliver = partial(self._put, channel.take)
         face.also_close(Withdrawal(self.node.context.inbox.open(face.token.entity_id, deliver)))
         face.announce(watch=False)
 

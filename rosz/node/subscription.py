@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rosz.node.channel import Channel
 from rosz.node.endpoint import Endpoint, Withdrawal
 from rosz.node.history import ask_for_history
-from rosz.node.reader import Reader, depth_of
+from rosz.node.reader import Reader
 from rosz.qos import QoS
 from rosz.wire import Kind, Token, format_token, gid
 
@@ -47,21 +47,20 @@ class Subscription(Reader[M], Endpoint):
         Reader.__init__(self, node, topic, callback, qos, with_info=with_info)
         self.message_type = message_type
         self._channel = Channel(topic, type_name, None if raw else message_type, node.log)
-        self._deliver = partial(self._feed.put, self._channel.take)
         context = node.context
         self._declared.append(
-            context.session.subscriber(
+            self._subscribe(
                 self.key,
-                self._deliver,
+                self._channel.take,
                 history=qos.depth if qos.latched else 0,
                 recover=qos.latched and qos.reliable,
             )
         )
+        self._deliver = partial(self._put, self._channel.take)
         self._declared.append(Withdrawal(context.inbox.open(self.token.entity_id, self._deliver)))
         self.announce()
         if not qos.latched:
             self._declared.append(node.listen(self._follow))
-        self._start()
 
     def _follow(self, publisher: Token, alive: bool) -> None:
         """Ask a latching publisher for what it sent before it knew of this subscription."""
@@ -70,7 +69,7 @@ class Subscription(Reader[M], Endpoint):
         sender = gid(format_token(publisher))
         if alive:
             self._channel.expect_replay(sender)
-            ask_for_history(self.node, publisher, self._deliver, depth_of(self.qos))
+            ask_for_history(self.node, publisher, self._deliver, self._depth)
         else:
             self._channel.forget(sender)
 
