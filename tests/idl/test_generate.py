@@ -143,8 +143,7 @@ def test_generated_modules_satisfy_mypy(tmp_path: Path) -> None:
     (tmp_path / "out" / "user.py").write_text(USER)
     top = str(Path(rosz.__file__).parents[1])
     done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache")]
-        + ["--follow-imports=silent", "user.py", "gripper", "shared"],
+        [sys.executable, "-m", "mypy", *MYPY, "user.py", "gripper", "shared"],
         cwd=tmp_path / "out",
         env={"MYPYPATH": top, "PATH": "/usr/bin:/bin"},
         capture_output=True,
