@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
+from .network import Network
 from .ros1 import Ros1, available
 
 # ROSZ_EXAMPLES=20000 makes a night of it.
@@ -25,3 +26,10 @@ def ros1() -> Iterator[Ros1]:
     worker = Ros1()
     yield worker
     worker.close()
+
+
+@pytest.fixture
+def network() -> Iterator[Network]:
+    found = Network()
+    yield found
+    found.close()

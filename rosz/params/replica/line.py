@@ -1,0 +1,178 @@
+"""How writes travel: told to all, acknowledged by each, told again to who seems to miss them."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from rosz.errors import DecodeError, RoszError
+from rosz.params.keys import Keys
+from rosz.params.merge import Change
+from rosz.params.paths import joined
+from rosz.params.replica.acks import Acks, Pending
+from rosz.params.replica.members import Members
+from rosz.params.replica.state import State
+from rosz.params.replica.worker import Worker
+from rosz.params.wire import Batch, decode, encode
+from rosz.session import Closable, Query, Reply, Sample, Session, Stamp
+
+__all__ = ("Line",)
+
+_log = logging.getLogger("rosz.params")
+
+_LARGE: Final = 16_384
+"""Bytes of a message above which it is not read on Zenoh's thread."""
+
+_PATIENCE: Final = 0.25
+"""Seconds after which those that have not acknowledged a write are told it once more."""
+
+
+class Line:
+    """The writes of one replica, going out and coming in.
+
+    Args:
+        session: The network.
+        keys: Where.
+        state: What takes in the writes of others.
+        worker: Where large ones are read.
+        kept: Calls a function once all that the state has taken in is safe.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        keys: Keys,
+        state: State,
+        worker: Worker,
+        kept: Callable[[Callable[[], None]], None],
+    ) -> None:
+        self.acks = Acks()
+        self._session = session
+        self._keys = keys
+        self._state = state
+        self._worker = worker
+        self._kept = kept
+        self._own = session.zid.encode()
+        self._declared: list[Closable] = [
+            session.subscriber(keys.change, self._on_change, remote_only=True),
+            session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
+            session.queryable(keys.write(session.zid), self._on_retry, complete=True),
+        ]
+
+    def tell(
+        self, changes: list[Change], stamp: Stamp, origin: str, members: Members, timeout: float
+    ) -> tuple[str, ...]:
+        """Tell all members what was written, and wait until they have it.
+
+        Args:
+            changes: What was written, of which those that lie deeper come later.
+            stamp: When.
+            origin: Who wrote it.
+            members: Who is to have it.
+            timeout: Seconds; 0 does not wait.
+
+        Returns:
+            What people call those that did not acknowledge it in time.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The session cannot send.
+        """
+        deadline = time.monotonic() + timeout
+        pending = self.acks.open(members.zids if timeout > 0 else ())
+        try:
+            batch = Batch.of(pending.number, (stamp.time, stamp.id), origin, changes)
+            data = encode(batch)
+            self._session.put(self._keys.change, data)
+            if not pending.wait(min(_PATIENCE, timeout)):
+                self._tell_again(pending, data, deadline - time.monotonic())
+                pending.wait(deadline - time.monotonic())
+        finally:
+            late = sorted(members.label(zid) for zid in self.acks.close(pending))
+        if late:
+            _warn(changes, late, timeout)
+        return tuple(late)
+
+    def close(self) -> None:
+        """Undeclare all, and wait for nobody any more."""
+        for declared in self._declared:
+            declared.close()
+        self.acks.give_up()
+
+    def _tell_again(self, pending: Pending, data: bytes, timeout: float) -> None:
+        if timeout <= 0:
+            return
+        for zid in sorted(pending.waiting.copy()):
+            self._session.get_async(
+                self._keys.write(zid),
+                partial(self._on_confirmed, zid, pending.number),
+                lambda: None,
+                payload=data,
+                timeout=timeout,
+            )
+
+    def _on_confirmed(self, zid: str, number: int, reply: Reply) -> None:
+        if reply.ok:
+            self.acks.heard(zid, number)
+
+    def _on_change(self, sample: Sample) -> None:
+        payload = sample.payload
+        if len(payload) > _LARGE or self._state.busy():
+            self._worker.submit(lambda: self._take(payload))
+        else:
+            self._take(payload)
+
+    def _take(self, payload: bytes) -> None:
+        batch = self._apply(payload)
+        if batch is not None:
+            self._kept(lambda: self._acknowledge(batch.clock, batch.number))
+
+    def _apply(self, payload: bytes) -> Batch | None:
+        try:
+            batch = decode(payload, Batch)
+            self._state.apply(batch.writes())
+        except DecodeError as error:
+            _log.warning("a replica wrote what is no parameter: %s", error)
+            return None
+        return batch
+
+    def _acknowledge(self, writer: str, number: int) -> None:
+        try:
+            # Called on Zenoh's thread: an acknowledgement lost on a full link is asked for again,
+            # but one that waits for the link would hold up all that comes in.
+            self._session.put(self._keys.ack(writer), b"%d %s" % (number, self._own), block=False)
+        except RoszError as error:
+            _log.debug("a write is not acknowledged: %s", error)
+
+    def _on_ack(self, sample: Sample) -> None:
+        number, _, zid = sample.payload.partition(b" ")
+        if number.isdigit() and zid.isalnum():
+            self.acks.heard(zid.decode(), int(number))
+
+    def _on_retry(self, query: Query) -> None:
+        payload = query.payload or b""
+        self._worker.submit(lambda: self._take_again(query, payload))
+
+    def _take_again(self, query: Query, payload: bytes) -> None:
+        if self._apply(payload) is None:
+            query.close()
+        else:
+            self._kept(lambda: self._confirm(query))
+
+    def _confirm(self, query: Query) -> None:
+        with query:
+            query.reply(query.key, b"")
+
+
+def _warn(changes: list[Change], late: list[str], timeout: float) -> None:
+    more = f" and {len(changes) - 1} more" if len(changes) > 1 else ""
+    _log.warning(
+        "'%s'%s is written, but not yet known to %s, which did not answer within %g s",
+        joined(changes[0][0]) if changes else "/",
+        more,
+        ", ".join(late),
+        timeout,
+    )

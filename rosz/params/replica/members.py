@@ -1,0 +1,88 @@
+"""The replicas that are alive, by their liveliness tokens."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from rosz.errors import DecodeError
+from rosz.params.keys import Keys, Member
+from rosz.session import Closable, Session
+
+__all__ = ("Members",)
+
+_log = logging.getLogger("rosz.params")
+
+
+class Members:
+    """All replicas of a domain except for this one.
+
+    Args:
+        session: Where to look.
+        keys: The keys of the domain.
+
+    Attributes:
+        zids: Their sessions; replaced, never changed in place.
+    """
+
+    def __init__(self, session: Session, keys: Keys) -> None:
+        self.zids: frozenset[str] = frozenset()
+        self._session = session
+        self._keys = keys
+        self._found: dict[str, Member] = {}
+        self._changed: Callable[[Member, bool], None] | None = None
+        self._watch: Closable | None = None
+
+    def follow(self, changed: Callable[[Member, bool], None]) -> None:
+        """Begin to look.
+
+        Args:
+            changed: Gets a replica and whether it appeared, on a Zenoh thread.
+
+        Raises:
+            ClosedError: The session is closed.
+        """
+        self._changed = changed
+        self._watch = self._session.tokens(self._keys.tokens, self._on_token)
+
+    def look(self, timeout: float) -> None:
+        """Ask for those that are there now.
+
+        Args:
+            timeout: Seconds.
+
+        Raises:
+            ClosedError: The session is closed.
+        """
+        for token in self._session.live_tokens(self._keys.tokens, timeout):
+            self._on_token(token, True)
+
+    def all(self) -> list[Member]:
+        """Return them, the oldest first."""
+        return sorted(self._found.copy().values())
+
+    def label(self, zid: str) -> str:
+        """Return what people call a replica."""
+        member = self._found.get(zid)
+        return member.label if member is not None else f"session {zid}"
+
+    def close(self) -> None:
+        """Look no more; again is no error."""
+        if self._watch is not None:
+            self._watch.close()
+
+    def _on_token(self, token: str, alive: bool) -> None:
+        try:
+            member = self._keys.member(token)
+        except DecodeError as error:
+            _log.warning("%s", error)
+            return
+        if member.zid == self._session.zid or (alive and self._found.get(member.zid) == member):
+            return
+        if alive:
+            self._found[member.zid] = member
+        else:
+            self._found.pop(member.zid, None)
+        self.zids = frozenset(self._found.copy())
+        if self._changed is not None:
+            self._changed(member, alive)

@@ -1,0 +1,232 @@
+"""Two replicas finding out what differs between them, and settling it.
+
+The asker sends its digest. Where the other's is the same, that is all. Otherwise the asker sends
+the index of the buckets that differ; the other answers with the writes that the asker lacks and the
+paths of those that it lacks itself, and the asker sends these. A replica that joins has nothing
+yet, and gets everything with the first answer.
+
+All of it is done on the replica's worker; what Zenoh calls only hands over to it.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+import time
+from collections.abc import Callable
+from functools import partial
+from queue import Empty, SimpleQueue
+from typing import Final
+
+from rosz.errors import DecodeError, RoszError
+from rosz.params.digest import Digest
+from rosz.params.keys import Keys, Member
+from rosz.params.replica.members import Members
+from rosz.params.replica.state import State
+from rosz.params.replica.worker import Worker
+from rosz.params.wire import (
+    Index,
+    Record,
+    Sync,
+    SyncAnswer,
+    decode,
+    encode,
+    join_path,
+    split_path,
+)
+from rosz.params.writes import DELETED, Write
+from rosz.session import Query, Session
+
+__all__ = ("Synchroniser",)
+
+_log = logging.getLogger("rosz.params")
+
+_NOTHING: Final = Digest().to_bytes()
+_TIMEOUT: Final = 5.0
+_PATIENCE: Final = 0.3
+"""Seconds that a joining replica gives one other before it asks the next as well."""
+
+_JOINED_BY: Final = 5.0
+_SPREAD: Final = 0.05
+"""Seconds over which replicas that find each other spread their questions, for each ten of them."""
+
+
+class Synchroniser:
+    """Keeps one replica the same as the others.
+
+    Args:
+        session: The network.
+        keys: Where to ask.
+        state: What is kept the same.
+        members: Whom to ask.
+        worker: Where it is done.
+
+    Attributes:
+        ready: Whether this replica has what the others had when it came.
+        busy: Those that it is comparing itself with.
+    """
+
+    def __init__(
+        self, session: Session, keys: Keys, state: State, members: Members, worker: Worker
+    ) -> None:
+        self.ready = False
+        self.session = session
+        self.keys = keys
+        self.state = state
+        self.members = members
+        self.worker = worker
+        self.busy: set[str] = set()
+
+    def join(self) -> None:
+        """Get what the others have, from the first that has it and answers."""
+        answers: SimpleQueue[bool] = SimpleQueue()
+        asked: list[str] = []
+        open_questions = 0
+        deadline = time.monotonic() + _JOINED_BY
+        while time.monotonic() < deadline:
+            for member in self.members.all():
+                if member.zid not in asked:
+                    asked.append(member.zid)
+                    self.worker.submit(partial(self._compare, member.zid, answers.put))
+                    open_questions += 1
+                    break
+            if not open_questions:
+                break
+            try:
+                if answers.get(timeout=_PATIENCE):
+                    break
+                open_questions -= 1
+            except Empty:
+                continue
+        else:
+            labels = ", ".join(self.members.label(zid) for zid in asked)
+            _log.warning("no replica of the parameters answered in %g s: %s", _JOINED_BY, labels)
+        self.ready = True
+
+    def serve(self, query: Query) -> None:
+        """Answer another replica."""
+        payload = query.payload or b""
+        self.worker.submit(lambda: self._answer(query, payload))
+
+    def meet(self, member: Member) -> None:
+        """Compare with a replica that has appeared, at a moment that not all choose alike."""
+        spread = _SPREAD * (1 + len(self.members.zids) / 10)
+        delay = random.uniform(0, spread)  # noqa: S311  # nothing secret
+        self.worker.later(delay, lambda: self._compare(member.zid))
+
+    def compare_with_one(self) -> None:
+        """Compare with a replica chosen by chance."""
+        zids = sorted(self.members.zids)
+        if zids:
+            zid = random.choice(zids)  # noqa: S311  # nothing secret
+            self.worker.submit(lambda: self._compare(zid))
+
+    def compare_with_all(self, done: Callable[[bool], object]) -> int:
+        """Compare with every replica; return how many times ``done`` will be called."""
+        zids = sorted(self.members.zids)
+        for zid in zids:
+            self.worker.submit(partial(self._compare, zid, done))
+        return len(zids)
+
+    def _compare(self, zid: str, done: Callable[[bool], object] = bool) -> None:
+        if zid in self.busy:
+            done(False)
+            return
+        self.busy.add(zid)
+        _Comparison(self, zid, done).start()
+
+    def _answer(self, query: Query, payload: bytes) -> None:
+        with query:
+            try:
+                sync = decode(payload, Sync)
+                self.state.apply([record.write() for record in sync.records])
+                answer = SyncAnswer(digest=self.state.digest(), ready=self.ready)
+                if sync.digest == _NOTHING:
+                    answer.records = [Record.of(write) for write in self.state.writes()]
+                if sync.index is not None:
+                    self._settle(sync.index, answer)
+            except DecodeError as error:
+                _log.warning("a replica sent what is no comparison: %s", error)
+                query.reply_error(str(error))
+                return
+            query.reply(query.key, encode(answer))
+
+    def _settle(self, index: Index, answer: SyncAnswer) -> None:
+        theirs = {path: (time_, clock) for path, time_, clock in index.entries}
+        for write in self.state.bucket(index.buckets):
+            known = theirs.get(join_path(write.path))
+            if known is None or known < (write.time, write.clock):
+                answer.records.append(Record.of(write))
+        for path, (time_, clock) in theirs.items():
+            if not self.state.hides(Write(split_path(path), time_, clock, DELETED)):
+                answer.wanted.append(path)
+
+
+class _Comparison:
+    """One talk with one other replica, from its digest to the last write that was missing."""
+
+    def __init__(self, owner: Synchroniser, zid: str, done: Callable[[bool], object]) -> None:
+        self._owner = owner
+        self._zid = zid
+        self._done = done
+        self._ready = False
+
+    def start(self) -> None:
+        self._ask(Sync(digest=self._state.digest()), self._on_digest)
+
+    @property
+    def _state(self) -> State:
+        return self._owner.state
+
+    def _on_digest(self, answer: SyncAnswer) -> None:
+        self._ready = answer.ready
+        buckets = self._state.differing(answer.digest)
+        if not buckets:
+            self._end()
+            return
+        entries = [
+            (join_path(write.path), write.time, write.clock)
+            for write in self._state.bucket(buckets)
+        ]
+        self._ask(Sync(index=Index(buckets, entries)), self._on_index)
+
+    def _on_index(self, answer: SyncAnswer) -> None:
+        found = [self._state.find(split_path(path)) for path in answer.wanted]
+        records = [Record.of(write) for write in found if write is not None]
+        if records:
+            self._ask(Sync(records=records), lambda _: self._end())
+        else:
+            self._end()
+
+    def _ask(self, sync: Sync, then: Callable[[SyncAnswer], None]) -> None:
+        answers: list[bytes] = []
+        key = self._owner.keys.sync(self._zid)
+        worker = self._owner.worker
+        try:
+            self._owner.session.get_async(
+                key,
+                lambda reply: answers.append(reply.payload) if reply.ok else None,
+                lambda: worker.submit(lambda: self._on_answer(answers, then)),
+                payload=encode(sync),
+                timeout=_TIMEOUT,
+            )
+        except RoszError:
+            self._end(failed=True)
+            raise
+
+    def _on_answer(self, answers: list[bytes], then: Callable[[SyncAnswer], None]) -> None:
+        if not answers:
+            self._end(failed=True)
+            return
+        try:
+            answer = decode(answers[0], SyncAnswer)
+            self._state.apply([record.write() for record in answer.records])
+            then(answer)
+        except DecodeError as error:
+            label = self._owner.members.label(self._zid)
+            _log.warning("the replica in %s answered nonsense: %s", label, error)
+            self._end(failed=True)
+
+    def _end(self, *, failed: bool = False) -> None:
+        self._owner.busy.discard(self._zid)
+        self._done(self._ready and not failed)

@@ -1,0 +1,342 @@
+from __future__ import annotations
+
+import logging
+import threading
+import time
+
+import pytest
+
+from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
+from rosz.params.keys import Keys, Member
+from rosz.params.replica import Replica
+from rosz.session import HybridClock, Stamp
+
+from .network import Network, until
+
+
+class SkewedClock(HybridClock):
+    """A clock that is wrong by so many seconds, until it sees a later stamp."""
+
+    def __init__(self, clock_id: str, seconds: float) -> None:
+        super().__init__(clock_id)
+        self._off = int(seconds * 1e9)
+        self._shown = 0
+        self._gate = threading.Lock()
+
+    def now(self) -> Stamp:
+        with self._gate:
+            stamp = super().now()
+            self._shown = max(self._shown + 1, stamp.time + self._off)
+            return Stamp(self._shown, stamp.id)
+
+    def observe(self, stamp: Stamp) -> None:
+        with self._gate:
+            self._shown = max(self._shown, stamp.time)
+
+
+def test_a_set_that_returned_is_seen_by_all(network: Network) -> None:
+    replicas = network.replicas(4)
+    for number in range(50):
+        writer = replicas[number % 4]
+        assert writer.set("/count", number).slow == ()
+        assert [replica.get("/count") for replica in replicas] == [number] * 4
+
+
+def test_a_newcomer_has_everything(network: Network) -> None:
+    first = network.replica()
+    first.set("/a/b", [1, {"c": "d"}])
+    first.set("/gone", 1)
+    first.delete("/gone")
+    later = network.replica()
+    assert later.root == {"a": {"b": [1, {"c": "d"}]}}
+    assert later.digest() == first.digest()
+    assert later.origin("/a/b") == first.label
+
+
+def test_a_newcomer_with_nobody_there_starts_empty_at_once(network: Network) -> None:
+    begun = time.monotonic()
+    assert network.replica().root == {}
+    assert time.monotonic() - begun < 1
+
+
+def test_domains_do_not_see_each_other(network: Network) -> None:
+    here, there = network.replica(1), network.replica(2)
+    assert here.set("/a", 1).slow == ()
+    assert not there.has("/a")
+    assert there.members() == []
+
+
+def test_the_store_lives_while_any_replica_does(network: Network) -> None:
+    first, second = network.replicas(2)
+    first.set("/a", 1)
+    first.close()
+    until(lambda: second.members() == [])
+    third = network.replica()
+    assert third.get("/a") == 1
+
+
+def test_reading(network: Network) -> None:
+    replica = network.replica(label="me")
+    replica.set("/ns", {"b": {"c": 1}, "a": [2], "e": {}})
+    assert replica.get("/ns/b") == {"c": 1}
+    assert replica.names() == ["/ns/a", "/ns/b/c"]
+    assert replica.has("/ns/e")
+    assert not replica.has("/ns/b/c/d")
+    assert replica.search("b", "/ns/x/y") == "/ns/b"
+    assert replica.search("q", "/ns/x/y") is None
+    assert replica.origin("/ns/b/c") == "me"
+    assert replica.origin("/nowhere") == ""
+    assert replica.root == {"ns": {"b": {"c": 1}, "a": [2], "e": {}}}
+
+
+def test_what_is_read_is_the_readers_own(network: Network) -> None:
+    replica = network.replica()
+    value = {"list": [1]}
+    replica.set("/a", value)
+    value["list"].append(2)
+    replica.get("/a")["list"].append(3)
+    assert replica.get("/a") == {"list": [1]}
+
+
+def test_a_missing_name_is_a_key_error_with_its_near_miss(network: Network) -> None:
+    replica = network.replica()
+    replica.set("/robot/max_speed", 1)
+    with pytest.raises(KeyError, match="'/robot/max_sped' is not set; did you mean"):
+        replica.get("/robot/max_sped")
+    with pytest.raises(ParamNotFound, match=r"'/robot/max_speed/x' is not set$"):
+        replica.delete("/robot/max_speed/x")
+
+
+def test_what_is_refused_is_written_nowhere(network: Network) -> None:
+    one, other = network.replicas(2)
+    with pytest.raises(ParamError, match="null is no parameter value"):
+        one.set("/a", None)
+    with pytest.raises(ParamError, match="the root of all parameters is a dict"):
+        one.set("/", 5)
+    with pytest.raises(ParamError, match="'/' cannot be deleted"):
+        one.delete("/")
+    with pytest.raises(InvalidName, match="it is not global"):
+        one.set("a", 1)
+    assert one.root == other.root == {}
+
+
+def test_a_dict_replaces_and_a_merge_does_not(network: Network) -> None:
+    one, other = network.replicas(2)
+    one.set("/a", {"x": 1, "y": 2})
+    one.set("/a", {"y": 3})
+    assert other.get("/a") == {"y": 3}
+    one.merge("/a", {"x": {"z": 4}})
+    assert other.get("/a") == {"x": {"z": 4}, "y": 3}
+    assert one.merge("/a", {}).time == 0
+    one.set("/", {"b": 1})
+    assert other.root == {"b": 1}
+
+
+def test_all_writers_agree_in_the_end(network: Network) -> None:
+    replicas = network.replicas(4)
+
+    def write(replica: Replica, seed: int) -> None:
+        for number in range(60):
+            name = f"/n{(seed * 7 + number) % 5}"
+            if number % 11 == 10 and replica.has(name):
+                try:
+                    replica.delete(name)
+                except ParamNotFound:
+                    continue
+            elif number % 3:
+                replica.set(f"{name}/x{number % 4}", [seed, number])
+            else:
+                replica.set(name, {"whole": seed})
+
+    threads = [
+        threading.Thread(target=write, args=(replica, seed))
+        for seed, replica in enumerate(replicas)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {replica.digest() for replica in replicas} == {replicas[0].digest()}
+    assert all(replica.root == replicas[0].root for replica in replicas)
+
+
+def test_a_batch_is_one_change_for_every_reader(network: Network) -> None:
+    writer, reader = network.replicas(2)
+    writer.merge("/", {f"k{number}": 0 for number in range(300)})
+    stop = threading.Event()
+    mixed: list[set[int]] = []
+
+    def watch() -> None:
+        while not stop.is_set():
+            seen = set(reader.root.values())
+            if len(seen) != 1:
+                mixed.append(seen)
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    for value in range(1, 30):
+        writer.merge("/", {f"k{number}": value for number in range(300)})
+    stop.set()
+    thread.join()
+    assert mixed == []
+
+
+def test_large_values_arrive_whole(network: Network) -> None:
+    one, other = network.replicas(2)
+    text = "x" * 10_000_000
+    assert one.set("/text", text, timeout=20).slow == ()
+    assert other.get("/text") == text
+    many = {f"ns{number % 100}/p{number}": number for number in range(20_000)}
+    assert one.merge("/many", many, timeout=20).slow == ()
+    assert len(other.names()) == 20_001
+    assert other.digest() == one.digest()
+
+
+def test_readers_do_not_wait_for_large_loads(network: Network) -> None:
+    one, other = network.replicas(2)
+    one.set("/rate", 5)
+    many = {f"p{number}": number for number in range(20_000)}
+    thread = threading.Thread(target=lambda: one.merge("/many", many, timeout=20))
+    thread.start()
+    waits = []
+    while thread.is_alive():
+        begun = time.perf_counter()
+        assert other.get("/rate") == 5
+        waits.append(time.perf_counter() - begun)
+    assert sorted(waits)[len(waits) // 2] < 0.001
+    assert max(waits) < 0.2
+
+
+@pytest.mark.parametrize("seconds", [-10.0, 10.0])
+def test_a_wrong_clock_loses_nothing(network: Network, seconds: float) -> None:
+    right = network.replica()
+    session = network.session()
+    session.clock = SkewedClock(session.zid, seconds)
+    wrong = network.join(session)
+    until(lambda: len(right.members()) == 1)
+    for number in range(20):
+        right.set("/a", ("right", number))
+        assert wrong.get("/a") == ["right", number]
+        wrong.set("/a", ("wrong", number))
+        assert right.get("/a") == ["wrong", number]
+        wrong.delete("/a")
+        assert not right.has("/a")
+
+
+class Mute:
+    """Something that looks like a replica and never answers."""
+
+    def __init__(self, network: Network) -> None:
+        session = network.session()
+        self.member = Member(1, session.zid, "mute program (pid 7 on elsewhere)")
+        self.token = session.token(Keys(0).token(self.member))
+        network.keep(self.token)
+
+
+def test_a_replica_that_does_not_answer_is_named_once_and_then_not_waited_for(
+    network: Network, caplog: pytest.LogCaptureFixture
+) -> None:
+    one, other = network.replicas(2)
+    Mute(network)
+    until(lambda: len(one.members()) == 2)
+    begun = time.monotonic()
+    with caplog.at_level(logging.WARNING, "rosz.params"):
+        outcome = one.set("/a/b", 1, timeout=0.4)
+    assert 0.3 < time.monotonic() - begun < 2
+    assert outcome.slow == ("mute program (pid 7 on elsewhere)",)
+    assert [record.getMessage() for record in caplog.records] == [
+        "'/a/b' is written, but not yet known to mute program (pid 7 on elsewhere), "
+        "which did not answer within 0.4 s"
+    ]
+    assert other.get("/a/b") == 1
+    begun = time.monotonic()
+    assert one.set("/a/b", 2, timeout=5).slow == ()
+    assert time.monotonic() - begun < 1
+
+
+def test_a_replica_that_goes_is_not_waited_for(network: Network) -> None:
+    one = network.replica()
+    mute = Mute(network)
+    until(lambda: len(one.members()) == 1)
+    timer = threading.Timer(0.2, mute.token.close)
+    timer.start()
+    begun = time.monotonic()
+    assert one.set("/a", 1, timeout=8).slow == ()
+    assert time.monotonic() - begun < 4
+    timer.join()
+
+
+def test_joining_does_not_hang_on_a_replica_that_is_mute(network: Network) -> None:
+    Mute(network)
+    first = network.replica()
+    first.set("/a", 1, timeout=0.1)
+    begun = time.monotonic()
+    second = network.replica()
+    assert time.monotonic() - begun < 4
+    assert second.get("/a") == 1
+
+
+def test_a_write_that_got_lost_is_told_once_more(network: Network) -> None:
+    one, deaf = network.replicas(2)
+    deaf._line._declared[0].close()
+    assert one.set("/a", 1, timeout=5).slow == ()
+    assert deaf.get("/a") == 1
+
+
+def test_what_was_missed_is_found_by_comparing(network: Network) -> None:
+    one, deaf = network.replicas(2)
+    one.set("/old", 1)
+    for declared in (deaf._line._declared[0], deaf._line._declared[2]):
+        declared.close()
+    for number in range(300):
+        one.set(f"/n/{number}", number, timeout=0)
+    one.delete("/old", timeout=0)
+    deaf.set("/only", "here", timeout=0)
+    assert deaf.root == {"old": 1, "only": "here"}
+    assert deaf.compare(5)
+    assert deaf.root == one.root == {"n": {str(n): n for n in range(300)}, "only": "here"}
+    assert deaf.digest() == one.digest()
+    assert one.compare(5)
+
+
+def test_those_that_meet_again_compare_unasked(network: Network) -> None:
+    one, deaf = network.replicas(2)
+    for declared in (deaf._line._declared[0], deaf._line._declared[2]):
+        declared.close()
+    one.set("/a", 1, timeout=0)
+    deaf._members._on_token(Keys(0).token(one._own), False)
+    assert deaf.members() == []
+    deaf._members._on_token(Keys(0).token(one._own), True)
+    until(lambda: deaf.has("/a"))
+
+
+def test_leaving_is_seen_and_ends_writing(network: Network) -> None:
+    one, other = network.replicas(2)
+    with one:
+        one.set("/a", 1)
+    one.close()
+    assert one.closed
+    until(lambda: other.members() == [])
+    with pytest.raises(ClosedError, match="parameter store of this process is closed"):
+        one.set("/a", 2)
+    assert one.get("/a") == 1
+    assert repr(one).endswith("writes, closed>")
+    assert repr(other) == "<Replica of 1 writes, 0 others>"
+
+
+def test_what_nobody_wrote_is_survived(network: Network, caplog: pytest.LogCaptureFixture) -> None:
+    replica = network.replica()
+    stranger = network.session()
+    keys = Keys(0)
+    until(lambda: stranger.peers() == [replica.zid])
+    junk = [b"", b"\xff", b"\x93", b"[1,2,3]", b"\xc1" * 50, b"\x96\x01\xff\xa1x\xa1y\x90\x90"]
+    for data in junk:
+        stranger.put(keys.change, data)
+        stranger.put(keys.ack(replica.zid), data)
+        for key in (keys.sync, keys.write, keys.ask):
+            stranger.get(key(replica.zid), payload=data, timeout=5)
+    stranger.token(f"{keys.tokens[:-3]}/nonsense").close()
+    assert replica.set("/a", 1).slow == ()
+    assert replica.root == {"a": 1}
+    assert any("wrote what is no parameter" in record.message for record in caplog.records)
+    assert not [record for record in caplog.records if record.levelno >= logging.ERROR]

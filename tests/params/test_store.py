@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+import datetime as dt
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+
+from rosz.errors import StoreError
+from rosz.params.history import History
+from rosz.params.store import Store
+from rosz.params.writes import Write, delete, put
+
+from .network import Network, until
+from .strategies import writes
+
+WRITER = """
+import sys
+from pathlib import Path
+from rosz.params.store import Store
+from rosz.params.writes import put
+store = Store(Path(sys.argv[1]))
+for number in range(1, 1_000_000):
+    store.save([put(("n", str(number % 50)), (number, "c"), number)])
+    print(number, flush=True)
+"""
+
+
+def saved(path: Path, *batches: list[Write]) -> History:
+    store = Store(path)
+    for batch in batches:
+        store.save(batch)
+    store.close()
+    return loaded(path)
+
+
+def loaded(path: Path) -> History:
+    store = Store(path)
+    history = History()
+    history.apply(store.load())
+    store.close()
+    return history
+
+
+@given(writes())
+def test_what_is_saved_comes_back(
+    tmp_path_factory: pytest.TempPathFactory, batch: list[Write]
+) -> None:
+    history = History()
+    news = [write for one in batch for write in history.apply([one])]
+    path = tmp_path_factory.mktemp("store") / "params"
+    again = saved(path, news)
+    assert again.root == history.root
+    assert again.digest() == history.digest()
+    assert {write.origin for write in again.writes()} == {
+        write.origin for write in history.writes()
+    }
+
+
+def test_what_is_hidden_leaves_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    saved(
+        path,
+        [put(("a", "b"), (1, "c"), 1), put(("a b",), (1, "c"), 1), put(("a", "c"), (9, "c"), 1)],
+        [delete(("a",), (5, "c"))],
+    )
+    base = sqlite3.connect(path)
+    assert base.execute("SELECT path FROM writes ORDER BY path").fetchall() == [
+        ("a",),
+        ("a b",),
+        ("a/c",),
+    ]
+    base.close()
+    saved(path, [put((), (20, "c"), {})])
+    assert len(loaded(path)) == 1
+
+
+def test_replacing_drops_all_else(tmp_path: Path) -> None:
+    store = Store(tmp_path / "params")
+    store.save([put(("a",), (1, "c"), 1), delete(("b",), (2, "c"))])
+    moment = dt.datetime(2024, 1, 2, tzinfo=dt.UTC)
+    store.replace([put(("c",), (3, "c"), {"when": moment, "raw": b"\x00"})])
+    assert [(write.path, write.value) for write in store.load()] == [
+        (("c",), {"when": moment, "raw": b"\x00"})
+    ]
+    store.close()
+    store.close()
+
+
+def test_a_file_in_use_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    store = Store(path)
+    with pytest.raises(StoreError, match=f"'{path}' is in use by another process"):
+        Store(path)
+    store.close()
+    Store(path).close()
+
+
+def test_another_programs_database_is_refused_and_left(tmp_path: Path) -> None:
+    path = tmp_path / "other"
+    base = sqlite3.connect(path)
+    base.execute("CREATE TABLE t (x)")
+    base.commit()
+    base.close()
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match=f"'{path}' is a database, but not one of parameters"):
+        Store(path)
+    assert path.read_bytes() == before
+
+
+def test_another_version_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    saved(path, [])
+    base = sqlite3.connect(path)
+    base.execute("PRAGMA user_version = 7")
+    base.close()
+    with pytest.raises(StoreError, match="is of version 7, expected 1"):
+        Store(path)
+
+
+@pytest.mark.parametrize("offset", [0, 20, 40, 4096, 4100, 8192])
+def test_a_damaged_file_is_refused_by_name_and_left(tmp_path: Path, offset: int) -> None:
+    path = tmp_path / "params"
+    batch = [put(("n", str(number)), (number + 1, "c"), "x" * 50) for number in range(200)]
+    saved(path, batch)
+    content = bytearray(path.read_bytes())
+    content[offset : offset + 64] = b"\xa5" * 64
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=str(path)):
+        Store(path)
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("place", [0, 0.3, 0.6, 0.9])
+def test_one_wrong_byte_in_a_value_is_noticed(tmp_path: Path, place: float) -> None:
+    path = tmp_path / "params"
+    saved(path, [put(("n", str(n)), (n + 1, "c"), "x" * 50) for n in range(200)])
+    content = bytearray(path.read_bytes())
+    at = content.index(b"x" * 50, int(len(content) * place)) + 25
+    content[at] = ord("y")
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=f"'{path}' is damaged .*the sum of '/n/"):
+        loaded(path)
+    assert path.read_bytes() == content
+
+
+def test_a_damaged_value_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    saved(path, [put(("a",), (1, "c"), 1)])
+    base = sqlite3.connect(path)
+    base.execute("UPDATE writes SET value = x'c1'")
+    base.commit()
+    base.close()
+    store = Store(path)
+    with pytest.raises(StoreError, match=f"'{path}' is damaged"):
+        store.load()
+    store.close()
+
+
+@pytest.mark.parametrize("content", [b"no database at all, but text" * 40, b"x"])
+def test_a_file_that_is_no_database_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "params"
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=f"'{path}' is damaged"):
+        Store(path)
+    assert path.read_bytes() == content
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "none" / "params"
+    with pytest.raises(StoreError, match=f"cannot open '{path}': unable to open database file"):
+        Store(path)
+
+
+def test_a_kill_loses_nothing_that_was_saved(tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    writer = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True
+    )
+    assert writer.stdout is not None
+    told = 0
+    while told < 30:
+        told = int(writer.stdout.readline())
+    os.kill(writer.pid, signal.SIGKILL)
+    rest = writer.stdout.read().split()
+    writer.stdout.close()
+    writer.wait(10)
+    told = max([told, *map(int, rest)])
+    history = loaded(path)
+    assert told <= history.latest <= told + 1
+    assert len(history) == min(history.latest, 50)
+
+
+def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    keeper = network.replica(keep=Store(path))
+    other = network.replica()
+    until(lambda: len(keeper.members()) == 1)
+    other.set("/a", {"b": 1, "c": 2})
+    keeper.delete("/a/b")
+    other.set("/late", 5)
+    assert loaded_while_open(path) == {"a": {"c": 2}, "late": 5}
+    keeper.close()
+    other.close()
+    again = network.replica(keep=Store(path))
+    assert again.root == {"a": {"c": 2}, "late": 5}
+    newer = again.set("/a", 1)
+    assert newer.time > 0
+    again.close()
+    assert loaded(path).root == {"a": 1, "late": 5}
+
+
+def loaded_while_open(path: Path) -> dict[str, object]:
+    """Read a copy of the file as a power cut would have left it."""
+    copy = path.with_name("copy")
+    for suffix in ("", "-wal"):
+        source = path.with_name(path.name + suffix)
+        if source.exists():
+            copy.with_name(copy.name + suffix).write_bytes(source.read_bytes())
+    return loaded(copy).root
