@@ -137,6 +137,17 @@ class Program:
                 stream.close()
 
 
+class _Joined:
+    """A thread as a thing that can be closed."""
+
+    def __init__(self, thread: threading.Thread) -> None:
+        self._thread = thread
+
+    def close(self) -> None:
+        self._thread.join(PATIENCE)
+        assert not self._thread.is_alive(), "a thread of the test hangs"
+
+
 class Network:
     """A meeting point and a domain that nobody else has.
 
@@ -200,6 +211,13 @@ class Network:
         """
         command = [sys.executable, "-c", dedent(script), *argv]
         return self._keep(Program(command, self.variables(**variables)))
+
+    def thread(self, function: Callable[[], object]) -> threading.Thread:
+        """Run a function on a thread that the test waits for in the end."""
+        thread = threading.Thread(target=function, daemon=True)
+        thread.start()
+        self._open.append(_Joined(thread))
+        return thread
 
     def _keep(self, thing: T) -> T:
         self._open.append(thing)

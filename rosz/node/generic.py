@@ -128,14 +128,15 @@ class GenericSubscription(Reader[Any]):
         kind = (publisher.type_name, publisher.type_hash)
         if kind in self._faces:
             return
-        face = Endpoint(self.node, Kind.SUBSCRIPTION, self.name, *kind, self.qos)
         with self._closing:
             if self.closed:
                 return
+            face = Endpoint(self.node, Kind.SUBSCRIPTION, self.name, *kind, self.qos)
+            inbox = self.node.context.inbox
+            deliver = partial(self._put, channel.take)
+            face.also_close(Withdrawal(inbox.open(face.token.entity_id, deliver)))
+            face.announce(watch=False)
             self._faces[kind] = face
-        deliver = partial(self._put, channel.take)
-        face.also_close(Withdrawal(self.node.context.inbox.open(face.token.entity_id, deliver)))
-        face.announce(watch=False)
 
     def close(self) -> None:
         """End it; from any thread, again is no error."""

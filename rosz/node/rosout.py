@@ -90,10 +90,12 @@ class RosoutSink(logging.Handler):
         """
         if self._thread is not None:
             raise RuntimeError("already publishing")
-        self._thread = threading.Thread(
+        thread = threading.Thread(
             target=self._run, args=(publish,), name=f"rosz-rosout {self._ros_name}", daemon=True
         )
-        self._thread.start()
+        # Only one that has been started can be waited for, and `stop` may come at any moment.
+        thread.start()
+        self._thread = thread
 
     def flush(self) -> None:
         """Wait, for a second at most, until all that was logged before is published.
@@ -117,6 +119,7 @@ class RosoutSink(logging.Handler):
         super().close()
 
     def _run(self, publish: PublishLine) -> None:
+        self._thread = threading.current_thread()
         told = False
         while (line := self._queue.get()) is not None:
             if isinstance(line, threading.Event):
