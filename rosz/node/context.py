@@ -58,6 +58,7 @@ class Context:
         when_settled: Has a function called when it is, or at once if it is already.
         inbox: What comes for single subscriptions of this process.
         reason: Why it was shut down, once it is.
+        passing: Whether this is a command rather than a part of the system: it holds no parameters.
         cooperative: Whether the program has shown that it asks for the end by itself.
         forked: Whether this is the copy in a forked child, which can do nothing.
 
@@ -79,6 +80,7 @@ class Context:
         self.arguments = remap.parse(argv)
         self.domain = self.environment.domain
         config = config or SessionConfig.node(self.environment)
+        self.passing = config.must_connect
         alone = config.mode == "peer" and not (
             config.connect or config.listen or config.multicast or is_answered(config.rendezvous)
         )
@@ -155,7 +157,7 @@ class Context:
         from rosz.params.replica import Replica
 
         with self._lock:
-            replica = Replica(self.session, self.domain)
+            replica = Replica(self.session, self.domain, settled=self.settled)
             self.on_shutdown(lambda _: replica.close())
             return replica
 

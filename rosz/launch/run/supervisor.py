@@ -110,7 +110,7 @@ class Supervisor:
 
     def restart(self, process: Process, done: Callable[[], None]) -> None:
         """End one process if it runs, and start it anew; call back when it has started."""
-        self._console.say(f"[{process.label}] restarting process")
+        self._console.say(f"[{process.label}] restart requested")
         self._told.setdefault(process.owner, []).append(done)
         process.restart()
 
