@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 
 from rosz import names
-from rosz.errors import ClosedError, RoszError, UsageError
-from rosz.node import control, signals
+from rosz.errors import ClosedError, RoszError
+from rosz.node import control, signals, standard
 from rosz.node.client import Client
 from rosz.node.console import DEFAULT_FORMAT
 from rosz.node.context import Context
@@ -25,9 +25,8 @@ from rosz.node.rate import Rate
 from rosz.node.service import Service
 from rosz.node.subscription import Subscription
 from rosz.node.timer import Timer, TimerEvent
-from rosz.qos import DEFAULT, ROSOUT, SERVICES, QoS
-from rosz.wire import Kind, Token, format_process, format_token
-from rosz.wire.processes import ProcessToken
+from rosz.qos import DEFAULT, SERVICES, QoS
+from rosz.wire import Token
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -118,65 +117,15 @@ class Node:
         )
         self._withdraw = context.on_shutdown(self._end)
         try:
-            self._set_initial_params()
-            self._announce()
+            standard.set_initial_params(self)
+            self.process = standard.announce(self)
             control.attach(self)
+            if not context.passing:
+                standard.follow_clock(self)
         except BaseException:
             self._end("")
             raise
-        # Loading the message type takes longer than the rest of a start, and nobody waits for it.
-        threading.Thread(target=self._open_rosout, name="rosz-rosout-open", daemon=True).start()
-
-    def _open_rosout(self) -> None:
-        from rosz.msgs.builtin_interfaces.msg import Time
-        from rosz.msgs.rcl_interfaces.msg import Log
-
-        try:
-            rosout = self.publisher("/rosout", Log, qos=ROSOUT)
-        except ClosedError:
-            return  # a program that ends within its first moments
-
-        def publish(  # noqa: PLR0917  # the signature of RosoutSink
-            level: int, name: str, message: str, file: str, function: str, line: int, stamp: int
-        ) -> None:
-            time = Time(*divmod(stamp, _SECOND))
-            rosout.publish(Log(time, level, name, message, file, function, line))
-
-        self.log.publish_to(publish)
-
-    def _set_initial_params(self) -> None:
-        if not self.context.arguments.params:
-            return
-        import yaml
-
-        for name, text in self.context.arguments.params.items():
-            try:
-                self.params[f"~{name}"] = yaml.safe_load(text)
-            except yaml.YAMLError as error:
-                raise UsageError(f"argument '_{name}:={text}' is no YAML value: {error}") from error
-
-    def _announce(self) -> None:
-        context = self.context
-        token = Token(
-            context.domain,
-            context.session.zid,
-            self.node_id,
-            self.node_id,
-            Kind.NODE,
-            self.namespace,
-            self.base_name,
-        )
-        self.process = ProcessToken(
-            context.domain,
-            context.session.zid,
-            self.node_id,
-            context.session.stamp().time,
-            os.getpid(),
-            socket.gethostname(),
-            self.name,
-        )
-        for key in (format_token(token), format_process(self.process)):
-            self._parts.append(context.session.token(key))
+        standard.open_rosout(self)
 
     @cached_property
     def params(self) -> Params:

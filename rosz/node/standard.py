@@ -1,0 +1,104 @@
+"""What every node has without being asked: its tokens, its first parameters, /rosout, /clock."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from typing import TYPE_CHECKING
+
+from rosz.errors import ClosedError, UsageError
+from rosz.qos import CLOCK, ROSOUT
+from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
+
+if TYPE_CHECKING:
+    from rosz.node.node import Node
+
+__all__ = ("announce", "follow_clock", "open_rosout", "set_initial_params")
+
+_SECOND = 1_000_000_000
+
+
+def announce(node: Node) -> ProcessToken:
+    """Make a node known, to ROS 2 by its token and to rosz by that of its process.
+
+    Returns:
+        What it is as a process.
+    """
+    context = node.context
+    zid = context.session.zid
+    token = Token(
+        context.domain, zid, node.node_id, node.node_id, Kind.NODE, node.namespace, node.base_name
+    )
+    process = ProcessToken(
+        context.domain,
+        zid,
+        node.node_id,
+        context.session.stamp().time,
+        os.getpid(),
+        socket.gethostname(),
+        node.name,
+    )
+    for key in (format_token(token), format_process(process)):
+        node.keep(context.session.token(key))
+    return process
+
+
+def set_initial_params(node: Node) -> None:
+    """Set the private parameters that the command line gives (``_name:=value``).
+
+    Raises:
+        UsageError: A value is no YAML.
+    """
+    if not node.context.arguments.params:
+        return
+    import yaml
+
+    for name, text in node.context.arguments.params.items():
+        try:
+            node.params[f"~{name}"] = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise UsageError(f"argument '_{name}:={text}' is no YAML value: {error}") from error
+
+
+def follow_clock(node: Node) -> None:
+    """Live in simulated time where the parameter /use_sim_time says so (ROS wiki, Clock).
+
+    Reading it makes the process a replica of the parameters, as every node is.
+    """
+    if node.params.get("/use_sim_time", False) is not True:
+        return
+    from rosz.msgs.rosgraph_msgs.msg import Clock
+
+    clock = node.context.clock
+    clock.enable_simulation()
+
+    def tick(message: Clock) -> None:
+        clock.advance(message.clock.sec * _SECOND + message.clock.nanosec)
+
+    node.subscription("/clock", Clock, tick, qos=CLOCK)
+
+
+def open_rosout(node: Node) -> None:
+    """Publish a node's log, from a thread: nobody waits for the message type to load."""
+    threading.Thread(
+        target=_open_rosout, args=(node,), name="rosz-rosout-open", daemon=True
+    ).start()
+
+
+def _open_rosout(node: Node) -> None:
+    from rosz.msgs.builtin_interfaces.msg import Time
+    from rosz.msgs.rcl_interfaces.msg import Log
+
+    try:
+        rosout = node.publisher("/rosout", Log, qos=ROSOUT)
+    except ClosedError:
+        return  # a program that ends within its first moments
+
+    def publish(  # noqa: PLR0917  # the signature of RosoutSink
+        level: int, name: str, message: str, file: str, function: str, line: int, stamp: int
+    ) -> None:
+        time = Time(*divmod(stamp, _SECOND))
+        rosout.publish(Log(time, level, name, message, file, function, line))
+
+    node.log.publish_to(publish)
