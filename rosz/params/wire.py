@@ -47,17 +47,19 @@ _Message = TypeVar("_Message", bound=msgspec.Struct)
 
 
 class Batch(msgspec.Struct, array_like=True):
-    """Writes of one writer under one stamp.
+    """Writes under one stamp.
 
     Attributes:
-        number: Which of its writes, for the acknowledgement.
+        sender: The replica that tells of them, and hears who has applied them.
+        number: Which of its messages, for the acknowledgement.
         time: Nanoseconds.
-        clock: The writer: its session and clock.
-        origin: On whose behalf.
+        clock: The clock that the time is of.
+        origin: Who made them, for people.
         puts: Path and value of each put.
         deletions: Path of each deletion.
     """
 
+    sender: str
     number: int
     time: int
     clock: str
@@ -67,10 +69,21 @@ class Batch(msgspec.Struct, array_like=True):
 
     @classmethod
     def of(
-        cls, number: int, stamp: tuple[int, str], origin: str, changes: Iterable[Change]
+        cls,
+        message: tuple[str, int],
+        stamp: tuple[int, str],
+        origin: str,
+        changes: Iterable[Change],
     ) -> Batch:
-        """Return the message for changes under one stamp."""
-        batch = cls(number, *stamp, origin)
+        """Return the message for changes under one stamp.
+
+        Args:
+            message: Its sender and number.
+            stamp: Time and clock.
+            origin: Who made the changes.
+            changes: What they are.
+        """
+        batch = cls(*message, *stamp, origin)
         for path, value in changes:
             if value is DELETED:
                 batch.deletions.append(join_path(path))
@@ -168,19 +181,18 @@ class Question(msgspec.Struct, omit_defaults=True):
     """What somebody who is no replica asks of one.
 
     Attributes:
-        verb: ``get``, ``names``, ``search``, ``write`` or ``delete``.
-        name: Global name, or the one searched for; a write has its paths in ``puts``.
+        verb: ``get``, ``names``, ``search``, ``stamp`` or ``write``.
+        name: Global name, or the one searched for.
         node: Where a search starts.
-        origin: On whose behalf a write is.
-        puts: What a write sets.
+        batch: What a write writes. Its stamp is the asker's own, so that it does no harm when two
+            replicas, or one of them much later, do it again.
         timeout: Seconds to wait for the other replicas, for a write.
     """
 
     verb: str
     name: str = "/"
     node: str = "/"
-    origin: str = ""
-    puts: list[tuple[str, Any]] = []
+    batch: Batch | None = None
     timeout: float = 0.0
 
 

@@ -25,13 +25,21 @@ class Network:
         self.sessions: list[Session] = []
         self._open: list[Closable] = []
 
-    def session(self, **settings: Any) -> Session:
+    def session(self) -> Session:
         """Open a session, linked to all before it."""
-        session = Session.open(SessionConfig(rendezvous=self.rendezvous, **settings))
+        session = Session.open(SessionConfig(rendezvous=self.rendezvous))
         self._open += [session, serve_links(session)]
         if self.sessions:
             assert Settling(session, PATIENCE, threading.Event()).settled.wait(PATIENCE)
         self.sessions.append(session)
+        return session
+
+    def command(self) -> Session:
+        """Open a session as commands do: a client of whoever is at the rendezvous."""
+        session = Session.open(
+            SessionConfig(mode="client", rendezvous=self.rendezvous, must_connect=True)
+        )
+        self._open.append(session)
         return session
 
     def replica(self, domain: int = 0, **settings: Any) -> Replica:

@@ -84,7 +84,8 @@ class Line:
         deadline = time.monotonic() + timeout
         pending = self.acks.open(members.zids if timeout > 0 else ())
         try:
-            batch = Batch.of(pending.number, (stamp.time, stamp.id), origin, changes)
+            message = (self._session.zid, pending.number)
+            batch = Batch.of(message, (stamp.time, stamp.id), origin, changes)
             data = encode(batch)
             self._session.put(self._keys.change, data)
             if not pending.wait(min(_PATIENCE, timeout)):
@@ -128,7 +129,7 @@ class Line:
     def _take(self, payload: bytes) -> None:
         batch = self._apply(payload)
         if batch is not None:
-            self._kept(lambda: self._acknowledge(batch.clock, batch.number))
+            self._kept(lambda: self._acknowledge(batch.sender, batch.number))
 
     def _apply(self, payload: bytes) -> Batch | None:
         try:
@@ -139,11 +140,11 @@ class Line:
             return None
         return batch
 
-    def _acknowledge(self, writer: str, number: int) -> None:
+    def _acknowledge(self, sender: str, number: int) -> None:
         try:
             # Called on Zenoh's thread: an acknowledgement lost on a full link is asked for again,
             # but one that waits for the link would hold up all that comes in.
-            self._session.put(self._keys.ack(writer), b"%d %s" % (number, self._own), block=False)
+            self._session.put(self._keys.ack(sender), b"%d %s" % (number, self._own), block=False)
         except RoszError as error:
             _log.debug("a write is not acknowledged: %s", error)
 

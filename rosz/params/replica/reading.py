@@ -11,7 +11,7 @@ from rosz.params.replica.watch import Callback, Watch
 from rosz.params.tree import MISSING, Missing, Tree, leaves, lookup
 from rosz.params.values import Value, copy
 
-__all__ = ("Reading", "not_found")
+__all__ = ("Reading", "names_beside", "not_found")
 
 _SUGGESTED_FROM: Final = 200
 """Names beside a missing one in which its near miss is looked for."""
@@ -19,9 +19,14 @@ _SUGGESTED_FROM: Final = 200
 
 def not_found(root: Tree, path: Path) -> ParamNotFound:
     """Return the error for a path that is not set, with the near miss beside it."""
+    return ParamNotFound(joined(path), names_beside(root, path))
+
+
+def names_beside(root: Tree, path: Path) -> list[str]:
+    """Return the names in the namespace of a path, or some of them where they are many."""
     beside = lookup(root, path[:-1])
     names = list(beside)[:_SUGGESTED_FROM] if type(beside) is dict else []
-    return ParamNotFound(joined(path), [joined((*path[:-1], name)) for name in names])
+    return [joined((*path[:-1], name)) for name in names]
 
 
 class Reading:

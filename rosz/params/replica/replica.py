@@ -37,7 +37,7 @@ from rosz.params.replica.worker import Worker
 from rosz.params.tree import MISSING, lookup
 from rosz.params.values import normalise
 from rosz.params.writes import DELETED
-from rosz.session import Closable, Session
+from rosz.session import Closable, Session, Stamp
 
 __all__ = ("ACKNOWLEDGED_BY", "Outcome", "Replica", "process_label")
 
@@ -111,7 +111,7 @@ class Replica(Reading):
         self._mirror = Mirror(session, keys, self._state, self._worker)
         self._members = Members(session, keys)
         self._sync = Synchroniser(session, keys, self._state, self._members, self._worker)
-        server = Server(self, self._worker, lambda: self._sync.ready)
+        server = Server(self, session.clock, self._worker, lambda: self._sync.ready)
         self._declared: list[Closable] = [
             session.queryable(keys.sync(session.zid), self._sync.serve, complete=True),
             session.queryable(keys.ask(session.zid), server.serve, complete=True),
@@ -170,7 +170,12 @@ class Replica(Reading):
         return self.write([(path, DELETED)], origin=origin, timeout=timeout)
 
     def write(
-        self, changes: Iterable[Change], *, origin: str = "", timeout: float = ACKNOWLEDGED_BY
+        self,
+        changes: Iterable[Change],
+        *,
+        origin: str = "",
+        stamp: Stamp | None = None,
+        timeout: float = ACKNOWLEDGED_BY,
     ) -> Outcome:
         """Make a batch of changes, which every replica applies as one.
 
@@ -178,6 +183,7 @@ class Replica(Reading):
             changes: Paths with values already normalised, or `DELETED`; of two of which one lies
                 below the other, the upper one comes first (`rosz.params.condense`).
             origin: Who makes them; this process when not given.
+            stamp: When they were made, if not now.
             timeout: Seconds to wait for the other replicas.
 
         Raises:
@@ -190,7 +196,7 @@ class Replica(Reading):
         if not batch:
             return Outcome(0)
         origin = origin or self.label
-        stamp, step = self._state.write(batch, origin)
+        stamp, step = self._state.write(batch, origin, stamp)
         slow = self._line.tell(batch, stamp, origin, self._members, timeout)
         self._mirror.show(step)
         self._wait_until_kept(timeout)

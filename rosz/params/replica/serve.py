@@ -8,11 +8,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from rosz.errors import DecodeError, ParamNotFound, RoszError
-from rosz.params.merge import condense
+from rosz.params.merge import Change
+from rosz.params.paths import split
+from rosz.params.replica.reading import names_beside
 from rosz.params.replica.worker import Worker
-from rosz.params.values import normalise
-from rosz.params.wire import Answer, Question, decode, encode, packed, split_path
-from rosz.session import Query
+from rosz.params.wire import Answer, Question, decode, encode, packed
+from rosz.session import HybridClock, Query, Stamp
 
 if TYPE_CHECKING:
     from rosz.params.replica.replica import Replica
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 __all__ = ("Server",)
 
 _log = logging.getLogger("rosz.params")
+
+_LONGEST: Final = 60.0
+"""Seconds that a write for somebody else may wait at most."""
 
 _AT_ONCE: Final = 16
 """Writes for others that may wait for acknowledgements at a time; further ones are put off."""
@@ -30,12 +34,20 @@ class Server:
 
     Args:
         replica: Whom to read and write.
+        clock: What gives stamps to those who are to write.
         worker: Where the reading is done.
         ready: Tells whether the replica has joined.
     """
 
-    def __init__(self, replica: Replica, worker: Worker, ready: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        replica: Replica,
+        clock: HybridClock,
+        worker: Worker,
+        ready: Callable[[], bool],
+    ) -> None:
         self._replica = replica
+        self._clock = clock
         self._worker = worker
         self._ready = ready
         self._places = threading.BoundedSemaphore(_AT_ONCE)
@@ -44,7 +56,7 @@ class Server:
             "names": self._names,
             "search": self._search,
             "write": self._write,
-            "delete": self._delete,
+            "stamp": self._stamp,
         }
 
     def serve(self, query: Query) -> None:
@@ -63,7 +75,7 @@ class Server:
             self._reply(query, Answer("refused", text=f"'{question.verb}' is nothing to ask for"))
         elif not self._ready():
             self._reply(query, Answer("joining"))
-        elif question.verb not in {"write", "delete"}:
+        elif question.verb != "write":
             self._reply(query, self._outcome(verb, question))
         elif self._places.acquire(blocking=False):
             threading.Thread(
@@ -82,7 +94,8 @@ class Server:
         try:
             return verb(question)
         except ParamNotFound as error:
-            return Answer("missing", text=str(error))
+            beside = names_beside(self._replica.root, split(question.name))
+            return Answer("missing", text=str(error), value=beside)
         except RoszError as error:
             return Answer("refused", text=str(error))
 
@@ -104,15 +117,16 @@ class Server:
         found = self._replica.search(question.name, question.node)
         return Answer("missing" if found is None else "ok", value=found)
 
-    def _write(self, question: Question) -> Answer:
-        changes = [(split_path(path), normalise(value)) for path, value in question.puts]
-        outcome = self._replica.write(
-            condense(changes), origin=question.origin, timeout=question.timeout
-        )
-        return Answer(slow=list(outcome.slow))
+    def _stamp(self, _: Question) -> Answer:
+        return Answer(value=self._clock.now().time)
 
-    def _delete(self, question: Question) -> Answer:
-        outcome = self._replica.delete(
-            question.name, origin=question.origin, timeout=question.timeout
+    def _write(self, question: Question) -> Answer:
+        batch = question.batch
+        if batch is None:
+            return Answer("refused", text="a write that writes nothing")
+        changes: list[Change] = [(write.path, write.value) for write in batch.writes()]
+        stamp = Stamp(batch.time, batch.clock)
+        outcome = self._replica.write(
+            changes, origin=batch.origin, stamp=stamp, timeout=min(question.timeout, _LONGEST)
         )
         return Answer(slow=list(outcome.slow))

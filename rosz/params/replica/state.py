@@ -47,14 +47,16 @@ class State:
         """Have a function given all that is news, in order; it must be quick."""
         self._sinks = (*self._sinks, sink)
 
-    def write(self, changes: Iterable[Change], origin: str) -> tuple[Stamp, Step]:
-        """Make writes of our own, later than all that was seen.
+    def write(
+        self, changes: Iterable[Change], origin: str, stamp: Stamp | None = None
+    ) -> tuple[Stamp, Step]:
+        """Make writes, under a given stamp, or one that is later than all that was seen.
 
         Raises:
             ParamError: A change has no meaning in the tree; nothing has changed then.
         """
         with self._lock:
-            stamp = self._clock.now()
+            stamp = stamp or self._clock.now()
             at = (stamp.time, stamp.id)
             writes = [
                 delete(path, at, origin) if value is DELETED else put(path, at, value, origin)
