@@ -46,6 +46,7 @@ class Decoder:
         self._memories = 0
         self._locals = Locals()
         self._sliced = False
+        self._checked = False
 
     def lines(self) -> list[str]:
         """Return the statements, without indentation."""
@@ -107,10 +108,8 @@ class Decoder:
             where = self._at()
             targets = f"({names[0]},)" if len(names) == 1 else ", ".join(names)
             self._emit(f"{targets} = {unpack}(data{'' if where == '0' else f', {where}'})")
-        if names:
-            self._sliced = False
-        else:
-            self._sliced = True
+        self._sliced = not names
+        self._checked |= bool(names)
         self._constant += self._size
         self._run, self._layout, self._size = [], [], 0
 
@@ -258,6 +257,7 @@ class Decoder:
         self._emit(f"    {local} = {local}[:]")
         self._emit("else:")
         self._emit(f"    {local}, p = {memo}.take(data, {where})")
+        self._checked = True
         self._base, self._constant = "p", 0
         self._phase = Phase(1, 0)
 
@@ -305,10 +305,14 @@ class Decoder:
         outer = self._indent
         self._indent += "    "
         self._base, self._constant, self._phase = "p", 0, phase
+        outside, self._checked = self._checked, False
         value = self._one(element_of(kind), f"{local}_one")
         self._flush()
         if self._constant:
             self._emit(f"p += {self._constant}")
+        if not self._checked:  # or a count out of the blue keeps the loop busy
+            self._emit("if p > len(data): raise ValueError")
+        self._checked = outside
         self._emit(f"{local}.append({value})")
         self._indent = outer
         self._base, self._constant, self._phase = "p", 0, phase

@@ -225,6 +225,7 @@ class _Reader:
         start = self._at + (len(_HEADER) - self._at) % alignment
         left = len(self._data) - start
         if size > left:
+            self._at = min(start, len(self._data))
             self._refuse(path, f"expected {what} ({size} bytes), {max(left, 0)} left")
         self._at = start + size
         return self._data[start : self._at]

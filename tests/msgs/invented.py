@@ -50,3 +50,35 @@ class Invented:
     def cls(self, name: str) -> type[Message]:
         found: type[Message] = getattr(self.module, name.rpartition("/")[2])
         return found
+
+
+class Written:
+    """The class of one message written down in a test.
+
+    Args:
+        text: Its definition.
+        below: Definitions of types in it, by name.
+    """
+
+    def __init__(self, text: str, **below: str) -> None:
+        texts = {"written/msg/It": text, **{f"written/msg/{k}": v for k, v in below.items()}}
+
+        def find(name: str) -> Definition:
+            if name not in texts:
+                raise TypeNotFound(name)
+            return Definition(texts[name], name)
+
+        catalog = Catalog(find)
+        source = message_module(
+            [catalog.message(name) for name in texts], catalog, lambda _: None, "written"
+        )
+        self.module: Any = ModuleType("written")
+        exec(compile(source, "<written>", "exec"), self.module.__dict__)
+
+    def below(self, name: str) -> Any:
+        """Return the class of a type in it."""
+        return getattr(self.module, name)
+
+    def __call__(self, *members: Any) -> Any:
+        """Make a message."""
+        return self.module.It(*members)

@@ -121,6 +121,7 @@ class Mesh(_Message):
                 q = p
                 p = q + 12
                 vertex_indices = _array("I", data[q : p])
+                if p > len(data): raise ValueError
                 triangles.append(MeshTriangle(vertex_indices))
             (n2,) = _u1(data, p)
             q = (p + 7 | 7) - 3 if n2 else p + 4
