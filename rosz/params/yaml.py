@@ -8,6 +8,8 @@ here, with its place, and so is a document whose aliases unfold to a size out of
 
 from __future__ import annotations
 
+import base64
+import math
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -18,7 +20,7 @@ from rosz.params import angles
 from rosz.params.nodes import fault, read_nodes
 from rosz.params.values import MAX_DEPTH, Value, normalise, type_name
 
-__all__ = ("dump", "format_get", "load", "load_all", "load_documents", "pretty")
+__all__ = ("dump", "format_get", "inline", "load", "load_all", "load_documents", "pretty")
 
 _NAMESPACE_KEY: Final = "_ns"
 _MOST_REPEATED: Final = 100_000
@@ -26,6 +28,7 @@ _MOST_REPEATED: Final = 100_000
 
 _MAP: Final = "tag:yaml.org,2002:map"
 _SEQ: Final = "tag:yaml.org,2002:seq"
+_BINARY: Final = "tag:yaml.org,2002:binary"
 _STR: Final = "tag:yaml.org,2002:str"
 _MERGE: Final = "tag:yaml.org,2002:merge"
 _VALUE: Final = "tag:yaml.org,2002:value"
@@ -44,6 +47,20 @@ class _Dumper(yaml.SafeDumper):
 
     def ignore_aliases(self, _data: Any) -> bool:
         return True
+
+
+class _LineDumper(_Dumper):
+    """Keeps what has several lines on one."""
+
+    def represent_text(self, data: str) -> Any:
+        return self.represent_scalar(_STR, data, style='"' if "\n" in data else None)
+
+    def represent_bytes(self, data: bytes) -> Any:
+        return self.represent_scalar(_BINARY, base64.b64encode(data).decode(), style='"')
+
+
+_LineDumper.add_representer(str, _LineDumper.represent_text)
+_LineDumper.add_representer(bytes, _LineDumper.represent_bytes)
 
 
 def load_all(text: str, path: str = "<string>") -> list[Value]:
@@ -113,6 +130,12 @@ def dump(value: Value) -> str:
 def format_get(value: Value) -> str:
     """Write a value as ``rosparam get`` prints it: without the mark that ends a lone scalar."""
     return dump(value).removesuffix("\n...\n") + "\n"
+
+
+def inline(value: Value) -> str:
+    """Write a value as YAML on one line."""
+    text = yaml.dump(value, Dumper=_LineDumper, default_flow_style=True, width=math.inf)
+    return str(text).removesuffix("\n").removesuffix("\n...")
 
 
 def pretty(value: Value) -> str:

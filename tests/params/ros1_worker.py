@@ -3,10 +3,11 @@
 Each request is one pickled list on stdin, each answer one on stdout, both behind their length.
 """
 
-# ruff: noqa: ANN001, ANN201, ANN204, BLE001
+# ruff: noqa: ANN001, ANN201, BLE001
 # mypy: ignore-errors
 import contextlib
 import io
+import os
 import pickle
 import struct
 import sys
@@ -14,6 +15,7 @@ import xmlrpc.client
 
 import rosparam
 import yaml
+from rosgraph.masterapi import MasterError
 from rosgraph.names import resolve_name
 from rosmaster.paramserver import ParamDictionary
 
@@ -41,13 +43,33 @@ def from_ros(value):
 
 
 class Master:
-    """Just the part of the master that rosparam sets parameters through."""
+    """The parameters of a master, without the network, in the words of master_api."""
 
-    def __init__(self, params):
+    def __init__(self, params) -> None:
         self.params = params
 
     def setParam(self, key, value):  # noqa: N802
-        self.params.set_param(resolve_name(key, CALLER), value)
+        try:
+            self.params.set_param(resolve_name(key, CALLER), value)
+        except TypeError as error:
+            raise MasterError(f"Error: invalid arguments: {error}") from error
+
+    def getParam(self, key):  # noqa: N802
+        key = resolve_name(key, CALLER)
+        try:
+            return self.params.get_param(key)
+        except KeyError:
+            raise MasterError(f"Parameter [{key}] is not set") from None
+
+    def deleteParam(self, key):  # noqa: N802
+        key = resolve_name(key, CALLER)
+        try:
+            self.params.delete_param(key)
+        except KeyError:
+            raise MasterError(f"parameter [{key}] is not set") from None
+
+    def getParamNames(self):  # noqa: N802
+        return self.params.get_param_names()
 
 
 def history(steps):
@@ -91,16 +113,43 @@ def read(text):
 def show(value):
     """Return what `rosparam dump`, `get` and `get -p` print of a value."""
     printed = []
-    for pretty in (False, True):
-        out = io.StringIO()
-        rosparam.get_param = lambda _name: value
-        with contextlib.redirect_stdout(out):
-            rosparam._rosparam_cmd_get_param("/x", pretty=pretty)
-        printed.append(out.getvalue())
+    original = rosparam.get_param
+    rosparam.get_param = lambda _name: value
+    try:
+        for pretty in (False, True):
+            out = io.StringIO()
+            with contextlib.redirect_stdout(out):
+                rosparam._rosparam_cmd_get_param("/x", pretty=pretty)
+            printed.append(out.getvalue())
+    finally:
+        rosparam.get_param = original
     return [yaml.dump(value), *printed]
 
 
-CALLS = {"history": history, "load": load, "read": read, "show": show}
+def commands(lines, stdin, folder):
+    """Run rosparam command lines; return exit code, stdout and stderr of each."""
+    params = ParamDictionary(None)
+    rosparam.get_param_server = lambda: Master(params)
+    os.chdir(folder)
+    os.environ.pop("ROS_NAMESPACE", None)
+    answers = []
+    for words in lines:
+        sys.stdin = io.StringIO(stdin)
+        out, err = io.StringIO(), io.StringIO()
+        code = 0
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            try:
+                rosparam.yamlmain(["rosparam", *words])
+            except SystemExit as end:
+                code = end.code or 0
+            except Exception as error:
+                code = 1
+                err.write(f"{error.__class__.__name__}: {error}")
+        answers.append((code, out.getvalue(), err.getvalue()))
+    return answers
+
+
+CALLS = {"commands": commands, "history": history, "load": load, "read": read, "show": show}
 
 
 def main():

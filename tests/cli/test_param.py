@@ -1,0 +1,441 @@
+"""``rosz param`` beside rosparam's own command code, and what rosparam has not."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from params.network import Network, until
+from params.ros1 import Ros1, available
+
+from rosz.cli.main import run
+from rosz.params.replica import Replica
+
+from .command import ROSZ, environ
+
+Command = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def ros1() -> Iterator[Ros1]:
+    if not available():
+        pytest.skip("ROS 1 is not installed: apt install python3-rosmaster python3-rosparam")
+    worker = Ros1()
+    yield worker
+    worker.close()
+
+
+@pytest.fixture
+def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Network]:
+    found = Network()
+    for name in ("ROS_NAMESPACE", "ROS_DOMAIN_ID", "ROSZ_CONNECT", "ROSZ_LISTEN", "ROSZ_MODE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("ROSZ_RENDEZVOUS", found.rendezvous)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    yield found
+    found.close()
+
+
+@pytest.fixture
+def replica(network: Network) -> Replica:
+    return network.replica()
+
+
+@pytest.fixture
+def param(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
+    def call(*words: str, stdin: str = "") -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
+        code = run(["param", *words])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return call
+
+
+CONFIG = """\
+wheel: {radius: 0.05, name: left}
+limits: [1, 2.5, fast]
+angle: deg(90)
+half: rad(pi/2)
+enabled: on
+text: "two\\nlines"
+"""
+
+FILES = {
+    "config.yaml": CONFIG,
+    "global.yaml": "/parameter_name_1: 10\n/parameter_name_2: 'D'\n",
+    "two.yaml": "a: 1\n---\n_ns: inner\nb: 2\n",
+    "list.yaml": "[1, 2]",
+    "broken.yaml": "a: 1\nb: [1, 2\n",
+    "keys.yaml": "2: 3\na: 1\n",
+    "text.txt": "some\ntext\n",
+}
+
+LINES = [
+    "list",
+    "get /",
+    "set /x 1",
+    "set /x ''",
+    "get /x",
+    "set /neg -1",
+    "get /neg",
+    "set /neg -1.5",
+    "get -p /neg",
+    "set -x /neg",
+    "set /neg -x",
+    "set /l [1, 2.5, a, {q: 1}]",
+    "get /l",
+    "get -p /l",
+    "set /m {a: 1, b: {c: x}}",
+    "get /m",
+    "get -p /m",
+    "set /m {a: 2}",
+    "get /m",
+    "set /m {1: 2}",
+    "set /m {}",
+    "get /m/b/c",
+    "get m/b",
+    "get //m//b/",
+    "get /nope",
+    "delete /nope",
+    "get /m/a/deeper",
+    "delete /m/b/c",
+    "get /m",
+    "delete /m",
+    "get",
+    "set",
+    "set /a",
+    "set /a 1 2",
+    "delete",
+    "delete a b",
+    "load",
+    "load a b c",
+    "dump a b c",
+    "get -z x",
+    "load /nofile",
+    "load broken.yaml",
+    "load keys.yaml",
+    "load config.yaml",
+    "list",
+    "get /",
+    "get -p /",
+    "load config.yaml /my_settings",
+    "load config.yaml relative",
+    "list /my_settings",
+    "list my_settings",
+    "list /my_set",
+    "get /my_settings/wheel",
+    "load global.yaml /my_settings",
+    "get /parameter_name_1",
+    "get /parameter_name_2",
+    "load two.yaml /two",
+    "get /two",
+    "load list.yaml",
+    "load list.yaml /numbers",
+    "get /numbers",
+    "load - /pre",
+    "get /pre",
+    "dump dumped.yaml",
+    "dump part.yaml /two",
+    "dump",
+    "load dumped.yaml copy",
+    "get /copy/wheel/radius",
+    "set -t text.txt /t",
+    "get /t",
+    "get -p /t",
+    "set /t2 --textfile text.txt",
+    "set --textfile=text.txt /t3",
+    "get /t3",
+    "set -t /nofile /t",
+    "set -t text.txt -b text.txt /t",
+    "set /t -b",
+    "set ~private 5",
+    "get ~private",
+    "list",
+    "set /s yes",
+    "get /s",
+    "set /s 'yes'",
+    "get /s",
+    "set /s 0x10",
+    "get /s",
+    "set /s 1e3",
+    "get /s",
+    'set /s "a\\nb"',
+    "get /s",
+    "set /name*with?odd#parts 1",
+    "get /name*with?odd#parts",
+    "set / 5",
+    "set / {}",
+    "delete /two",
+    "delete /",
+    "list",
+    "get /",
+    "list /",
+]
+
+
+def words_of(line: str) -> list[str]:
+    command, *rest = line.split(" ", 2)
+    if command == "set" and len(rest) == 2:
+        name, value = rest
+        if value == "''":
+            return [command, name, ""]
+        if value[0] in "[{":
+            return [command, name, value]
+    return line.split()
+
+
+def test_it_does_what_rosparam_does(
+    ros1: Ros1, replica: Replica, param: Command, tmp_path: Path
+) -> None:
+    assert replica.root == {}
+    folders = {"theirs": tmp_path / "theirs", "ours": tmp_path}
+    for folder in folders.values():
+        folder.mkdir(exist_ok=True)
+        for name, text in FILES.items():
+            (folder / name).write_text(text)
+    lines = [words_of(line) for line in LINES]
+    theirs = ros1.call("commands", lines, "piped: [1, 2]\n", str(folders["theirs"]))
+    wrong = []
+    for words, (code, out, err) in zip(lines, theirs, strict=True):
+        ours = param(*words, stdin="piped: [1, 2]\n")
+        if (code, out) != ours[:2] or bool(err) != bool(ours[2]):
+            wrong.append((words, (code, out, err), ours))
+        if err.startswith("ERROR: ") and err.rstrip().endswith("is not set"):
+            assert ours[2].startswith(err.rstrip())
+    assert wrong == [], "\n".join(map(str, wrong))
+    for name in ("dumped.yaml", "part.yaml"):
+        assert (folders["ours"] / name).read_bytes() == (folders["theirs"] / name).read_bytes()
+
+
+def test_listing_as_json(replica: Replica, param: Command) -> None:
+    replica.set("/", {"a": {"b": [1, 2.5, "x", b"raw"], "c": True}, "d": {}})
+    assert json.loads(param("list", "--json")[1]) == ["/a/b", "/a/c"]
+    assert json.loads(param("list", "a", "--json")[1]) == ["/a/b", "/a/c"]
+    assert json.loads(param("get", "/a", "--json")[1]) == {"b": [1, 2.5, "x", "cmF3"], "c": True}
+    assert json.loads(param("dump", "--json")[1])["a"]["c"] is True
+    assert json.loads(param("search", "c", "/a/x", "--json")[1]) == "/a/c"
+
+
+def test_values_rosparam_cannot_take(replica: Replica, param: Command, tmp_path: Path) -> None:
+    (tmp_path / "raw").write_bytes(b"\x00\xff")
+    for words in (
+        ("/big", "9223372036854775807"),
+        ("/day", "2001-12-14"),
+        ("/moment", "2001-12-14 21:59:43.5"),
+        ("/bytes", "!!binary aGVsbG8="),
+        ("/list", "[1, {a: !degrees 180}]"),
+        ("-b", "raw", "/raw"),
+    ):
+        assert param("set", *words) == (0, "", ""), words
+    assert param("get", "/big")[1] == "9223372036854775807\n"
+    assert param("get", "/day")[1] == "2001-12-14\n"
+    assert param("get", "/moment")[1] == "2001-12-14 21:59:43.500000\n"
+    assert param("get", "/bytes")[1] == "!!binary |\n  aGVsbG8=\n\n"
+    assert replica.get("/raw") == b"\x00\xff"
+    code, text, _ = param("dump")
+    before = replica.root
+    replica.set("/", {})
+    assert param("load", "-", stdin=text) == (code, "", "")
+    assert replica.root == before
+
+
+@pytest.mark.parametrize("value", ["from:=to", "__x", "a:=b", "--", "-1e3", "-0x10", "- a"])
+def test_values_that_look_like_something_else(replica: Replica, param: Command, value: str) -> None:
+    words = ("--", value) if value.startswith("--") or value == "- a" else (value,)
+    assert param("set", "/v", *words) == (0, "", "")
+    expected = {"-1e3": "-1e3", "-0x10": -16, "- a": ["a"]}
+    assert replica.get("/v") == expected.get(value, value)
+
+
+def test_a_value_from_stdin(replica: Replica, param: Command) -> None:
+    assert param("set", "/v", "-", stdin="{a: [1, 2]}\n")[0] == 0
+    assert replica.get("/v") == {"a": [1, 2]}
+
+
+def test_names_are_those_of_the_namespace(
+    replica: Replica, param: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_NAMESPACE", "/robot")
+    param("set", "rate", "5")
+    param("set", "~own", "6")
+    param("set", "__ns:=/other", "rate", "7")
+    assert replica.root == {"robot": {"rate": 5, "rosparam": {"own": 6}}, "other": {"rate": 7}}
+    assert param("list")[1] == "/other/rate\n/robot/rate\n/robot/rosparam/own\n"
+    assert param("list", "")[1] == "/robot/rate\n/robot/rosparam/own\n"
+    assert param("get", "rate")[1] == "5\n"
+    assert param("load", "-", stdin="x: 1") == (0, "", "")
+    assert replica.get("/robot/x") == 1
+
+
+def test_verbose_talk_goes_to_stderr(replica: Replica, param: Command, tmp_path: Path) -> None:
+    (tmp_path / "f.yaml").write_text("a: {b: 1}")
+    assert replica.root == {}
+    assert param("load", "-v", "f.yaml", "/n")[1:] == (
+        "",
+        "reading parameters from [f.yaml]\nset parameter [/n/a/b] to [1]\n",
+    )
+    assert param("get", "-v", "/n/a/b")[1:] == ("1\n", "getting parameter [/n/a/b]\n")
+    assert param("set", "-v", "/n/a", "{b: 2}")[2] == "set parameter [/n/a/b] to [2]\n"
+    assert param("dump", "-v", "o.yaml", "/n")[2] == "dumping namespace [/n] to file [o.yaml]\n"
+    assert param("delete", "-v", "/n")[2] == "deleted parameter [/n]\n"
+    assert param("delete", "-v", "/")[2] == "deleted all parameters\n"
+
+
+def test_searching(replica: Replica, param: Command) -> None:
+    replica.set("/robot/description", "urdf")
+    assert param("search", "description", "/robot/arm/node") == (0, "/robot/description\n", "")
+    assert param("search", "/robot/description")[1] == "/robot/description\n"
+    assert param("search", "nothing") == (
+        1,
+        "",
+        "ERROR: Cannot find parameter [nothing] in an upwards search\n",
+    )
+
+
+def test_loading_is_all_or_nothing(replica: Replica, param: Command, tmp_path: Path) -> None:
+    replica.set("/a", 1)
+    (tmp_path / "bad.yaml").write_text("a: 2\nb:\n  - 1\n  - ~\n")
+    assert param("load", "bad.yaml") == (
+        1,
+        "",
+        "rosz: bad.yaml:4:5: null is no parameter value; "
+        "delete the parameter, or set '' or {} instead\n",
+    )
+    (tmp_path / "bad.yaml").write_bytes(b"a: 2\nb: \xff\n")
+    assert param("load", "bad.yaml")[2] == (
+        "rosz: bad.yaml:2: byte 0xff is no UTF-8; save the file as UTF-8\n"
+    )
+    (tmp_path / "bad.yaml").write_text("a: 2\n~private: 3\n")
+    assert "the key '~private' in '/' is private" in param("load", "bad.yaml")[2]
+    assert param("set", "/a", "{b: [1}")[2].startswith("rosz: <value>:1:7: while parsing")
+    assert param("set", "/a", "null")[0] == 1
+    assert replica.root == {"a": 1}
+
+
+def test_a_dry_run_tells_what_it_would_replace(
+    replica: Replica, param: Command, tmp_path: Path
+) -> None:
+    replica.set("/", {"same": 1, "a": {"b": 1}, "leaf": "x", "text": "old"})
+    (tmp_path / "f.yaml").write_text("same: 1\na: {b: 2, c: [1, 2]}\nleaf: {now: {}, d: 1}\n")
+    before = replica.digest()
+    assert param("load", "f.yaml", "--dry-run") == (
+        0,
+        "~ /a/b: 1 -> 2\n+ /a/c: [1, 2]\n- /leaf: x\n+ /leaf/d: 1\n",
+        "4 parameters would change; nothing is written\n",
+    )
+    found = json.loads(param("load", "f.yaml", "--dry-run", "--json")[1])
+    assert found[0] == {"name": "/a/b", "old": 1, "new": 2}
+    assert replica.digest() == before
+    assert param("load", "f.yaml", "--json")[0] == 2
+
+
+def test_nobody_there_is_one_line_and_exit_code_1(network: Network, param: Command) -> None:
+    code, out, err = param("list")
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert "start 'rosz core'" in err
+    network.session()
+    code, out, err = param("set", "/a", "1")
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert "no process on this network holds the parameter store" in err
+    assert "'rosz core'" in err
+
+
+def test_a_missing_name_suggests_the_near_one(replica: Replica, param: Command) -> None:
+    replica.set("/robot/speed", 1)
+    assert param("get", "/robot/sped") == (
+        1,
+        "",
+        "ERROR: Parameter [/robot/sped] is not set; did you mean '/robot/speed'?\n",
+    )
+
+
+def test_watching_in_a_process_of_its_own(
+    network: Network, replica: Replica, tmp_path: Path
+) -> None:
+    replica.set("/ns/a", 1)
+    watcher = subprocess.Popen(
+        [*ROSZ, "param", "watch", "/ns", "-n", "4"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environ(tmp_path, ROSZ_RENDEZVOUS=network.rendezvous),
+    )
+    assert watcher.stderr is not None
+    assert watcher.stderr.readline() == "watching [/ns]; press Ctrl-C to end\n"
+    replica.set("/ns/a", 2)
+    replica.set("/ns/b", "two\nlines")
+    replica.set("/other", 1)
+    replica.delete("/ns/a")
+    replica.set("/ns/c", [1])
+    out, err = watcher.communicate(timeout=20)
+    assert out == '~ /ns/a: 1 -> 2\n+ /ns/b: "two\\nlines"\n- /ns/a: 2\n+ /ns/c: [1]\n'
+    assert (watcher.returncode, err) == (0, "")
+
+
+def test_watching_as_json_in_this_process(replica: Replica, param: Command) -> None:
+    stop = threading.Event()
+
+    def change() -> None:
+        number = 0
+        while not stop.wait(0.01):
+            number += 1
+            replica.set("/a", number)
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    code, out, _ = param("watch", "/a", "-n", "2", "--json")
+    stop.set()
+    thread.join()
+    first, second = map(json.loads, out.splitlines())
+    assert code == 0
+    assert first["name"] == "/a"
+    assert first["new"] == second["old"]
+    assert second["origin"] == replica.label
+
+
+def test_wrong_usage_is_exit_code_2(replica: Replica, param: Command) -> None:
+    assert replica.root == {}
+    for words in (["watch", "/a", "-n", "0"], ["frob"], ["list", "a", "b"], ["watch"], ["search"]):
+        assert param(*words)[0] == 2, words
+
+
+def test_the_command_is_light(tmp_path: Path) -> None:
+    code = (
+        "import sys, rosz.cli.param; heavy = {'yaml', 'numpy', 'rosz.params', 'rosz.node'}"
+        "; print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env=environ(tmp_path),
+        check=True,
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_a_writer_is_told_who_did_not_hear(
+    network: Network, param: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from params.test_replica import Mute
+
+    from rosz.params import remote
+
+    monkeypatch.setattr(remote, "ACKNOWLEDGED_BY", 0.3)
+    replica = network.replica()
+    Mute(network)
+    until(lambda: len(replica.members()) == 1)
+    assert param("set", "/a", "1") == (
+        0,
+        "",
+        "WARNING: written, but not yet known to mute program (pid 7 on elsewhere), "
+        "which did not answer\n",
+    )
