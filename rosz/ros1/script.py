@@ -14,7 +14,7 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType, TracebackType
 
-from rosz.errors import NotFoundError
+from rosz.errors import NotFoundError, RoszError
 from rosz.ros1.python2 import explain, hint
 
 __all__ = ("Script",)
@@ -96,9 +96,23 @@ def _trimming(show: _Hook, main: ModuleType) -> _Hook:
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         while trace is not None and trace.tb_frame.f_globals is not main.__dict__:
             trace = trace.tb_next
+        if isinstance(error, RoszError):
+            # It says all there is to say but where the script stood.
+            sys.stderr.write(f"rosz: {_place(trace, main)}{error}\n")
+            return
         show(kind, error.with_traceback(trace), trace)
         advice = hint(error)
         if advice:
             sys.stderr.write(f"rosz: {advice}\n")
 
     return hook
+
+
+def _place(trace: TracebackType | None, main: ModuleType) -> str:
+    """Return ``file:line: `` of the innermost frame that is of the script itself."""
+    place = ""
+    while trace is not None:
+        if trace.tb_frame.f_globals is main.__dict__:
+            place = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}: "
+        trace = trace.tb_next
+    return place

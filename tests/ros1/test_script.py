@@ -178,3 +178,25 @@ def test_errors_of_use(tmp_path: Path) -> None:
     )
     assert done.returncode == 1
     assert done.stderr.decode() == f"rosz: cannot run '{gone}': No such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("import rosz; rosz.Node('a b')", "'a b' is not a valid name: character ' ' at position 2"),
+        ("from rosz.errors import ParamNotFound; raise ParamNotFound('/x')", "'/x' is not set"),
+    ],
+)
+def test_an_error_of_rosz_is_one_line_with_its_place(tmp_path: Path, line: str, text: str) -> None:
+    script = tmp_path / "node.py"
+    script.write_text(f"\n{line}\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "rosz.ros1", str(script)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith(f"rosz: {script}:2: ")
+    assert text in done.stderr
