@@ -9,17 +9,12 @@ lines. Where the folder cannot be written, the source lives in memory only.
 from __future__ import annotations
 
 import hashlib
-import linecache
 import os
 import re
 import sys
-import tempfile
 from collections.abc import Sequence
 from functools import cached_property
 from importlib import import_module
-from importlib.abc import Loader
-from importlib.machinery import ModuleSpec, SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, TypeAlias
@@ -30,11 +25,12 @@ import rosz.msgs
 from rosz.errors import PackageNotFound, TypeNotFound, near_miss
 from rosz.idl.catalog import Catalog, Definition
 from rosz.idl.generate import Folders, generate, shipped_module
+from rosz.idl.keep import Keep
 from rosz.idl.module import MARKER, message_module, service_module
 from rosz.message import Message, Service
 from rosz.packages import PackageIndex
 
-__all__ = ("Kind", "TypeStore", "is_generated", "shipped_packages")
+__all__ = ("Kind", "TypeStore", "is_generated", "shipped_packages", "shipped_types")
 
 Kind: TypeAlias = Literal["msg", "srv"]
 
@@ -56,7 +52,7 @@ class TypeStore:
 
     def __init__(self, packages: PackageIndex | None = None, cache: Path | None = None) -> None:
         self._packages = packages
-        self._cache = cache
+        self._keep = Keep(cache)
         self._modules: dict[tuple[str, Kind], ModuleType] = {}
         self._folders = Folders(self._folder)
         self._catalog = Catalog(self.definition)
@@ -113,7 +109,7 @@ class TypeStore:
 
     def has(self, package: str, kind: Kind) -> bool:
         """Tell whether a package has types of a kind."""
-        return bool(_shipped(package, kind) or self._folders.names(package, kind))
+        return bool(shipped_types(package, kind) or self._folders.names(package, kind))
 
     def definition(self, name: str) -> Definition:
         """Return the text of a type and where it is.
@@ -196,10 +192,10 @@ class TypeStore:
         if match is None or match[2] not in (None, kind):
             raise TypeNotFound(name, f"expected a name such as 'package/Type' of a {kind}")
         package, base = match[1], match[3]
+        if base in shipped_types(package, kind):
+            return getattr(import_module(shipped_module(f"{package}/{kind}/{base}")), base)
         if base not in self._bases(package, kind):
             raise TypeNotFound(name, self._why_not(package, kind, base))
-        if base in _shipped(package, kind):
-            return getattr(import_module(shipped_module(f"{package}/{kind}/{base}")), base)
         return getattr(self.module(package, kind), base)
 
     def _why_not(self, package: str, kind: Kind, base: str) -> str:
@@ -228,13 +224,13 @@ class TypeStore:
 
     def _bases(self, package: str, kind: Kind) -> list[str]:
         """List the types of a package without the package's name, sorted."""
-        ours = set(_shipped(package, kind))
+        ours = set(shipped_types(package, kind))
         return sorted(ours | {n.rpartition("/")[2] for n in self._folders.names(package, kind)})
 
     # Compiling.
 
     def _make(self, package: str, kind: Kind) -> ModuleType:
-        shipped = _shipped(package, kind)
+        shipped = shipped_types(package, kind)
         more = self._own_names(package, kind)
         if not shipped and not more:
             raise TypeNotFound(f"{package}/{kind}", self._why_not(package, kind, ""))
@@ -254,15 +250,36 @@ class TypeStore:
             definition = self.definition(name)
             digest.update(f"\n{name} {len(definition.text)}\n{definition.text}".encode())
         stem = f"{package}_{kind}_{digest.hexdigest()[:32]}"
-        module_name = f"rosz.msgs.{package}.{kind}" + ("_more" if _shipped(package, kind) else "")
-        cached = self._load(module_name, stem)
-        if cached is not None:
-            return cached
-        source = self._source(package, kind, names)
-        file = self._keep(stem, source)
-        if file is not None:
-            return self._run(module_name, SourceFileLoader(module_name, str(file)))
-        return self._run(module_name, _TextLoader(source, f"<{stem}>"))
+        module_name = f"rosz.msgs.{package}.{kind}" + (
+            "_more" if shipped_types(package, kind) else ""
+        )
+        known = sys.modules.get(module_name)
+        if known is not None and self._fits(known, stem):
+            return known
+        needs: dict[str, type[Message]] = {}
+
+        def type_of(name: str, type_hash: str, md5: str) -> type[Message]:
+            """Give the module a class that it builds on, if it is still the same."""
+            cls = needs[name] = self.message(name)
+            if (cls._type_hash, cls._md5sum) != (type_hash, md5):
+                raise _StaleError(name)
+            return cls
+
+        namespace = {"_type_of": type_of, "_made_of": (stem, needs)}
+        bases = [name.rpartition("/")[2] for name in names]
+        module = self._keep.find(module_name, stem, namespace, bases)
+        if module is None:
+            source = self._source(package, kind, names)
+            module = self._keep.run(module_name, stem, namespace, source)
+        sys.modules.setdefault(module_name, module)  # where pickle looks for the classes
+        return module
+
+    def _fits(self, module: ModuleType, stem: str) -> bool:
+        """Tell whether a module that another store compiled is what this one would compile."""
+        made = getattr(module, "_made_of", None)
+        if made is None or made[0] != stem:
+            return False
+        return all(self.message(name) is cls for name, cls in made[1].items())
 
     @cached_property
     def _generation(self) -> bytes:
@@ -281,65 +298,6 @@ class TypeStore:
         services = [self._catalog.service(name) for name in names]
         return service_module(services, self._catalog, _injected, package)
 
-    def _load(self, module_name: str, stem: str) -> ModuleType | None:
-        """Return the module from the cache, if it is there and fits."""
-        file = self._cache / f"{stem}.py" if self._cache is not None else None
-        if file is None or not file.is_file():
-            return None
-        try:
-            return self._run(module_name, SourceFileLoader(module_name, str(file)))
-        except (_StaleError, OSError, SyntaxError, ImportError, EOFError, NameError):
-            return None
-
-    def _keep(self, stem: str, source: str) -> Path | None:
-        """Write a source into the cache, whole or not at all: others may do so at the same time."""
-        if self._cache is None:
-            return None
-        file = self._cache / f"{stem}.py"
-        try:
-            self._cache.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(
-                "w", encoding="utf-8", dir=self._cache, suffix=".tmp", delete=False
-            ) as temporary:
-                temporary.write(source)
-            Path(temporary.name).replace(file)
-        except OSError:
-            return None  # a read-only home: the source stays in memory
-        return file
-
-    def _run(self, name: str, loader: SourceFileLoader | _TextLoader) -> ModuleType:
-        spec = spec_from_loader(name, loader)
-        if spec is None:
-            raise ImportError(name)
-        module = module_from_spec(spec)
-        module.__dict__["_type_of"] = self._type_of
-        loader.exec_module(module)
-        return sys.modules.setdefault(name, module)  # where pickle looks for the classes
-
-    def _type_of(self, name: str, type_hash: str, md5: str) -> type[Message]:
-        """Return a class that a generated module builds on, if it is still the same."""
-        cls = self.message(name)
-        if (cls._type_hash, cls._md5sum) != (type_hash, md5):
-            raise _StaleError(name)
-        return cls
-
-
-class _TextLoader(Loader):
-    """Runs a source that has no file; tracebacks find its lines in ``linecache``."""
-
-    def __init__(self, source: str, name: str) -> None:
-        self._source = source
-        self._name = name
-
-    def create_module(self, spec: ModuleSpec) -> None:
-        """Leave the making of the module to the import system."""
-
-    def exec_module(self, module: ModuleType) -> None:
-        """Run the source in the module."""
-        lines = self._source.splitlines(keepends=True)
-        linecache.cache[self._name] = (len(self._source), None, lines, self._name)
-        exec(compile(self._source, self._name, "exec"), module.__dict__)  # noqa: S102  # our own
-
 
 def is_generated(file: str) -> bool:
     """Tell whether a file is a module that rosz generated."""
@@ -354,7 +312,8 @@ def _injected(_name: str) -> None:
     """Tell the generator that the module gets its classes from ``_type_of``."""
 
 
-def _shipped(package: str, kind: str) -> tuple[str, ...]:
+def shipped_types(package: str, kind: str) -> tuple[str, ...]:
+    """Return the names of the types of a kind that come with rosz, without the package's name."""
     if package not in shipped_packages():
         return ()
     index = import_module(f"rosz.msgs.{package}")
@@ -364,7 +323,7 @@ def _shipped(package: str, kind: str) -> tuple[str, ...]:
 
 def _is_shipped(name: str) -> bool:
     package, kind, base = name.split("/")
-    return base in _shipped(package, kind)
+    return base in shipped_types(package, kind)
 
 
 def shipped_packages() -> frozenset[str]:

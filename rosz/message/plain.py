@@ -117,8 +117,8 @@ class _Writer:
 
     def _text(self, slot: Slot, value: Any, path: str) -> None:
         wide = slot.kind == "wstring"
-        given = value.decode() if isinstance(value, bytes | bytearray) and not wide else value
         try:
+            given = value.decode() if isinstance(value, bytes | bytearray) and not wide else value
             packed = pack_wide(given) if wide else put_text(given)
         except AttributeError:
             self._refuse(path, str(slot.kind), value)

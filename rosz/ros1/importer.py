@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cached_property
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
@@ -22,9 +23,9 @@ from pathlib import Path
 from types import ModuleType
 
 from rosz.environment import Environment, package_index
-from rosz.errors import RoszError
+from rosz.errors import PackageError, RoszError
 from rosz.packages import PackageIndex
-from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages
+from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
 
 __all__ = ("MODULES", "install", "type_store", "uninstall")
 
@@ -104,6 +105,24 @@ class _Types:
 
     def has(self, package: str, kind: Kind) -> bool:
         return self.store.has(package, kind)
+
+    def shipped(self, package: str, kind: Kind) -> ModuleType:
+        """Return a shipped module; what it lacks, a package of the same name may have."""
+        if not shipped_types(package, kind):
+            return self.store.module(package, kind)
+        module = import_module(f"rosz.msgs.{package}.{kind}")
+
+        def more(name: str) -> object:
+            whole = module
+            if not name.startswith("_"):
+                with suppress(PackageError):  # of a package that has nothing to do with this one
+                    whole = self.store.module(package, kind)
+            if name not in whole.__dict__:
+                raise AttributeError(f"module '{package}.{kind}' has no attribute '{name}'")
+            return whole.__dict__[name]
+
+        module.__dict__.setdefault("__getattr__", more)
+        return module
 
     def folder(self, package: str) -> Path | None:
         """Return the folder of a package that has types of its own."""
@@ -195,7 +214,9 @@ class _First(MetaPathFinder):
         if not self.types.has(package, kind):
             return None
         if not inner:
-            generated = None if package in self._shipped else PathFinder.find_spec(name, path)
+            if package in self._shipped:
+                return _same(name, lambda: self.types.shipped(package, kind))
+            generated = PathFinder.find_spec(name, path)
             if generated is not None and generated.origin and is_generated(generated.origin):
                 return generated
             return _same(name, lambda: self.types.store.module(package, kind))

@@ -8,8 +8,12 @@ from typing import Any
 
 from rosz.errors import TypeNotFound
 from rosz.idl import Catalog, Definition
+from rosz.idl.generate import shipped_module
 from rosz.idl.module import message_module
 from rosz.message import Message
+from rosz.typestore import TypeStore
+
+STORE = TypeStore()
 
 PRIMITIVES = (
     *("bool", "byte", "char", "int8", "uint8", "int16", "uint16", "int32", "uint32"),
@@ -57,21 +61,18 @@ class Written:
 
     Args:
         text: Its definition.
-        below: Definitions of types in it, by name.
+        below: Definitions of types of the same package in it, by name.
     """
 
     def __init__(self, text: str, **below: str) -> None:
         texts = {"written/msg/It": text, **{f"written/msg/{k}": v for k, v in below.items()}}
 
         def find(name: str) -> Definition:
-            if name not in texts:
-                raise TypeNotFound(name)
-            return Definition(texts[name], name)
+            return Definition(texts[name], name) if name in texts else STORE.definition(name)
 
         catalog = Catalog(find)
-        source = message_module(
-            [catalog.message(name) for name in texts], catalog, lambda _: None, "written"
-        )
+        specs = [catalog.message(name) for name in texts]
+        source = message_module(specs, catalog, shipped_module, "written")
         self.module: Any = ModuleType("written")
         exec(compile(source, "<written>", "exec"), self.module.__dict__)
 

@@ -1,0 +1,256 @@
+"""ROS 1's names in processes of their own: what a process can import is a matter of the process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+from rosz.idl.generate import write
+from rosz.packages import PackageIndex
+from rosz.typestore import TypeStore
+
+TOP = Path(__file__).parents[2]
+
+
+def package(root: Path, name: str, files: dict[str, str]) -> Path:
+    folder = root / name
+    for file, text in files.items():
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_text(text)
+    (folder / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    return folder
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    root = tmp_path / "ws" / "src"
+    package(
+        root, "gripper", {"msg/Grip.msg": "Header header\nparts/Part part\n", "srv/Do.srv": "---"}
+    )
+    package(
+        root,
+        "parts",
+        {
+            "msg/Part.msg": "uint8 BOLT=1\nuint8 kind\n",
+            "src/parts/__init__.py": "WHO = 'the code of the package'\n",
+            "src/parts/helper.py": (
+                "from parts.msg import Part\n\n\ndef bolt():\n    return Part(Part.BOLT)\n"
+            ),
+        },
+    )
+    package(root, "plain", {"scripts/x.py": ""})
+    return root
+
+
+def run(code: str, tmp_path: Path, workspace: Path | None = None, **env: str) -> str:
+    """Run a program in a process; return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", dedent(code)],
+        cwd=tmp_path,
+        env={
+            "PATH": os.environ["PATH"],
+            "HOME": str(tmp_path),
+            "PYTHONPATH": str(TOP),
+            "ROS_PACKAGE_PATH": str(workspace or ""),
+            **env,
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_shipped_packages(tmp_path: Path) -> None:
+    code = """
+        import rosz.ros1
+        import std_msgs.msg
+        import geometry_msgs.msg as geometry
+        from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
+        from sensor_msgs.msg import *
+        from std_msgs.msg._String import String
+        from rospy_tutorials.srv._AddTwoInts import AddTwoIntsRequest
+        import rosz.msgs.std_msgs.msg
+        assert std_msgs.msg is rosz.msgs.std_msgs.msg
+        assert String is std_msgs.msg.String is rosz.msgs.std_msgs.msg.String
+        assert geometry.Twist().linear.x == 0
+        assert SetBool.Request is SetBoolRequest
+        assert Image and LaserScan and AddTwoIntsRequest(1, 2)
+        import sys
+        assert not [name for name in sys.modules if name.startswith(("yaml", "zenoh", "rosz.node"))]
+        for absent in ("std_msgs.srv", "std_msgs.msg._Strin", "std_msgs.nothing", "std_srvs.msg"):
+            try:
+                __import__(absent)
+            except ModuleNotFoundError as error:
+                print(error.name)
+    """
+    assert run(code, tmp_path).split() == [
+        "std_msgs.srv",
+        "std_msgs.msg._Strin",
+        "std_msgs.nothing",
+        "std_srvs.msg",
+    ]
+
+
+def test_packages_on_the_path(tmp_path: Path, workspace: Path) -> None:
+    code = """
+        import rosz.ros1
+        from gripper.msg import Grip
+        from gripper.srv import Do, DoRequest
+        import gripper.msg._Grip
+        from parts.msg import Part
+        from std_msgs.msg import Header
+        import parts.helper, pickle, sys
+        grip = Grip(Header(frame_id="hand"), parts.helper.bolt())
+        assert Grip.from_cdr(grip.to_cdr()) == grip
+        assert gripper.msg._Grip.Grip is Grip
+        assert type(grip.part) is Part and isinstance(grip.header, Header)
+        assert parts.WHO == "the code of the package"
+        data = pickle.dumps(grip)
+        for name in [name for name in sys.modules if "gripper" in name or "parts" in name]:
+            del sys.modules[name]
+        again = pickle.loads(data)
+        assert again.part.kind == 1 and type(again).__module__ == "rosz.msgs.gripper.msg"
+        print(type(again).__name__)
+    """
+    assert run(code, tmp_path, workspace) == "Grip\n"
+    kept = {file.name.rpartition("_")[0] for file in (tmp_path / ".ros" / "rosz").glob("*.py")}
+    assert kept == {"gripper_msg", "gripper_srv", "parts_msg"}
+    assert run(code, tmp_path, workspace) == "Grip\n"
+
+
+def test_a_read_only_home(tmp_path: Path, workspace: Path) -> None:
+    code = """
+        import rosz.ros1
+        from gripper.msg import Grip
+        print(len(Grip().to_cdr()))
+    """
+    assert run(code, tmp_path, workspace, ROS_HOME="/proc/nothing") == "18\n"
+
+
+def test_a_bad_definition_names_its_place(tmp_path: Path, workspace: Path) -> None:
+    (workspace / "parts" / "msg" / "Bad.msg").write_text("int32 x\nint32\n")
+    code = """
+        import rosz.ros1
+        from rosz.errors import DefinitionError
+        try:
+            import gripper.msg
+        except DefinitionError as error:
+            print(error)
+    """
+    file = workspace / "parts" / "msg" / "Bad.msg"
+    assert run(code, tmp_path, workspace) == f"{file}:2:6: expected a name after type 'int32'\n"
+
+
+def test_other_imports_are_left_alone(tmp_path: Path, workspace: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "__init__.py").write_text("WHO = 'another one'\n")
+    (tmp_path / "mail").mkdir()
+    (tmp_path / "mail" / "__init__.py").write_text("")
+    (tmp_path / "mail" / "msg.py").write_text("SUBJECT = 'hello'\n")
+    code = """
+        import rosz.ros1, sys
+        import json, email, xml.dom
+        import mail.msg
+        assert mail.msg.SUBJECT == "hello"
+        import parts
+        assert parts.WHO == "another one"
+        from parts.msg import Part
+        assert Part.BOLT == 1
+        for absent in ("plain", "plain.msg", "gripper.nothing", "no_such_package", "gripper.msg.x"):
+            try:
+                __import__(absent)
+            except ModuleNotFoundError as error:
+                print(error.name)
+    """
+    printed = run(code, tmp_path, workspace).split()
+    assert printed == ["plain", "plain", "gripper.nothing", "no_such_package", "gripper.msg.x"]
+
+
+def test_a_broken_package_elsewhere_does_not_break_imports(tmp_path: Path, workspace: Path) -> None:
+    (workspace / "broken").mkdir()
+    (workspace / "broken" / "package.xml").write_text("<package><name>")
+    code = """
+        import rosz.ros1
+        try:
+            import no_such_package
+        except ModuleNotFoundError as error:
+            print(error)
+        from std_msgs.msg import String
+    """
+    assert run(code, tmp_path, workspace) == "No module named 'no_such_package'\n"
+
+
+def test_generated_modules_are_preferred(tmp_path: Path, workspace: Path) -> None:
+    store = TypeStore(PackageIndex([workspace]))
+    for name, files in store.sources(["gripper"]).items():
+        write(files, tmp_path / "out" / name)
+    code = """
+        import rosz.ros1
+        from gripper.msg import Grip
+        import parts.msg
+        print(Grip.__module__, parts.msg.Part.__module__, len(Grip().to_cdr()))
+    """
+    path = os.pathsep.join([str(TOP), str(tmp_path / "out")])
+    assert run(code, tmp_path, workspace, PYTHONPATH=path) == "gripper.msg parts.msg 18\n"
+    assert not (tmp_path / ".ros").exists()
+
+
+def test_a_package_of_a_shipped_name_may_add_types(tmp_path: Path, workspace: Path) -> None:
+    package(workspace, "std_msgs", {"msg/Mine.msg": "String text", "srv/Do.srv": "---"})
+    code = """
+        import rosz.ros1
+        from std_msgs.msg import String, Mine
+        from std_msgs.srv import Do
+        assert Mine(String("x")).text.data == "x"
+        try:
+            from std_msgs.msg import Yours
+        except ImportError as error:
+            print(error.name)
+    """
+    assert run(code, tmp_path, workspace) == "rosz.msgs.std_msgs.msg\n"
+
+
+def test_installing_twice_and_taking_back(tmp_path: Path, workspace: Path) -> None:
+    code = """
+        import sys
+        from rosz.ros1.importer import install, type_store, uninstall
+        finders = list(sys.meta_path)
+        install()
+        install()
+        assert sys.meta_path == finders
+        assert type_store() is type_store()
+        assert type_store().message("gripper/Grip").__name__ == "Grip"
+        uninstall()
+        assert len(sys.meta_path) == len(finders) - 2
+        try:
+            import std_msgs
+        except ModuleNotFoundError:
+            print("gone")
+        install()
+        import std_msgs
+    """
+    assert run(code, tmp_path, workspace) == "gone\n"
+
+
+def test_threads_import_at_once(tmp_path: Path, workspace: Path) -> None:
+    code = """
+        import rosz.ros1
+        from concurrent.futures import ThreadPoolExecutor
+        from importlib import import_module
+        names = ["gripper.msg", "parts.msg", "gripper.srv", "std_msgs.msg", "nav_msgs.srv"] * 8
+        with ThreadPoolExecutor(8) as pool:
+            modules = list(pool.map(import_module, names))
+        assert len(set(map(id, modules))) == 5
+        from gripper.msg import Grip
+        from parts.msg import Part
+        assert type(Grip().part) is Part
+        print("fine")
+    """
+    assert run(code, tmp_path, workspace) == "fine\n"
