@@ -4,6 +4,7 @@ Reads a line of JSON, writes a line of JSON: ``{"expression": …}`` is evaluate
 and Duration; ``{"type": …, "args": …, "now": …, "width": …, …}`` is filled and shown.
 """
 
+# mypy: disable-error-code="import-not-found"
 from __future__ import annotations
 
 import json

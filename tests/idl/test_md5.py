@@ -78,8 +78,10 @@ def installed() -> list[tuple[str, str, str]]:
                 for target in statement.targets
                 if isinstance(target, ast.Name)
             }
-            if isinstance(values.get("_full_text"), str):
-                found.append((str(values["_type"]), values["_full_text"], str(values["_md5sum"])))
+            if "_full_text" in values:
+                names = ("_type", "_full_text", "_md5sum")
+                name, text, md5 = (str(values[key]) for key in names)
+                found.append((name, text, md5))
     return found
 
 

@@ -81,7 +81,8 @@ def test_equality_copies_and_pickles() -> None:
     deep.pose.position.x = 5.0
     assert deep != pose
     assert pose.pose.position.x == 0.0
-    assert Twist() != Vector3()
+    other: Any = Vector3()
+    assert Twist() != other
     with pytest.raises(TypeError, match="unhashable"):
         hash(pose)
 

@@ -96,7 +96,8 @@ def test_invented_types(seed: int) -> None:
 
 def as_numpy(message: Any) -> Any:
     """Replace numeric sequences by numpy arrays."""
-    for slot in slots(type(message)):
+    cls: Any = type(message)
+    for slot in slots(cls):
         value = getattr(message, slot.name)
         if isinstance(value, Message):
             as_numpy(value)

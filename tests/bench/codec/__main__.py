@@ -1,8 +1,9 @@
-"""Compares codecs in one interleaved run: ``python tests/bench/codec``.
+"""Compares codecs in one interleaved run: ``python -m tests.bench.codec``.
 
 All libraries work in this process, in turn, on the same values; the best of several rounds counts.
-What is missing (genpy comes with Debian's ROS 1 packages, rosbags from PyPI) is left out. Prints how
-many times as fast as each the codecs of rosz are, encoding / decoding.
+What is missing (genpy comes with Debian's ROS 1 packages, rosbags from PyPI) is left out. Printed
+is how many times as fast as each of them rosz is, encoding / decoding. Debian builds its Python for
+speed: ``PYTHONPATH=<site-packages of the environment> /usr/bin/python3 -m tests.bench.codec``.
 """
 
 from __future__ import annotations
@@ -11,14 +12,10 @@ import sys
 import time
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[3]))
-sys.path.insert(1, str(Path(__file__).parent))
-
-from cases import CASES, VARIANTS  # noqa: E402
-from systems import Genpy, Rosbags, Rosz, System  # noqa: E402
+from .cases import CASES, VARIANTS
+from .systems import Genpy, Rosbags, Rosz, System
 
 
 def available() -> Iterator[System]:
@@ -80,7 +77,10 @@ def main() -> None:
         print(f"| {system.name} | " + " | ".join(cells) + " |")
     if options.times:
         for system in systems:
-            cells = ["{:.2f} / {:.2f}".format(*(1e6 * s for s in figures[t, system.name])) for t in titles]
+            cells = [
+                "{:.2f} / {:.2f}".format(*(1e6 * s for s in figures[t, system.name]))
+                for t in titles
+            ]
             print(f"| {system.name} µs | " + " | ".join(cells) + " |")
 
 
