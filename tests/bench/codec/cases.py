@@ -1,7 +1,8 @@
 """The messages that the codecs are compared on: their values, free of any library.
 
 Each case has several variants, as a running system has: times and readings change, the names of
-frames and joints stay.
+frames and joints stay. The frames of images and clouds differ in length, for how fast memory is
+copied depends on where it lies.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ def diagnostic_array(n: int) -> Plain:
 
 def image(n: int) -> Plain:
     return {
-        "header": header(n, "camera"),
+        "header": header(n, "camera_optical_frame"[: 5 + n]),
         "height": 480,
         "width": 640,
         "encoding": "rgb8",
@@ -116,7 +117,7 @@ def image(n: int) -> Plain:
 
 def point_cloud(n: int) -> Plain:
     return {
-        "header": header(n, "lidar"),
+        "header": header(n, "lidar_optical_frame"[: 4 + n]),
         "height": 1,
         "width": 100_000,
         "fields": [
