@@ -1,12 +1,15 @@
 """The network edge: sessions, and all that is declared on them. Nothing else imports zenoh."""
 
+from rosz.session import calls as calls  # waits at the exit
+from rosz.session.answers import Answers, Target
 from rosz.session.config import SessionConfig
 from rosz.session.declared import Closable, RawPublisher, Ring
 from rosz.session.samples import Query, Reply, Sample
-from rosz.session.session import Session, Target
+from rosz.session.session import Session
 from rosz.session.stamp import HybridClock, Stamp
 
 __all__ = (
+    "Answers",
     "Closable",
     "HybridClock",
     "Query",

@@ -1,7 +1,12 @@
-"""Which threads are inside Zenoh right now."""
+"""Leaving no thread inside Zenoh behind at the end of the program.
+
+The runtime aborts a program that ends while a thread of Python is inside Zenoh. All sessions are
+closed by then, so whoever is still inside is on the way out, and is waited for.
+"""
 
 from __future__ import annotations
 
+import atexit
 import sys
 import threading
 import time
@@ -11,6 +16,7 @@ __all__ = ("wait_for_calls",)
 
 _HERE = str(Path(__file__).parent)
 _POLL = 0.001
+_OUT_BY = 1.0
 
 
 def wait_for_calls(timeout: float) -> bool:
@@ -35,3 +41,7 @@ def wait_for_calls(timeout: float) -> bool:
             return False
         time.sleep(_POLL)
     return True
+
+
+# Registered before anything that uses a session, and so run after all of that has been closed.
+atexit.register(wait_for_calls, _OUT_BY)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol
@@ -11,7 +12,19 @@ import zenoh
 from rosz.errors import ClosedError, TransportError
 from rosz.session.samples import Sample
 
-__all__ = ("Closable", "Declared", "RawPublisher", "Ring", "direct", "mapped")
+__all__ = (
+    "Closable",
+    "Declared",
+    "Pumped",
+    "RawPublisher",
+    "Ring",
+    "channel",
+    "direct",
+    "mapped",
+)
+
+_CHANNEL = 1 << 20
+"""Items that a channel holds: more than ever come before a thread of ours gets its turn."""
 
 
 class Closable(Protocol):
@@ -33,9 +46,19 @@ def mapped(what: str) -> Iterator[None]:
         raise TransportError(f"cannot {what}: {text}") from error
 
 
-def direct(callback: Callable[[Any], None]) -> Any:
-    """Have a callback run right on Zenoh's thread instead of a Python thread per declaration."""
+def direct(callback: Callable[[Any], object]) -> Any:
+    """Have a callback run right on Zenoh's thread, where it waits for Python's lock.
+
+    Only for what comes from a link as data or query. What Zenoh tells from its inner work, such as
+    tokens that go when a link ends, must never wait for Python: to undeclare an advanced publisher
+    Zenoh holds Python's lock, and waits for that inner work.
+    """
     return zenoh.handlers.Callback(callback, indirect=False)
+
+
+def channel() -> Any:
+    """Have what comes wait in a channel, so that Zenoh never waits for Python."""
+    return zenoh.handlers.FifoChannel(_CHANNEL)
 
 
 class Declared:
@@ -55,6 +78,31 @@ class Declared:
             # The session may end right now and take the declaration along.
             with suppress(ClosedError), mapped(f"undeclare {self._what}"):
                 entity.undeclare()
+
+
+class Pumped(Declared):
+    """A declaration with a `channel`, and a thread that calls back for what comes.
+
+    Args:
+        what: Name for errors.
+        entity: What was declared.
+        deliver: Gets each item, on the thread.
+    """
+
+    def __init__(self, what: str, entity: Any, deliver: Callable[[Any], None]) -> None:
+        super().__init__(what, entity)
+        threading.Thread(
+            target=_pump, args=(entity.handler.recv, deliver), name=f"rosz {what}", daemon=True
+        ).start()
+
+
+def _pump(receive: Callable[[], Any], deliver: Callable[[Any], None]) -> None:
+    while True:
+        try:
+            item = receive()
+        except zenoh.ZError:  # undeclared, or the session is closed
+            return
+        deliver(item)
 
 
 class Ring(Declared):

@@ -11,24 +11,31 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import zenoh
-import zenoh.ext
 
-from rosz.errors import ClosedError, WaitTimeout
-from rosz.session.calls import wait_for_calls
+from rosz.session.advanced import advanced_publisher, advanced_subscriber
+from rosz.session.answers import Answers, AskOptions, Target
 from rosz.session.config import SessionConfig, overrides, zenoh_settings
-from rosz.session.declared import Closable, Declared, RawPublisher, Ring, direct, mapped
+from rosz.session.declared import (
+    Closable,
+    Declared,
+    Pumped,
+    RawPublisher,
+    Ring,
+    channel,
+    direct,
+    mapped,
+)
+from rosz.session.ending import ClosedSession
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.stamp import HybridClock, Stamp
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-__all__ = ("Session", "Target")
-
-Target = Literal["all", "all_complete", "best"]
+__all__ = ("Session",)
 
 _TARGETS = {
     "all": zenoh.QueryTarget.ALL,
@@ -36,11 +43,7 @@ _TARGETS = {
     "best": zenoh.QueryTarget.BEST_MATCHING,
 }
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
-_HEARTBEAT_SECONDS = 0.5
 _RUNTIME = "ZENOH_RUNTIME"
-_CALLS_END_BY = 1.0
-_REPLY_MARGIN = 1.0
-"""Seconds given to Zenoh's own query timeout to report before a wait ends by itself."""
 
 
 @contextmanager
@@ -58,16 +61,6 @@ def _one_receiver() -> Iterator[None]:
     finally:
         if not given:
             os.environ.pop(_RUNTIME, None)
-
-
-class _ClosedSession:
-    """Stands for the session once it is closed, so that no call reaches Zenoh any more."""
-
-    def __init__(self, why: str) -> None:
-        self._why = why
-
-    def __getattr__(self, name: str) -> Any:
-        raise ClosedError(f"no {name.replace('_', ' ')} any more: {self._why}")
 
 
 class Session:
@@ -177,19 +170,13 @@ class Session:
                     key, congestion_control=congestion, reliability=reliability, express=express
                 )
                 return RawPublisher(key, plain)
-            keeping = zenoh.ext.declare_advanced_publisher(
+            keeping = advanced_publisher(
                 self._raw,
                 key,
+                cache,
                 congestion_control=congestion,
                 reliability=reliability,
                 express=express,
-                cache=zenoh.ext.CacheConfig(cache),
-                publisher_detection=True,
-                sample_miss_detection=zenoh.ext.MissDetectionConfig(
-                    heartbeat=None, sporadic_heartbeat=_HEARTBEAT_SECONDS
-                )
-                if reliable
-                else None,
             )
             return RawPublisher(key, keeping)
 
@@ -206,7 +193,7 @@ class Session:
 
         Args:
             key: Key expression.
-            callback: Gets every sample, on a Zenoh thread.
+            callback: Gets every sample, on a thread that must not be kept.
             history: Samples per publisher to ask the caches of transient-local publishers for.
             recover: Whether to notice and fetch samples that were missed.
             remote_only: Whether to leave out what this very session publishes.
@@ -216,10 +203,16 @@ class Session:
             TransportError: The key is malformed.
         """
         origin = zenoh.Locality.REMOTE if remote_only else None
-        handler = direct(lambda raw: callback(Sample(raw)))
-        return Declared(
-            f"subscriber '{key}'", self._subscribe(key, handler, history, recover, origin)
-        )
+        what = f"subscriber '{key}'"
+
+        def deliver(raw: zenoh.Sample) -> None:
+            callback(Sample(raw))
+
+        if not history:
+            return Declared(what, self._subscribe(key, direct(deliver), 0, recover, origin))
+        # An advanced subscriber calls back with a lock held that its end needs, too.
+        entity = self._subscribe(key, channel(), history, recover, origin)
+        return Pumped(what, entity, deliver)
 
     def ring(self, key: str, depth: int, *, history: int = 0, recover: bool = False) -> Ring:
         """Declare a subscriber that keeps the newest samples until somebody takes them.
@@ -250,16 +243,8 @@ class Session:
         with mapped(f"subscribe to '{key}'"):
             if not history:
                 return self._raw.declare_subscriber(key, handler, allowed_origin=origin)
-            return zenoh.ext.declare_advanced_subscriber(
-                self._raw,
-                key,
-                handler,
-                allowed_origin=origin,
-                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history),
-                recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
-                if recover
-                else None,
-                subscriber_detection=True,
+            return advanced_subscriber(
+                self._raw, key, handler, history, recover=recover, allowed_origin=origin
             )
 
     def queryable(
@@ -276,17 +261,32 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
+        return self.questions(key, lambda raw: callback(Query(raw)), complete=complete)
+
+    def questions(
+        self, key: str, put: Callable[[Any], object], *, complete: bool = False
+    ) -> Closable:
+        """Declare that questions on a key are answered here, and have them put into a queue.
+
+        The fastest way to a thread of one's own: when ``put`` is the method of a `SimpleQueue`, no
+        Python runs on Zenoh's thread.
+
+        Args:
+            key: Key expression.
+            put: Gets each query as Zenoh has it; who takes it out makes a `Query` of it.
+            complete: Whether the answers here are all there are; ROS 2 clients ask only such.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
         with mapped(f"serve '{key}'"):
-            entity = self._raw.declare_queryable(
-                key, direct(lambda raw: callback(Query(raw))), complete=complete
-            )
+            entity = self._raw.declare_queryable(key, direct(put), complete=complete)
         return Declared(f"queryable '{key}'", entity)
 
-    def get_async(
+    def ask(
         self,
         key: str,
-        on_reply: Callable[[Reply], None],
-        on_done: Callable[[], None],
         *,
         timeout: float,
         payload: bytes | None = None,
@@ -294,14 +294,13 @@ class Session:
         parameters: str = "",
         target: Target = "all",
         any_key: bool = False,
-    ) -> None:
-        """Ask, and have the answers delivered on a Zenoh thread.
+    ) -> Answers:
+        """Ask, and have the answers to iterate over; one that is not ``ok`` is an error.
 
         Args:
             key: Key expression to ask for.
-            on_reply: Gets each answer.
-            on_done: Called after the last answer, or when the time is over.
-            timeout: Seconds after which whoever has not answered is given up.
+            timeout: Seconds after which whoever has not answered is given up; an answer that is not
+                ``ok`` with payload ``Timeout`` stands for them.
             payload: Sent along with the question.
             attachment: Sent beside the payload.
             parameters: What follows the ``?`` of the selector.
@@ -312,59 +311,62 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        handler: Any = zenoh.handlers.Callback(
-            lambda raw: on_reply(Reply(raw)), on_done, indirect=False
-        )
+        cancel = zenoh.CancellationToken()
         with mapped(f"ask '{key}'"):
-            self._raw.get(
+            handler = self._raw.get(
                 f"{key}?{parameters}" if parameters else key,
-                handler,
+                channel(),
                 target=_TARGETS[target],
                 consolidation=zenoh.ConsolidationMode.NONE,
                 accept_replies=zenoh.ReplyKeyExpr.ANY if any_key else None,
                 timeout=timeout,
                 payload=payload,
                 attachment=attachment,
+                cancellation_token=cancel,
             )
+        return Answers(handler, cancel)
 
-    def get(
-        self,
-        key: str,
-        *,
-        timeout: float,
-        payload: bytes | None = None,
-        attachment: bytes | None = None,
-        parameters: str = "",
-        target: Target = "all",
-        any_key: bool = False,
-    ) -> list[Reply]:
-        """Ask, and wait for all answers; the arguments are those of `get_async`.
-
-        Returns:
-            The answers, possibly none; one that is not ``ok`` with payload ``Timeout`` stands for
-            somebody who did not answer in time.
+    def get(self, key: str, *, timeout: float, **options: Unpack[AskOptions]) -> list[Reply]:
+        """Ask, and wait for all answers; the arguments are those of `ask`.
 
         Raises:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
-            WaitTimeout: Zenoh itself did not report back.
         """
-        replies: list[Reply] = []
-        done = threading.Event()
-        self.get_async(
-            key,
-            replies.append,
-            done.set,
-            timeout=timeout,
-            payload=payload,
-            attachment=attachment,
-            parameters=parameters,
-            target=target,
-            any_key=any_key,
-        )
-        if not done.wait(timeout + _REPLY_MARGIN):
-            raise WaitTimeout(f"end of answers on '{key}'", timeout + _REPLY_MARGIN)
-        return replies
+        return list(self.ask(key, timeout=timeout, **options))
+
+    def get_async(
+        self,
+        key: str,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+        *,
+        timeout: float,
+        **options: Unpack[AskOptions],
+    ) -> None:
+        """Ask, and have the answers delivered on another thread.
+
+        Args:
+            key: Key expression to ask for.
+            on_reply: Gets each answer.
+            on_done: Called after the last answer, or when the time is over.
+            timeout: As for `ask`.
+            options: As for `ask`.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        answers = self.ask(key, timeout=timeout, **options)
+
+        def deliver() -> None:
+            try:
+                for reply in answers:
+                    on_reply(reply)
+            finally:
+                on_done()
+
+        threading.Thread(target=deliver, name=f"rosz answers '{key}'", daemon=True).start()
 
     def token(self, key: str) -> Closable:
         """Declare a liveliness token: it is seen by others until closed or the link dies.
@@ -381,7 +383,7 @@ class Session:
 
         Args:
             key: Key expression that the tokens match.
-            callback: Gets a token's key and whether it is alive, on a Zenoh thread.
+            callback: Gets a token's key and whether it is alive, on a thread of the watch.
 
         Raises:
             ClosedError: The session is closed.
@@ -392,8 +394,8 @@ class Session:
             callback(str(raw.key_expr), raw.kind == zenoh.SampleKind.PUT)
 
         with mapped(f"watch tokens '{key}'"):
-            entity = self._raw.liveliness().declare_subscriber(key, direct(deliver), history=True)
-        return Declared(f"watch of tokens '{key}'", entity)
+            entity = self._raw.liveliness().declare_subscriber(key, channel(), history=True)
+        return Pumped(f"watch of tokens '{key}'", entity, deliver)
 
     def live_tokens(self, key: str, timeout: float) -> list[str]:
         """Return the keys of all liveliness tokens that match, sorted.
@@ -401,23 +403,13 @@ class Session:
         Raises:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
-            WaitTimeout: Zenoh itself did not report back.
         """
-        found: set[str] = set()
-        done = threading.Event()
-
-        def collect(raw: zenoh.Reply) -> None:
-            sample = raw.ok
-            if sample is not None:
-                found.add(str(sample.key_expr))
-
+        cancel = zenoh.CancellationToken()
         with mapped(f"look for tokens '{key}'"):
-            self._raw.liveliness().get(
-                key, zenoh.handlers.Callback(collect, done.set, indirect=False), timeout=timeout
+            handler = self._raw.liveliness().get(
+                key, channel(), timeout=timeout, cancellation_token=cancel
             )
-        if not done.wait(timeout + _REPLY_MARGIN):
-            raise WaitTimeout(f"end of tokens '{key}'", timeout + _REPLY_MARGIN)
-        return sorted(found)
+        return sorted({reply.key for reply in Answers(handler, cancel) if reply.ok})
 
     def peers(self) -> list[str]:
         """Return the ids of the sessions and routers that this one is linked to."""
@@ -427,7 +419,7 @@ class Session:
     @property
     def closed(self) -> bool:
         """Whether the session has been closed."""
-        return isinstance(self._raw, _ClosedSession)
+        return isinstance(self._raw, ClosedSession)
 
     def disown(self, why: str) -> None:
         """Refuse everything from now on, leaving Zenoh alone: after a fork, in the child.
@@ -440,20 +432,15 @@ class Session:
         # Zenoh's threads are not here to answer: even to free the session would wait for ever.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._raw))
         self._closing = threading.Lock()
-        self._raw = _ClosedSession(why)
+        self._raw = ClosedSession(why)
 
     def close(self) -> None:
-        """Close the session and all that is declared on it; again is no error.
-
-        Calls that other threads have under way are waited for, a second at most: a program that
-        ends while a thread is inside Zenoh is aborted by the runtime.
-        """
+        """Close the session and all that is declared on it; again is no error."""
         with self._closing:
             if self.closed:
                 return
-            raw, self._raw = self._raw, _ClosedSession("the session is closed")
+            raw, self._raw = self._raw, ClosedSession("the session is closed")
             raw.close()
-        wait_for_calls(_CALLS_END_BY)
 
     def __enter__(self) -> Self:
         return self

@@ -1,0 +1,50 @@
+"""The answers to a question, as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Literal, TypedDict
+
+import zenoh
+
+from rosz.session.samples import Reply
+
+__all__ = ("Answers", "AskOptions", "Target")
+
+Target = Literal["all", "all_complete", "best"]
+"""Who is asked: all who may answer, those who have all there is, or the best of them."""
+
+
+class AskOptions(TypedDict, total=False):
+    """What may be said with a question; see `Session.ask`."""
+
+    payload: bytes | None
+    attachment: bytes | None
+    parameters: str
+    target: Target
+    any_key: bool
+
+
+class Answers:
+    """Iterate over it for the answers; it ends with the last one, or when the time is over.
+
+    Args:
+        handler: Zenoh's channel of replies.
+        token: What cancels the question.
+    """
+
+    def __init__(self, handler: Any, token: zenoh.CancellationToken) -> None:
+        self._recv = handler.recv
+        self._token = token
+
+    def __iter__(self) -> Iterator[Reply]:
+        while True:
+            try:
+                raw = self._recv()
+            except zenoh.ZError:  # the channel is empty, and nothing more will come
+                return
+            yield Reply(raw)
+
+    def cancel(self) -> None:
+        """Expect no more answers: who iterates is done; from any thread, again is no error."""
+        self._token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
