@@ -93,6 +93,9 @@ def _invoke(app: object, argv: list[str], program: str) -> int:
     from typer.exceptions import TyperException
 
     assert isinstance(app, typer.Typer)  # noqa: S101  # every group module defines one
+    if not argv and app.info.no_args_is_help is True:
+        app(args=["--help"], prog_name=program, standalone_mode=False)
+        return 2
     try:
         code = app(args=argv, prog_name=program, standalone_mode=False)
     except typer.Abort:

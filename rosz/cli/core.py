@@ -1,0 +1,57 @@
+"""``rosz core``: hold the meeting point and a replica of the parameters."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rosz.cli.group import print_lines, until_stopped
+from rosz.errors import UsageError
+
+__all__ = ("app",)
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+def core_command(
+    *,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT", help="Listen there as well, such as tcp/0.0.0.0:7447; repeatable."
+        ),
+    ] = None,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT", help="Connect to another machine, tcp/robot1:7447; repeatable."
+        ),
+    ] = None,
+    store: Annotated[str, typer.Option(metavar="FILE", help="Keep the parameters in a file.")] = "",
+    port: Annotated[str, typer.Option("-p", "--port", hidden=True)] = "",
+) -> None:
+    """Hold the meeting point of this machine and a replica of the parameters, until stopped.
+
+    Nothing needs it; it links machines, and keeps parameters when no node runs.
+    """
+    if port:
+        raise UsageError(
+            "there is no master, and so no port of it: ROSZ_RENDEZVOUS moves the meeting point,"
+            " ROS_DOMAIN_ID keeps groups of nodes apart"
+        )
+    from rosz.environment import Environment
+    from rosz.introspect.core import Core
+
+    environment = Environment.read()
+    file = Path(store).absolute() if store else None
+    with until_stopped(), Core(environment, listen or (), connect or (), file) as core:
+        lines = [f"listening on {endpoint}" for endpoint in core.endpoints]
+        lines += [f"connecting to {endpoint}" for endpoint in core.connect]
+        kept = f"kept in {core.store}" if core.store else "kept in memory"
+        lines.append(f"parameters of domain {core.domain} are {kept}")
+        print_lines([*lines, "started core; press Ctrl-C to end it"])
+        threading.Event().wait()

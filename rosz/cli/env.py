@@ -1,0 +1,52 @@
+"""``rosz env``: print what to eval in a shell, so that ROS 1's command names mean rosz."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path, PurePath
+from typing import Annotated
+
+import typer
+
+from rosz.cli.group import print_json
+from rosz.errors import UsageError, near_miss
+
+__all__ = ("app",)
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+def env_command(
+    shell: Annotated[
+        str, typer.Argument(metavar="[SHELL]", help="bash, zsh or fish; by SHELL when not given.")
+    ] = "",
+    *,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print the settings that rosz reads, as JSON.")
+    ] = False,
+) -> None:
+    """Print what makes rostopic, roslaunch and the like mean rosz.
+
+    Use it as: eval "$(rosz env)", in fish: rosz env fish | source
+    """
+    if json:
+        from rosz.environment import Environment
+
+        print_json(Environment.read())
+        return
+    from rosz.introspect.shells import SHELLS, script
+
+    name = shell or PurePath(os.environ.get("SHELL", "")).name
+    folder = str(Path(__file__).parent / "bin")
+    for known in SHELLS:
+        if name == known:
+            sys.stdout.write(script(known, folder, sys.executable))
+            return
+    if shell:
+        raise UsageError(
+            f"'{shell}' is no shell that is known; expected {', '.join(SHELLS)}"
+            f"{near_miss(shell, SHELLS)}"
+        )
+    sys.stdout.write(script("bash", folder, sys.executable))

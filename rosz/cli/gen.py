@@ -1,0 +1,54 @@
+"""``rosz gen``: write Python modules for the messages and services of packages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rosz.cli.group import print_lines
+
+__all__ = ("app",)
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+def gen_command(
+    packages: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[PACKAGE]...", help="Names or folders; the one around this folder if none."
+        ),
+    ] = None,
+    *,
+    output: Annotated[
+        str,
+        typer.Option(
+            "-o", "--output", metavar="FOLDER", help="Where; src in the package when not given."
+        ),
+    ] = "",
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit code 1 if something is stale.")
+    ] = False,
+) -> int:
+    """Write Python modules for messages and services, for editors and type checkers.
+
+    Running programs needs none of this: what is not generated is compiled when it is imported.
+    """
+    from rosz.environment import Environment, package_index
+    from rosz.introspect.generate import Generator
+
+    index = package_index(Environment.read())
+    generator = Generator(index, Path(output).absolute() if output else None)
+    chosen = [generator.package(word, Path.cwd()) for word in packages or ("",)]
+    code = 0
+    for package in chosen:
+        if check:
+            wrong = generator.stale(package)
+            print_lines(wrong)
+            code = code or int(bool(wrong))
+        else:
+            print_lines(map(str, generator.write(package)))
+    return code

@@ -1,0 +1,172 @@
+"""What the command groups share: how they take arguments, resolve names, print, and are stopped.
+
+A group takes remappings anywhere (``from:=to``, ``__name:=``, ``__ns:=``), as ROS 1's tools do, so
+that it can be a node of a launch file.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+from typer.core import TyperGroup
+
+from rosz import names, remap
+from rosz.environment import Environment
+from rosz.introspect.reach import open_context, open_session
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+    from rosz.node import Context
+    from rosz.session import Session
+    from rosz.typestore import TypeStore
+
+__all__ = (
+    "Call",
+    "call_of",
+    "new_group",
+    "print_json",
+    "print_lines",
+    "until_stopped",
+    "warn",
+)
+
+
+class Call:
+    """One call of a command: settings, remappings, and the way into the network.
+
+    Args:
+        argv: The remappings among its arguments.
+    """
+
+    def __init__(self, argv: Sequence[str]) -> None:
+        self.argv = tuple(argv)
+        self.environment = Environment.read()
+        self._arguments = remap.parse(argv)
+
+    @property
+    def domain(self) -> int:
+        """The ROS domain."""
+        return self.environment.domain
+
+    def resolve(self, name: str, tool: str = "rosz") -> str:
+        """Return the global name that a name means to a tool.
+
+        Args:
+            name: As it was written.
+            tool: Base name of the tool's node, which private names belong to.
+
+        Raises:
+            InvalidName: It is not legal.
+        """
+        node = self._arguments.node_name(tool, self.environment.namespace)
+        return names.resolve(name, node, self._arguments.resolved_remaps(node))
+
+    @property
+    def types(self) -> TypeStore:
+        """Types by name."""
+        from rosz.environment import package_index
+        from rosz.typestore import TypeStore
+
+        return TypeStore(package_index(self.environment), self.environment.home / "rosz")
+
+    def session(self) -> Session:
+        """Open a session to ask and end.
+
+        Raises:
+            TransportError: Nobody answers.
+        """
+        return open_session(self.environment)
+
+    def context(self, *, lasting: bool = False) -> Context:
+        """Open the context of a node that publishes, subscribes or calls.
+
+        Raises:
+            TransportError: Nobody answers.
+        """
+        return open_context(self.environment, self.argv, lasting=lasting)
+
+    def survey(self, *, processes: bool = False) -> Survey:
+        """Ask who is there.
+
+        Raises:
+            TransportError: Nobody answers.
+        """
+        from rosz.introspect.survey import take
+
+        with self.session() as session:
+            survey = take(session, self.domain, processes=processes)
+        for damage in survey.damaged:
+            warn(f"ignoring what is no name of a node or topic: {damage}")
+        return survey
+
+
+def call_of(context: typer.Context) -> Call:
+    """Return the call that a command is part of."""
+    argv = context.find_object(tuple)
+    return Call(argv or ())
+
+
+class _Group(TyperGroup):
+    """Takes remappings out of the arguments before anything else looks at them."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        ctx.obj = tuple(filter(_is_remapping, args))
+        return super().parse_args(ctx, [word for word in args if not _is_remapping(word)])
+
+
+def _is_remapping(word: str) -> bool:
+    left, separator, _ = word.partition(":=")
+    return bool(separator and left) and names.is_valid(left.lstrip("_") or "x")
+
+
+def new_group(text: str) -> typer.Typer:
+    """Return a group of commands.
+
+    Args:
+        text: What it is for.
+    """
+    return typer.Typer(
+        cls=_Group,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        help=text,
+        add_completion=False,
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines to stdout at once."""
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
+    sys.stdout.flush()
+
+
+def print_json(value: Any) -> None:
+    """Print a value as JSON for people and programs alike."""
+    import msgspec
+
+    sys.stdout.write(msgspec.json.format(msgspec.json.encode(value)).decode() + "\n")
+
+
+def warn(text: str) -> None:
+    """Tell something that is no data."""
+    sys.stderr.write(f"WARNING: {text}\n")
+    sys.stderr.flush()
+
+
+@contextmanager
+def until_stopped() -> Iterator[None]:
+    """Let Ctrl-C, or a request to terminate, be the regular end of what goes on for ever."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    except KeyboardInterrupt:
+        return
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,133 @@
+"""``rosz node``: what rosnode does."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from rosz.cli.group import call_of, new_group, print_json, print_lines, until_stopped
+from rosz.errors import UsageError
+
+__all__ = ("app",)
+
+app = new_group("List, inspect, ping and end nodes.")
+
+_TOOL = "rosnode"
+_Json = Annotated[bool, typer.Option("--json", help="As JSON.")]
+
+
+@app.command("list")
+def list_command(
+    context: typer.Context,
+    namespace: Annotated[str, typer.Argument(metavar="[NAMESPACE]")] = "",
+    *,
+    everything: Annotated[bool, typer.Option("-a", "--all", help="With where they are.")] = False,
+    places: Annotated[bool, typer.Option("-u", help="Only where they are.")] = False,
+    json: _Json = False,
+) -> None:
+    """List nodes."""
+    from rosz.introspect.nodes import list_nodes
+    from rosz.introspect.topics import in_namespace
+
+    call = call_of(context)
+    space = call.resolve(namespace, _TOOL) if namespace else "/"
+    survey = call.survey(processes=everything or places or json)
+    nodes = [node for node in list_nodes(survey) if in_namespace(node.name, space)]
+    if json:
+        print_json(nodes)
+    elif everything:
+        print_lines(f"{node.address} \t{node.name}" for node in nodes)
+    else:
+        print_lines(node.address if places else node.name for node in nodes)
+
+
+@app.command("info")
+def info_command(
+    context: typer.Context,
+    nodes: Annotated[list[str], typer.Argument(metavar="NODE...")],
+    *,
+    quiet: Annotated[
+        bool, typer.Option("-q", "--quiet", help="Do not ask the nodes themselves.")
+    ] = False,
+    json: _Json = False,
+) -> None:
+    """Tell what nodes publish, subscribe to and serve, and whom they are connected with."""
+    from rosz.cli.node_talk import info
+
+    info(call_of(context), nodes, quiet=quiet, as_json=json)
+
+
+@app.command("machine")
+def machine_command(
+    context: typer.Context,
+    machine: Annotated[str, typer.Argument(metavar="[MACHINE]")] = "",
+    *,
+    json: _Json = False,
+) -> None:
+    """List the machines that nodes run on, or the nodes on one of them."""
+    from rosz.introspect.nodes import list_nodes, machines, on_machine
+
+    nodes = list_nodes(call_of(context).survey(processes=True))
+    found = on_machine(nodes, machine) if machine else machines(nodes)
+    if json:
+        print_json(found)
+    else:
+        print_lines(found)
+
+
+@app.command("ping")
+def ping_command(
+    context: typer.Context,
+    node: Annotated[str, typer.Argument(metavar="NODE")] = "",
+    *,
+    everybody: Annotated[bool, typer.Option("-a", "--all", help="Ping all nodes once.")] = False,
+    count: Annotated[
+        int | None, typer.Option("-c", metavar="COUNT", help="Ping so often; for ever otherwise.")
+    ] = None,
+) -> int:
+    """Tell how long a node takes to answer; exit code 1 if it does not."""
+    if everybody and (node or count is not None):
+        raise UsageError("--all pings every node once: it takes no node and no -c")
+    if count is not None and count < 1:
+        raise UsageError(f"-c is {count}; expected at least 1")
+    from rosz.cli.node_talk import ping, ping_all
+
+    call = call_of(context)
+    if everybody:
+        return ping_all(call)
+    if not node:
+        names = "\n".join(call.survey().view.nodes())
+        raise UsageError(f"no node is given; there are:\n{names}")
+    with until_stopped():
+        return ping(call, node, count)
+    return 0
+
+
+@app.command("kill")
+def kill_command(
+    context: typer.Context,
+    nodes: Annotated[list[str] | None, typer.Argument(metavar="[NODE]...")] = None,
+    *,
+    everybody: Annotated[bool, typer.Option("-a", "--all", help="End all nodes.")] = False,
+) -> int:
+    """Have nodes end, and wait until they are gone."""
+    if everybody and nodes:
+        raise UsageError("--all ends every node: it takes no names")
+    from rosz.cli.node_talk import choose, kill
+
+    call = call_of(context)
+    if not everybody and not nodes:
+        nodes = choose(call, sys.stdin)
+        if not nodes:
+            return 0
+    return kill(call, nodes or (), everybody=everybody)
+
+
+@app.command("cleanup")
+def cleanup_command() -> None:
+    """Forget nodes that are dead: there is nothing to do, since nobody keeps them."""
+    print_lines(
+        ["a node that is dead is gone from all lists at once: there is nothing to clean up"]
+    )

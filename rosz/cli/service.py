@@ -1,0 +1,152 @@
+"""``rosz service``: what rosservice does."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rosz.cli.group import call_of, new_group, print_json, print_lines
+from rosz.errors import UsageError
+
+__all__ = ("app",)
+
+app = new_group("List and call services.")
+
+_TOOL = "rosservice"
+_Json = Annotated[bool, typer.Option("--json", help="As JSON.")]
+_ServiceName = Annotated[str, typer.Argument(metavar="SERVICE")]
+
+
+@app.command("list")
+def list_command(
+    context: typer.Context,
+    namespace: Annotated[str, typer.Argument(metavar="[NAMESPACE]")] = "",
+    *,
+    nodes: Annotated[bool, typer.Option("-n", "--nodes", help="With the nodes.")] = False,
+    types: Annotated[bool, typer.Option("-t", "--types", help="With types.")] = False,
+    json: _Json = False,
+) -> None:
+    """List services."""
+    from rosz.introspect import services as library
+    from rosz.introspect.topics import in_namespace
+
+    call = call_of(context)
+    space = call.resolve(namespace, _TOOL) if namespace else "/"
+    entries = [
+        entry
+        for entry in library.list_services(call.survey().view)
+        if in_namespace(entry.name, space)
+    ]
+    if json:
+        print_json(entries)
+        return
+    for entry in entries:
+        kind = f" [{', '.join(entry.types)}]" if types else ""
+        print_lines([entry.name + kind + (f" {','.join(entry.nodes)}" if nodes else "")])
+
+
+@app.command("info")
+def info_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
+    """Tell who serves a service, of what type and with what arguments."""
+    from rosz.introspect import services as library
+    from rosz.introspect.fill import list_arguments
+    from rosz.introspect.survey import ros1_type
+
+    call = call_of(context)
+    token = library.server(call.survey().view, call.resolve(service, _TOOL))
+    arguments = list_arguments(call.types.service(token.type_name).Request)
+    type_name = ros1_type(token.type_name)
+    if json:
+        row = {"name": token.name, "node": token.node_name, "uri": library.uri(token)}
+        print_json(row | {"type": type_name, "args": arguments.split()})
+        return
+    print_lines(
+        [
+            f"Node: {token.node_name}",
+            f"URI: {library.uri(token)}",
+            f"Type: {type_name}",
+            f"Args: {arguments}",
+        ]
+    )
+
+
+@app.command("type")
+def type_command(context: typer.Context, service: _ServiceName) -> None:
+    """Print the type of a service."""
+    from rosz.introspect.services import server
+    from rosz.introspect.survey import ros1_type
+
+    call = call_of(context)
+    print_lines([ros1_type(server(call.survey().view, call.resolve(service, _TOOL)).type_name)])
+
+
+@app.command("find")
+def find_command(
+    context: typer.Context,
+    type_name: Annotated[str, typer.Argument(metavar="TYPE")],
+    *,
+    json: _Json = False,
+) -> None:
+    """List the services of a type."""
+    from rosz.introspect.services import find
+
+    found = find(call_of(context).survey().view, type_name)
+    if json:
+        print_json(found)
+    else:
+        print_lines(found)
+
+
+@app.command("args")
+def args_command(context: typer.Context, service: _ServiceName) -> None:
+    """Print the arguments that a service takes."""
+    from rosz.introspect.fill import list_arguments
+    from rosz.introspect.services import server
+
+    call = call_of(context)
+    token = server(call.survey().view, call.resolve(service, _TOOL))
+    print_lines([list_arguments(call.types.service(token.type_name).Request)])
+
+
+@app.command("node")
+def node_command(context: typer.Context, service: _ServiceName) -> None:
+    """Print the node that serves a service."""
+    from rosz.introspect.services import server
+
+    call = call_of(context)
+    print_lines([server(call.survey().view, call.resolve(service, _TOOL)).node_name])
+
+
+@app.command("uri")
+def uri_command(context: typer.Context, service: _ServiceName) -> None:
+    """Print the key that a service is called by on Zenoh."""
+    from rosz.introspect.services import server, uri
+
+    call = call_of(context)
+    print_lines([uri(server(call.survey().view, call.resolve(service, _TOOL)))])
+
+
+@app.command("call")
+def call_command(
+    context: typer.Context,
+    service: _ServiceName,
+    values: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[VALUE]...", help="YAML: one dictionary, or a value per field."),
+    ] = None,
+    *,
+    verbose: Annotated[bool, typer.Option("-v", help="Print the request too.")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for the service.")] = False,
+    timeout: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Wait for the answer at most so long.")
+    ] = 3600.0,
+    json: _Json = False,
+) -> None:
+    """Call a service and print its answer."""
+    if not timeout > 0:
+        raise UsageError(f"--timeout is {timeout:g}; expected seconds above 0")
+    from rosz.cli.service_call import CallOptions, call_service
+
+    options = CallOptions(verbose=verbose, wait=wait, timeout=timeout, as_json=json)
+    call_service(call_of(context), service, values or (), options)

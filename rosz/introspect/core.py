@@ -1,0 +1,112 @@
+"""What ``rosz core`` keeps up: a Zenoh router at the rendezvous, and a replica of the parameters.
+
+Nothing needs it: nodes find each other and keep the parameters among themselves. It gives what a
+process that stays can: a meeting point that does not move, links to other machines, and parameters
+that outlive all nodes, on disk also itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from rosz.environment import Environment
+from rosz.errors import TransportError
+from rosz.session import Session, SessionConfig
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from rosz.params.replica import Replica
+
+__all__ = ("Core",)
+
+_REFUSED = re.compile(r"bound to (\S+?): \[.*address already in use", re.IGNORECASE)
+
+
+class Core:
+    """A meeting point and a replica, until closed.
+
+    Args:
+        environment: Settings.
+        listen: Further endpoints to listen on.
+        connect: Further endpoints to connect to.
+        store: File that keeps the parameters; none when not given.
+
+    Attributes:
+        endpoints: Where it listens.
+        connect: Where it connects to.
+        domain: The ROS domain of the parameters; nodes of all domains may meet here.
+        store: The file.
+
+    Raises:
+        TransportError: An endpoint is occupied or malformed.
+        StoreError: The file cannot be used.
+    """
+
+    def __init__(
+        self,
+        environment: Environment,
+        listen: Sequence[str] = (),
+        connect: Sequence[str] = (),
+        store: Path | None = None,
+    ) -> None:
+        from rosz.params.replica import Replica
+
+        self.endpoints = (environment.rendezvous, *environment.listen, *listen)
+        self.connect = (*environment.connect, *connect)
+        self.domain = environment.domain
+        self.store = store
+        config = SessionConfig(
+            mode="router",
+            rendezvous=environment.rendezvous,
+            listen=self.endpoints[1:],
+            connect=self.connect,
+            multicast=environment.multicast,
+            config_file=environment.zenoh_config,
+            override=environment.zenoh_override,
+        )
+        keep = None
+        if store is not None:
+            from rosz.params.store import Store
+
+            keep = Store(store)
+        try:
+            self.session = Session.open(config)
+        except TransportError as error:
+            if keep is not None:
+                keep.close()
+            raise _explained(error) from error
+        try:
+            self.params: Replica = Replica(self.session, self.domain, keep=keep)
+        except BaseException:
+            self.session.close()
+            raise
+
+    def close(self) -> None:
+        """End both; again is no error."""
+        self.params.close()
+        self.session.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _explained(error: TransportError) -> TransportError:
+    match = _REFUSED.search(str(error))
+    if match is None:
+        return error
+    return TransportError(
+        f"'{match[1]}' is occupied: another core, or a node that the others meet at, holds it; all"
+        " goes on as it is, or end that one and start the core then"
+    )

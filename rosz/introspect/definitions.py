@@ -1,0 +1,162 @@
+"""Definitions of messages and services as rosmsg and rossrv show them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from rosz.errors import TypeNotFound, UsageError, near_miss
+from rosz.idl import Catalog, MessageSpec, message_hash, message_md5, service_hash, service_md5
+from rosz.idl.spec import ros1_name
+from rosz.typestore import Kind, TypeStore
+
+__all__ = ("Definitions", "TypeSummary")
+
+_PRIMITIVE_IN_ROS1 = {
+    "builtin_interfaces/msg/Time": "time",
+    "builtin_interfaces/msg/Duration": "duration",
+}
+_HEADER = "std_msgs/msg/Header"
+
+
+class TypeSummary(msgspec.Struct, frozen=True):
+    """What there is to say about a type.
+
+    Attributes:
+        name: As ROS 1 spells it.
+        type_name: Full name.
+        md5: Hash of ROS 1.
+        hash: Hash of ROS 2, part of the key that the type is sent under.
+        parts: A message's fields, or those of a request and of a response, name to type.
+        constants: Likewise.
+        text: The definition.
+    """
+
+    name: str
+    type_name: str
+    md5: str
+    hash: str
+    parts: list[dict[str, str]]
+    constants: list[dict[str, Any]]
+    text: str
+
+
+class Definitions:
+    """All definitions of one kind that can be found.
+
+    Args:
+        store: Where types are.
+        kind: Messages or services.
+    """
+
+    def __init__(self, store: TypeStore, kind: Kind) -> None:
+        self._store = store
+        self._kind = kind
+        self._catalog = Catalog(store.definition)
+
+    def find(self, name: str) -> list[str]:
+        """Return the full names that a name means: one, or all of that base name.
+
+        Args:
+            name: ``pkg/Name``, ``pkg/msg/Name``, or ``Name`` alone; a suffix ``.msg`` is ignored.
+
+        Raises:
+            TypeNotFound: There is none.
+            UsageError: It is no name of a type.
+        """
+        name = name.removesuffix(f".{self._kind}")
+        if "::" in name or "." in name:
+            raise UsageError(f"'{name}' is no type; expected a form such as 'std_msgs/String'")
+        known = self._store.names(self._kind)
+        if "/" not in name:
+            found = [one for one in known if one.rpartition("/")[2] == name]
+            if not found:
+                bases = {one.rpartition("/")[2] for one in known}
+                raise TypeNotFound(name, f"no package has it{near_miss(name, bases)}")
+            return [self._full(one) for one in found]
+        package, _, rest = name.partition("/")
+        short = f"{package}/{rest.removeprefix(f'{self._kind}/')}"
+        if short not in known:
+            # The store knows best why not.
+            look = self._store.message if self._kind == "msg" else self._store.service
+            look(name)
+        return [self._full(short)]
+
+    def _full(self, name: str) -> str:
+        package, _, base = name.partition("/")
+        return f"{package}/{self._kind}/{base}"
+
+    def parts(self, name: str) -> list[MessageSpec]:
+        """Return the message, or the request and the response, of a full name.
+
+        Raises:
+            RoszError: The definition, or one that it refers to, is missing or not well-formed.
+        """
+        if self._kind == "msg":
+            return [self._catalog.message(name)]
+        service = self._catalog.service(name)
+        return [service.request, service.response]
+
+    def show(self, name: str) -> str:
+        """Return a definition, the types in it unfolded, as ``rosmsg show`` prints it."""
+        return "---\n".join(
+            "".join(f"{line}\n" for line in self._lines(part, "")) for part in self.parts(name)
+        )
+
+    def _lines(self, spec: MessageSpec, indent: str) -> Iterator[str]:
+        for constant in spec.constants:
+            yield f"{indent}{constant.type} {constant.name}={constant.text}"
+        if spec.name == _HEADER and all(field.name != "seq" for field in spec.fields):
+            yield f"{indent}uint32 seq"  # not on the wire; receivers fill it in
+        for field in spec.fields:
+            yield f"{indent}{_written(field.type)} {field.name}"
+            if not field.type.primitive and field.type.base not in _PRIMITIVE_IN_ROS1:
+                yield from self._lines(self._catalog.message(field.type.base), f"{indent}  ")
+
+    def text(self, name: str) -> str:
+        """Return a definition as it is written.
+
+        Raises:
+            RoszError: It cannot be read.
+        """
+        return self._store.definition(name).text
+
+    def md5(self, name: str) -> str:
+        """Return the hash that ROS 1 knows a type by."""
+        if self._kind == "msg":
+            return message_md5(self._catalog.message(name), self._catalog)
+        return service_md5(self._catalog.service(name), self._catalog)
+
+    def hash(self, name: str) -> str:
+        """Return the hash that ROS 2 knows a type by."""
+        if self._kind == "msg":
+            return message_hash(self._catalog.message(name), self._catalog)
+        return service_hash(self._catalog.service(name), self._catalog)
+
+    def summary(self, name: str) -> TypeSummary:
+        """Return all about a type.
+
+        Raises:
+            RoszError: The definition, or one that it refers to, is missing or not well-formed.
+        """
+        parts = self.parts(name)
+        return TypeSummary(
+            name=ros1_name(name),
+            type_name=name,
+            md5=self.md5(name),
+            hash=self.hash(name),
+            parts=[{field.name: _written(field.type) for field in part.fields} for part in parts],
+            constants=[{one.name: one.value for one in part.constants} for part in parts],
+            text=self.text(name),
+        )
+
+
+def _written(kind: Any) -> str:
+    """Spell the type of a field as ROS 1 does."""
+    if kind.primitive:
+        base = kind.base + (f"<={kind.bound}" if kind.bound else "")
+    else:
+        base = _PRIMITIVE_IN_ROS1.get(kind.base) or ros1_name(kind.base)
+    return f"{base}{kind.suffix}"

@@ -1,0 +1,192 @@
+"""Paths to fields of messages: ``pose/position``, ``ranges[0]``, ``poses[2:4]/x``.
+
+A path is checked against the type before the first message comes, so a wrong name is told at once.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
+from rosz.introspect.survey import ros1_type
+from rosz.message import Message
+from rosz.message.schema import Slot, slots
+from rosz.message.schema import ros1_type as slot_type
+
+__all__ = ("FieldPath", "Target", "find_target")
+
+_STEP = re.compile(r"(\w+)(?:\[([^\]]*)\])?")
+_MOST_SLICE_PARTS = 3
+
+Loader = Callable[[str], type[Message]]
+
+
+class Step(msgspec.Struct, frozen=True):
+    """One name of a path, with what is in brackets behind it."""
+
+    name: str
+    index: int | slice | None
+
+
+class FieldPath:
+    """The way from a message to a part of it.
+
+    Args:
+        text: Names joined by slashes, each with an index or slice where it is a sequence; without
+            any name it leads to the message itself.
+
+    Raises:
+        UsageError: It has not that form.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text.strip("/")
+        self.steps = tuple(_parse_step(part, text) for part in self.text.split("/") if part)
+
+    def read(self, message: Any) -> Any:
+        """Return the part of a message.
+
+        Raises:
+            LookupError: An index is outside of the sequence.
+        """
+        return _follow(message, self.steps)
+
+    def type_in(self, cls: type[Message]) -> str:
+        """Return the type of the part, as ROS 1 spells it, such as ``float64[]``.
+
+        Raises:
+            NotFoundError: The class has no such field.
+            UsageError: An index is given for what is no sequence, or none where one is needed.
+        """
+        type_text = cls._type
+        here: type[Any] | str = cls
+        before = cls._type
+        for step in self.steps:
+            if isinstance(here, str):
+                raise NotFoundError(f"'{before}' is a {type_text}: it has no field '{step.name}'")
+            slot = _slot(here, step.name)
+            here = slot.kind
+            type_text = slot_type(slot)
+            before = f"{before}.{step.name}"
+            if step.index is not None and slot.shape == "one" and slot.kind != "string":
+                raise UsageError(f"'{before}' is a {type_text}, no sequence: it takes no index")
+            if step.index is None and slot.shape != "one" and step is not self.steps[-1]:
+                raise UsageError(
+                    f"'{before}' is a {type_text}: say which of them, as in {step.name}[0]"
+                )
+            if isinstance(step.index, int):
+                type_text = slot_type(msgspec.structs.replace(slot, shape="one"))
+        return type_text
+
+    def __repr__(self) -> str:
+        return f"FieldPath({self.text!r})"
+
+
+def _parse_step(part: str, whole: str) -> Step:
+    match = _STEP.fullmatch(part)
+    if match is None:
+        raise UsageError(f"'{part}' in '{whole}' is no field; expected a form such as ranges[0:3]")
+    name, inside = match.groups()
+    if inside is None:
+        return Step(name, None)
+    numbers = inside.split(":")
+    try:
+        ends = [int(number) if number.strip() else None for number in numbers]
+    except ValueError as error:
+        raise UsageError(
+            f"'[{inside}]' in '{whole}' is no index; expected whole numbers"
+        ) from error
+    if len(ends) == 1 and ends[0] is not None:
+        return Step(name, ends[0])
+    if len(ends) == 1 or len(ends) > _MOST_SLICE_PARTS:
+        raise UsageError(
+            f"'[{inside}]' in '{whole}' is no index; expected [3] or [start:stop:step]"
+        )
+    return Step(name, slice(*ends))
+
+
+def _follow(value: Any, steps: Sequence[Step]) -> Any:
+    for number, step in enumerate(steps):
+        value = getattr(value, step.name)
+        if step.index is None:
+            continue
+        value = value[step.index]
+        rest = steps[number + 1 :]
+        if isinstance(step.index, slice):
+            if not rest:
+                return list(value) if isinstance(value, bytes | array) else value
+            return [_follow(one, rest) for one in value]
+    return value
+
+
+def _slot(cls: type[Any], name: str) -> Slot:
+    for slot in slots(cls):
+        if slot.name == name:
+            return slot
+    if name == "seq" and "seq" in cls.__slots__:
+        return Slot("seq", "uint32", 0, "one", 0)
+    if name in {"secs", "nsecs"} and hasattr(cls, name):  # ROS 1's spelling of the fields of times
+        return slots(cls)[name == "nsecs"]
+    known = cls.__slots__
+    listing = f"; it has {', '.join(known)}" if known else "; it has no fields"
+    raise NotFoundError(f"'{cls._type}' has no field '{name}'{near_miss(name, known) or listing}")
+
+
+class Target(msgspec.Struct, frozen=True):
+    """A topic, or a field of what is sent on it.
+
+    Attributes:
+        topic: Name of the topic.
+        type_name: Its type, ``pkg/msg/Name``.
+        path: From a message to the part that is meant.
+    """
+
+    topic: str
+    type_name: str
+    path: FieldPath
+
+    def type_text(self, load: Loader) -> str:
+        """Return what ``rostopic type`` prints.
+
+        Raises:
+            RoszError: The type of a field cannot be told.
+        """
+        own = ros1_type(self.type_name)
+        if not self.path.steps:
+            return own
+        return f"{own} {self.path.text} {self.path.type_in(load(self.type_name))}"
+
+
+def find_target(name: str, topics: Mapping[str, Sequence[str]], load: Loader) -> Target:
+    """Find the topic that a name means, or the topic and the field in it.
+
+    The whole name is a topic, or else its longest beginning that is one and has such a field.
+
+    Args:
+        name: Global name, fields and indices included.
+        topics: Types by topic.
+        load: Gives the class of a type.
+
+    Raises:
+        NotFoundError: There is no such topic, or it has no such field; the text says which.
+        UsageError: The path is malformed.
+    """
+    if name in topics:
+        return Target(name, topics[name][0], FieldPath(""))
+    refused = ""
+    for topic in sorted(topics, key=len, reverse=True):
+        if not name.startswith(f"{topic}/"):
+            continue
+        path = FieldPath(name[len(topic) :])
+        try:
+            path.type_in(load(topics[topic][0]))
+        except RoszError as error:
+            refused = refused or f"; '{topic}' is there, but {error}"
+            continue
+        return Target(topic, topics[topic][0], path)
+    raise NotFoundError(f"unknown topic '{name}'{refused or near_miss(name, topics)}")

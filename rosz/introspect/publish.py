@@ -1,0 +1,133 @@
+"""Messages made of text, sent as ``rostopic pub`` sends them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rosz.introspect.fill import fill
+
+if TYPE_CHECKING:
+    from rosz.node import Node, Publisher
+
+__all__ = ("DEFAULT_RATE", "ONCE_SECONDS", "SendOptions", "Sender")
+
+ONCE_SECONDS = 3.0
+"""How long a message that is sent once stays there for those who come late."""
+DEFAULT_RATE = 10.0
+"""Messages per second from a file or stream."""
+
+
+class SendOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """How messages are sent.
+
+    Attributes:
+        rate: Per second; ``None`` to send and latch.
+        once: Send one, and end.
+        verbose: Tell what is sent.
+        substitute: Fill in ``now`` and ``auto`` anew for each message.
+        ros_time: Take them from ROS time, which may be simulated.
+    """
+
+    rate: float | None = None
+    once: bool = False
+    verbose: bool = False
+    substitute: bool = False
+    ros_time: bool = False
+
+
+class Sender:
+    """Sends on one topic until it is done, or its context ends.
+
+    Args:
+        node: The node that sends.
+        publisher: What it sends with.
+        options: How.
+        say: Told what is going on, a line at a time.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        publisher: Publisher[Any],
+        options: SendOptions,
+        say: Callable[[str], object],
+    ) -> None:
+        self._node = node
+        self._publisher = publisher
+        self._options = options
+        self._say = say
+
+    def send(self, arguments: Sequence[Any]) -> None:
+        """Send what the arguments of the command line say.
+
+        Raises:
+            EncodeError: They do not fit the type.
+        """
+        if self._options.rate is None:
+            self._latch(arguments, once=self._options.once)
+            self._stay(ONCE_SECONDS if self._options.once else None)
+        else:
+            self._repeat(arguments, self._options.rate)
+
+    def send_documents(self, documents: Iterable[Any], *, only_one: bool = False) -> None:
+        """Send the documents of a file or a stream, one after the other.
+
+        Args:
+            documents: A dictionary of fields, or a list of their values, each.
+            only_one: Whether it is known that there is just one, which is then repeated.
+
+        Raises:
+            EncodeError: One of them does not fit the type.
+            YamlError: One of them is no YAML.
+        """
+        rate = self._options.rate
+        if only_one and rate is not None:
+            self._say("Got one message and a rate, publishing repeatedly")
+            for document in documents:
+                self._repeat(_arguments(document), rate)
+            return
+        pace = None if rate is None else self._node.rate(rate)
+        sent = False
+        for document in documents:
+            if self._node.is_shutdown:
+                return
+            sent = True
+            self._latch(_arguments(document), once=pace is not None or self._options.once)
+            if pace is None or self._options.once:
+                break
+            pace.sleep()
+        if sent:
+            self._stay(ONCE_SECONDS if pace is not None or self._options.once else None)
+
+    def _make(self, arguments: Sequence[Any]) -> Any:
+        now = self._node.now() if self._options.ros_time else time.time_ns()
+        return fill(self._publisher.message_type, arguments, now)
+
+    def _latch(self, arguments: Sequence[Any], *, once: bool) -> None:
+        message = self._make(arguments)
+        shown = f" [{message}]" if self._options.verbose else ""
+        end = f" for {ONCE_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
+        self._say(f"publishing and latching message{shown}{end}")
+        self._publisher.publish(message)
+
+    def _stay(self, seconds: float | None) -> None:
+        self._node.context.wait_for_shutdown(seconds)
+
+    def _repeat(self, arguments: Sequence[Any], rate: float) -> None:
+        message = self._make(arguments)
+        pace = self._node.rate(rate)
+        while not self._node.is_shutdown:
+            if self._options.verbose:
+                self._say(f"publishing {message}")
+            self._publisher.publish(message)
+            pace.sleep()
+            if self._options.substitute:
+                message = self._make(arguments)
+
+
+def _arguments(document: Any) -> list[Any]:
+    return document if isinstance(document, list) else [document]

@@ -1,0 +1,122 @@
+"""How a command gets into the network.
+
+A short one is a client of whoever holds the rendezvous: one link, and it sees everything at once.
+When nobody holds it, because the process that did has ended, those that are left look for a new
+meeting point all the time; then the command becomes that point and waits for them. One that stays
+for long is a peer from the start, so that it lives on when the process at the rendezvous ends.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rosz.environment import Environment
+from rosz.errors import TransportError
+from rosz.session import Session, SessionConfig
+from rosz.session.probe import is_answered
+from rosz.session.settle import Settling
+
+if TYPE_CHECKING:
+    from rosz.node import Context
+
+__all__ = ("open_context", "open_session")
+
+_MEET_SECONDS = 0.5
+"""Somewhat more than the pause in which a lone peer tries the rendezvous again."""
+_SETTLE_SECONDS = 1.0
+_LOOK_SECONDS = 0.002
+
+
+def open_session(environment: Environment) -> Session:
+    """Open the session of a command that asks and ends.
+
+    Raises:
+        TransportError: Nobody answers; the text says what to start.
+    """
+    if _may_answer(environment):
+        try:
+            return Session.open(SessionConfig.command(environment))
+        except TransportError as error:
+            _check_free(environment, error)
+    session = Session.open(SessionConfig.node(environment))
+    try:
+        _meet(session, environment)
+    except BaseException:
+        session.close()
+        raise
+    return session
+
+
+def open_context(
+    environment: Environment, argv: Sequence[str] = (), *, lasting: bool = False
+) -> Context:
+    """Open the context of a command that publishes, subscribes or calls.
+
+    Args:
+        environment: Settings.
+        argv: Remappings and the like of its node.
+        lasting: Whether it stays until it is told to end.
+
+    Raises:
+        TransportError: Nobody answers; the text says what to start.
+    """
+    from rosz.node import Context
+
+    if not lasting and _may_answer(environment):
+        try:
+            return Context(environment, argv, SessionConfig.command(environment))
+        except TransportError as error:
+            _check_free(environment, error)
+    context = Context(environment, argv)
+    try:
+        _meet(context.session, environment)
+        context.settled.wait(_SETTLE_SECONDS)
+    except BaseException:
+        context.close()
+        raise
+    return context
+
+
+def _may_answer(environment: Environment) -> bool:
+    """Tell whether it is worth the wait to try as a client."""
+    return bool(
+        environment.connect
+        or environment.multicast
+        or environment.mode == "client"
+        or environment.zenoh_config
+        or is_answered(environment.rendezvous)
+    )
+
+
+def _check_free(environment: Environment, error: TransportError) -> None:
+    """See that a failure to connect is not one of something that holds the rendezvous.
+
+    Raises:
+        TransportError: Somebody listens there, and does not speak.
+    """
+    if is_answered(environment.rendezvous):
+        raise TransportError(
+            f"what listens at {environment.rendezvous} does not answer: it is stopped, or it is no"
+            " Zenoh; end it, or set ROSZ_RENDEZVOUS to another endpoint for all"
+        ) from error
+
+
+def _meet(session: Session, environment: Environment) -> None:
+    """Wait until a peer is linked to all that are there."""
+    deadline = time.monotonic() + _MEET_SECONDS
+    while not session.peers():
+        if time.monotonic() > deadline:
+            raise _nobody(environment)
+        time.sleep(_LOOK_SECONDS)
+    Settling(session, _SETTLE_SECONDS, threading.Event()).settled.wait(_SETTLE_SECONDS)
+
+
+def _nobody(environment: Environment) -> TransportError:
+    where = ", ".join((environment.rendezvous, *environment.connect))
+    return TransportError(
+        f"nobody answers at {where}: start 'rosz core', a launch or a node, or set ROSZ_CONNECT to"
+        " the endpoint of a machine where one runs"
+    )

@@ -1,0 +1,113 @@
+"""The lines that nodes log, as they are published on ``/rosout``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import msgspec
+
+from rosz.errors import UsageError
+from rosz.msgs.rcl_interfaces.msg import Log
+from rosz.node.severity import parse_severity, severity_name
+
+__all__ = ("LogFilter", "LogLine", "format_line", "read_line", "ros1_node")
+
+_COLORS = {"DEBUG": "\033[32m", "WARN": "\033[33m", "ERROR": "\033[31m", "FATAL": "\033[31m"}
+_RESET = "\033[0m"
+
+
+class LogLine(msgspec.Struct, frozen=True):
+    """One line.
+
+    Attributes:
+        level: ``DEBUG``, ``INFO``, ``WARN``, ``ERROR`` or ``FATAL``.
+        stamp: Seconds since the Unix epoch, by ROS time of the node.
+        node: Full name of the node, and behind it, after a point, the part of it that logs.
+        text: What it says.
+        file: Source file.
+        line: Line in it.
+        function: Function in it.
+    """
+
+    level: str
+    stamp: float
+    node: str
+    text: str
+    file: str
+    line: int
+    function: str
+
+
+def ros1_node(name: str, nodes: Iterable[str]) -> str:
+    """Return the name of a logger with the full name of its node in place of ROS 2's form.
+
+    Args:
+        name: Such as ``ns.talker.arm``, a part called arm of node ``/ns/talker``.
+        nodes: Full names of the nodes that are known.
+    """
+    best = ""
+    for node in nodes:
+        dotted = node.strip("/").replace("/", ".")
+        if f"{name}.".startswith(f"{dotted}.") and len(node) > len(best):
+            best = node
+    return best + name[len(best) - 1 :] if best else f"/{name}"
+
+
+def read_line(message: Log, nodes: Iterable[str]) -> LogLine:
+    """Return a message of ``/rosout`` as a line."""
+    return LogLine(
+        level=severity_name(max(message.level, 10)),
+        stamp=message.stamp.to_sec(),
+        node=ros1_node(message.name, nodes),
+        text=message.msg,
+        file=message.file,
+        line=message.line,
+        function=message.function,
+    )
+
+
+class LogFilter:
+    """Which lines are wanted.
+
+    Args:
+        nodes: Full names of nodes, or namespaces of such; all when there are none.
+        level: The least level.
+        pattern: Regular expression that the text must hold; empty for any.
+
+    Raises:
+        UsageError: There is no such level, or the pattern is no regular expression.
+    """
+
+    def __init__(self, nodes: Iterable[str] = (), level: str = "DEBUG", pattern: str = "") -> None:
+        self._nodes = tuple(nodes)
+        self._level = parse_severity(level)
+        try:
+            self._pattern = re.compile(pattern)
+        except re.error as error:
+            raise UsageError(f"'{pattern}' is no regular expression: {error}") from error
+
+    def accepts(self, line: LogLine) -> bool:
+        """Tell whether a line is wanted."""
+        if parse_severity(line.level) < self._level or not self._pattern.search(line.text):
+            return False
+        return not self._nodes or any(_belongs(line.node, node) for node in self._nodes)
+
+
+def _belongs(name: str, node: str) -> bool:
+    return name == node or name.startswith((f"{node}.", f"{node.rstrip('/')}/"))
+
+
+def format_line(line: LogLine, *, color: bool = False, verbose: bool = False) -> str:
+    """Return a line as text.
+
+    Args:
+        line: The line.
+        color: Whether to colour it by its level.
+        verbose: Whether to say where in the source it comes from.
+    """
+    text = f"[{line.level}] [{line.stamp:.6f}] [{line.node}]: {line.text}"
+    if verbose:
+        text += f"\n    at {line.file}:{line.line} in {line.function}"
+    mark = _COLORS.get(line.level) if color else None
+    return f"{mark}{text}{_RESET}" if mark else text

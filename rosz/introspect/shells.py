@@ -1,0 +1,69 @@
+"""What makes ROS 1's command names mean rosz in a shell, and in all that is started from it.
+
+A folder of small programs goes on the PATH, so that ``timeout 5 rostopic …``, ``nohup roscore`` and
+scripts find them as well. Only roscd, which changes the shell's own folder, is a function.
+"""
+
+from __future__ import annotations
+
+import shlex
+from typing import Literal
+
+__all__ = ("COMMANDS", "SHELLS", "Shell", "program", "script")
+
+Shell = Literal["bash", "zsh", "fish"]
+SHELLS: tuple[Shell, ...] = ("bash", "zsh", "fish")
+
+COMMANDS = {
+    "catkin_create_pkg": "pkg create",
+    "catkin_make": "pkg check",
+    "roscore": "core",
+    "roslaunch": "launch",
+    "rosmsg": "msg",
+    "rosnode": "node",
+    "rosparam": "param",
+    "rosrun": "run",
+    "rosservice": "service",
+    "rossrv": "srv",
+    "rostopic": "topic",
+    "roswtf": "doctor",
+}
+"""ROS 1's commands, and what they are here."""
+
+_POSIX = """\
+export ROSZ_PYTHON={python}
+case ":$PATH:" in *:{folder}:*) ;; *) export PATH={folder}:"$PATH" ;; esac
+unalias roscd 2>/dev/null
+roscd() {{
+  [ -n "$1" ] || {{ echo "usage: roscd PACKAGE[/FOLDER]" >&2; return 2; }}
+  local package="${{1%%/*}}" folder
+  folder="$(rospack find "$package")" && cd "$folder${{1#"$package"}}"
+}}
+"""
+
+_FISH = """\
+set -gx ROSZ_PYTHON {python}
+contains {folder} $PATH; or set -gx PATH {folder} $PATH
+function roscd
+    test -n "$argv[1]"; or begin; echo "usage: roscd PACKAGE[/FOLDER]" >&2; return 2; end
+    set -l parts (string split -m 1 / $argv[1])
+    set -l folder (rospack find $parts[1]); and cd $folder/$parts[2]
+end
+"""
+
+
+def script(shell: Shell, folder: str, python: str) -> str:
+    """Return what a shell has to evaluate.
+
+    Args:
+        shell: Which one.
+        folder: Where the programs are.
+        python: The interpreter that has rosz.
+    """
+    text = _FISH if shell == "fish" else _POSIX
+    return text.format(folder=shlex.quote(folder), python=shlex.quote(python))
+
+
+def program(command: str) -> str:
+    """Return the text of the program that stands for one of ROS 1's commands."""
+    return f'#!/bin/sh\nexec "${{ROSZ_PYTHON:-python3}}" -m rosz {COMMANDS[command]} "$@"\n'
