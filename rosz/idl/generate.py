@@ -143,7 +143,7 @@ def stale(files: dict[str, str], folder: Path) -> Iterator[str]:
         elif file.read_text("utf-8") != source:
             yield f"{file} is stale"
     for file in sorted(folder.glob("*.py")):
-        if file.name not in files:
+        if file.name not in files and file.read_text("utf-8").startswith(MARKER):
             yield f"{file} has no definitions any more"
 
 
