@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.message import Service as ServiceType
     from rosz.node.node import Node
-    from rosz.session import Reply
+    from rosz.session import Answers, Reply
 
 __all__ = ("Client",)
 
@@ -35,24 +35,6 @@ _AT_ONCE = 0.01
 
 _GRACE = 1.0
 """Seconds given to a server that is there, but was not heard of yet."""
-
-
-class _Call:
-    """One call on its way; ``done`` is set by its answer, its end or the client's end."""
-
-    def __init__(self) -> None:
-        self.done = threading.Event()
-        self.reply: Reply | None = None
-        self.closed = False
-
-    def take(self, reply: Reply) -> None:
-        if self.reply is None:
-            self.reply = reply
-            self.done.set()
-
-    def cancel(self) -> None:
-        self.closed = True
-        self.done.set()
 
 
 class Client(Endpoint):
@@ -68,7 +50,7 @@ class Client(Endpoint):
         self.timeout = timeout
         self._sequence = 0
         self._lock = threading.Lock()
-        self._calls: set[_Call] = set()
+        self._calls: set[Answers] = set()
         self.announce()
 
     def __call__(self, *args: Any, timeout: float | None = None, **fields: Any) -> Any:
@@ -79,7 +61,7 @@ class Client(Endpoint):
         try:
             request = request_type(*args, **fields)
         except TypeError as error:
-            raise EncodeError(request_type._type_name, "", str(error)) from error
+            raise EncodeError(request_type._type, "", str(error)) from error
         return self.call(request, timeout)
 
     def call(self, request: Message, timeout: float | None = None) -> Any:
@@ -121,30 +103,29 @@ class Client(Endpoint):
         left = deadline - time.monotonic()
         if left <= 0:
             raise self._late(limit)
-        call = _Call()
         with self._lock:
             self.ensure_open("call")
-            self._calls.add(call)
             self._sequence += 1
             attachment = pack(self._sequence, time.time_ns(), self.gid)
+        answers = self.node.context.session.ask(
+            self.key,
+            timeout=left,
+            payload=payload,
+            attachment=attachment,
+            target="all_complete",
+        )
+        with self._lock:
+            self._calls.add(answers)
+            if self.closed:
+                answers.cancel()
         try:
-            self.node.context.session.get_async(
-                self.key,
-                call.take,
-                call.done.set,
-                timeout=left,
-                payload=payload,
-                attachment=attachment,
-                target="all_complete",
-            )
-            if not call.done.wait(left):
-                raise self._late(limit)
+            first = next(iter(answers), None)
         finally:
             with self._lock:
-                self._calls.discard(call)
-        if call.closed:
+                self._calls.discard(answers)
+        if first is None and self.closed:
             raise ClosedError(f"the call of '{self.name}' was cancelled: shutting down")
-        return call.reply
+        return first
 
     def _response(self, reply: Reply, limit: float) -> Message:
         if not reply.ok:
@@ -220,8 +201,8 @@ class Client(Endpoint):
     def _finish(self) -> None:
         with self._lock:
             calls = list(self._calls)
-        for call in calls:
-            call.cancel()
+        for answers in calls:
+            answers.cancel()
 
     def disown(self, reason: str) -> None:
         """Refuse everything from now on, touching neither threads nor links: after a fork."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosz.errors import ClosedError, EncodeError
-from rosz.node.endpoint import Endpoint
+from rosz.node.endpoint import Endpoint, Withdrawal
 from rosz.node.inbox import address
 from rosz.node.pool import Pool
 from rosz.qos import QoS
@@ -132,7 +132,7 @@ class Publisher(Endpoint, Generic[M]):
             return self.message_type(*args, **fields)
         except TypeError as error:
             raise EncodeError(
-                self.message_type._type_name,
+                self.message_type._type,
                 "",
                 f"{error}; expected a message of that type or its fields,"
                 f" got {', '.join(type(a).__name__ for a in args) or 'keywords'}",
@@ -190,9 +190,9 @@ class Publisher(Endpoint, Generic[M]):
             connected: Gets the link, whose ``publish`` reaches that subscription alone.
             disconnected: Gets the full name of the node.
         """
-        pool = Pool(1, f"rosz-links{self.name}")
 
-        def tell(token: Token, alive: bool) -> None:
+        def tell(change: tuple[Token, bool]) -> None:
+            token, alive = change
             if self.closed:
                 return
             try:
@@ -204,10 +204,13 @@ class Publisher(Endpoint, Generic[M]):
                 if not (self.closed and isinstance(error, ClosedError)):
                     self.node.log.report(f"connection callback of '{self.name}' failed", error)
 
+        pool = Pool(1, f"rosz-links{self.name}", tell)
+
         def changed(token: Token, alive: bool) -> None:
             if self.matches(token):
-                pool.run(lambda: tell(token, alive))
+                pool.put((token, alive))
 
+        self._declared.append(Withdrawal(pool.close))
         self._declared.append(self.node.listen(changed))
 
     def disown(self, reason: str) -> None:

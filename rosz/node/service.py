@@ -10,13 +10,13 @@ from rosz.errors import DecodeError, EncodeError, RoszError, ServiceError, Trans
 from rosz.node.endpoint import Endpoint
 from rosz.node.pool import Pool
 from rosz.qos import QoS
+from rosz.session import Query
 from rosz.wire import Kind, pack, unpack
 
 if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.message import Service as ServiceType
     from rosz.node.node import Node
-    from rosz.session import Query
 
 __all__ = ("Service", "to_response")
 
@@ -44,17 +44,19 @@ class Service(Endpoint):
         )
         self.service_type = service_type
         self._handler = handler
-        self._pool = Pool(threads, f"rosz-srv{name}")
-        session = node.context.session
+        self._pool = Pool(threads, f"rosz-srv{name}", self._serve)
         self._declared.append(
-            session.queryable(
-                self.key, lambda query: self._pool.run(lambda: self._serve(query)), complete=True
-            )
+            node.context.session.questions(self.key, self._pool.put, complete=True)
         )
         self.announce()
 
-    def _serve(self, query: Query) -> None:
-        with query:
+    def close(self) -> None:
+        """Undeclare it, its token first; from any thread, again is no error."""
+        super().close()
+        self._pool.close()
+
+    def _serve(self, raw: Any) -> None:
+        with Query(raw) as query:
             if self.closed:
                 return
             try:
@@ -120,9 +122,9 @@ def to_response(response: type[Message], result: Any) -> Message:
         elif result is None and not fields:
             return response()
     except TypeError as error:
-        raise EncodeError(response._type_name, "", str(error)) from error
+        raise EncodeError(response._type, "", str(error)) from error
     raise EncodeError(
-        response._type_name,
+        response._type,
         "",
         f"got {type(result).__name__} {result!r:.80}, expected a response, or values for"
         f" {', '.join(fields) or 'no fields'}",

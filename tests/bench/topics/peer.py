@@ -94,9 +94,9 @@ def pour(system: System, kind: str) -> None:
     publish, message = system.publisher("flood", kind), system.message(kind)
     system.wait_for_subscriber()
     say("ready")
-    ended = threading.Event()
-    threading.Thread(target=lambda: (wait_for_end(), ended.set()), daemon=True).start()
-    while not ended.is_set():
+    watch = threading.Thread(target=wait_for_end, daemon=True)
+    watch.start()
+    while watch.is_alive():
         for _ in range(10):
             publish(message)
 

@@ -31,6 +31,7 @@ class Peer:
     """
 
     def __init__(self, command: list[str], variables: dict[str, str]) -> None:
+        self._command = command
         self._process = subprocess.Popen(
             command,
             env=variables,
@@ -45,7 +46,7 @@ class Peer:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            raise SystemExit(f"{' '.join(map(str, self._process.args))} ended too early")
+            raise SystemExit(f"{' '.join(self._command)} ended too early")
         return json.loads(line)
 
     def ask(self) -> Any:

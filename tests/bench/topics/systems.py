@@ -214,4 +214,6 @@ def open_system(system: str, name: str) -> System:
         return Rospy(name, None)
     if system == "zenoh, direct":
         return Zenoh(name, indirect=False)
-    return {"rosz": Rosz, "rosz, shared memory": Rosz, "rospy": Rospy, "zenoh": Zenoh}[system](name)
+    if system.startswith("rosz"):
+        return Rosz(name)
+    return Rospy(name) if system == "rospy" else Zenoh(name)
