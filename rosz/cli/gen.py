@@ -40,15 +40,11 @@ def gen_command(
     from rosz.environment import Environment, package_index
     from rosz.introspect.generate import Generator
 
-    index = package_index(Environment.read())
-    generator = Generator(index, Path(output).absolute() if output else None)
-    chosen = [generator.package(word, Path.cwd()) for word in packages or ("",)]
-    code = 0
-    for package in chosen:
-        if check:
-            wrong = generator.stale(package)
-            print_lines(wrong)
-            code = code or int(bool(wrong))
-        else:
-            print_lines(map(str, generator.write(package)))
-    return code
+    folder = Path(output).absolute() if output else None
+    generator = Generator(package_index(Environment.read()), folder, Path.cwd())
+    if check:
+        wrong = generator.stale(packages or [])
+        print_lines(wrong)
+        return int(bool(wrong))
+    print_lines(map(str, generator.write(packages or [])))
+    return 0

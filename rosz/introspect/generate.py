@@ -1,112 +1,93 @@
-"""Python modules for the messages and services of a user's package."""
+"""Python modules for the messages and services of a package, and of rosz itself."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
-from rosz.errors import NotFoundError, PackageNotFound, UsageError
-from rosz.idl.catalog import Catalog, Definition
-from rosz.idl.generate import Folders, generate, shipped_module, stale, write
+from rosz.errors import UsageError
+from rosz.idl.generate import shipped_sources, stale, write
 from rosz.idl.module import MARKER
-from rosz.packages import Package, PackageIndex
+from rosz.packages import MANIFEST, PackageIndex
 from rosz.typestore import TypeStore
 
 __all__ = ("Generator",)
 
+_Sources = dict[Path, dict[str, str]]
+"""Sources by folder and file name."""
+
 
 class Generator:
-    """Writes modules ``<package>/msg.py`` and ``<package>/srv.py``.
+    """Writes modules ``<package>/msg.py`` and ``<package>/srv.py``, or tells which are stale.
 
     Args:
         index: Where packages are.
-        output: Folder to write below; ``src`` of each package when not given.
+        output: Folder to write below, dependencies included; when not given, each package's own
+            modules go to its ``src``.
+        cwd: The working folder.
     """
 
-    def __init__(self, index: PackageIndex, output: Path | None) -> None:
+    def __init__(self, index: PackageIndex, output: Path | None, cwd: Path) -> None:
         self._index = index
         self._output = output
-        self._store = TypeStore(index)
-        self._shipped = TypeStore()
+        self._cwd = cwd
 
-    def package(self, word: str, cwd: Path) -> Package:
-        """Return the package that a word means.
-
-        Args:
-            word: Its name, its folder, or nothing for the package around the working folder.
-            cwd: The working folder.
-
-        Raises:
-            PackageNotFound: There is no such package.
-            UsageError: There is none around the working folder.
-        """
-        if not word:
-            for folder in (cwd, *cwd.parents):
-                if (folder / "package.xml").is_file():
-                    return PackageIndex([folder]).packages()[0]
-            raise UsageError("no package is given, and this folder is in none: rosz gen PACKAGE")
-        folder = (cwd / word).resolve()
-        if (folder / "package.xml").is_file():
-            return PackageIndex([folder]).packages()[0]
-        return self._index.find(word)
-
-    def folder(self, package: Package) -> Path:
-        """Return the folder that a package's modules go to."""
-        return (self._output or package.path / "src") / package.name
-
-    def _files(self, package: Package) -> dict[str, str]:
-        folders = Folders(lambda name: self._path(package, name))
-
-        def find(name: str) -> Definition:
-            return folders.find(name) if name.startswith(f"{package.name}/") else self._other(name)
-
-        files = generate(package.name, folders, Catalog(find), self._place)
-        if set(files) == {"__init__.py"}:
-            raise NotFoundError(
-                f"package '{package.name}' ({package.path}) has no msg/*.msg and no srv/*.srv"
-            )
-        return files
-
-    def _path(self, package: Package, name: str) -> Path | None:
-        if name == package.name:
-            return package.path
-        try:
-            return self._index.find(name).path
-        except PackageNotFound:
-            return None
-
-    def _other(self, name: str) -> Definition:
-        return self._store.definition(name)
-
-    def _place(self, name: str) -> str:
-        """Return the module of a type of another package."""
-        package, kind, _ = name.split("/")
-        short = f"{package}/{name.rpartition('/')[2]}"
-        if package in self._shipped.packages() and short in self._shipped.names("msg", package):
-            return shipped_module(name)
-        return f"{package}.{kind}"
-
-    def stale(self, package: Package) -> list[str]:
+    def stale(self, words: list[str]) -> list[str]:
         """Return what differs between the modules there are and what they should be.
 
-        Raises:
-            DefinitionError: A definition is not well-formed.
-            NotFoundError: The package has no definitions.
-        """
-        return list(stale(self._files(package), self.folder(package)))
-
-    def write(self, package: Package) -> list[Path]:
-        """Write the modules of a package, and return the files.
+        Args:
+            words: Names or folders of packages. With none, the package around the working folder;
+                in rosz's own source tree, the modules that it ships.
 
         Raises:
             DefinitionError: A definition is not well-formed.
-            NotFoundError: The package has no definitions.
-            UsageError: A file that a person wrote is in the way.
+            PackageNotFound: There is no such package.
+            TypeNotFound: A package has no definitions.
+            UsageError: No package is given, and the working folder is in none.
         """
-        files = self._files(package)
-        folder = self.folder(package)
-        for name in files:
-            file = folder / name
-            if file.is_file() and not file.read_text("utf-8").startswith(MARKER):
-                raise UsageError(f"'{file}' was not generated: it stays; choose a folder with -o")
-        write(files, folder)
-        return [folder / name for name in sorted(files)]
+        found = self._sources(words)
+        return [line for folder, files in found.items() for line in stale(files, folder)]
+
+    def write(self, words: list[str]) -> list[Path]:
+        """Write the modules, and return the files; the arguments and errors are those of `stale`.
+
+        Raises:
+            UsageError: Also when a file that a person wrote is in the way.
+        """
+        found = self._sources(words)
+        for folder, files in found.items():
+            for name in files:
+                _check_ours(folder / name)
+        for folder, files in found.items():
+            write(files, folder)
+        return [folder / name for folder, files in found.items() for name in sorted(files)]
+
+    def _sources(self, words: list[str]) -> _Sources:
+        source_tree = self._cwd / "interfaces", self._cwd / "rosz" / "msgs"
+        if not words and all(folder.is_dir() for folder in source_tree):
+            interfaces, modules = source_tree
+            return {modules / name: files for name, files in shipped_sources(interfaces).items()}
+        return dict(self._of_packages(words or [self._around()]))
+
+    def _of_packages(self, words: list[str]) -> Iterator[tuple[Path, dict[str, str]]]:
+        for word in words:
+            folder = (self._cwd / word).resolve()
+            given = [folder] if (folder / MANIFEST).is_file() else []
+            index = PackageIndex([*given, *self._index.roots])
+            package = PackageIndex(given).packages()[0] if given else index.find(word)
+            sources = TypeStore(index).sources([package.name])
+            if self._output is None:
+                yield package.path / "src" / package.name, sources[package.name]
+            else:
+                yield from ((self._output / name, files) for name, files in sources.items())
+
+    def _around(self) -> str:
+        for folder in (self._cwd, *self._cwd.parents):
+            if (folder / MANIFEST).is_file():
+                return str(folder)
+        raise UsageError("no package is given, and this folder is in none: rosz gen PACKAGE")
+
+
+def _check_ours(file: Path) -> None:
+    if file.is_file() and not file.read_text("utf-8").startswith(MARKER):
+        raise UsageError(f"'{file}' was not generated: it stays; choose a folder with -o")
