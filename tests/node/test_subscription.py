@@ -77,10 +77,10 @@ def test_newest_samples_are_kept(talker: Node, listener: Node, with_callback: bo
         assert gate.wait(PATIENCE)
 
     publisher = talker.publisher("count", Int32)
+    after = listener.subscription("after", String)
     subscription = listener.subscription(
         "count", Int32, slow if with_callback else None, queue_size=3
     )
-    after = listener.subscription("after", String)
     publisher.wait_for_subscribers()
     publisher.publish(0)
     if with_callback:

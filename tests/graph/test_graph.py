@@ -1,0 +1,259 @@
+from __future__ import annotations
+
+import logging
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from queue import SimpleQueue
+
+import pytest
+from network import PATIENCE, Network, eventually
+
+from rosz.errors import ClosedError, WaitTimeout
+from rosz.graph import Graph, View
+from rosz.msgs.std_msgs.msg import Int32, String
+from rosz.msgs.std_srvs.srv import Empty
+from rosz.wire import Kind, ProcessToken, Token
+
+VISITOR = """
+    import rosz
+    from rosz.msgs.std_msgs.msg import String
+    from rosz.msgs.std_srvs.srv import Empty
+
+    node = rosz.Node("visitor")
+    node.publisher("visit", String)
+    node.service("leave", Empty, lambda request: None)
+    print("ready")
+    node.spin()
+"""
+
+
+@pytest.fixture
+def graph(network: Network) -> Iterator[Graph]:
+    made = Graph(network.session(), network.domain)
+    yield made
+    made.close()
+
+
+def test_nodes_and_endpoints(network: Network, graph: Graph) -> None:
+    node = network.node("robot", namespace="/lab")
+    node.publisher("scan", String)
+    node.subscription("cmd", Int32)
+    node.service("~reset", Empty, lambda _: None)
+    node.client("/dock", Empty)
+    view = graph.wait_for(
+        lambda view: len(view.clients("/dock")) == 1 and len(view.publishers("/rosout")) == 1,
+        PATIENCE,
+        "client",
+    )
+    assert view.nodes() == ["/lab/robot"]
+    assert view.topics() == {
+        "/lab/cmd": ["std_msgs/msg/Int32"],
+        "/lab/scan": ["std_msgs/msg/String"],
+        "/rosout": ["rcl_interfaces/msg/Log"],
+    }
+    assert view.services() == {"/lab/robot/reset": ["std_srvs/srv/Empty"]}
+    (scan,) = view.publishers("/lab/scan")
+    assert (scan.node_name, scan.zid) == ("/lab/robot", node.context.session.zid)
+    assert view.sessions_of("/lab/robot") == [(node.context.session.zid, node.node_id)]
+    (process,) = view.processes("/lab/robot")
+    assert process == node.process
+
+
+def test_come_and_go(network: Network, graph: Graph) -> None:
+    events: SimpleQueue[tuple[str, bool]] = SimpleQueue()
+    graph.listen(lambda token, alive: events.put((token.name or token.node_name, alive)))
+    node = network.node("robot")
+    assert events.get(timeout=PATIENCE) == ("/robot", True)
+    scan = node.publisher("scan", String)
+    seen = {events.get(timeout=PATIENCE) for _ in range(2)}
+    assert seen == {("/scan", True), ("/rosout", True)}
+    scan.close()
+    assert events.get(timeout=PATIENCE) == ("/scan", False)
+    node.close()
+    assert {events.get(timeout=PATIENCE) for _ in range(2)} == {
+        ("/robot", False),
+        ("/rosout", False),
+    }
+
+
+def test_history_comes_first_and_ends_with_withdrawal(network: Network, graph: Graph) -> None:
+    network.node("robot")
+    graph.wait_for_topic("/rosout", PATIENCE)
+    told: SimpleQueue[str] = SimpleQueue()
+    news: SimpleQueue[str] = SimpleQueue()
+    withdraw = graph.listen(lambda token, _: told.put(token.node_name))
+    graph.listen(lambda token, _: news.put(token.node_name), history=False)
+    assert told.get(timeout=PATIENCE) == "/robot"
+    withdraw()
+    withdraw()
+    network.node("second")
+    assert news.get(timeout=PATIENCE) == "/second"
+    while not told.empty():
+        assert told.get() == "/robot"
+
+
+def test_a_failing_listener_harms_nobody(
+    network: Network, graph: Graph, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(token: Token, alive: bool) -> None:
+        raise ValueError(f"no {token.node_name} {alive}")
+
+    after: SimpleQueue[str] = SimpleQueue()
+    graph.listen(fail)
+    graph.listen(lambda token, _: after.put(token.node_name))
+    network.node("robot")
+    assert after.get(timeout=PATIENCE) == "/robot"
+    assert "ValueError: no /robot True" in caplog.text
+
+
+def test_a_listener_may_wait_for_the_graph(network: Network, graph: Graph) -> None:
+    seen: SimpleQueue[str] = SimpleQueue()
+
+    def listener(token: Token, alive: bool) -> None:
+        if token.name == "/scan" and alive:
+            graph.wait_for_node("/second", PATIENCE)
+            seen.put("both")
+
+    graph.listen(listener)
+    network.node("robot").publisher("scan", String)
+    network.node("second")
+    assert seen.get(timeout=PATIENCE) == "both"
+
+
+def test_killed_process_is_gone_at_once(network: Network, graph: Graph) -> None:
+    visitor = network.program(VISITOR)
+    graph.wait_for_service("/leave", PATIENCE)
+    visitor.kill()
+    began = time.monotonic()
+    view = graph.wait_for(lambda view: "/visitor" not in view.nodes(), PATIENCE, "death")
+    assert time.monotonic() - began < 1.0
+    assert not view.processes("/visitor")
+    assert not view.services()
+
+
+def test_stopped_process_is_not_gone(network: Network, graph: Graph) -> None:
+    """It may go on: only a link that ends, or a lease that runs out, is an end."""
+    visitor = network.program(VISITOR)
+    graph.wait_for_service("/leave", PATIENCE)
+    visitor.send(signal.SIGSTOP)
+    network.node("robot")
+    graph.wait_for_node("/robot", PATIENCE)
+    assert graph.view().nodes() == ["/robot", "/visitor"]
+    visitor.send(signal.SIGCONT)
+
+
+class TestWaiting:
+    def test_for_things_that_come(self, network: Network, graph: Graph) -> None:
+        arrived: SimpleQueue[View] = SimpleQueue()
+        for wait in (
+            lambda: graph.wait_for_node("/robot", PATIENCE),
+            lambda: graph.wait_for_topic("/scan", PATIENCE),
+            lambda: graph.wait_for_service("/reset", PATIENCE),
+            lambda: graph.wait_for_subscribers("/cmd", 2, PATIENCE),
+        ):
+            network.thread(lambda wait=wait: arrived.put(wait()))  # type: ignore[misc]
+        node = network.node("robot")
+        node.publisher("scan", String)
+        node.service("reset", Empty, lambda _: None)
+        for _ in range(2):
+            node.subscription("cmd", Int32)
+        for _ in range(4):
+            arrived.get(timeout=PATIENCE)
+
+    def test_near_miss(self, network: Network, graph: Graph) -> None:
+        network.node("robot").publisher("scanner", String)
+        graph.wait_for_topic("/scanner", PATIENCE)
+        with pytest.raises(
+            WaitTimeout,
+            match=r"no publisher of '/scaner' within 0\.01 s; did you mean '/scanner'\?",
+        ):
+            graph.wait_for_topic("/scaner", 0.01)
+        with pytest.raises(WaitTimeout, match=r"no node '/robt' .* did you mean '/robot'\?"):
+            graph.wait_for_node("/robt", 0.01)
+
+    def test_ends_with_the_graph(self, network: Network, graph: Graph) -> None:
+        ended: SimpleQueue[str] = SimpleQueue()
+        begun = threading.Event()
+
+        def wait() -> None:
+            begun.set()
+            try:
+                graph.wait_for_node("/never", PATIENCE)
+            except ClosedError as error:
+                ended.put(str(error))
+
+        network.thread(wait)
+        assert begun.wait(PATIENCE)
+        graph.close()
+        graph.close()
+        assert ended.get(timeout=PATIENCE) == "the wait for node '/never' ended: shutting down"
+        with pytest.raises(ClosedError):
+            graph.wait_for_node("/never", PATIENCE)
+
+
+def test_refresh(network: Network) -> None:
+    """A graph that has heard of nobody yet can ask; what ended meanwhile does not stay."""
+    node = network.node("robot")
+    scan = node.publisher("scan", String)
+    graph = network.context().graph
+    view = graph.refresh(PATIENCE)
+    assert [token.node_name for token in view.publishers("/scan")] == ["/robot"]
+    assert [process.node for process in view.processes()] == ["/robot"]
+    scan.close()
+    eventually(lambda: not graph.view().publishers("/scan"), "the publisher is gone")
+    assert not graph.refresh(PATIENCE).publishers("/scan")
+    graph.close()
+
+
+def test_domains_do_not_meet(network: Network, graph: Graph) -> None:
+    context = network.context(domain=7)
+    network.node("elsewhere", context=context)
+    network.node("here")
+    graph.wait_for_node("/here", PATIENCE)
+    context.graph.wait_for_node("/elsewhere", PATIENCE)
+    assert graph.view().nodes() == ["/here"]
+    assert context.graph.view().nodes() == ["/elsewhere"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "kind"),
+    [
+        (["@ros2_lv/42/1/0/0/NN/%", "@ros2_lv/42/1/0/1/NN"], "liveliness token"),
+        (["@ros2_lv/42/1/0/0/XX/%/%/a", "@ros2_lv/42/1/x/0/NN/%/%/a"], "liveliness token"),
+        (["@ros2_lv/42/1/0/1/MP/%/%/a/%t/String/RIHS01_0/::,10:,:,:,,"], "type chunk"),
+        (["@ros2_lv/42/1/0/1/MP/%/%/a/%t/a::msg::dds_::B_/RIHS01_0/:"], "QoS chunk"),
+        (["@rosz/42/node/1/x/1/1/h/%a", "@rosz/42/node/1"], "process token"),
+    ],
+)
+def test_damaged_tokens(
+    network: Network, graph: Graph, caplog: pytest.LogCaptureFixture, keys: list[str], kind: str
+) -> None:
+    """They are told of, once per kind of damage, and the rest goes on."""
+    session = network.session()
+    with caplog.at_level(logging.WARNING, "rosz.graph"):
+        for key in keys:
+            session.token(key)
+        network.node("robot")
+        view = graph.wait_for_node("/robot", PATIENCE)
+    assert view.nodes() == ["/robot"]
+    told = [record.getMessage() for record in caplog.records if record.name == "rosz.graph"]
+    assert len(set(told)) == 1
+    assert told[0].startswith(f"ignoring foreign tokens with a damaged {kind} (told once): ")
+    assert len(told[0]) < 400
+
+
+def test_a_foreign_token_alone_makes_its_node_known() -> None:
+    token = Token(0, "1", 5, 9, Kind.PUBLISHER, "/", "cpp", name="/t")
+    assert View([token]).nodes() == ["/cpp"]
+
+
+def test_two_nodes_of_one_name() -> None:
+    tokens = [Token(0, zid, 0, 0, Kind.NODE, "/", "n") for zid in ("1", "2")]
+    assert View(tokens).nodes() == ["/n", "/n"]
+
+
+def test_processes_are_in_the_order_of_their_start() -> None:
+    processes = [ProcessToken(0, zid, 0, when, 1, "h", "/n") for zid, when in (("1", 9), ("2", 3))]
+    assert [process.started for process in View([], processes).processes("/n")] == [3, 9]

@@ -1,0 +1,272 @@
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from network import PATIENCE, Network, eventually
+
+from rosz.errors import ClosedError, EncodeError, InvalidName, WaitTimeout
+from rosz.msgs.geometry_msgs.msg import Twist, Vector3
+from rosz.msgs.std_msgs.msg import Int32, String, UInt8MultiArray
+from rosz.node import Node, SubscriberLink
+from rosz.qos import QoS
+
+
+@pytest.fixture
+def talker(network: Network) -> Node:
+    return network.node("talker")
+
+
+@pytest.fixture
+def listener(network: Network) -> Node:
+    return network.node("listener")
+
+
+@pytest.mark.parametrize(
+    ("args", "fields"),
+    [
+        ((Vector3(1.0, 2.0, 3.0),), {}),
+        ((1.0, 2.0, 3.0), {}),
+        ((1.0,), {"y": 2.0, "z": 3.0}),
+        ((), {"x": 1.0, "y": 2.0, "z": 3.0}),
+    ],
+)
+def test_ways_to_publish(talker: Node, args: tuple[Any, ...], fields: dict[str, Any]) -> None:
+    subscription = talker.subscription("point", Vector3)
+    talker.publisher("point", Vector3).publish(*args, **fields)
+    assert subscription.get() == Vector3(1.0, 2.0, 3.0)
+
+
+def test_encoded(talker: Node) -> None:
+    subscription = talker.subscription("chatter", String)
+    talker.publisher("chatter", String).publish_raw(String("hello").to_cdr())
+    assert subscription.get() == String("hello")
+
+
+def test_class_of_the_same_type_from_elsewhere(talker: Node) -> None:
+    """Two classes of one definition, such as a compiled and a shipped one, are the same type."""
+
+    class Other(String):
+        pass
+
+    subscription = talker.subscription("chatter", Other)
+    talker.publisher("chatter", Other).publish(String("hello"))
+    assert subscription.get().data == "hello"
+
+
+@pytest.mark.parametrize(
+    ("args", "fields", "text"),
+    [
+        ((Twist(),), {}, r"std_msgs/Int32\.data: .*Twist"),
+        ((1, 2), {}, "std_msgs/Int32: .*got int, int"),
+        ((), {"dat": 1}, "std_msgs/Int32: .*'dat'"),
+        (("one",), {}, r"std_msgs/Int32\.data: .*'one'"),
+        ((1 << 31,), {}, r"std_msgs/Int32\.data: .*2147483648"),
+    ],
+)
+def test_what_does_not_fit(
+    talker: Node, args: tuple[Any, ...], fields: dict[str, Any], text: str
+) -> None:
+    publisher = talker.publisher("count", Int32)
+    with pytest.raises(EncodeError, match=text):
+        publisher.publish(*args, **fields)
+
+
+def test_bad_topic(talker: Node) -> None:
+    with pytest.raises(InvalidName, match="'1st' is not a valid name"):
+        talker.publisher("1st", String)
+
+
+def test_closed(talker: Node) -> None:
+    publisher = talker.publisher("chatter", String)
+    publisher.close()
+    publisher.close()
+    with pytest.raises(ClosedError, match="the publisher is closed"):
+        publisher.publish("hello")
+    assert repr(publisher) == "<Publisher /chatter [std_msgs/msg/String] closed>"
+
+
+def test_as_context_manager(talker: Node) -> None:
+    with talker.publisher("chatter", String) as publisher:
+        assert not publisher.closed
+    assert publisher.closed
+
+
+def test_closing_while_others_publish(network: Network, talker: Node, listener: Node) -> None:
+    """Zenoh's handle refuses to be undeclared inside its put: closing has to wait its turn."""
+    listener.subscription("chatter", String, lambda _: None)
+    for _ in range(20):
+        publisher = talker.publisher("chatter", String)
+        going = threading.Barrier(5)
+        unexpected: list[BaseException] = []
+
+        def work(publisher: Any = publisher, going: Any = going, bad: Any = unexpected) -> None:
+            going.wait(PATIENCE)
+            try:
+                while True:
+                    publisher.publish("hello")
+            except ClosedError:
+                return
+            except BaseException as error:  # noqa: BLE001  # whatever it is, it is wrong
+                bad.append(error)
+
+        threads = [network.thread(work) for _ in range(4)]
+        going.wait(PATIENCE)
+        publisher.close()
+        for thread in threads:
+            thread.join(PATIENCE)
+        assert not unexpected
+
+
+def test_wait_for_subscribers(network: Network, talker: Node, listener: Node) -> None:
+    publisher = talker.publisher("chatter", String)
+    listener.subscription("chatter", Int32)
+    with pytest.raises(WaitTimeout, match=r"no 1 subscriber\(s\) of '/chatter' with type") as got:
+        publisher.wait_for_subscribers(timeout=0.05)
+    assert isinstance(got.value, TimeoutError)
+    waited = network.thread(lambda: publisher.wait_for_subscribers(2))
+    listener.subscription("chatter", String)
+    talker.subscription("chatter", String)
+    waited.join(PATIENCE)
+    assert [token.node_name for token in publisher.subscribers()] == ["/listener", "/talker"]
+
+
+def test_wait_ends_with_the_node(network: Network, talker: Node) -> None:
+    publisher = talker.publisher("chatter", String)
+    ended: SimpleQueue[str] = SimpleQueue()
+
+    def wait() -> None:
+        try:
+            publisher.wait_for_subscribers(timeout=PATIENCE)
+        except ClosedError as error:
+            ended.put(str(error))
+
+    network.thread(wait)
+    talker.context.close()
+    assert "shutting down" in ended.get(timeout=PATIENCE)
+
+
+class TestConnections:
+    def test_come_and_go(self, network: Network, talker: Node, listener: Node) -> None:
+        came: SimpleQueue[str] = SimpleQueue()
+        went: SimpleQueue[str] = SimpleQueue()
+        publisher = talker.publisher("chatter", String)
+        early = listener.subscription("chatter", String)
+        publisher.wait_for_subscribers()
+        publisher.on_connection(lambda link: came.put(link.node), went.put)
+        assert came.get(timeout=PATIENCE) == "/listener"
+        network.node("late").subscription("chatter", String)
+        assert came.get(timeout=PATIENCE) == "/late"
+        early.close()
+        assert went.get(timeout=PATIENCE) == "/listener"
+
+    def test_first_message_for_one_alone(
+        self, network: Network, talker: Node, listener: Node
+    ) -> None:
+        """rospy's SubscribeListener: each newcomer gets its own greeting, nobody else hears it."""
+        publisher = talker.publisher("chatter", String)
+        first = listener.subscription("chatter", String)
+        publisher.on_connection(lambda link: link.publish(String(f"hello {link.node}")))
+        assert first.get().data == "hello /listener"
+        second = network.node("late").subscription("chatter", String)
+        assert second.get().data == "hello /late"
+        publisher.publish("to all")
+        assert first.get().data == "to all"
+        assert second.get().data == "to all"
+
+    def test_two_subscriptions_of_one_node(self, talker: Node, listener: Node) -> None:
+        publisher = talker.publisher("chatter", String)
+        links: SimpleQueue[SubscriberLink[String]] = SimpleQueue()
+        publisher.on_connection(links.put)
+        subscriptions = [listener.subscription("chatter", String) for _ in range(2)]
+        for number in range(2):
+            links.get(timeout=PATIENCE).publish(String(str(number)))
+        assert sorted(each.get().data for each in subscriptions) == ["0", "1"]
+
+    def test_private_messages_make_no_gaps(self, talker: Node, listener: Node) -> None:
+        publisher = talker.publisher("chatter", String)
+        lost: SimpleQueue[tuple[str, int]] = SimpleQueue()
+        listener.subscription(
+            "chatter", String, lambda m, info: lost.put((m.data, info.lost)), with_info=True
+        )
+        links: SimpleQueue[SubscriberLink[String]] = SimpleQueue()
+        publisher.on_connection(links.put)
+        link = links.get(timeout=PATIENCE)
+        for text in ("1", "2"):
+            publisher.publish(text)
+            assert lost.get(timeout=PATIENCE) == (text, 0)
+            link.publish(String("psst"))
+            assert lost.get(timeout=PATIENCE) == ("psst", 0)
+
+    def test_callback_may_do_anything(self, talker: Node, listener: Node) -> None:
+        """It may wait for the graph, and may raise: other callbacks go on."""
+        seen: SimpleQueue[str] = SimpleQueue()
+
+        def connected(link: SubscriberLink[String]) -> None:
+            talker.context.graph.wait_for_node("/listener", PATIENCE)
+            seen.put(link.node)
+            raise ValueError("no more")
+
+        publisher = talker.publisher("chatter", String)
+        publisher.on_connection(connected)
+        for _ in range(2):
+            listener.subscription("chatter", String)
+            assert seen.get(timeout=PATIENCE) == "/listener"
+
+
+STUCK = """
+    import rosz, time
+    from rosz.msgs.std_msgs.msg import UInt8MultiArray
+
+    node = rosz.Node("stuck")
+    node.subscription("data", UInt8MultiArray, lambda m: None)
+    print("ready")
+    node.spin()
+"""
+
+
+@pytest.mark.parametrize("size", [100, 200_000])
+def test_stopped_subscriber_holds_nobody_up(network: Network, size: int) -> None:
+    """One that takes nothing delays neither the publisher nor the others."""
+    talker, listener = network.node("talker"), network.node("listener")
+    publisher = talker.publisher("data", UInt8MultiArray)
+    got: SimpleQueue[int] = SimpleQueue()
+    listener.subscription("data", UInt8MultiArray, lambda m: got.put(m.data[0]), queue_size=1000)
+    stuck = network.program(STUCK)
+    publisher.wait_for_subscribers(2)
+    stuck.send(signal.SIGSTOP)
+    longest = 0.0
+    for number in range(60):
+        began = time.monotonic()
+        publisher.publish(data=bytes([number]) * size)
+        longest = max(longest, time.monotonic() - began)
+        assert got.get(timeout=PATIENCE) == number
+    stuck.send(signal.SIGCONT)
+    assert longest < 1.0
+
+
+def test_killed_subscriber_is_gone(network: Network) -> None:
+    publisher = network.node("talker").publisher("data", UInt8MultiArray)
+    victim = network.program(STUCK)
+    publisher.wait_for_subscribers()
+    publisher.publish()
+    victim.kill()
+    began = time.monotonic()
+    eventually(lambda: not publisher.subscribers(), "the dead subscriber is out of the graph")
+    assert time.monotonic() - began < 2.0
+    publisher.publish()
+
+
+def test_blocking_publisher_loses_nothing(talker: Node, listener: Node) -> None:
+    """``keep_all`` waits for a slow way rather than drop a sample."""
+    qos = QoS(history="keep_all")
+    subscription = listener.subscription("data", UInt8MultiArray, qos=qos)
+    publisher = talker.publisher("data", UInt8MultiArray, qos=qos)
+    publisher.wait_for_subscribers()
+    for number in range(200):
+        publisher.publish(data=bytes([number]) * 50_000)
+    assert [subscription.get().data[0] for _ in range(200)] == list(range(200))
