@@ -91,7 +91,9 @@ class _Filler:
         if value is None or value == "":
             return cls()
         if issubclass(cls, Sequenced) and value in {"auto", "now"}:
-            return cls(stamp=self._time(type(cls().stamp), "now", prefix))
+            header: Any = cls()
+            header.stamp = self._time(type(header.stamp), "now", prefix)
+            return header
         raise self._refusal(
             prefix, f"expected the fields of a {cls._type} ({_listed(cls)}), got {_shown(value)}"
         )
