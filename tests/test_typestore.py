@@ -182,6 +182,15 @@ def test_a_change_in_another_package_is_noticed(workspace: Path, tmp_path: Path)
     assert third._md5sum != after._md5sum
 
 
+def test_another_generator_generates_anew(workspace: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    store(workspace, cache).message("shared_msgs/Part")
+    newer = store(workspace, cache)
+    newer.__dict__["_generation"] = b"of tomorrow"
+    newer.message("shared_msgs/Part")
+    assert len(list(cache.glob("*.py"))) == 2
+
+
 @pytest.mark.parametrize("content", ["", "def broken(", "import no_such_module", "\0", "x = 1 / 0"])
 def test_a_spoilt_cache_is_mended(workspace: Path, tmp_path: Path, content: str) -> None:
     cache = tmp_path / "cache"
@@ -212,7 +221,7 @@ def test_tracebacks_show_generated_lines(workspace: Path, tmp_path: Path, *, kep
     with pytest.raises(RuntimeError) as caught:
         grip(parts=[Broken()]).to_cdr()
     shown = "".join(traceback.format_exception(caught.value))
-    assert ".at" in shown.partition("gripper_msgs_msg_")[2].splitlines()[1]
+    assert "e_at" in shown.partition("gripper_msgs_msg_")[2].splitlines()[1]
     assert "gripper_msgs_msg_" in shown
 
 

@@ -13,6 +13,7 @@ from rosz.idl.md5 import message_md5, service_md5
 from rosz.idl.names import Module, attribute, class_name
 from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec, ros1_name
 from rosz.idl.typehash import message_hash, service_hash
+from rosz.idl.wrap import wrap
 
 __all__ = ("message_class", "service_class")
 
@@ -52,7 +53,8 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: Module) -> str:
     """
     name = class_name(spec.name)
     base = BASES.get(spec.name, "_Message")
-    body = [_field(field, module) for field in spec.fields]
+    body = _docstring(spec.text)
+    body += [_field(field, module) for field in spec.fields]
     body += _ros1_fields(spec)
     body += [f"{attribute(one.name)} = {_literal(one.value)}" for one in spec.constants]
     body += _names(spec.name, message_hash(spec, catalog), message_md5(spec, catalog), spec.text)
@@ -73,13 +75,28 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: Module) -> str:
 def service_class(spec: ServiceSpec, catalog: Catalog) -> str:
     """Return the source of a service class; those of its two messages stand before it."""
     name = class_name(spec.name)
-    body = [f"Request = {name}Request", f"Response = {name}Response"]
+    body = _docstring(spec.text)
+    body += [f"Request = {name}Request", f"Response = {name}Response"]
     body += _names(spec.name, service_hash(spec, catalog), service_md5(spec, catalog), spec.text)
     return "\n".join([f"class {name}(_Service):", *_indented(body)])
 
 
 def _indented(lines: list[str]) -> list[str]:
-    return [f"    {line}" if line else "" for line in lines]
+    return [each for line in lines for each in wrap(f"    {line}" if line else "")]
+
+
+def _docstring(text: str) -> list[str]:
+    """Turn the comment at the head of a definition into a docstring."""
+    head: list[str] = []
+    for line in text.splitlines():
+        if not line.startswith("#") or not line.strip("# "):
+            break
+        head.append(line.strip("# ").replace("\\", "\\\\").replace('"', "'"))
+    if not head:
+        return []
+    closed = [f'"""{head[0]}', *head[1:]]
+    closed[-1] += '"""'
+    return [*closed, ""]
 
 
 def _names(name: str, type_hash: str, md5: str, text: str) -> list[str]:

@@ -51,7 +51,7 @@ class Encoder:
         self._spec = spec
         self._catalog = catalog
         self._module = module
-        self._full = widest(spec, catalog)
+        self._full = max(widest(spec, catalog), 4)  # the header is a word
         self._out = Pieces(module, self._full)
         self._memories = 0
         self._locals = Locals()

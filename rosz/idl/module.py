@@ -56,7 +56,7 @@ def message_module(
     blocks: list[str] = []
     for spec in own:
         source = message_class(spec, catalog, module)
-        blocks.append("\n".join([*module.fresh(), "", "", source]))
+        blocks.append("\n".join(["", *module.fresh(), "", "", source, ""]))
     names = sorted(class_name(spec.name) for spec in own)
     return _assemble(blocks, names, module, place, catalog, f"messages of {origin}")
 
@@ -73,9 +73,9 @@ def service_module(
     for spec in own:
         for half in (spec.request, spec.response):
             source = message_class(half, catalog, module)
-            blocks.append("\n".join([*module.fresh(), "", "", source]))
+            blocks.append("\n".join(["", *module.fresh(), "", "", source, ""]))
             names.append(class_name(half.name))
-        blocks.append("\n\n" + service_class(spec, catalog))
+        blocks.append("\n" + service_class(spec, catalog) + "\n")
         names.append(class_name(spec.name))
     return _assemble(blocks, sorted(names), module, place, catalog, f"services of {origin}")
 
@@ -145,8 +145,8 @@ def _assemble(
         imports.append(f"from {where} import {plain}{alias}")
     head = [f"{MARKER}; do not edit.", f'"""The {origin}."""', ""]
     head += ["from __future__ import annotations", "", *sorted(imports), ""]
-    head += ["__all__ = (", *(f'    "{name}",' for name in names), ")", "", *late, ""]
-    return "\n".join(head) + body + "\n"
+    head += ["__all__ = (", *(f'    "{name}",' for name in names), ")", *([""] * bool(late)), *late]
+    return re.sub(r"\n{4,}", "\n\n\n", "\n".join(head) + "\n" + body)
 
 
 def _words(text: str) -> set[str]:

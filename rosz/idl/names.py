@@ -11,8 +11,8 @@ from rosz.idl.spec import FieldType
 __all__ = ("Locals", "Module", "attribute", "class_name", "module_of")
 
 
-_RESERVED = re.compile(r"[a-z][0-9]*")
-"""One letter, perhaps with a number: what generated code calls its own variables."""
+_RESERVED = re.compile(r"[befhkmnpq][0-9]*")
+"""What generated code calls its own variables."""
 
 
 def attribute(name: str) -> str:

@@ -26,6 +26,8 @@ _u1 = _Struct("<I16siI").unpack_from
 
 
 class GoalInfo(_Message):
+    """Which goal of an action is meant."""
+
     goal_id: UUID = _field(default_factory=UUID)
     stamp: Time = _field(default_factory=Time)
     _type = "action_msgs/GoalInfo"
@@ -60,11 +62,15 @@ class GoalInfo(_Message):
             return GoalInfo(UUID(uuid), Time(sec, nanosec))
         except _FAULTS:
             return _explain(data, GoalInfo)
+
+
 _p2 = _Struct("<I16siIb").pack
 _u2 = _Struct("<I16siIb").unpack_from
 
 
 class GoalStatus(_Message):
+    """How far a goal of an action has come. The last three are final."""
+
     goal_info: GoalInfo = _field(default_factory=GoalInfo)
     status: int = 0
     STATUS_UNKNOWN = 0
@@ -115,6 +121,8 @@ class GoalStatus(_Message):
             return GoalStatus(GoalInfo(UUID(uuid), Time(sec, nanosec)), status)
         except _FAULTS:
             return _explain(data, GoalStatus)
+
+
 _p3 = _Struct("<2I").pack
 _t1 = _Template("16s i I b", None)
 _u3 = _Struct("<2I").unpack_from
@@ -123,6 +131,8 @@ _u5 = _Struct("<iIb").unpack_from
 
 
 class GoalStatusArray(_Message):
+    """How far all goals of an action server have come."""
+
     status_list: list[GoalStatus] = []
     _type = "action_msgs/GoalStatusArray"
     _type_name = "action_msgs/msg/GoalStatusArray"

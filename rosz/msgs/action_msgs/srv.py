@@ -27,6 +27,8 @@ _u1 = _Struct("<I16siI").unpack_from
 
 
 class CancelGoalRequest(_Message):
+    """Call off goals of an action."""
+
     goal_info: GoalInfo = _field(default_factory=GoalInfo)
     _type = "action_msgs/CancelGoalRequest"
     _type_name = "action_msgs/srv/CancelGoal_Request"
@@ -63,6 +65,8 @@ class CancelGoalRequest(_Message):
             return CancelGoalRequest(GoalInfo(UUID(uuid), Time(sec, nanosec)))
         except _FAULTS:
             return _explain(data, CancelGoalRequest)
+
+
 _p2 = _Struct("<Ib3xI").pack
 _p3 = _Struct("<16siI").pack
 _u2 = _Struct("<Ib3xI").unpack_from
@@ -126,6 +130,8 @@ class CancelGoalResponse(_Message):
 
 
 class CancelGoal(_Service):
+    """Call off goals of an action."""
+
     Request = CancelGoalRequest
     Response = CancelGoalResponse
     _type = "action_msgs/CancelGoal"

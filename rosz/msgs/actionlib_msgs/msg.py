@@ -27,6 +27,8 @@ _u1 = _Struct("<Ii2I").unpack_from
 
 
 class GoalID(_Message):
+    """Which goal of a ROS 1 action is meant."""
+
     stamp: Time = _field(default_factory=Time)
     id: str = ""
     _type = "actionlib_msgs/GoalID"
@@ -66,12 +68,16 @@ class GoalID(_Message):
             return GoalID(Time(sec, nanosec), id_2)
         except _FAULTS:
             return _explain(data, GoalID)
+
+
 _t2 = _Stride("I i I I $ B", -4, 4)
 _t3 = _Stride("I $", None, 4)
 _u2 = _Struct("<I").unpack_from
 
 
 class GoalStatus(_Message):
+    """How far a goal of a ROS 1 action has come."""
+
     goal_id: GoalID = _field(default_factory=GoalID)
     status: int = 0
     text: str = ""
@@ -144,12 +150,16 @@ class GoalStatus(_Message):
             return GoalStatus(GoalID(Time(sec, nanosec), id_2), status, text)
         except _FAULTS:
             return _explain(data, GoalStatus)
+
+
 _t4 = _Template("I i I I $ I", -4)
 _t5 = _Stride("i I I $ B", None, 4)
 _u3 = _Struct("<i2I").unpack_from
 
 
 class GoalStatusArray(_Message):
+    """How far all goals of a ROS 1 action server have come."""
+
     header: Header = _field(default_factory=Header)
     status_list: list[GoalStatus] = []
     _type = "actionlib_msgs/GoalStatusArray"
@@ -185,7 +195,8 @@ class GoalStatusArray(_Message):
                 n5 = len(b5) + 1
                 f6, p7 = _t5[p3, n4]
                 f8, p9 = _t3[p7, n5]
-                out += (f6(stamp_2.sec, stamp_2.nanosec, n4, b4, status_list_one.status), f8(n5, b5))
+                out += (f6(stamp_2.sec, stamp_2.nanosec, n4, b4, status_list_one.status),
+                    f8(n5, b5))
                 p3 = p9
             return b"".join(out)
         except _FAULTS:

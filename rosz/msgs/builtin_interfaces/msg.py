@@ -22,6 +22,8 @@ _u1 = _Struct("<IiI").unpack_from
 
 
 class Duration(_DurationValue, _Message):
+    """A span of time, positive or negative: sec + nanosec * 1e-9 seconds."""
+
     sec: int = 0
     nanosec: int = 0
     _type = "builtin_interfaces/Duration"
@@ -56,6 +58,8 @@ class Duration(_DurationValue, _Message):
 
 
 class Time(_TimeValue, _Message):
+    """A point in time, as whole seconds and the nanoseconds beyond them."""
+
     sec: int = 0
     nanosec: int = 0
     _type = "builtin_interfaces/Time"

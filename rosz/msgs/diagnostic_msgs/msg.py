@@ -28,6 +28,8 @@ _u2 = _Struct("<I").unpack_from
 
 
 class KeyValue(_Message):
+    """A detail of a DiagnosticStatus."""
+
     key: str = ""
     value: str = ""
     _type = "diagnostic_msgs/KeyValue"
@@ -70,6 +72,8 @@ class KeyValue(_Message):
             return KeyValue(key, value)
         except _FAULTS:
             return _explain(data, KeyValue)
+
+
 _t2 = _Stride("I B I $ I $", -4, 4)
 _t3 = _Template("I $ I", None)
 _t4 = _Stride("I $ I $", None, 4)
@@ -77,6 +81,8 @@ _u3 = _Struct("<IB3xI").unpack_from
 
 
 class DiagnosticStatus(_Message):
+    """How one part of a robot is doing."""
+
     level: int = 0
     name: str = ""
     message: str = ""
@@ -104,7 +110,8 @@ class DiagnosticStatus(_Message):
         "string hardware_id  # serial number or the like\n"
         "KeyValue[] values   # details\n"
     )
-    _schema = (("level", "byte", ""), ("name", "string", ""), ("message", "string", ""), ("hardware_id", "string", ""), ("values", KeyValue, "[]"))
+    _schema = (("level", "byte", ""), ("name", "string", ""), ("message", "string", ""),
+        ("hardware_id", "string", ""), ("values", KeyValue, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -168,12 +175,16 @@ class DiagnosticStatus(_Message):
             return DiagnosticStatus(level, name, message, hardware_id, values)
         except _FAULTS:
             return _explain(data, DiagnosticStatus)
+
+
 _t5 = _Template("I i I I $ I", -4)
 _t6 = _Stride("B I $ I $", None, 4)
 _u4 = _Struct("<Ii2I").unpack_from
 
 
 class DiagnosticArray(_Message):
+    """How parts of a robot are doing, sent on /diagnostics."""
+
     header: Header = _field(default_factory=Header)
     status: list[DiagnosticStatus] = []
     _type = "diagnostic_msgs/DiagnosticArray"

@@ -30,6 +30,8 @@ _u1 = _Struct("<2I").unpack_from
 
 
 class AddDiagnosticsRequest(_Message):
+    """Tell a diagnostics aggregator to load more analyzers."""
+
     load_namespace: str = ""
     _type = "diagnostic_msgs/AddDiagnosticsRequest"
     _type_name = "diagnostic_msgs/srv/AddDiagnostics_Request"
@@ -64,6 +66,8 @@ class AddDiagnosticsRequest(_Message):
             return AddDiagnosticsRequest(load_namespace)
         except _FAULTS:
             return _explain(data, AddDiagnosticsRequest)
+
+
 _t2 = _Stride("I ? I $", -4, 4)
 _u2 = _Struct("<I?3xI").unpack_from
 
@@ -106,6 +110,8 @@ class AddDiagnosticsResponse(_Message):
 
 
 class AddDiagnostics(_Service):
+    """Tell a diagnostics aggregator to load more analyzers."""
+
     Request = AddDiagnosticsRequest
     Response = AddDiagnosticsResponse
     _type = "diagnostic_msgs/AddDiagnostics"
@@ -120,11 +126,15 @@ class AddDiagnostics(_Service):
         "bool success     # whether they were loaded\n"
         "string message   # what to tell a person\n"
     )
-_t3 = _Template("I x", -4)
+
+
+_p1 = _Struct("<Ix").pack
 _u3 = _Struct("<Ix").unpack_from
 
 
 class SelfTestRequest(_Message):
+    """Tell a device to test itself."""
+
     _type = "diagnostic_msgs/SelfTestRequest"
     _type_name = "diagnostic_msgs/srv/SelfTest_Request"
     _type_hash = "RIHS01_3bb94b497e74e9beed2dddc7212d3ae596696d30413bd1550fe932fc20efb8a4"
@@ -135,7 +145,7 @@ class SelfTestRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t3[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, SelfTestRequest)
 
@@ -147,10 +157,12 @@ class SelfTestRequest(_Message):
             return SelfTestRequest()
         except _FAULTS:
             return _explain(data, SelfTestRequest)
-_t4 = _Template("I I $ B I", -4)
-_t5 = _Stride("B I $ I $", None, 4)
-_t6 = _Template("I $ I", None)
-_t7 = _Stride("I $ I $", None, 4)
+
+
+_t3 = _Template("I I $ B I", -4)
+_t4 = _Stride("B I $ I $", None, 4)
+_t5 = _Template("I $ I", None)
+_t6 = _Stride("I $ I $", None, 4)
 _u4 = _Struct("<I").unpack_from
 
 
@@ -177,7 +189,7 @@ class SelfTestResponse(_Message):
             n1 = len(b1) + 1
             status = m.status
             n2 = len(status)
-            out = [_t4[n1](256, n1, b1, m.passed, n2)]
+            out = [_t3[n1](256, n1, b1, m.passed, n2)]
             p3 = 0
             for status_one in status:
                 n4, b4 = _texts[status_one.name]
@@ -185,17 +197,17 @@ class SelfTestResponse(_Message):
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
                 n6, b6 = _texts[status_one.hardware_id]
-                f7, p8 = _t5[p3, n4, n5]
+                f7, p8 = _t4[p3, n4, n5]
                 values = status_one.values
                 n9 = len(values)
-                out += (f7(status_one.level, n4, b4, n5, b5), _t6[p8, n6](n6, b6, n9))
+                out += (f7(status_one.level, n4, b4, n5, b5), _t5[p8, n6](n6, b6, n9))
                 p10 = 0
                 for values_one in values:
                     n11, b11 = _texts[values_one.key]
                     b12 = values_one.value.encode()
                     if 0 in b12: raise ValueError
                     n12 = len(b12) + 1
-                    f13, p14 = _t7[p10, n11, n12]
+                    f13, p14 = _t6[p10, n11, n12]
                     out.append(f13(n11, b11, n12, b12))
                     p10 = p14
                 p3 = p10
@@ -256,6 +268,8 @@ class SelfTestResponse(_Message):
 
 
 class SelfTest(_Service):
+    """Tell a device to test itself."""
+
     Request = SelfTestRequest
     Response = SelfTestResponse
     _type = "diagnostic_msgs/SelfTest"

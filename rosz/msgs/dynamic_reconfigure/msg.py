@@ -33,6 +33,8 @@ _u2 = _Struct("<?").unpack_from
 
 
 class BoolParameter(_Message):
+    """A true or false setting."""
+
     name: str = ""
     value: bool = False
     _type = "dynamic_reconfigure/BoolParameter"
@@ -67,11 +69,15 @@ class BoolParameter(_Message):
             return BoolParameter(name, value)
         except _FAULTS:
             return _explain(data, BoolParameter)
+
+
 _t2 = _Template("I I $ i", -4)
 _u3 = _Struct("<i").unpack_from
 
 
 class IntParameter(_Message):
+    """An integer setting."""
+
     name: str = ""
     value: int = 0
     _type = "dynamic_reconfigure/IntParameter"
@@ -106,11 +112,15 @@ class IntParameter(_Message):
             return IntParameter(name, value)
         except _FAULTS:
             return _explain(data, IntParameter)
+
+
 _t3 = _Stride("I I $ I $", -4, 4)
 _u4 = _Struct("<I").unpack_from
 
 
 class StrParameter(_Message):
+    """A text setting."""
+
     name: str = ""
     value: str = ""
     _type = "dynamic_reconfigure/StrParameter"
@@ -153,11 +163,15 @@ class StrParameter(_Message):
             return StrParameter(name, value)
         except _FAULTS:
             return _explain(data, StrParameter)
+
+
 _t4 = _Template("I I $ d", -4)
 _u5 = _Struct("<d").unpack_from
 
 
 class DoubleParameter(_Message):
+    """A floating-point setting."""
+
     name: str = ""
     value: float = 0.0
     _type = "dynamic_reconfigure/DoubleParameter"
@@ -192,11 +206,15 @@ class DoubleParameter(_Message):
             return DoubleParameter(name, value)
         except _FAULTS:
             return _explain(data, DoubleParameter)
+
+
 _t5 = _Template("I I $ ? i i", -4)
 _u6 = _Struct("<2i").unpack_from
 
 
 class GroupState(_Message):
+    """Whether a group of settings is shown."""
+
     name: str = ""
     state: bool = False
     id: int = 0
@@ -213,7 +231,8 @@ class GroupState(_Message):
         "int32 id\n"
         "int32 parent  # id of the group that it is in\n"
     )
-    _schema = (("name", "string", ""), ("state", "bool", ""), ("id", "int32", ""), ("parent", "int32", ""))
+    _schema = (("name", "string", ""), ("state", "bool", ""), ("id", "int32", ""),
+        ("parent", "int32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -236,6 +255,8 @@ class GroupState(_Message):
             return GroupState(name, state, id_2, parent)
         except _FAULTS:
             return _explain(data, GroupState)
+
+
 _p1 = _Struct("<2I").pack
 _t6 = _Stride("I $ ?", None, 8)
 _t7 = _Stride("I", None, 8)
@@ -247,6 +268,8 @@ _t11 = _Stride("I $ ? i i", None, 8)
 
 
 class Config(_Message):
+    """Settings of a node: all of them, or those to change."""
+
     bools: list[BoolParameter] = []
     ints: list[IntParameter] = []
     strs: list[StrParameter] = []
@@ -265,7 +288,9 @@ class Config(_Message):
         "DoubleParameter[] doubles\n"
         "GroupState[] groups\n"
     )
-    _schema = (("bools", BoolParameter, "[]"), ("ints", IntParameter, "[]"), ("strs", StrParameter, "[]"), ("doubles", DoubleParameter, "[]"), ("groups", GroupState, "[]"))
+    _schema = (("bools", BoolParameter, "[]"), ("ints", IntParameter, "[]"),
+        ("strs", StrParameter, "[]"), ("doubles", DoubleParameter, "[]"),
+        ("groups", GroupState, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -397,12 +422,16 @@ class Config(_Message):
             return Config(bools, ints, strs, doubles, groups)
         except _FAULTS:
             return _explain(data, Config)
+
+
 _t12 = _Template("I I $ I $ I", -4)
 _t13 = _Stride("I $", 0, 4)
 _t14 = _Stride("I $", None, 4)
 
 
 class ParamDescription(_Message):
+    """A setting of a node, without its value."""
+
     name: str = ""
     type: str = ""
     level: int = 0
@@ -421,7 +450,8 @@ class ParamDescription(_Message):
         "string description  # what it is for\n"
         "string edit_method  # the values of an enumeration, as text of a Python dict; else empty\n"
     )
-    _schema = (("name", "string", ""), ("type", "string", ""), ("level", "uint32", ""), ("description", "string", ""), ("edit_method", "string", ""))
+    _schema = (("name", "string", ""), ("type", "string", ""), ("level", "uint32", ""),
+        ("description", "string", ""), ("edit_method", "string", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -468,11 +498,15 @@ class ParamDescription(_Message):
             return ParamDescription(name, type_2, level, description, edit_method)
         except _FAULTS:
             return _explain(data, ParamDescription)
+
+
 _t15 = _Template("I $ I $ I", None)
 _t16 = _Template("i i", None)
 
 
 class Group(_Message):
+    """Settings that belong together."""
+
     name: str = ""
     type: str = ""
     parameters: list[ParamDescription] = []
@@ -491,7 +525,8 @@ class Group(_Message):
         "int32 parent                    # id of the group that it is in\n"
         "int32 id                        # 0: the group that everything is in\n"
     )
-    _schema = (("name", "string", ""), ("type", "string", ""), ("parameters", ParamDescription, "[]"), ("parent", "int32", ""), ("id", "int32", ""))
+    _schema = (("name", "string", ""), ("type", "string", ""),
+        ("parameters", ParamDescription, "[]"), ("parent", "int32", ""), ("id", "int32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -517,7 +552,8 @@ class Group(_Message):
                 n8 = len(b8) + 1
                 f9, p10 = _t13[n7]
                 f11, p12 = _t14[p10, n8]
-                out += (_t15[p4, n5, n6](n5, b5, n6, b6, parameters_one.level), f9(n7, b7), f11(n8, b8))
+                out += (_t15[p4, n5, n6](n5, b5, n6, b6, parameters_one.level), f9(n7, b7),
+                    f11(n8, b8))
                 p4 = p12
             out.append(_t16[p4](m.parent, m.id))
             return b"".join(out)
@@ -567,12 +603,16 @@ class Group(_Message):
             return Group(name, type_2, parameters, parent, id_2)
         except _FAULTS:
             return _explain(data, Group)
+
+
 _t17 = _Stride("I $ I $ I", None, 8)
 _t18 = _Stride("I $", None, 8)
 _t19 = _Stride("i i", None, 8)
 
 
 class ConfigDescription(_Message):
+    """What settings a node has and what they may be."""
+
     groups: list[Group] = []
     max: Config = _field(default_factory=Config)
     min: Config = _field(default_factory=Config)
@@ -589,7 +629,8 @@ class ConfigDescription(_Message):
         "Config min    # smallest allowed values\n"
         "Config dflt   # default values\n"
     )
-    _schema = (("groups", Group, "[]"), ("max", Config, ""), ("min", Config, ""), ("dflt", Config, ""))
+    _schema = (("groups", Group, "[]"), ("max", Config, ""), ("min", Config, ""),
+        ("dflt", Config, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -622,7 +663,8 @@ class ConfigDescription(_Message):
                     n14 = len(b14) + 1
                     f15, p16 = _t18[p13, n11]
                     f17, p18 = _t18[p16, n14]
-                    out += (f12(n9, b9, n10, b10, parameters_one.level), f15(n11, b11), f17(n14, b14))
+                    out += (f12(n9, b9, n10, b10, parameters_one.level), f15(n11, b11),
+                        f17(n14, b14))
                     p8 = p18
                 f19, p20 = _t19[p8]
                 out.append(f19(groups_one.parent, groups_one.id))
@@ -775,7 +817,8 @@ class ConfigDescription(_Message):
             for groups_one_4 in groups_4:
                 n102, b102 = _texts[groups_one_4.name]
                 f103, p104 = _t11[p101, n102]
-                out.append(f103(n102, b102, groups_one_4.state, groups_one_4.id, groups_one_4.parent))
+                out.append(f103(n102, b102, groups_one_4.state, groups_one_4.id,
+                    groups_one_4.parent))
                 p101 = p104
             return b"".join(out)
         except _FAULTS:
@@ -823,7 +866,8 @@ class ConfigDescription(_Message):
                     q = p + 4
                     p = q + n8
                     edit_method = data[q : p - 1].decode()
-                    parameters.append(ParamDescription(name_2, type_3, level, description, edit_method))
+                    parameters.append(ParamDescription(name_2, type_3, level, description,
+                        edit_method))
                 p = p + 3 & -4
                 parent, id_2 = _u6(data, p)
                 p += 8
@@ -1027,14 +1071,20 @@ class ConfigDescription(_Message):
                 p += 8
                 groups_4.append(GroupState(name_17, state_3, id_5, parent_4))
             if p > len(data): raise ValueError
-            return ConfigDescription(groups, Config(bools, ints, strs, doubles, groups_2), Config(bools_2, ints_2, strs_2, doubles_2, groups_3), Config(bools_3, ints_3, strs_3, doubles_3, groups_4))
+            return ConfigDescription(groups, Config(bools, ints, strs, doubles, groups_2),
+                Config(bools_2, ints_2, strs_2, doubles_2, groups_3),
+                Config(bools_3, ints_3, strs_3, doubles_3, groups_4))
         except _FAULTS:
             return _explain(data, ConfigDescription)
-_t20 = _Template("I x", -4)
+
+
+_p3 = _Struct("<Ix").pack
 _u7 = _Struct("<Ix").unpack_from
 
 
 class SensorLevels(_Message):
+    """What a driver has to do before a setting of a level can change."""
+
     RECONFIGURE_CLOSE = 3
     RECONFIGURE_STOP = 1
     RECONFIGURE_RUNNING = 0
@@ -1054,7 +1104,7 @@ class SensorLevels(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t20[0](256)
+            return _p3(256)
         except _FAULTS:
             return _plain(m, SensorLevels)
 

@@ -44,6 +44,8 @@ _u6 = _Struct("<2i").unpack_from
 
 
 class ReconfigureRequest(_Message):
+    """Change settings of a node."""
+
     config: Config = _field(default_factory=Config)
     _type = "dynamic_reconfigure/ReconfigureRequest"
     _type_name = "dynamic_reconfigure/srv/Reconfigure_Request"
@@ -332,6 +334,8 @@ class ReconfigureResponse(_Message):
 
 
 class Reconfigure(_Service):
+    """Change settings of a node."""
+
     Request = ReconfigureRequest
     Response = ReconfigureResponse
     _type = "dynamic_reconfigure/Reconfigure"

@@ -56,11 +56,13 @@ __all__ = (
     "WString",
 )
 
-_t1 = _Template("I ?", -4)
+_p1 = _Struct("<I?").pack
 _u1 = _Struct("<I?").unpack_from
 
 
 class Bool(_Message):
+    """A truth value on its own."""
+
     data: bool = False
     _type = "example_interfaces/Bool"
     _type_name = "example_interfaces/msg/Bool"
@@ -76,7 +78,7 @@ class Bool(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256, m.data)
+            return _p1(256, m.data)
         except _FAULTS:
             return _plain(m, Bool)
 
@@ -88,11 +90,15 @@ class Bool(_Message):
             return Bool(data_2)
         except _FAULTS:
             return _explain(data, Bool)
-_t2 = _Template("I B", -4)
+
+
+_p2 = _Struct("<IB").pack
 _u2 = _Struct("<IB").unpack_from
 
 
 class Byte(_Message):
+    """One octet without numeric meaning."""
+
     data: int = 0
     _type = "example_interfaces/Byte"
     _type_name = "example_interfaces/msg/Byte"
@@ -108,7 +114,7 @@ class Byte(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.data)
+            return _p2(256, m.data)
         except _FAULTS:
             return _plain(m, Byte)
 
@@ -120,11 +126,15 @@ class Byte(_Message):
             return Byte(data_2)
         except _FAULTS:
             return _explain(data, Byte)
-_t3 = _Template("I I $ I I", -4)
+
+
+_t1 = _Template("I I $ I I", -4)
 _u3 = _Struct("<2I").unpack_from
 
 
 class MultiArrayDimension(_Message):
+    """One dimension of a multi-dimensional array; see MultiArrayLayout."""
+
     label: str = ""
     size: int = 0
     stride: int = 0
@@ -146,7 +156,7 @@ class MultiArrayDimension(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.label]
-            return _t3[n1](256, n1, b1, m.size, m.stride)
+            return _t1[n1](256, n1, b1, m.size, m.stride)
         except _FAULTS:
             return _plain(m, MultiArrayDimension)
 
@@ -162,13 +172,17 @@ class MultiArrayDimension(_Message):
             return MultiArrayDimension(label, size, stride)
         except _FAULTS:
             return _explain(data, MultiArrayDimension)
-_p1 = _Struct("<2I").pack
-_t4 = _Template("I $ I I", 0)
-_p2 = _Struct("<I").pack
+
+
+_p3 = _Struct("<2I").pack
+_t2 = _Template("I $ I I", 0)
+_p4 = _Struct("<I").pack
 _u4 = _Struct("<I").unpack_from
 
 
 class MultiArrayLayout(_Message):
+    """How the flat data of a multi-dimensional array is to be read."""
+
     dim: list[MultiArrayDimension] = []
     data_offset: int = 0
     _type = "example_interfaces/MultiArrayLayout"
@@ -193,11 +207,11 @@ class MultiArrayLayout(_Message):
         try:
             dim = m.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
-            out.append(_p2(m.data_offset))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
+            out.append(_p4(m.data_offset))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MultiArrayLayout)
@@ -225,6 +239,8 @@ class MultiArrayLayout(_Message):
 
 
 class ByteMultiArray(_Message):
+    """A multi-dimensional array of octets."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Bytes = b""
     _type = "example_interfaces/ByteMultiArray"
@@ -245,15 +261,15 @@ class ByteMultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ByteMultiArray)
@@ -285,6 +301,8 @@ class ByteMultiArray(_Message):
 
 
 class Char(_Message):
+    """One 8-bit character code (unsigned, as on the wire)."""
+
     data: int = 0
     _type = "example_interfaces/Char"
     _type_name = "example_interfaces/msg/Char"
@@ -300,7 +318,7 @@ class Char(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.data)
+            return _p2(256, m.data)
         except _FAULTS:
             return _plain(m, Char)
 
@@ -312,11 +330,15 @@ class Char(_Message):
             return Char(data_2)
         except _FAULTS:
             return _explain(data, Char)
-_t5 = _Template("I x", -4)
+
+
+_p5 = _Struct("<Ix").pack
 _u5 = _Struct("<Ix").unpack_from
 
 
 class Empty(_Message):
+    """Carries nothing: that it arrives is the information."""
+
     _type = "example_interfaces/Empty"
     _type_name = "example_interfaces/msg/Empty"
     _type_hash = "RIHS01_73c22a7341eeccf8ef504a991e60d4078223f0931a5d5d212800e7c978903c58"
@@ -327,7 +349,7 @@ class Empty(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t5[0](256)
+            return _p5(256)
         except _FAULTS:
             return _plain(m, Empty)
 
@@ -339,11 +361,15 @@ class Empty(_Message):
             return Empty()
         except _FAULTS:
             return _explain(data, Empty)
-_p3 = _Struct("<If").pack
+
+
+_p6 = _Struct("<If").pack
 _u6 = _Struct("<If").unpack_from
 
 
 class Float32(_Message):
+    """A single-precision number."""
+
     data: float = 0.0
     _type = "example_interfaces/Float32"
     _type_name = "example_interfaces/msg/Float32"
@@ -359,7 +385,7 @@ class Float32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256, m.data)
+            return _p6(256, m.data)
         except _FAULTS:
             return _plain(m, Float32)
 
@@ -371,10 +397,14 @@ class Float32(_Message):
             return Float32(data_2)
         except _FAULTS:
             return _explain(data, Float32)
+
+
 _d1 = _empty("f")
 
 
 class Float32MultiArray(_Message):
+    """A multi-dimensional array of single-precision numbers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[float] = _field(default_factory=_d1)
     _type = "example_interfaces/Float32MultiArray"
@@ -395,15 +425,15 @@ class Float32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "f":
                 data_2 = _numbers(data_2, "f")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float32MultiArray)
@@ -432,11 +462,15 @@ class Float32MultiArray(_Message):
             return Float32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float32MultiArray)
-_p4 = _Struct("<Id").pack
+
+
+_p7 = _Struct("<Id").pack
 _u7 = _Struct("<Id").unpack_from
 
 
 class Float64(_Message):
+    """A double-precision number."""
+
     data: float = 0.0
     _type = "example_interfaces/Float64"
     _type_name = "example_interfaces/msg/Float64"
@@ -452,7 +486,7 @@ class Float64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p4(256, m.data)
+            return _p7(256, m.data)
         except _FAULTS:
             return _plain(m, Float64)
 
@@ -464,11 +498,15 @@ class Float64(_Message):
             return Float64(data_2)
         except _FAULTS:
             return _explain(data, Float64)
+
+
 _d2 = _empty("d")
-_t6 = _Stride("I $ I I", None, 8)
+_t3 = _Stride("I $ I I", None, 8)
 
 
 class Float64MultiArray(_Message):
+    """A multi-dimensional array of double-precision numbers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[float] = _field(default_factory=_d2)
     _type = "example_interfaces/Float64MultiArray"
@@ -489,11 +527,11 @@ class Float64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                f4, p5 = _t6[p2, n3]
+                f4, p5 = _t3[p2, n3]
                 out.append(f4(n3, b3, dim_one.size, dim_one.stride))
                 p2 = p5
             data_2 = m.data
@@ -501,7 +539,7 @@ class Float64MultiArray(_Message):
                 data_2 = _numbers(data_2, "d")
             n6 = len(data_2)
             p7 = 0 if n6 else p2
-            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
+            out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float64MultiArray)
@@ -530,11 +568,15 @@ class Float64MultiArray(_Message):
             return Float64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float64MultiArray)
-_t7 = _Template("I h", -4)
+
+
+_p8 = _Struct("<Ih").pack
 _u8 = _Struct("<Ih").unpack_from
 
 
 class Int16(_Message):
+    """A signed 16-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/Int16"
     _type_name = "example_interfaces/msg/Int16"
@@ -550,7 +592,7 @@ class Int16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t7[0](256, m.data)
+            return _p8(256, m.data)
         except _FAULTS:
             return _plain(m, Int16)
 
@@ -562,10 +604,14 @@ class Int16(_Message):
             return Int16(data_2)
         except _FAULTS:
             return _explain(data, Int16)
+
+
 _d3 = _empty("h")
 
 
 class Int16MultiArray(_Message):
+    """A multi-dimensional array of signed 16-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d3)
     _type = "example_interfaces/Int16MultiArray"
@@ -586,15 +632,15 @@ class Int16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "h":
                 data_2 = _numbers(data_2, "h")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int16MultiArray)
@@ -623,11 +669,15 @@ class Int16MultiArray(_Message):
             return Int16MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int16MultiArray)
-_p5 = _Struct("<Ii").pack
+
+
+_p9 = _Struct("<Ii").pack
 _u9 = _Struct("<Ii").unpack_from
 
 
 class Int32(_Message):
+    """A signed 32-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/Int32"
     _type_name = "example_interfaces/msg/Int32"
@@ -643,7 +693,7 @@ class Int32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p5(256, m.data)
+            return _p9(256, m.data)
         except _FAULTS:
             return _plain(m, Int32)
 
@@ -655,10 +705,14 @@ class Int32(_Message):
             return Int32(data_2)
         except _FAULTS:
             return _explain(data, Int32)
+
+
 _d4 = _empty("i")
 
 
 class Int32MultiArray(_Message):
+    """A multi-dimensional array of signed 32-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d4)
     _type = "example_interfaces/Int32MultiArray"
@@ -679,15 +733,15 @@ class Int32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "i":
                 data_2 = _numbers(data_2, "i")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int32MultiArray)
@@ -716,11 +770,15 @@ class Int32MultiArray(_Message):
             return Int32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int32MultiArray)
-_p6 = _Struct("<Iq").pack
+
+
+_p10 = _Struct("<Iq").pack
 _u10 = _Struct("<Iq").unpack_from
 
 
 class Int64(_Message):
+    """A signed 64-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/Int64"
     _type_name = "example_interfaces/msg/Int64"
@@ -736,7 +794,7 @@ class Int64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p6(256, m.data)
+            return _p10(256, m.data)
         except _FAULTS:
             return _plain(m, Int64)
 
@@ -748,10 +806,14 @@ class Int64(_Message):
             return Int64(data_2)
         except _FAULTS:
             return _explain(data, Int64)
+
+
 _d5 = _empty("q")
 
 
 class Int64MultiArray(_Message):
+    """A multi-dimensional array of signed 64-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d5)
     _type = "example_interfaces/Int64MultiArray"
@@ -772,11 +834,11 @@ class Int64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                f4, p5 = _t6[p2, n3]
+                f4, p5 = _t3[p2, n3]
                 out.append(f4(n3, b3, dim_one.size, dim_one.stride))
                 p2 = p5
             data_2 = m.data
@@ -784,7 +846,7 @@ class Int64MultiArray(_Message):
                 data_2 = _numbers(data_2, "q")
             n6 = len(data_2)
             p7 = 0 if n6 else p2
-            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
+            out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int64MultiArray)
@@ -813,11 +875,15 @@ class Int64MultiArray(_Message):
             return Int64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int64MultiArray)
-_t8 = _Template("I b", -4)
+
+
+_p11 = _Struct("<Ib").pack
 _u11 = _Struct("<Ib").unpack_from
 
 
 class Int8(_Message):
+    """A signed 8-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/Int8"
     _type_name = "example_interfaces/msg/Int8"
@@ -833,7 +899,7 @@ class Int8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t8[0](256, m.data)
+            return _p11(256, m.data)
         except _FAULTS:
             return _plain(m, Int8)
 
@@ -845,10 +911,14 @@ class Int8(_Message):
             return Int8(data_2)
         except _FAULTS:
             return _explain(data, Int8)
+
+
 _d6 = _empty("b")
 
 
 class Int8MultiArray(_Message):
+    """A multi-dimensional array of signed 8-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d6)
     _type = "example_interfaces/Int8MultiArray"
@@ -869,15 +939,15 @@ class Int8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int8MultiArray)
@@ -906,10 +976,14 @@ class Int8MultiArray(_Message):
             return Int8MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int8MultiArray)
-_t9 = _Stride("I I $", -4, 4)
+
+
+_t4 = _Stride("I I $", -4, 4)
 
 
 class String(_Message):
+    """A piece of text, UTF-8 encoded on the wire."""
+
     data: str = ""
     _type = "example_interfaces/String"
     _type_name = "example_interfaces/msg/String"
@@ -928,7 +1002,7 @@ class String(_Message):
             b1 = m.data.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t9[n1]
+            f2, p3 = _t4[n1]
             return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, String)
@@ -944,11 +1018,15 @@ class String(_Message):
             return String(data_2)
         except _FAULTS:
             return _explain(data, String)
-_t10 = _Template("I H", -4)
+
+
+_p12 = _Struct("<IH").pack
 _u12 = _Struct("<IH").unpack_from
 
 
 class UInt16(_Message):
+    """An unsigned 16-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/UInt16"
     _type_name = "example_interfaces/msg/UInt16"
@@ -964,7 +1042,7 @@ class UInt16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t10[0](256, m.data)
+            return _p12(256, m.data)
         except _FAULTS:
             return _plain(m, UInt16)
 
@@ -976,10 +1054,14 @@ class UInt16(_Message):
             return UInt16(data_2)
         except _FAULTS:
             return _explain(data, UInt16)
+
+
 _d7 = _empty("H")
 
 
 class UInt16MultiArray(_Message):
+    """A multi-dimensional array of unsigned 16-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d7)
     _type = "example_interfaces/UInt16MultiArray"
@@ -1000,15 +1082,15 @@ class UInt16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "H":
                 data_2 = _numbers(data_2, "H")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt16MultiArray)
@@ -1040,6 +1122,8 @@ class UInt16MultiArray(_Message):
 
 
 class UInt32(_Message):
+    """An unsigned 32-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/UInt32"
     _type_name = "example_interfaces/msg/UInt32"
@@ -1055,7 +1139,7 @@ class UInt32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.data)
+            return _p3(256, m.data)
         except _FAULTS:
             return _plain(m, UInt32)
 
@@ -1067,10 +1151,14 @@ class UInt32(_Message):
             return UInt32(data_2)
         except _FAULTS:
             return _explain(data, UInt32)
+
+
 _d8 = _empty("I")
 
 
 class UInt32MultiArray(_Message):
+    """A multi-dimensional array of unsigned 32-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d8)
     _type = "example_interfaces/UInt32MultiArray"
@@ -1091,15 +1179,15 @@ class UInt32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "I":
                 data_2 = _numbers(data_2, "I")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt32MultiArray)
@@ -1128,11 +1216,15 @@ class UInt32MultiArray(_Message):
             return UInt32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, UInt32MultiArray)
-_p7 = _Struct("<IQ").pack
+
+
+_p13 = _Struct("<IQ").pack
 _u13 = _Struct("<IQ").unpack_from
 
 
 class UInt64(_Message):
+    """An unsigned 64-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/UInt64"
     _type_name = "example_interfaces/msg/UInt64"
@@ -1148,7 +1240,7 @@ class UInt64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p7(256, m.data)
+            return _p13(256, m.data)
         except _FAULTS:
             return _plain(m, UInt64)
 
@@ -1160,10 +1252,14 @@ class UInt64(_Message):
             return UInt64(data_2)
         except _FAULTS:
             return _explain(data, UInt64)
+
+
 _d9 = _empty("Q")
 
 
 class UInt64MultiArray(_Message):
+    """A multi-dimensional array of unsigned 64-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d9)
     _type = "example_interfaces/UInt64MultiArray"
@@ -1184,11 +1280,11 @@ class UInt64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                f4, p5 = _t6[p2, n3]
+                f4, p5 = _t3[p2, n3]
                 out.append(f4(n3, b3, dim_one.size, dim_one.stride))
                 p2 = p5
             data_2 = m.data
@@ -1196,7 +1292,7 @@ class UInt64MultiArray(_Message):
                 data_2 = _numbers(data_2, "Q")
             n6 = len(data_2)
             p7 = 0 if n6 else p2
-            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
+            out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt64MultiArray)
@@ -1228,6 +1324,8 @@ class UInt64MultiArray(_Message):
 
 
 class UInt8(_Message):
+    """An unsigned 8-bit integer."""
+
     data: int = 0
     _type = "example_interfaces/UInt8"
     _type_name = "example_interfaces/msg/UInt8"
@@ -1243,7 +1341,7 @@ class UInt8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.data)
+            return _p2(256, m.data)
         except _FAULTS:
             return _plain(m, UInt8)
 
@@ -1258,6 +1356,8 @@ class UInt8(_Message):
 
 
 class UInt8MultiArray(_Message):
+    """A multi-dimensional array of unsigned 8-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Bytes = b""
     _type = "example_interfaces/UInt8MultiArray"
@@ -1278,15 +1378,15 @@ class UInt8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt8MultiArray)
@@ -1318,6 +1418,8 @@ class UInt8MultiArray(_Message):
 
 
 class WString(_Message):
+    """A piece of text, UTF-16 encoded on the wire."""
+
     data: str = ""
     _type = "example_interfaces/WString"
     _type_name = "example_interfaces/msg/WString"
@@ -1335,7 +1437,7 @@ class WString(_Message):
         try:
             b1 = _pack_wide(m.data)
             n1 = len(b1) >> 2
-            return b"".join((_p1(256, n1), b1))
+            return b"".join((_p3(256, n1), b1))
         except _FAULTS:
             return _plain(m, WString)
 

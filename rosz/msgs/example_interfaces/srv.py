@@ -7,7 +7,6 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from struct import Struct as _Struct
@@ -30,6 +29,8 @@ _u1 = _Struct("<I2q").unpack_from
 
 
 class AddTwoIntsRequest(_Message):
+    """Add two numbers: the first service of every tutorial."""
+
     a: int = 0
     b: int = 0
     _type = "example_interfaces/AddTwoIntsRequest"
@@ -54,11 +55,13 @@ class AddTwoIntsRequest(_Message):
     @staticmethod
     def _decode(data: bytes) -> AddTwoIntsRequest:
         try:
-            h, a_2, b_2 = _u1(data)
+            h, a, b_2 = _u1(data)
             if h != 256: raise ValueError
-            return AddTwoIntsRequest(a_2, b_2)
+            return AddTwoIntsRequest(a, b_2)
         except _FAULTS:
             return _explain(data, AddTwoIntsRequest)
+
+
 _p2 = _Struct("<Iq").pack
 _u2 = _Struct("<Iq").unpack_from
 
@@ -90,6 +93,8 @@ class AddTwoIntsResponse(_Message):
 
 
 class AddTwoInts(_Service):
+    """Add two numbers: the first service of every tutorial."""
+
     Request = AddTwoIntsRequest
     Response = AddTwoIntsResponse
     _type = "example_interfaces/AddTwoInts"
@@ -104,11 +109,15 @@ class AddTwoInts(_Service):
         "---\n"
         "int64 sum\n"
     )
-_t1 = _Template("I ?", -4)
+
+
+_p3 = _Struct("<I?").pack
 _u3 = _Struct("<I?").unpack_from
 
 
 class SetBoolRequest(_Message):
+    """Switch something on or off."""
+
     data: bool = False
     _type = "example_interfaces/SetBoolRequest"
     _type_name = "example_interfaces/srv/SetBool_Request"
@@ -124,7 +133,7 @@ class SetBoolRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256, m.data)
+            return _p3(256, m.data)
         except _FAULTS:
             return _plain(m, SetBoolRequest)
 
@@ -136,7 +145,9 @@ class SetBoolRequest(_Message):
             return SetBoolRequest(data_2)
         except _FAULTS:
             return _explain(data, SetBoolRequest)
-_t2 = _Stride("I ? I $", -4, 4)
+
+
+_t1 = _Stride("I ? I $", -4, 4)
 _u4 = _Struct("<I?3xI").unpack_from
 
 
@@ -159,7 +170,7 @@ class SetBoolResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t2[n1]
+            f2, p3 = _t1[n1]
             return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, SetBoolResponse)
@@ -178,6 +189,8 @@ class SetBoolResponse(_Message):
 
 
 class SetBool(_Service):
+    """Switch something on or off."""
+
     Request = SetBoolRequest
     Response = SetBoolResponse
     _type = "example_interfaces/SetBool"
@@ -192,11 +205,15 @@ class SetBool(_Service):
         "bool success     # whether it was done\n"
         "string message   # what to tell a person\n"
     )
-_t3 = _Template("I x", -4)
+
+
+_p4 = _Struct("<Ix").pack
 _u5 = _Struct("<Ix").unpack_from
 
 
 class TriggerRequest(_Message):
+    """Do the thing that the service is named after, and tell how it went."""
+
     _type = "example_interfaces/TriggerRequest"
     _type_name = "example_interfaces/srv/Trigger_Request"
     _type_hash = "RIHS01_2521571bb7fb4de94da045720b069b2859084c689ee27382f48414ebf4dd3a8d"
@@ -207,7 +224,7 @@ class TriggerRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t3[0](256)
+            return _p4(256)
         except _FAULTS:
             return _plain(m, TriggerRequest)
 
@@ -240,7 +257,7 @@ class TriggerResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t2[n1]
+            f2, p3 = _t1[n1]
             return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, TriggerResponse)
@@ -259,6 +276,8 @@ class TriggerResponse(_Message):
 
 
 class Trigger(_Service):
+    """Do the thing that the service is named after, and tell how it went."""
+
     Request = TriggerRequest
     Response = TriggerResponse
     _type = "example_interfaces/Trigger"

@@ -47,6 +47,8 @@ _u1 = _Struct("<I3d").unpack_from
 
 
 class GeoPoint(_Message):
+    """A position on the WGS 84 ellipsoid."""
+
     latitude: float = 0.0
     longitude: float = 0.0
     altitude: float = 0.0
@@ -61,7 +63,8 @@ class GeoPoint(_Message):
         "float64 longitude  # degrees, positive east of Greenwich, -180 to 180\n"
         "float64 altitude   # m above the ellipsoid; NaN: unknown\n"
     )
-    _schema = (("latitude", "float64", ""), ("longitude", "float64", ""), ("altitude", "float64", ""))
+    _schema = (("latitude", "float64", ""), ("longitude", "float64", ""),
+        ("altitude", "float64", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -78,11 +81,15 @@ class GeoPoint(_Message):
             return GeoPoint(latitude, longitude, altitude)
         except _FAULTS:
             return _explain(data, GeoPoint)
+
+
 _p2 = _Struct("<I6d").pack
 _u2 = _Struct("<I6d").unpack_from
 
 
 class BoundingBox(_Message):
+    """A region between two parallels and two meridians, and between two altitudes."""
+
     min_pt: GeoPoint = _field(default_factory=GeoPoint)
     max_pt: GeoPoint = _field(default_factory=GeoPoint)
     _type = "geographic_msgs/BoundingBox"
@@ -105,7 +112,8 @@ class BoundingBox(_Message):
         try:
             min_pt = m.min_pt
             max_pt = m.max_pt
-            return _p2(256, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude)
+            return _p2(256, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude,
+                max_pt.longitude, max_pt.altitude)
         except _FAULTS:
             return _plain(m, BoundingBox)
 
@@ -114,14 +122,19 @@ class BoundingBox(_Message):
         try:
             h, latitude, longitude, altitude, latitude_2, longitude_2, altitude_2 = _u2(data)
             if h != 256: raise ValueError
-            return BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2))
+            return BoundingBox(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2))
         except _FAULTS:
             return _explain(data, BoundingBox)
+
+
 _p3 = _Struct("<I7d").pack
 _u3 = _Struct("<I7d").unpack_from
 
 
 class GeoPose(_Message):
+    """A position on the WGS 84 ellipsoid and a heading."""
+
     position: GeoPoint = _field(default_factory=GeoPoint)
     orientation: Quaternion = _field(default_factory=Quaternion)
     _type = "geographic_msgs/GeoPose"
@@ -141,24 +154,29 @@ class GeoPose(_Message):
         try:
             position = m.position
             orientation = m.orientation
-            return _p3(256, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w)
+            return _p3(256, position.latitude, position.longitude, position.altitude,
+                orientation.x, orientation.y, orientation.z, orientation.w)
         except _FAULTS:
             return _plain(m, GeoPose)
 
     @staticmethod
     def _decode(data: bytes) -> GeoPose:
         try:
-            h, latitude, longitude, altitude, x_2, y_2, z_2, w_2 = _u3(data)
+            h, latitude, longitude, altitude, x, y, z, w = _u3(data)
             if h != 256: raise ValueError
-            return GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2))
+            return GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x, y, z, w))
         except _FAULTS:
             return _explain(data, GeoPose)
+
+
 _t1 = _Template("I i I I $ d d d d d d d", -4)
 _u4 = _Struct("<Ii2I").unpack_from
 _u5 = _Struct("<7d").unpack_from
 
 
 class GeoPoseStamped(_Message):
+    """A position on the WGS 84 ellipsoid and a heading, with their time."""
+
     header: Header = _field(default_factory=Header)
     pose: GeoPose = _field(default_factory=GeoPose)
     _type = "geographic_msgs/GeoPoseStamped"
@@ -182,7 +200,9 @@ class GeoPoseStamped(_Message):
             pose = m.pose
             position = pose.position
             orientation = pose.orientation
-            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w)
+            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.latitude,
+                position.longitude, position.altitude, orientation.x, orientation.y, orientation.z,
+                orientation.w)
         except _FAULTS:
             return _plain(m, GeoPoseStamped)
 
@@ -194,10 +214,13 @@ class GeoPoseStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            latitude, longitude, altitude, x_2, y_2, z_2, w_2 = _u5(data, p)
-            return GeoPoseStamped(Header(Time(sec, nanosec), frame_id), GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2)))
+            latitude, longitude, altitude, x, y, z, w = _u5(data, p)
+            return GeoPoseStamped(Header(Time(sec, nanosec), frame_id),
+                GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x, y, z, w)))
         except _FAULTS:
             return _explain(data, GeoPoseStamped)
+
+
 _t2 = _Stride("I i I I $ I", -4, 8)
 _t3 = _Template("i I I $ d d d d d d d", None)
 _u6 = _Struct("<I").unpack_from
@@ -205,6 +228,8 @@ _u7 = _Struct("<i2I").unpack_from
 
 
 class GeoPath(_Message):
+    """Places and headings to pass one after the other."""
+
     header: Header = _field(default_factory=Header)
     poses: list[GeoPoseStamped] = []
     _type = "geographic_msgs/GeoPath"
@@ -237,7 +262,9 @@ class GeoPath(_Message):
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t3[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w))
+                out.append(_t3[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.latitude,
+                    position.longitude, position.altitude, orientation.x, orientation.y,
+                    orientation.z, orientation.w))
                 p5 = 0
             return b"".join(out)
         except _FAULTS:
@@ -260,18 +287,23 @@ class GeoPath(_Message):
                 p = q + n3
                 frame_id_2 = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                latitude, longitude, altitude, x_2, y_2, z_2, w_2 = _u5(data, p)
+                latitude, longitude, altitude, x, y, z, w = _u5(data, p)
                 p += 56
-                poses.append(GeoPoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2), GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2))))
+                poses.append(GeoPoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                    GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x, y, z, w))))
             if p > len(data): raise ValueError
             return GeoPath(Header(Time(sec, nanosec), frame_id), poses)
         except _FAULTS:
             return _explain(data, GeoPath)
+
+
 _t4 = _Template("I i I I $ d d d", -4)
 _u8 = _Struct("<3d").unpack_from
 
 
 class GeoPointStamped(_Message):
+    """A position on the WGS 84 ellipsoid, with its time."""
+
     header: Header = _field(default_factory=Header)
     position: GeoPoint = _field(default_factory=GeoPoint)
     _type = "geographic_msgs/GeoPointStamped"
@@ -293,7 +325,8 @@ class GeoPointStamped(_Message):
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
             position = m.position
-            return _t4[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.latitude, position.longitude, position.altitude)
+            return _t4[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.latitude,
+                position.longitude, position.altitude)
         except _FAULTS:
             return _plain(m, GeoPointStamped)
 
@@ -306,13 +339,18 @@ class GeoPointStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             latitude, longitude, altitude = _u8(data, p)
-            return GeoPointStamped(Header(Time(sec, nanosec), frame_id), GeoPoint(latitude, longitude, altitude))
+            return GeoPointStamped(Header(Time(sec, nanosec), frame_id),
+                GeoPoint(latitude, longitude, altitude))
         except _FAULTS:
             return _explain(data, GeoPointStamped)
+
+
 _d1 = _zeros("d", 36)
 
 
 class GeoPoseWithCovariance(_Message):
+    """An estimated position and heading, and how sure the estimate is."""
+
     pose: GeoPose = _field(default_factory=GeoPose)
     covariance: _Array[float] = _field(default_factory=_d1)
     _type = "geographic_msgs/GeoPoseWithCovariance"
@@ -337,26 +375,34 @@ class GeoPoseWithCovariance(_Message):
             position = pose.position
             orientation = pose.orientation
             covariance = m.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_p3(256, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w), covariance))
+            return b"".join((_p3(256, position.latitude, position.longitude, position.altitude,
+                orientation.x, orientation.y, orientation.z, orientation.w), covariance))
         except _FAULTS:
             return _plain(m, GeoPoseWithCovariance)
 
     @staticmethod
     def _decode(data: bytes) -> GeoPoseWithCovariance:
         try:
-            h, latitude, longitude, altitude, x_2, y_2, z_2, w_2 = _u3(data)
+            h, latitude, longitude, altitude, x, y, z, w = _u3(data)
             if h != 256: raise ValueError
             p = 60 + 288
             covariance = _array("d", data[60 : p])
             if p > len(data): raise ValueError
-            return GeoPoseWithCovariance(GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2)), covariance)
+            return GeoPoseWithCovariance(GeoPose(GeoPoint(latitude, longitude, altitude),
+                Quaternion(x, y, z, w)), covariance)
         except _FAULTS:
             return _explain(data, GeoPoseWithCovariance)
 
 
 class GeoPoseWithCovarianceStamped(_Message):
+    """An estimated position and heading with covariance and time."""
+
     header: Header = _field(default_factory=Header)
     pose: GeoPoseWithCovariance = _field(default_factory=GeoPoseWithCovariance)
     _type = "geographic_msgs/GeoPoseWithCovarianceStamped"
@@ -382,9 +428,15 @@ class GeoPoseWithCovarianceStamped(_Message):
             position = pose_2.position
             orientation = pose_2.orientation
             covariance = pose.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w), covariance))
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.latitude,
+                position.longitude, position.altitude, orientation.x, orientation.y, orientation.z,
+                orientation.w), covariance))
         except _FAULTS:
             return _plain(m, GeoPoseWithCovarianceStamped)
 
@@ -396,19 +448,25 @@ class GeoPoseWithCovarianceStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            latitude, longitude, altitude, x_2, y_2, z_2, w_2 = _u5(data, p)
+            latitude, longitude, altitude, x, y, z, w = _u5(data, p)
             q = p + 56
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return GeoPoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id), GeoPoseWithCovariance(GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2)), covariance))
+            return GeoPoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+                GeoPoseWithCovariance(GeoPose(GeoPoint(latitude, longitude, altitude),
+                Quaternion(x, y, z, w)), covariance))
         except _FAULTS:
             return _explain(data, GeoPoseWithCovarianceStamped)
+
+
 _t5 = _Stride("I I $ I $", -4, 4)
 _u9 = _Struct("<2I").unpack_from
 
 
 class KeyValue(_Message):
+    """A property of a map or of a part of it."""
+
     key: str = ""
     value: str = ""
     _type = "geographic_msgs/KeyValue"
@@ -451,12 +509,16 @@ class KeyValue(_Message):
             return KeyValue(key, value)
         except _FAULTS:
             return _explain(data, KeyValue)
+
+
 _p4 = _Struct("<I16s3dI").pack
 _t6 = _Stride("I $ I $", None, 8)
 _u10 = _Struct("<I16s3dI").unpack_from
 
 
 class WayPoint(_Message):
+    """A point of a map or of a route network."""
+
     id: UUID = _field(default_factory=UUID)
     position: GeoPoint = _field(default_factory=GeoPoint)
     props: list[KeyValue] = []
@@ -520,6 +582,8 @@ class WayPoint(_Message):
             return WayPoint(UUID(uuid), GeoPoint(latitude, longitude, altitude), props)
         except _FAULTS:
             return _explain(data, WayPoint)
+
+
 _p5 = _Struct("<I16sI").pack
 _p6 = _Struct("<16s").pack
 _p7 = _Struct("<I").pack
@@ -529,6 +593,8 @@ _u12 = _Struct("<16s").unpack_from
 
 
 class MapFeature(_Message):
+    """Something on a map that several points or other features make up, such as a road or a building."""
+
     id: UUID = _field(default_factory=UUID)
     components: list[UUID] = []
     props: list[KeyValue] = []
@@ -606,6 +672,8 @@ class MapFeature(_Message):
             return MapFeature(UUID(uuid), components, props)
         except _FAULTS:
             return _explain(data, MapFeature)
+
+
 _t8 = _Template("I i I I $ 16s d d d d d d I", -4)
 _t9 = _Template("16s d d d I", None)
 _t10 = _Stride("I", None, 8)
@@ -615,6 +683,8 @@ _u14 = _Struct("<3dI").unpack_from
 
 
 class GeographicMap(_Message):
+    """A map of points and features. What they stand for is told by their properties."""
+
     header: Header = _field(default_factory=Header)
     id: UUID = _field(default_factory=UUID)
     bounds: BoundingBox = _field(default_factory=BoundingBox)
@@ -636,7 +706,8 @@ class GeographicMap(_Message):
         "MapFeature[] features\n"
         "KeyValue[] props\n"
     )
-    _schema = (("header", Header, ""), ("id", UUID, ""), ("bounds", BoundingBox, ""), ("points", WayPoint, "[]"), ("features", MapFeature, "[]"), ("props", KeyValue, "[]"))
+    _schema = (("header", Header, ""), ("id", UUID, ""), ("bounds", BoundingBox, ""),
+        ("points", WayPoint, "[]"), ("features", MapFeature, "[]"), ("props", KeyValue, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -653,7 +724,9 @@ class GeographicMap(_Message):
             max_pt = bounds.max_pt
             points = m.points
             n2 = len(points)
-            out = [_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n2)]
+            out = [_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude,
+                min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude,
+                max_pt.altitude, n2)]
             p3 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -663,7 +736,8 @@ class GeographicMap(_Message):
                 position = points_one.position
                 props = points_one.props
                 n4 = len(props)
-                out.append(_t9[p3](uuid_2, position.latitude, position.longitude, position.altitude, n4))
+                out.append(_t9[p3](uuid_2, position.latitude, position.longitude,
+                    position.altitude, n4))
                 p5 = 4
                 for props_one in props:
                     n6, b6 = _texts[props_one.key]
@@ -755,7 +829,8 @@ class GeographicMap(_Message):
                     p = q + n5
                     value = data[q : p - 1].decode()
                     props.append(KeyValue(key, value))
-                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3), props))
+                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3),
+                    props))
             p = p + 3 & -4
             (n6,) = _u6(data, p)
             features = []
@@ -803,13 +878,19 @@ class GeographicMap(_Message):
                 value_3 = data[q : p - 1].decode()
                 props_3.append(KeyValue(key_3, value_3))
             if p > len(data): raise ValueError
-            return GeographicMap(Header(Time(sec, nanosec), frame_id), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3)
+            return GeographicMap(Header(Time(sec, nanosec), frame_id), UUID(uuid),
+                BoundingBox(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3)
         except _FAULTS:
             return _explain(data, GeographicMap)
+
+
 _t12 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
 
 
 class GeographicMapChanges(_Message):
+    """What changed in a map."""
+
     header: Header = _field(default_factory=Header)
     diffs: GeographicMap = _field(default_factory=GeographicMap)
     deletes: list[UUID] = []
@@ -845,7 +926,9 @@ class GeographicMapChanges(_Message):
             max_pt = bounds.max_pt
             points = diffs.points
             n3 = len(points)
-            out = [_t12[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
+            out = [_t12[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec,
+                stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude,
+                max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
             p4 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -855,7 +938,8 @@ class GeographicMapChanges(_Message):
                 position = points_one.position
                 props = points_one.props
                 n5 = len(props)
-                out.append(_t9[p4](uuid_2, position.latitude, position.longitude, position.altitude, n5))
+                out.append(_t9[p4](uuid_2, position.latitude, position.longitude,
+                    position.altitude, n5))
                 p6 = 4
                 for props_one in props:
                     n7, b7 = _texts[props_one.key]
@@ -963,7 +1047,8 @@ class GeographicMapChanges(_Message):
                     p = q + n6
                     value = data[q : p - 1].decode()
                     props.append(KeyValue(key, value))
-                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3), props))
+                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3),
+                    props))
             p = p + 3 & -4
             (n7,) = _u6(data, p)
             features = []
@@ -1019,14 +1104,21 @@ class GeographicMapChanges(_Message):
                 p += 16
                 deletes.append(UUID(uuid_5))
             if p > len(data): raise ValueError
-            return GeographicMapChanges(Header(Time(sec, nanosec), frame_id), GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3), deletes)
+            return GeographicMapChanges(Header(Time(sec, nanosec), frame_id),
+                GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid),
+                BoundingBox(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3), deletes)
         except _FAULTS:
             return _explain(data, GeographicMapChanges)
+
+
 _p8 = _Struct("<I16s16s16sI").pack
 _u15 = _Struct("<I16s16s16sI").unpack_from
 
 
 class RouteSegment(_Message):
+    """The way from one point of a route network to another."""
+
     id: UUID = _field(default_factory=UUID)
     start: UUID = _field(default_factory=UUID)
     end: UUID = _field(default_factory=UUID)
@@ -1099,11 +1191,15 @@ class RouteSegment(_Message):
             return RouteSegment(UUID(uuid), UUID(uuid_2), UUID(uuid_3), props)
         except _FAULTS:
             return _explain(data, RouteSegment)
+
+
 _t13 = _Stride("16s 16s 16s I", None, 8)
 _u16 = _Struct("<16s16s16s").unpack_from
 
 
 class RouteNetwork(_Message):
+    """Points and the ways from one to another: a graph to plan routes on."""
+
     header: Header = _field(default_factory=Header)
     id: UUID = _field(default_factory=UUID)
     bounds: BoundingBox = _field(default_factory=BoundingBox)
@@ -1125,7 +1221,8 @@ class RouteNetwork(_Message):
         "RouteSegment[] segments          # one direction each\n"
         "KeyValue[] props\n"
     )
-    _schema = (("header", Header, ""), ("id", UUID, ""), ("bounds", BoundingBox, ""), ("points", WayPoint, "[]"), ("segments", RouteSegment, "[]"), ("props", KeyValue, "[]"))
+    _schema = (("header", Header, ""), ("id", UUID, ""), ("bounds", BoundingBox, ""),
+        ("points", WayPoint, "[]"), ("segments", RouteSegment, "[]"), ("props", KeyValue, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1142,7 +1239,9 @@ class RouteNetwork(_Message):
             max_pt = bounds.max_pt
             points = m.points
             n2 = len(points)
-            out = [_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n2)]
+            out = [_t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, uuid, min_pt.latitude,
+                min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude,
+                max_pt.altitude, n2)]
             p3 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -1152,7 +1251,8 @@ class RouteNetwork(_Message):
                 position = points_one.position
                 props = points_one.props
                 n4 = len(props)
-                out.append(_t9[p3](uuid_2, position.latitude, position.longitude, position.altitude, n4))
+                out.append(_t9[p3](uuid_2, position.latitude, position.longitude,
+                    position.altitude, n4))
                 p5 = 4
                 for props_one in props:
                     n6, b6 = _texts[props_one.key]
@@ -1242,7 +1342,8 @@ class RouteNetwork(_Message):
                     p = q + n5
                     value = data[q : p - 1].decode()
                     props.append(KeyValue(key, value))
-                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3), props))
+                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3),
+                    props))
             p = p + 3 & -4
             (n6,) = _u6(data, p)
             segments = []
@@ -1283,13 +1384,19 @@ class RouteNetwork(_Message):
                 value_3 = data[q : p - 1].decode()
                 props_3.append(KeyValue(key_3, value_3))
             if p > len(data): raise ValueError
-            return RouteNetwork(Header(Time(sec, nanosec), frame_id), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, segments, props_3)
+            return RouteNetwork(Header(Time(sec, nanosec), frame_id), UUID(uuid),
+                BoundingBox(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2)), points, segments, props_3)
         except _FAULTS:
             return _explain(data, RouteNetwork)
+
+
 _t14 = _Template("I i I I $ 16s I", -4)
 
 
 class RoutePath(_Message):
+    """A way through a route network."""
+
     header: Header = _field(default_factory=Header)
     network: UUID = _field(default_factory=UUID)
     segments: list[UUID] = []
@@ -1306,7 +1413,8 @@ class RoutePath(_Message):
         "unique_identifier_msgs/UUID[] segments   # its segments, in order\n"
         "KeyValue[] props\n"
     )
-    _schema = (("header", Header, ""), ("network", UUID, ""), ("segments", UUID, "[]"), ("props", KeyValue, "[]"))
+    _schema = (("header", Header, ""), ("network", UUID, ""), ("segments", UUID, "[]"),
+        ("props", KeyValue, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:

@@ -51,6 +51,8 @@ _u1 = _Struct("<I6d").unpack_from
 
 
 class GetGeoPathRequest(_Message):
+    """Ask a planner for a path along a route network, between any two positions."""
+
     start: GeoPoint = _field(default_factory=GeoPoint)
     goal: GeoPoint = _field(default_factory=GeoPoint)
     _type = "geographic_msgs/GetGeoPathRequest"
@@ -70,7 +72,8 @@ class GetGeoPathRequest(_Message):
         try:
             start = m.start
             goal = m.goal
-            return _p1(256, start.latitude, start.longitude, start.altitude, goal.latitude, goal.longitude, goal.altitude)
+            return _p1(256, start.latitude, start.longitude, start.altitude, goal.latitude,
+                goal.longitude, goal.altitude)
         except _FAULTS:
             return _plain(m, GetGeoPathRequest)
 
@@ -79,9 +82,12 @@ class GetGeoPathRequest(_Message):
         try:
             h, latitude, longitude, altitude, latitude_2, longitude_2, altitude_2 = _u1(data)
             if h != 256: raise ValueError
-            return GetGeoPathRequest(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2))
+            return GetGeoPathRequest(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2))
         except _FAULTS:
             return _explain(data, GetGeoPathRequest)
+
+
 _t1 = _Stride("I ? I $ i I", -4, 8)
 _t2 = _Stride("I $ I", None, 8)
 _t3 = _Template("i I I $ d d d d d d d", None)
@@ -115,7 +121,9 @@ class GetGeoPathResponse(_Message):
         "unique_identifier_msgs/UUID goal_seg    # segment nearest to the goal\n"
         "float64 distance                        # m, length of the path\n"
     )
-    _schema = (("success", "bool", ""), ("status", "string", ""), ("plan", GeoPath, ""), ("network", UUID, ""), ("start_seg", UUID, ""), ("goal_seg", UUID, ""), ("distance", "float64", ""))
+    _schema = (("success", "bool", ""), ("status", "string", ""), ("plan", GeoPath, ""),
+        ("network", UUID, ""), ("start_seg", UUID, ""), ("goal_seg", UUID, ""),
+        ("distance", "float64", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -140,7 +148,9 @@ class GetGeoPathResponse(_Message):
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t3[p8, n9](stamp_2.sec, stamp_2.nanosec, n9, b9, position.latitude, position.longitude, position.altitude, orientation.x, orientation.y, orientation.z, orientation.w))
+                out.append(_t3[p8, n9](stamp_2.sec, stamp_2.nanosec, n9, b9, position.latitude,
+                    position.longitude, position.altitude, orientation.x, orientation.y,
+                    orientation.z, orientation.w))
                 p8 = 0
             network = m.network
             uuid = network.uuid
@@ -181,18 +191,23 @@ class GetGeoPathResponse(_Message):
                 p = q + n4
                 frame_id_2 = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                latitude, longitude, altitude, x_2, y_2, z_2, w_2 = _u5(data, p)
+                latitude, longitude, altitude, x, y, z, w = _u5(data, p)
                 p += 56
-                poses.append(GeoPoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2), GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x_2, y_2, z_2, w_2))))
+                poses.append(GeoPoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                    GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x, y, z, w))))
             uuid, uuid_2, uuid_3 = _u6(data, p)
             p = (p + 51 | 7) - 3
             (distance,) = _u7(data, p)
-            return GetGeoPathResponse(success, status, GeoPath(Header(Time(sec, nanosec), frame_id), poses), UUID(uuid), UUID(uuid_2), UUID(uuid_3), distance)
+            return GetGeoPathResponse(success, status,
+                GeoPath(Header(Time(sec, nanosec), frame_id), poses), UUID(uuid), UUID(uuid_2),
+                UUID(uuid_3), distance)
         except _FAULTS:
             return _explain(data, GetGeoPathResponse)
 
 
 class GetGeoPath(_Service):
+    """Ask a planner for a path along a route network, between any two positions."""
+
     Request = GetGeoPathRequest
     Response = GetGeoPathResponse
     _type = "geographic_msgs/GetGeoPath"
@@ -213,12 +228,16 @@ class GetGeoPath(_Service):
         "unique_identifier_msgs/UUID goal_seg    # segment nearest to the goal\n"
         "float64 distance                        # m, length of the path\n"
     )
+
+
 _t5 = _Template("I I $ d d d d d d", -4)
 _u8 = _Struct("<2I").unpack_from
 _u9 = _Struct("<6d").unpack_from
 
 
 class GetGeographicMapRequest(_Message):
+    """Ask for a part of a map."""
+
     url: str = ""
     bounds: BoundingBox = _field(default_factory=BoundingBox)
     _type = "geographic_msgs/GetGeographicMapRequest"
@@ -242,7 +261,8 @@ class GetGeographicMapRequest(_Message):
             bounds = m.bounds
             min_pt = bounds.min_pt
             max_pt = bounds.max_pt
-            return _t5[n1](256, n1, b1, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude)
+            return _t5[n1](256, n1, b1, min_pt.latitude, min_pt.longitude, min_pt.altitude,
+                max_pt.latitude, max_pt.longitude, max_pt.altitude)
         except _FAULTS:
             return _plain(m, GetGeographicMapRequest)
 
@@ -255,9 +275,13 @@ class GetGeographicMapRequest(_Message):
             url = data[8 : p - 1].decode()
             p = (p + 3 | 7) - 3
             latitude, longitude, altitude, latitude_2, longitude_2, altitude_2 = _u9(data, p)
-            return GetGeographicMapRequest(url, BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)))
+            return GetGeographicMapRequest(url,
+                BoundingBox(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2)))
         except _FAULTS:
             return _explain(data, GetGeographicMapRequest)
+
+
 _t6 = _Template("I $ 16s d d d d d d I", None)
 _t7 = _Template("16s d d d I", None)
 _t8 = _Stride("I $ I $", None, 8)
@@ -305,7 +329,9 @@ class GetGeographicMapResponse(_Message):
             max_pt = bounds.max_pt
             points = map_2.points
             n5 = len(points)
-            out = [f3(256, m.success, n1, b1, stamp.sec, stamp.nanosec), _t6[p4, n2](n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n5)]
+            out = [f3(256, m.success, n1, b1, stamp.sec, stamp.nanosec),
+                _t6[p4, n2](n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude,
+                max_pt.latitude, max_pt.longitude, max_pt.altitude, n5)]
             p6 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -315,7 +341,8 @@ class GetGeographicMapResponse(_Message):
                 position = points_one.position
                 props = points_one.props
                 n7 = len(props)
-                out.append(_t7[p6](uuid_2, position.latitude, position.longitude, position.altitude, n7))
+                out.append(_t7[p6](uuid_2, position.latitude, position.longitude,
+                    position.altitude, n7))
                 p8 = 4
                 for props_one in props:
                     n9, b9 = _texts[props_one.key]
@@ -412,7 +439,8 @@ class GetGeographicMapResponse(_Message):
                     p = q + n6
                     value = data[q : p - 1].decode()
                     props.append(KeyValue(key, value))
-                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3), props))
+                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3),
+                    props))
             p = p + 3 & -4
             (n7,) = _u4(data, p)
             features = []
@@ -460,12 +488,17 @@ class GetGeographicMapResponse(_Message):
                 value_3 = data[q : p - 1].decode()
                 props_3.append(KeyValue(key_3, value_3))
             if p > len(data): raise ValueError
-            return GetGeographicMapResponse(success, status, GeographicMap(Header(Time(sec, nanosec), frame_id), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3))
+            return GetGeographicMapResponse(success, status,
+                GeographicMap(Header(Time(sec, nanosec), frame_id), UUID(uuid),
+                BoundingBox(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3))
         except _FAULTS:
             return _explain(data, GetGeographicMapResponse)
 
 
 class GetGeographicMap(_Service):
+    """Ask for a part of a map."""
+
     Request = GetGeographicMapRequest
     Response = GetGeographicMapResponse
     _type = "geographic_msgs/GetGeographicMap"
@@ -482,11 +515,15 @@ class GetGeographicMap(_Service):
         "string status                        # what to tell a person\n"
         "geographic_msgs/GeographicMap map    # may cover more or less than was asked for\n"
     )
-_t11 = _Template("I 16s 16s 16s", -4)
+
+
+_p4 = _Struct("<I16s16s16s").pack
 _u13 = _Struct("<I16s16s16s").unpack_from
 
 
 class GetRoutePlanRequest(_Message):
+    """Ask a planner for a way through a route network."""
+
     network: UUID = _field(default_factory=UUID)
     start: UUID = _field(default_factory=UUID)
     goal: UUID = _field(default_factory=UUID)
@@ -518,7 +555,7 @@ class GetRoutePlanRequest(_Message):
             uuid_3 = goal.uuid
             if type(uuid_3) is not bytes or len(uuid_3) != 16:
                 uuid_3 = bytes(_octets(uuid_3, 16))
-            return _t11[0](256, uuid, uuid_2, uuid_3)
+            return _p4(256, uuid, uuid_2, uuid_3)
         except _FAULTS:
             return _plain(m, GetRoutePlanRequest)
 
@@ -530,9 +567,11 @@ class GetRoutePlanRequest(_Message):
             return GetRoutePlanRequest(UUID(uuid), UUID(uuid_2), UUID(uuid_3))
         except _FAULTS:
             return _explain(data, GetRoutePlanRequest)
-_t12 = _Template("I ? I $ i I", -4)
-_t13 = _Template("I $ 16s I", 0)
-_t14 = _Stride("I $ I $", None, 4)
+
+
+_t11 = _Template("I ? I $ i I", -4)
+_t12 = _Template("I $ 16s I", 0)
+_t13 = _Stride("I $ I $", None, 4)
 
 
 class GetRoutePlanResponse(_Message):
@@ -566,7 +605,8 @@ class GetRoutePlanResponse(_Message):
                 uuid = bytes(_octets(uuid, 16))
             segments = plan.segments
             n3 = len(segments)
-            out = [_t12[n1](256, m.success, n1, b1, stamp.sec, stamp.nanosec), _t13[n2](n2, b2, uuid, n3)]
+            out = [_t11[n1](256, m.success, n1, b1, stamp.sec, stamp.nanosec),
+                _t12[n2](n2, b2, uuid, n3)]
             for segments_one in segments:
                 uuid_2 = segments_one.uuid
                 if type(uuid_2) is not bytes or len(uuid_2) != 16:
@@ -581,7 +621,7 @@ class GetRoutePlanResponse(_Message):
                 b7 = props_one.value.encode()
                 if 0 in b7: raise ValueError
                 n7 = len(b7) + 1
-                f8, p9 = _t14[p5, n6, n7]
+                f8, p9 = _t13[p5, n6, n7]
                 out.append(f8(n6, b6, n7, b7))
                 p5 = p9
             return b"".join(out)
@@ -625,12 +665,15 @@ class GetRoutePlanResponse(_Message):
                 value = data[q : p - 1].decode()
                 props.append(KeyValue(key, value))
             if p > len(data): raise ValueError
-            return GetRoutePlanResponse(success, status, RoutePath(Header(Time(sec, nanosec), frame_id), UUID(uuid), segments, props))
+            return GetRoutePlanResponse(success, status,
+                RoutePath(Header(Time(sec, nanosec), frame_id), UUID(uuid), segments, props))
         except _FAULTS:
             return _explain(data, GetRoutePlanResponse)
 
 
 class GetRoutePlan(_Service):
+    """Ask a planner for a way through a route network."""
+
     Request = GetRoutePlanRequest
     Response = GetRoutePlanResponse
     _type = "geographic_msgs/GetRoutePlan"
@@ -648,11 +691,15 @@ class GetRoutePlan(_Service):
         "string status                      # what to tell a person\n"
         "RoutePath plan\n"
     )
-_t15 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
+
+
+_t14 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
 _u14 = _Struct("<Ii2I").unpack_from
 
 
 class UpdateGeographicMapRequest(_Message):
+    """Change a map."""
+
     updates: GeographicMapChanges = _field(default_factory=GeographicMapChanges)
     _type = "geographic_msgs/UpdateGeographicMapRequest"
     _type_name = "geographic_msgs/srv/UpdateGeographicMap_Request"
@@ -685,7 +732,9 @@ class UpdateGeographicMapRequest(_Message):
             max_pt = bounds.max_pt
             points = diffs.points
             n3 = len(points)
-            out = [_t15[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude, max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
+            out = [_t14[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec,
+                stamp_2.nanosec, n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude,
+                max_pt.latitude, max_pt.longitude, max_pt.altitude, n3)]
             p4 = 4
             for points_one in points:
                 id_3 = points_one.id
@@ -695,7 +744,8 @@ class UpdateGeographicMapRequest(_Message):
                 position = points_one.position
                 props = points_one.props
                 n5 = len(props)
-                out.append(_t7[p4](uuid_2, position.latitude, position.longitude, position.altitude, n5))
+                out.append(_t7[p4](uuid_2, position.latitude, position.longitude,
+                    position.altitude, n5))
                 p6 = 4
                 for props_one in props:
                     n7, b7 = _texts[props_one.key]
@@ -803,7 +853,8 @@ class UpdateGeographicMapRequest(_Message):
                     p = q + n6
                     value = data[q : p - 1].decode()
                     props.append(KeyValue(key, value))
-                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3), props))
+                points.append(WayPoint(UUID(uuid_2), GeoPoint(latitude_3, longitude_3, altitude_3),
+                    props))
             p = p + 3 & -4
             (n7,) = _u4(data, p)
             features = []
@@ -859,10 +910,17 @@ class UpdateGeographicMapRequest(_Message):
                 p += 16
                 deletes.append(UUID(uuid_5))
             if p > len(data): raise ValueError
-            return UpdateGeographicMapRequest(GeographicMapChanges(Header(Time(sec, nanosec), frame_id), GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid), BoundingBox(GeoPoint(latitude, longitude, altitude), GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3), deletes))
+            return UpdateGeographicMapRequest(GeographicMapChanges(Header(Time(sec, nanosec),
+                frame_id),
+                GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid),
+                BoundingBox(GeoPoint(latitude, longitude, altitude),
+                GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3),
+                deletes))
         except _FAULTS:
             return _explain(data, UpdateGeographicMapRequest)
-_t16 = _Stride("I ? I $", -4, 4)
+
+
+_t15 = _Stride("I ? I $", -4, 4)
 
 
 class UpdateGeographicMapResponse(_Message):
@@ -884,7 +942,7 @@ class UpdateGeographicMapResponse(_Message):
             b1 = m.status.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t16[n1]
+            f2, p3 = _t15[n1]
             return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, UpdateGeographicMapResponse)
@@ -903,6 +961,8 @@ class UpdateGeographicMapResponse(_Message):
 
 
 class UpdateGeographicMap(_Service):
+    """Change a map."""
+
     Request = UpdateGeographicMapRequest
     Response = UpdateGeographicMapResponse
     _type = "geographic_msgs/UpdateGeographicMap"

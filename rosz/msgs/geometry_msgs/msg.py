@@ -62,6 +62,8 @@ _u1 = _Struct("<I3d").unpack_from
 
 
 class Vector3(_Message):
+    """A direction with a length, such as a velocity or a force. The unit is the user's."""
+
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
@@ -90,16 +92,20 @@ class Vector3(_Message):
     @staticmethod
     def _decode(data: bytes) -> Vector3:
         try:
-            h, x_2, y_2, z_2 = _u1(data)
+            h, x, y, z = _u1(data)
             if h != 256: raise ValueError
-            return Vector3(x_2, y_2, z_2)
+            return Vector3(x, y, z)
         except _FAULTS:
             return _explain(data, Vector3)
+
+
 _p2 = _Struct("<I6d").pack
 _u2 = _Struct("<I6d").unpack_from
 
 
 class Accel(_Message):
+    """The acceleration of a body in free space."""
+
     linear: Vector3 = _field(default_factory=Vector3)
     angular: Vector3 = _field(default_factory=Vector3)
     _type = "geometry_msgs/Accel"
@@ -126,17 +132,21 @@ class Accel(_Message):
     @staticmethod
     def _decode(data: bytes) -> Accel:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3 = _u2(data)
+            h, x, y, z, x_2, y_2, z_2 = _u2(data)
             if h != 256: raise ValueError
-            return Accel(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3))
+            return Accel(Vector3(x, y, z), Vector3(x_2, y_2, z_2))
         except _FAULTS:
             return _explain(data, Accel)
+
+
 _t1 = _Template("I i I I $ d d d d d d", -4)
 _u3 = _Struct("<Ii2I").unpack_from
 _u4 = _Struct("<6d").unpack_from
 
 
 class AccelStamped(_Message):
+    """An acceleration with its time and the frame it is expressed in."""
+
     header: Header = _field(default_factory=Header)
     accel: Accel = _field(default_factory=Accel)
     _type = "geometry_msgs/AccelStamped"
@@ -160,7 +170,8 @@ class AccelStamped(_Message):
             accel = m.accel
             linear = accel.linear
             angular = accel.angular
-            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y, linear.z,
+                angular.x, angular.y, angular.z)
         except _FAULTS:
             return _plain(m, AccelStamped)
 
@@ -172,14 +183,19 @@ class AccelStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3 = _u4(data, p)
-            return AccelStamped(Header(Time(sec, nanosec), frame_id), Accel(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)))
+            x, y, z, x_2, y_2, z_2 = _u4(data, p)
+            return AccelStamped(Header(Time(sec, nanosec), frame_id),
+                Accel(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, AccelStamped)
+
+
 _d1 = _zeros("d", 36)
 
 
 class AccelWithCovariance(_Message):
+    """An estimated acceleration and how sure the estimate is."""
+
     accel: Accel = _field(default_factory=Accel)
     covariance: _Array[float] = _field(default_factory=_d1)
     _type = "geometry_msgs/AccelWithCovariance"
@@ -201,26 +217,33 @@ class AccelWithCovariance(_Message):
             linear = accel.linear
             angular = accel.angular
             covariance = m.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_p2(256, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance))
+            return b"".join((_p2(256, linear.x, linear.y, linear.z, angular.x, angular.y,
+                angular.z), covariance))
         except _FAULTS:
             return _plain(m, AccelWithCovariance)
 
     @staticmethod
     def _decode(data: bytes) -> AccelWithCovariance:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3 = _u2(data)
+            h, x, y, z, x_2, y_2, z_2 = _u2(data)
             if h != 256: raise ValueError
             p = 52 + 288
             covariance = _array("d", data[52 : p])
             if p > len(data): raise ValueError
-            return AccelWithCovariance(Accel(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)), covariance)
+            return AccelWithCovariance(Accel(Vector3(x, y, z), Vector3(x_2, y_2, z_2)), covariance)
         except _FAULTS:
             return _explain(data, AccelWithCovariance)
 
 
 class AccelWithCovarianceStamped(_Message):
+    """An estimated acceleration with covariance, time and frame."""
+
     header: Header = _field(default_factory=Header)
     accel: AccelWithCovariance = _field(default_factory=AccelWithCovariance)
     _type = "geometry_msgs/AccelWithCovarianceStamped"
@@ -246,9 +269,14 @@ class AccelWithCovarianceStamped(_Message):
             linear = accel_2.linear
             angular = accel_2.angular
             covariance = accel.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance))
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y,
+                linear.z, angular.x, angular.y, angular.z), covariance))
         except _FAULTS:
             return _plain(m, AccelWithCovarianceStamped)
 
@@ -260,19 +288,24 @@ class AccelWithCovarianceStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3 = _u4(data, p)
+            x, y, z, x_2, y_2, z_2 = _u4(data, p)
             q = p + 48
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return AccelWithCovarianceStamped(Header(Time(sec, nanosec), frame_id), AccelWithCovariance(Accel(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)), covariance))
+            return AccelWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+                AccelWithCovariance(Accel(Vector3(x, y, z), Vector3(x_2, y_2, z_2)), covariance))
         except _FAULTS:
             return _explain(data, AccelWithCovarianceStamped)
+
+
 _p3 = _Struct("<I10d").pack
 _u5 = _Struct("<I10d").unpack_from
 
 
 class Inertia(_Message):
+    """Mass properties of a rigid body."""
+
     m: float = 0.0
     com: Vector3 = _field(default_factory=Vector3)
     ixx: float = 0.0
@@ -302,7 +335,9 @@ class Inertia(_Message):
         "float64 iyz\n"
         "float64 izz\n"
     )
-    _schema = (("m", "float64", ""), ("com", Vector3, ""), ("ixx", "float64", ""), ("ixy", "float64", ""), ("ixz", "float64", ""), ("iyy", "float64", ""), ("iyz", "float64", ""), ("izz", "float64", ""))
+    _schema = (("m", "float64", ""), ("com", Vector3, ""), ("ixx", "float64", ""),
+        ("ixy", "float64", ""), ("ixz", "float64", ""), ("iyy", "float64", ""),
+        ("iyz", "float64", ""), ("izz", "float64", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -315,16 +350,20 @@ class Inertia(_Message):
     @staticmethod
     def _decode(data: bytes) -> Inertia:
         try:
-            h, m_2, x_2, y_2, z_2, ixx, ixy, ixz, iyy, iyz, izz = _u5(data)
+            h, m_2, x, y, z, ixx, ixy, ixz, iyy, iyz, izz = _u5(data)
             if h != 256: raise ValueError
-            return Inertia(m_2, Vector3(x_2, y_2, z_2), ixx, ixy, ixz, iyy, iyz, izz)
+            return Inertia(m_2, Vector3(x, y, z), ixx, ixy, ixz, iyy, iyz, izz)
         except _FAULTS:
             return _explain(data, Inertia)
+
+
 _t2 = _Template("I i I I $ d d d d d d d d d d", -4)
 _u6 = _Struct("<10d").unpack_from
 
 
 class InertiaStamped(_Message):
+    """Mass properties of a rigid body, with time and frame."""
+
     header: Header = _field(default_factory=Header)
     inertia: Inertia = _field(default_factory=Inertia)
     _type = "geometry_msgs/InertiaStamped"
@@ -347,7 +386,8 @@ class InertiaStamped(_Message):
             n1, b1 = _texts[header.frame_id]
             inertia = m.inertia
             com = inertia.com
-            return _t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, inertia.m, com.x, com.y, com.z, inertia.ixx, inertia.ixy, inertia.ixz, inertia.iyy, inertia.iyz, inertia.izz)
+            return _t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, inertia.m, com.x, com.y, com.z,
+                inertia.ixx, inertia.ixy, inertia.ixz, inertia.iyy, inertia.iyz, inertia.izz)
         except _FAULTS:
             return _plain(m, InertiaStamped)
 
@@ -359,13 +399,16 @@ class InertiaStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            m_2, x_2, y_2, z_2, ixx, ixy, ixz, iyy, iyz, izz = _u6(data, p)
-            return InertiaStamped(Header(Time(sec, nanosec), frame_id), Inertia(m_2, Vector3(x_2, y_2, z_2), ixx, ixy, ixz, iyy, iyz, izz))
+            m_2, x, y, z, ixx, ixy, ixz, iyy, iyz, izz = _u6(data, p)
+            return InertiaStamped(Header(Time(sec, nanosec), frame_id),
+                Inertia(m_2, Vector3(x, y, z), ixx, ixy, ixz, iyy, iyz, izz))
         except _FAULTS:
             return _explain(data, InertiaStamped)
 
 
 class Point(_Message):
+    """A position in space, m."""
+
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
@@ -392,16 +435,20 @@ class Point(_Message):
     @staticmethod
     def _decode(data: bytes) -> Point:
         try:
-            h, x_2, y_2, z_2 = _u1(data)
+            h, x, y, z = _u1(data)
             if h != 256: raise ValueError
-            return Point(x_2, y_2, z_2)
+            return Point(x, y, z)
         except _FAULTS:
             return _explain(data, Point)
+
+
 _p4 = _Struct("<I3f").pack
 _u7 = _Struct("<I3f").unpack_from
 
 
 class Point32(_Message):
+    """A position in space in single precision, m."""
+
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
@@ -430,16 +477,20 @@ class Point32(_Message):
     @staticmethod
     def _decode(data: bytes) -> Point32:
         try:
-            h, x_2, y_2, z_2 = _u7(data)
+            h, x, y, z = _u7(data)
             if h != 256: raise ValueError
-            return Point32(x_2, y_2, z_2)
+            return Point32(x, y, z)
         except _FAULTS:
             return _explain(data, Point32)
+
+
 _t3 = _Template("I i I I $ d d d", -4)
 _u8 = _Struct("<3d").unpack_from
 
 
 class PointStamped(_Message):
+    """A position with its time and the frame it is expressed in."""
+
     header: Header = _field(default_factory=Header)
     point: Point = _field(default_factory=Point)
     _type = "geometry_msgs/PointStamped"
@@ -473,10 +524,12 @@ class PointStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2 = _u8(data, p)
-            return PointStamped(Header(Time(sec, nanosec), frame_id), Point(x_2, y_2, z_2))
+            x, y, z = _u8(data, p)
+            return PointStamped(Header(Time(sec, nanosec), frame_id), Point(x, y, z))
         except _FAULTS:
             return _explain(data, PointStamped)
+
+
 _p5 = _Struct("<3f").pack
 _p6 = _Struct("<2I").pack
 _u9 = _Struct("<2I").unpack_from
@@ -484,6 +537,8 @@ _i1 = _Struct("<3f").iter_unpack
 
 
 class Polygon(_Message):
+    """A closed outline: each point joins the next, and the last one joins the first."""
+
     points: list[Point32] = []
     _type = "geometry_msgs/Polygon"
     _type_name = "geometry_msgs/msg/Polygon"
@@ -516,11 +571,15 @@ class Polygon(_Message):
             return Polygon(points)
         except _FAULTS:
             return _explain(data, Polygon)
+
+
 _t4 = _Template("q", None)
 _u10 = _Struct("<q").unpack_from
 
 
 class PolygonInstance(_Message):
+    """An outline with a number by which it is told from others."""
+
     polygon: Polygon = _field(default_factory=Polygon)
     id: int = 0
     _type = "geometry_msgs/PolygonInstance"
@@ -541,7 +600,8 @@ class PolygonInstance(_Message):
             polygon = m.polygon
             points = polygon.points
             n1 = len(points)
-            return b"".join((_p6(256, n1), b"".join([_p5(e.x, e.y, e.z) for e in points]), _t4[n1 * 12 + 4 & 7](m.id)))
+            return b"".join((_p6(256, n1), b"".join([_p5(e.x, e.y, e.z) for e in points]),
+                _t4[n1 * 12 + 4 & 7](m.id)))
         except _FAULTS:
             return _plain(m, PolygonInstance)
 
@@ -557,11 +617,15 @@ class PolygonInstance(_Message):
             return PolygonInstance(Polygon(points), id_2)
         except _FAULTS:
             return _explain(data, PolygonInstance)
+
+
 _t5 = _Stride("I i I I $ I", -4, 8)
 _u11 = _Struct("<I").unpack_from
 
 
 class PolygonInstanceStamped(_Message):
+    """A numbered outline with its time and the frame it is expressed in."""
+
     header: Header = _field(default_factory=Header)
     polygon: PolygonInstance = _field(default_factory=PolygonInstance)
     _type = "geometry_msgs/PolygonInstanceStamped"
@@ -587,7 +651,8 @@ class PolygonInstanceStamped(_Message):
             points = polygon_2.points
             n2 = len(points)
             f3, p4 = _t5[n1]
-            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p5(e.x, e.y, e.z) for e in points]), _t4[p4 + n2 * 12 & 7](polygon.id)))
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, n2),
+                b"".join([_p5(e.x, e.y, e.z) for e in points]), _t4[p4 + n2 * 12 & 7](polygon.id)))
         except _FAULTS:
             return _plain(m, PolygonInstanceStamped)
 
@@ -605,13 +670,18 @@ class PolygonInstanceStamped(_Message):
             points = list(_starmap(Point32, _i1(data[q : p])))
             p = (p + 3 | 7) - 3
             (id_2,) = _u10(data, p)
-            return PolygonInstanceStamped(Header(Time(sec, nanosec), frame_id), PolygonInstance(Polygon(points), id_2))
+            return PolygonInstanceStamped(Header(Time(sec, nanosec), frame_id),
+                PolygonInstance(Polygon(points), id_2))
         except _FAULTS:
             return _explain(data, PolygonInstanceStamped)
+
+
 _t6 = _Template("I i I I $ I", -4)
 
 
 class PolygonStamped(_Message):
+    """An outline with its time and the frame it is expressed in."""
+
     header: Header = _field(default_factory=Header)
     polygon: Polygon = _field(default_factory=Polygon)
     _type = "geometry_msgs/PolygonStamped"
@@ -635,7 +705,8 @@ class PolygonStamped(_Message):
             polygon = m.polygon
             points = polygon.points
             n2 = len(points)
-            return b"".join((_t6[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p5(e.x, e.y, e.z) for e in points])))
+            return b"".join((_t6[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2),
+                b"".join([_p5(e.x, e.y, e.z) for e in points])))
         except _FAULTS:
             return _plain(m, PolygonStamped)
 
@@ -655,11 +726,15 @@ class PolygonStamped(_Message):
             return PolygonStamped(Header(Time(sec, nanosec), frame_id), Polygon(points))
         except _FAULTS:
             return _explain(data, PolygonStamped)
+
+
 _p7 = _Struct("<I4d").pack
 _u12 = _Struct("<I4d").unpack_from
 
 
 class Quaternion(_Message):
+    """A rotation as a unit quaternion. The default is no rotation."""
+
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
@@ -676,7 +751,8 @@ class Quaternion(_Message):
         "float64 z 0\n"
         "float64 w 1\n"
     )
-    _schema = (("x", "float64", ""), ("y", "float64", ""), ("z", "float64", ""), ("w", "float64", ""))
+    _schema = (("x", "float64", ""), ("y", "float64", ""), ("z", "float64", ""),
+        ("w", "float64", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -688,16 +764,20 @@ class Quaternion(_Message):
     @staticmethod
     def _decode(data: bytes) -> Quaternion:
         try:
-            h, x_2, y_2, z_2, w_2 = _u12(data)
+            h, x, y, z, w = _u12(data)
             if h != 256: raise ValueError
-            return Quaternion(x_2, y_2, z_2, w_2)
+            return Quaternion(x, y, z, w)
         except _FAULTS:
             return _explain(data, Quaternion)
+
+
 _p8 = _Struct("<I7d").pack
 _u13 = _Struct("<I7d").unpack_from
 
 
 class Pose(_Message):
+    """Where a body is and which way it faces."""
+
     position: Point = _field(default_factory=Point)
     orientation: Quaternion = _field(default_factory=Quaternion)
     _type = "geometry_msgs/Pose"
@@ -717,21 +797,24 @@ class Pose(_Message):
         try:
             position = m.position
             orientation = m.orientation
-            return _p8(256, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
+            return _p8(256, position.x, position.y, position.z, orientation.x, orientation.y,
+                orientation.z, orientation.w)
         except _FAULTS:
             return _plain(m, Pose)
 
     @staticmethod
     def _decode(data: bytes) -> Pose:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u13(data)
+            h, x, y, z, x_2, y_2, z_2, w = _u13(data)
             if h != 256: raise ValueError
-            return Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))
+            return Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))
         except _FAULTS:
             return _explain(data, Pose)
 
 
 class Pose2D(_Message):
+    """Where a body is on a plane and which way it faces."""
+
     x: float = 0.0
     y: float = 0.0
     theta: float = 0.0
@@ -758,16 +841,20 @@ class Pose2D(_Message):
     @staticmethod
     def _decode(data: bytes) -> Pose2D:
         try:
-            h, x_2, y_2, theta = _u1(data)
+            h, x, y, theta = _u1(data)
             if h != 256: raise ValueError
-            return Pose2D(x_2, y_2, theta)
+            return Pose2D(x, y, theta)
         except _FAULTS:
             return _explain(data, Pose2D)
+
+
 _p9 = _Struct("<7d").pack
 _i2 = _Struct("<7d").iter_unpack
 
 
 class PoseArray(_Message):
+    """Several poses of one time and frame."""
+
     header: Header = _field(default_factory=Header)
     poses: list[Pose] = []
     _type = "geometry_msgs/PoseArray"
@@ -792,7 +879,11 @@ class PoseArray(_Message):
             n2 = len(poses)
             f3, p4 = _t5[n1]
             p5 = 0 if n2 else p4
-            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, n2), (_PADDING[-(p4) & 7] if n2 else b""), b"".join([_p9(e_position.x, e_position.y, e_position.z, e_orientation.x, e_orientation.y, e_orientation.z, e_orientation.w) for e in poses for e_position in (e.position,) for e_orientation in (e.orientation,)])))
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, n2),
+                (_PADDING[-(p4) & 7] if n2 else b""),
+                b"".join([_p9(e_position.x, e_position.y, e_position.z, e_orientation.x,
+                e_orientation.y, e_orientation.z,
+                e_orientation.w) for e in poses for e_position in (e.position,) for e_orientation in (e.orientation,)])))
         except _FAULTS:
             return _plain(m, PoseArray)
 
@@ -807,16 +898,23 @@ class PoseArray(_Message):
             (n2,) = _u11(data, p)
             q = (p + 7 | 7) - 3 if n2 else p + 4
             p = q + n2 * 56
-            poses = [Pose(Point(e_position_x, e_position_y, e_position_z), Quaternion(e_orientation_x, e_orientation_y, e_orientation_z, e_orientation_w)) for e_position_x, e_position_y, e_position_z, e_orientation_x, e_orientation_y, e_orientation_z, e_orientation_w in _i2(data[q : p])]
+            poses = [Pose(Point(e_position_x, e_position_y, e_position_z),
+                Quaternion(e_orientation_x, e_orientation_y, e_orientation_z,
+                e_orientation_w)) for e_position_x, e_position_y, e_position_z, e_orientation_x,
+                e_orientation_y, e_orientation_z, e_orientation_w in _i2(data[q : p])]
             if p > len(data): raise ValueError
             return PoseArray(Header(Time(sec, nanosec), frame_id), poses)
         except _FAULTS:
             return _explain(data, PoseArray)
+
+
 _t7 = _Template("I i I I $ d d d d d d d", -4)
 _u14 = _Struct("<7d").unpack_from
 
 
 class PoseStamped(_Message):
+    """A pose with its time and the frame it is expressed in."""
+
     header: Header = _field(default_factory=Header)
     pose: Pose = _field(default_factory=Pose)
     _type = "geometry_msgs/PoseStamped"
@@ -840,7 +938,8 @@ class PoseStamped(_Message):
             pose = m.pose
             position = pose.position
             orientation = pose.orientation
-            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
+            return _t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y,
+                position.z, orientation.x, orientation.y, orientation.z, orientation.w)
         except _FAULTS:
             return _plain(m, PoseStamped)
 
@@ -852,13 +951,16 @@ class PoseStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u14(data, p)
-            return PoseStamped(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)))
+            x, y, z, x_2, y_2, z_2, w = _u14(data, p)
+            return PoseStamped(Header(Time(sec, nanosec), frame_id),
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)))
         except _FAULTS:
             return _explain(data, PoseStamped)
 
 
 class PoseWithCovariance(_Message):
+    """An estimated pose and how sure the estimate is."""
+
     pose: Pose = _field(default_factory=Pose)
     covariance: _Array[float] = _field(default_factory=_d1)
     _type = "geometry_msgs/PoseWithCovariance"
@@ -880,26 +982,34 @@ class PoseWithCovariance(_Message):
             position = pose.position
             orientation = pose.orientation
             covariance = m.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_p8(256, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w), covariance))
+            return b"".join((_p8(256, position.x, position.y, position.z, orientation.x,
+                orientation.y, orientation.z, orientation.w), covariance))
         except _FAULTS:
             return _plain(m, PoseWithCovariance)
 
     @staticmethod
     def _decode(data: bytes) -> PoseWithCovariance:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u13(data)
+            h, x, y, z, x_2, y_2, z_2, w = _u13(data)
             if h != 256: raise ValueError
             p = 60 + 288
             covariance = _array("d", data[60 : p])
             if p > len(data): raise ValueError
-            return PoseWithCovariance(Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), covariance)
+            return PoseWithCovariance(Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)),
+                covariance)
         except _FAULTS:
             return _explain(data, PoseWithCovariance)
 
 
 class PoseWithCovarianceStamped(_Message):
+    """An estimated pose with covariance, time and frame."""
+
     header: Header = _field(default_factory=Header)
     pose: PoseWithCovariance = _field(default_factory=PoseWithCovariance)
     _type = "geometry_msgs/PoseWithCovarianceStamped"
@@ -925,9 +1035,15 @@ class PoseWithCovarianceStamped(_Message):
             position = pose_2.position
             orientation = pose_2.orientation
             covariance = pose.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w), covariance))
+            return b"".join((_t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y,
+                position.z, orientation.x, orientation.y, orientation.z, orientation.w),
+                covariance))
         except _FAULTS:
             return _plain(m, PoseWithCovarianceStamped)
 
@@ -939,19 +1055,24 @@ class PoseWithCovarianceStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u14(data, p)
+            x, y, z, x_2, y_2, z_2, w = _u14(data, p)
             q = p + 56
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return PoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id), PoseWithCovariance(Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), covariance))
+            return PoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+                PoseWithCovariance(Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), covariance))
         except _FAULTS:
             return _explain(data, PoseWithCovarianceStamped)
+
+
 _t8 = _Template("I i I I $ d d d d", -4)
 _u15 = _Struct("<4d").unpack_from
 
 
 class QuaternionStamped(_Message):
+    """A rotation with its time and the frame it is relative to."""
+
     header: Header = _field(default_factory=Header)
     quaternion: Quaternion = _field(default_factory=Quaternion)
     _type = "geometry_msgs/QuaternionStamped"
@@ -973,7 +1094,8 @@ class QuaternionStamped(_Message):
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
             quaternion = m.quaternion
-            return _t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, quaternion.x, quaternion.y, quaternion.z, quaternion.w)
+            return _t8[n1](256, stamp.sec, stamp.nanosec, n1, b1, quaternion.x, quaternion.y,
+                quaternion.z, quaternion.w)
         except _FAULTS:
             return _plain(m, QuaternionStamped)
 
@@ -985,13 +1107,15 @@ class QuaternionStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, w_2 = _u15(data, p)
-            return QuaternionStamped(Header(Time(sec, nanosec), frame_id), Quaternion(x_2, y_2, z_2, w_2))
+            x, y, z, w = _u15(data, p)
+            return QuaternionStamped(Header(Time(sec, nanosec), frame_id), Quaternion(x, y, z, w))
         except _FAULTS:
             return _explain(data, QuaternionStamped)
 
 
 class Transform(_Message):
+    """The way from one coordinate frame to another."""
+
     translation: Vector3 = _field(default_factory=Vector3)
     rotation: Quaternion = _field(default_factory=Quaternion)
     _type = "geometry_msgs/Transform"
@@ -1011,22 +1135,27 @@ class Transform(_Message):
         try:
             translation = m.translation
             rotation = m.rotation
-            return _p8(256, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w)
+            return _p8(256, translation.x, translation.y, translation.z, rotation.x, rotation.y,
+                rotation.z, rotation.w)
         except _FAULTS:
             return _plain(m, Transform)
 
     @staticmethod
     def _decode(data: bytes) -> Transform:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u13(data)
+            h, x, y, z, x_2, y_2, z_2, w = _u13(data)
             if h != 256: raise ValueError
-            return Transform(Vector3(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))
+            return Transform(Vector3(x, y, z), Quaternion(x_2, y_2, z_2, w))
         except _FAULTS:
             return _explain(data, Transform)
+
+
 _t9 = _Template("I i I I $ I $ d d d d d d d", -4)
 
 
 class TransformStamped(_Message):
+    """The pose of one coordinate frame in another at a time."""
+
     header: Header = _field(default_factory=Header)
     child_frame_id: str = ""
     transform: Transform = _field(default_factory=Transform)
@@ -1043,7 +1172,8 @@ class TransformStamped(_Message):
         "string child_frame_id   # the frame that is placed\n"
         "Transform transform\n"
     )
-    _schema = (("header", Header, ""), ("child_frame_id", "string", ""), ("transform", Transform, ""))
+    _schema = (("header", Header, ""), ("child_frame_id", "string", ""),
+        ("transform", Transform, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1055,7 +1185,8 @@ class TransformStamped(_Message):
             transform = m.transform
             translation = transform.translation
             rotation = transform.rotation
-            return _t9[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w)
+            return _t9[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, translation.x,
+                translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w)
         except _FAULTS:
             return _plain(m, TransformStamped)
 
@@ -1072,13 +1203,16 @@ class TransformStamped(_Message):
             p = q + n2
             child_frame_id = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u14(data, p)
-            return TransformStamped(Header(Time(sec, nanosec), frame_id), child_frame_id, Transform(Vector3(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)))
+            x, y, z, x_2, y_2, z_2, w = _u14(data, p)
+            return TransformStamped(Header(Time(sec, nanosec), frame_id), child_frame_id,
+                Transform(Vector3(x, y, z), Quaternion(x_2, y_2, z_2, w)))
         except _FAULTS:
             return _explain(data, TransformStamped)
 
 
 class Twist(_Message):
+    """The velocity of a body in free space."""
+
     linear: Vector3 = _field(default_factory=Vector3)
     angular: Vector3 = _field(default_factory=Vector3)
     _type = "geometry_msgs/Twist"
@@ -1105,14 +1239,16 @@ class Twist(_Message):
     @staticmethod
     def _decode(data: bytes) -> Twist:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3 = _u2(data)
+            h, x, y, z, x_2, y_2, z_2 = _u2(data)
             if h != 256: raise ValueError
-            return Twist(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3))
+            return Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2))
         except _FAULTS:
             return _explain(data, Twist)
 
 
 class TwistStamped(_Message):
+    """A velocity with its time and the frame it is expressed in."""
+
     header: Header = _field(default_factory=Header)
     twist: Twist = _field(default_factory=Twist)
     _type = "geometry_msgs/TwistStamped"
@@ -1136,7 +1272,8 @@ class TwistStamped(_Message):
             twist = m.twist
             linear = twist.linear
             angular = twist.angular
-            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y, linear.z,
+                angular.x, angular.y, angular.z)
         except _FAULTS:
             return _plain(m, TwistStamped)
 
@@ -1148,13 +1285,16 @@ class TwistStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3 = _u4(data, p)
-            return TwistStamped(Header(Time(sec, nanosec), frame_id), Twist(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)))
+            x, y, z, x_2, y_2, z_2 = _u4(data, p)
+            return TwistStamped(Header(Time(sec, nanosec), frame_id),
+                Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, TwistStamped)
 
 
 class TwistWithCovariance(_Message):
+    """An estimated velocity and how sure the estimate is."""
+
     twist: Twist = _field(default_factory=Twist)
     covariance: _Array[float] = _field(default_factory=_d1)
     _type = "geometry_msgs/TwistWithCovariance"
@@ -1176,26 +1316,33 @@ class TwistWithCovariance(_Message):
             linear = twist.linear
             angular = twist.angular
             covariance = m.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_p2(256, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance))
+            return b"".join((_p2(256, linear.x, linear.y, linear.z, angular.x, angular.y,
+                angular.z), covariance))
         except _FAULTS:
             return _plain(m, TwistWithCovariance)
 
     @staticmethod
     def _decode(data: bytes) -> TwistWithCovariance:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3 = _u2(data)
+            h, x, y, z, x_2, y_2, z_2 = _u2(data)
             if h != 256: raise ValueError
             p = 52 + 288
             covariance = _array("d", data[52 : p])
             if p > len(data): raise ValueError
-            return TwistWithCovariance(Twist(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)), covariance)
+            return TwistWithCovariance(Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2)), covariance)
         except _FAULTS:
             return _explain(data, TwistWithCovariance)
 
 
 class TwistWithCovarianceStamped(_Message):
+    """An estimated velocity with covariance, time and frame."""
+
     header: Header = _field(default_factory=Header)
     twist: TwistWithCovariance = _field(default_factory=TwistWithCovariance)
     _type = "geometry_msgs/TwistWithCovarianceStamped"
@@ -1221,9 +1368,14 @@ class TwistWithCovarianceStamped(_Message):
             linear = twist_2.linear
             angular = twist_2.angular
             covariance = twist.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance))
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y,
+                linear.z, angular.x, angular.y, angular.z), covariance))
         except _FAULTS:
             return _plain(m, TwistWithCovarianceStamped)
 
@@ -1235,17 +1387,20 @@ class TwistWithCovarianceStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3 = _u4(data, p)
+            x, y, z, x_2, y_2, z_2 = _u4(data, p)
             q = p + 48
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return TwistWithCovarianceStamped(Header(Time(sec, nanosec), frame_id), TwistWithCovariance(Twist(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)), covariance))
+            return TwistWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+                TwistWithCovariance(Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2)), covariance))
         except _FAULTS:
             return _explain(data, TwistWithCovarianceStamped)
 
 
 class Vector3Stamped(_Message):
+    """A vector with its time and the frame it is expressed in."""
+
     header: Header = _field(default_factory=Header)
     vector: Vector3 = _field(default_factory=Vector3)
     _type = "geometry_msgs/Vector3Stamped"
@@ -1279,15 +1434,19 @@ class Vector3Stamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2 = _u8(data, p)
-            return Vector3Stamped(Header(Time(sec, nanosec), frame_id), Vector3(x_2, y_2, z_2))
+            x, y, z = _u8(data, p)
+            return Vector3Stamped(Header(Time(sec, nanosec), frame_id), Vector3(x, y, z))
         except _FAULTS:
             return _explain(data, Vector3Stamped)
+
+
 _t10 = _Stride("I i I I $ I $", -4, 8)
 _t11 = _Template("I $ d d d d d d", None)
 
 
 class VelocityStamped(_Message):
+    """How one frame moves as seen from a second one, written in the axes of a third."""
+
     header: Header = _field(default_factory=Header)
     body_frame_id: str = ""
     reference_frame_id: str = ""
@@ -1304,7 +1463,8 @@ class VelocityStamped(_Message):
         "string reference_frame_id  # the frame it moves against\n"
         "Twist velocity             # m/s and rad/s\n"
     )
-    _schema = (("header", Header, ""), ("body_frame_id", "string", ""), ("reference_frame_id", "string", ""), ("velocity", Twist, ""))
+    _schema = (("header", Header, ""), ("body_frame_id", "string", ""),
+        ("reference_frame_id", "string", ""), ("velocity", Twist, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1322,7 +1482,9 @@ class VelocityStamped(_Message):
             velocity = m.velocity
             linear = velocity.linear
             angular = velocity.angular
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2), _t11[p5, n3](n3, b3, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2),
+                _t11[p5, n3](n3, b3, linear.x, linear.y, linear.z, angular.x, angular.y,
+                angular.z)))
         except _FAULTS:
             return _plain(m, VelocityStamped)
 
@@ -1344,13 +1506,16 @@ class VelocityStamped(_Message):
             p = q + n3
             reference_frame_id = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3 = _u4(data, p)
-            return VelocityStamped(Header(Time(sec, nanosec), frame_id), body_frame_id, reference_frame_id, Twist(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)))
+            x, y, z, x_2, y_2, z_2 = _u4(data, p)
+            return VelocityStamped(Header(Time(sec, nanosec), frame_id), body_frame_id,
+                reference_frame_id, Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, VelocityStamped)
 
 
 class Wrench(_Message):
+    """Force and torque at a point, in free space."""
+
     force: Vector3 = _field(default_factory=Vector3)
     torque: Vector3 = _field(default_factory=Vector3)
     _type = "geometry_msgs/Wrench"
@@ -1377,14 +1542,16 @@ class Wrench(_Message):
     @staticmethod
     def _decode(data: bytes) -> Wrench:
         try:
-            h, x_2, y_2, z_2, x_3, y_3, z_3 = _u2(data)
+            h, x, y, z, x_2, y_2, z_2 = _u2(data)
             if h != 256: raise ValueError
-            return Wrench(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3))
+            return Wrench(Vector3(x, y, z), Vector3(x_2, y_2, z_2))
         except _FAULTS:
             return _explain(data, Wrench)
 
 
 class WrenchStamped(_Message):
+    """Force and torque with their time and the frame they are expressed in."""
+
     header: Header = _field(default_factory=Header)
     wrench: Wrench = _field(default_factory=Wrench)
     _type = "geometry_msgs/WrenchStamped"
@@ -1408,7 +1575,8 @@ class WrenchStamped(_Message):
             wrench = m.wrench
             force = wrench.force
             torque = wrench.torque
-            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, force.x, force.y, force.z, torque.x, torque.y, torque.z)
+            return _t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, force.x, force.y, force.z,
+                torque.x, torque.y, torque.z)
         except _FAULTS:
             return _plain(m, WrenchStamped)
 
@@ -1420,7 +1588,8 @@ class WrenchStamped(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3 = _u4(data, p)
-            return WrenchStamped(Header(Time(sec, nanosec), frame_id), Wrench(Vector3(x_2, y_2, z_2), Vector3(x_3, y_3, z_3)))
+            x, y, z, x_2, y_2, z_2 = _u4(data, p)
+            return WrenchStamped(Header(Time(sec, nanosec), frame_id),
+                Wrench(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, WrenchStamped)

@@ -25,6 +25,8 @@ _u1 = _Struct("<IB3xI").unpack_from
 
 
 class State(_Message):
+    """A state of a managed node."""
+
     id: int = 0
     label: str = ""
     PRIMARY_STATE_UNKNOWN = 0
@@ -88,6 +90,8 @@ class State(_Message):
 
 
 class Transition(_Message):
+    """A step of a managed node from one state to the next."""
+
     id: int = 0
     label: str = ""
     TRANSITION_CREATE = 0
@@ -193,12 +197,16 @@ class Transition(_Message):
             return Transition(id_2, label)
         except _FAULTS:
             return _explain(data, Transition)
+
+
 _t2 = _Stride("I B I $ B I $ B", -4, 4)
 _t3 = _Stride("I $", None, 4)
 _u2 = _Struct("<I").unpack_from
 
 
 class TransitionDescription(_Message):
+    """A step of a managed node and the states that it joins."""
+
     transition: Transition = _field(default_factory=Transition)
     start_state: State = _field(default_factory=State)
     goal_state: State = _field(default_factory=State)
@@ -213,7 +221,8 @@ class TransitionDescription(_Message):
         "State start_state\n"
         "State goal_state\n"
     )
-    _schema = (("transition", Transition, ""), ("start_state", State, ""), ("goal_state", State, ""))
+    _schema = (("transition", Transition, ""), ("start_state", State, ""),
+        ("goal_state", State, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -226,7 +235,8 @@ class TransitionDescription(_Message):
             n3, b3 = _texts[goal_state.label]
             f4, p5 = _t2[n1, n2]
             f6, p7 = _t3[p5, n3]
-            return b"".join((f4(256, transition.id, n1, b1, start_state.id, n2, b2, goal_state.id), f6(n3, b3)))
+            return b"".join((f4(256, transition.id, n1, b1, start_state.id, n2, b2, goal_state.id),
+                f6(n3, b3)))
         except _FAULTS:
             return _plain(m, TransitionDescription)
 
@@ -250,15 +260,20 @@ class TransitionDescription(_Message):
             p = q + n3
             label_3 = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return TransitionDescription(Transition(id_2, label), State(id_3, label_2), State(id_4, label_3))
+            return TransitionDescription(Transition(id_2, label), State(id_3, label_2),
+                State(id_4, label_3))
         except _FAULTS:
             return _explain(data, TransitionDescription)
+
+
 _t4 = _Stride("I Q B I $ B I $ B", -4, 8)
 _t5 = _Stride("I $", None, 8)
 _u3 = _Struct("<IQB3xI").unpack_from
 
 
 class TransitionEvent(_Message):
+    """A step that a managed node has taken."""
+
     timestamp: int = 0
     transition: Transition = _field(default_factory=Transition)
     start_state: State = _field(default_factory=State)
@@ -275,7 +290,8 @@ class TransitionEvent(_Message):
         "State start_state\n"
         "State goal_state\n"
     )
-    _schema = (("timestamp", "uint64", ""), ("transition", Transition, ""), ("start_state", State, ""), ("goal_state", State, ""))
+    _schema = (("timestamp", "uint64", ""), ("transition", Transition, ""),
+        ("start_state", State, ""), ("goal_state", State, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -288,7 +304,8 @@ class TransitionEvent(_Message):
             n3, b3 = _texts[goal_state.label]
             f4, p5 = _t4[n1, n2]
             f6, p7 = _t5[p5, n3]
-            return b"".join((f4(256, m.timestamp, transition.id, n1, b1, start_state.id, n2, b2, goal_state.id), f6(n3, b3)))
+            return b"".join((f4(256, m.timestamp, transition.id, n1, b1, start_state.id, n2, b2,
+                goal_state.id), f6(n3, b3)))
         except _FAULTS:
             return _plain(m, TransitionEvent)
 
@@ -312,6 +329,7 @@ class TransitionEvent(_Message):
             p = q + n3
             label_3 = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return TransitionEvent(timestamp, Transition(id_2, label), State(id_3, label_2), State(id_4, label_3))
+            return TransitionEvent(timestamp, Transition(id_2, label), State(id_3, label_2),
+                State(id_4, label_3))
         except _FAULTS:
             return _explain(data, TransitionEvent)

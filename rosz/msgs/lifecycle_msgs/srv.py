@@ -8,7 +8,6 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
@@ -38,6 +37,8 @@ _u1 = _Struct("<IB3xI").unpack_from
 
 
 class ChangeStateRequest(_Message):
+    """Tell a managed node to take a step."""
+
     transition: Transition = _field(default_factory=Transition)
     _type = "lifecycle_msgs/ChangeStateRequest"
     _type_name = "lifecycle_msgs/srv/ChangeState_Request"
@@ -71,7 +72,9 @@ class ChangeStateRequest(_Message):
             return ChangeStateRequest(Transition(id_2, label))
         except _FAULTS:
             return _explain(data, ChangeStateRequest)
-_t2 = _Template("I ?", -4)
+
+
+_p1 = _Struct("<I?").pack
 _u2 = _Struct("<I?").unpack_from
 
 
@@ -87,7 +90,7 @@ class ChangeStateResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.success)
+            return _p1(256, m.success)
         except _FAULTS:
             return _plain(m, ChangeStateResponse)
 
@@ -102,6 +105,8 @@ class ChangeStateResponse(_Message):
 
 
 class ChangeState(_Service):
+    """Tell a managed node to take a step."""
+
     Request = ChangeStateRequest
     Response = ChangeStateResponse
     _type = "lifecycle_msgs/ChangeState"
@@ -115,11 +120,15 @@ class ChangeState(_Service):
         "---\n"
         "bool success\n"
     )
-_t3 = _Template("I x", -4)
+
+
+_p2 = _Struct("<Ix").pack
 _u3 = _Struct("<Ix").unpack_from
 
 
 class GetAvailableStatesRequest(_Message):
+    """Ask a managed node which states it has."""
+
     _type = "lifecycle_msgs/GetAvailableStatesRequest"
     _type_name = "lifecycle_msgs/srv/GetAvailableStates_Request"
     _type_hash = "RIHS01_c2c0c12de6023822f284929577d4ca2862e0501150010966e8a90b632e4424de"
@@ -130,7 +139,7 @@ class GetAvailableStatesRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t3[0](256)
+            return _p2(256)
         except _FAULTS:
             return _plain(m, GetAvailableStatesRequest)
 
@@ -142,8 +151,10 @@ class GetAvailableStatesRequest(_Message):
             return GetAvailableStatesRequest()
         except _FAULTS:
             return _explain(data, GetAvailableStatesRequest)
-_p1 = _Struct("<2I").pack
-_t4 = _Stride("B I $", None, 4)
+
+
+_p3 = _Struct("<2I").pack
+_t2 = _Stride("B I $", None, 4)
 _u4 = _Struct("<2I").unpack_from
 _u5 = _Struct("<I").unpack_from
 
@@ -162,11 +173,11 @@ class GetAvailableStatesResponse(_Message):
         try:
             available_states = m.available_states
             n1 = len(available_states)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 0
             for available_states_one in available_states:
                 n3, b3 = _texts[available_states_one.label]
-                f4, p5 = _t4[p2, n3]
+                f4, p5 = _t2[p2, n3]
                 out.append(f4(available_states_one.id, n3, b3))
                 p2 = p5
             return b"".join(out)
@@ -195,6 +206,8 @@ class GetAvailableStatesResponse(_Message):
 
 
 class GetAvailableStates(_Service):
+    """Ask a managed node which states it has."""
+
     Request = GetAvailableStatesRequest
     Response = GetAvailableStatesResponse
     _type = "lifecycle_msgs/GetAvailableStates"
@@ -209,6 +222,8 @@ class GetAvailableStates(_Service):
 
 
 class GetAvailableTransitionsRequest(_Message):
+    """Ask a managed node which steps it may take now."""
+
     _type = "lifecycle_msgs/GetAvailableTransitionsRequest"
     _type_name = "lifecycle_msgs/srv/GetAvailableTransitions_Request"
     _type_hash = "RIHS01_52a73c0b5d7489bee0df6ddb0aec45c41289d223ff225b58fe11d859ac8109a6"
@@ -219,7 +234,7 @@ class GetAvailableTransitionsRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t3[0](256)
+            return _p2(256)
         except _FAULTS:
             return _plain(m, GetAvailableTransitionsRequest)
 
@@ -231,8 +246,10 @@ class GetAvailableTransitionsRequest(_Message):
             return GetAvailableTransitionsRequest()
         except _FAULTS:
             return _explain(data, GetAvailableTransitionsRequest)
-_t5 = _Stride("B I $ B I $ B", None, 4)
-_t6 = _Stride("I $", None, 4)
+
+
+_t3 = _Stride("B I $ B I $ B", None, 4)
+_t4 = _Stride("I $", None, 4)
 
 
 class GetAvailableTransitionsResponse(_Message):
@@ -249,7 +266,7 @@ class GetAvailableTransitionsResponse(_Message):
         try:
             available_transitions = m.available_transitions
             n1 = len(available_transitions)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 0
             for available_transitions_one in available_transitions:
                 transition = available_transitions_one.transition
@@ -258,9 +275,10 @@ class GetAvailableTransitionsResponse(_Message):
                 n4, b4 = _texts[start_state.label]
                 goal_state = available_transitions_one.goal_state
                 n5, b5 = _texts[goal_state.label]
-                f6, p7 = _t5[p2, n3, n4]
-                f8, p9 = _t6[p7, n5]
-                out += (f6(transition.id, n3, b3, start_state.id, n4, b4, goal_state.id), f8(n5, b5))
+                f6, p7 = _t3[p2, n3, n4]
+                f8, p9 = _t4[p7, n5]
+                out += (f6(transition.id, n3, b3, start_state.id, n4, b4, goal_state.id),
+                    f8(n5, b5))
                 p2 = p9
             return b"".join(out)
         except _FAULTS:
@@ -292,7 +310,8 @@ class GetAvailableTransitionsResponse(_Message):
                 q = p + 4
                 p = q + n4
                 label_3 = data[q : p - 1].decode()
-                available_transitions.append(TransitionDescription(Transition(id_2, label), State(id_3, label_2), State(id_4, label_3)))
+                available_transitions.append(TransitionDescription(Transition(id_2, label),
+                    State(id_3, label_2), State(id_4, label_3)))
             if p > len(data): raise ValueError
             return GetAvailableTransitionsResponse(available_transitions)
         except _FAULTS:
@@ -300,6 +319,8 @@ class GetAvailableTransitionsResponse(_Message):
 
 
 class GetAvailableTransitions(_Service):
+    """Ask a managed node which steps it may take now."""
+
     Request = GetAvailableTransitionsRequest
     Response = GetAvailableTransitionsResponse
     _type = "lifecycle_msgs/GetAvailableTransitions"
@@ -314,6 +335,8 @@ class GetAvailableTransitions(_Service):
 
 
 class GetStateRequest(_Message):
+    """Ask a managed node which state it is in."""
+
     _type = "lifecycle_msgs/GetStateRequest"
     _type_name = "lifecycle_msgs/srv/GetState_Request"
     _type_hash = "RIHS01_77a9c844e7975f15bc2221e8bbebafc4d118afb78c7f7071eef91f83f940f2f6"
@@ -324,7 +347,7 @@ class GetStateRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t3[0](256)
+            return _p2(256)
         except _FAULTS:
             return _plain(m, GetStateRequest)
 
@@ -371,6 +394,8 @@ class GetStateResponse(_Message):
 
 
 class GetState(_Service):
+    """Ask a managed node which state it is in."""
+
     Request = GetStateRequest
     Response = GetStateResponse
     _type = "lifecycle_msgs/GetState"

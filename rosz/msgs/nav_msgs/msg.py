@@ -48,11 +48,13 @@ __all__ = (
     "Path",
 )
 
-_t1 = _Template("I x", -4)
+_p1 = _Struct("<Ix").pack
 _u1 = _Struct("<Ix").unpack_from
 
 
 class GetMapGoal(_Message):
+    """Goal of ROS 1's GetMap action: the current map, nothing to add."""
+
     _type = "nav_msgs/GetMapGoal"
     _type_name = "nav_msgs/msg/GetMapGoal"
     _type_hash = "RIHS01_7ac2b7052e83de1a6a0f9dca3cd01ae1412ce1c8a0126b2a3cd4499f2c458320"
@@ -63,7 +65,7 @@ class GetMapGoal(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, GetMapGoal)
 
@@ -75,12 +77,16 @@ class GetMapGoal(_Message):
             return GetMapGoal()
         except _FAULTS:
             return _explain(data, GetMapGoal)
-_t2 = _Stride("I i I I $ i I I $ x", -4, 4)
+
+
+_t1 = _Stride("I i I I $ i I I $ x", -4, 4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 
 
 class GetMapActionGoal(_Message):
+    """Goal of ROS 1's GetMap action, as it is sent."""
+
     header: Header = _field(default_factory=Header)
     goal_id: GoalID = _field(default_factory=GoalID)
     goal: GetMapGoal = _field(default_factory=GetMapGoal)
@@ -109,7 +115,7 @@ class GetMapActionGoal(_Message):
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
             goal = m.goal
-            f3, p4 = _t2[n1, n2]
+            f3, p4 = _t1[n1, n2]
             return f3(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2)
         except _FAULTS:
             return _plain(m, GetMapActionGoal)
@@ -127,14 +133,19 @@ class GetMapActionGoal(_Message):
             p = q + n2
             id_2 = data[q : p - 1].decode()
             if p + 1 > len(data): raise ValueError
-            return GetMapActionGoal(Header(Time(sec, nanosec), frame_id), GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal())
+            return GetMapActionGoal(Header(Time(sec, nanosec), frame_id),
+                GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal())
         except _FAULTS:
             return _explain(data, GetMapActionGoal)
-_p1 = _Struct("<IiIf2I4x7d").pack
+
+
+_p2 = _Struct("<IiIf2I4x7d").pack
 _u4 = _Struct("<IiIf2I4x7d").unpack_from
 
 
 class MapMetaData(_Message):
+    """Where the cells of an occupancy grid lie."""
+
     map_load_time: Time = _field(default_factory=Time)
     resolution: float = 0.0
     width: int = 0
@@ -153,7 +164,8 @@ class MapMetaData(_Message):
         "uint32 height                          # cells along the map's y axis\n"
         "geometry_msgs/Pose origin              # outer corner of cell (0, 0), and the map's axes\n"
     )
-    _schema = (("map_load_time", Time, ""), ("resolution", "float32", ""), ("width", "uint32", ""), ("height", "uint32", ""), ("origin", Pose, ""))
+    _schema = (("map_load_time", Time, ""), ("resolution", "float32", ""), ("width", "uint32", ""),
+        ("height", "uint32", ""), ("origin", Pose, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -162,25 +174,32 @@ class MapMetaData(_Message):
             origin = m.origin
             position = origin.position
             orientation = origin.orientation
-            return _p1(256, map_load_time.sec, map_load_time.nanosec, m.resolution, m.width, m.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
+            return _p2(256, map_load_time.sec, map_load_time.nanosec, m.resolution, m.width,
+                m.height, position.x, position.y, position.z, orientation.x, orientation.y,
+                orientation.z, orientation.w)
         except _FAULTS:
             return _plain(m, MapMetaData)
 
     @staticmethod
     def _decode(data: bytes) -> MapMetaData:
         try:
-            h, sec, nanosec, resolution, width, height, x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u4(data)
+            h, sec, nanosec, resolution, width, height, x, y, z, x_2, y_2, z_2, w = _u4(data)
             if h != 256: raise ValueError
-            return MapMetaData(Time(sec, nanosec), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)))
+            return MapMetaData(Time(sec, nanosec), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)))
         except _FAULTS:
             return _explain(data, MapMetaData)
+
+
 _d1 = _empty("b")
-_t3 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
+_t2 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
 _u5 = _Struct("<iIf2I").unpack_from
 _u6 = _Struct("<7dI").unpack_from
 
 
 class OccupancyGrid(_Message):
+    """A map of square cells that says how likely each is occupied."""
+
     header: Header = _field(default_factory=Header)
     info: MapMetaData = _field(default_factory=MapMetaData)
     data: _Array[int] = _field(default_factory=_d1)
@@ -214,7 +233,10 @@ class OccupancyGrid(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t3[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
+            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
+                map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
+                position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
+                n2), data_2))
         except _FAULTS:
             return _plain(m, OccupancyGrid)
 
@@ -228,17 +250,21 @@ class OccupancyGrid(_Message):
             p = p + 3 & -4
             sec_2, nanosec_2, resolution, width, height = _u5(data, p)
             p = (p + 23 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n2 = _u6(data, p)
+            x, y, z, x_2, y_2, z_2, w, n2 = _u6(data, p)
             q = p + 60
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2)
+            return OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+                MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2)
         except _FAULTS:
             return _explain(data, OccupancyGrid)
 
 
 class GetMapResult(_Message):
+    """Result of ROS 1's GetMap action."""
+
     map: OccupancyGrid = _field(default_factory=OccupancyGrid)
     _type = "nav_msgs/GetMapResult"
     _type_name = "nav_msgs/msg/GetMapResult"
@@ -267,7 +293,10 @@ class GetMapResult(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t3[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
+            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
+                map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
+                position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
+                n2), data_2))
         except _FAULTS:
             return _plain(m, GetMapResult)
 
@@ -281,21 +310,27 @@ class GetMapResult(_Message):
             p = p + 3 & -4
             sec_2, nanosec_2, resolution, width, height = _u5(data, p)
             p = (p + 23 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n2 = _u6(data, p)
+            x, y, z, x_2, y_2, z_2, w, n2 = _u6(data, p)
             q = p + 60
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return GetMapResult(OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2))
+            return GetMapResult(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+                MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2))
         except _FAULTS:
             return _explain(data, GetMapResult)
-_t4 = _Stride("I i I I $ i I I $ B", -4, 8)
-_t5 = _Stride("I $ i I", None, 8)
-_t6 = _Template("I $ i I f I I d d d d d d d I", None)
+
+
+_t3 = _Stride("I i I I $ i I I $ B", -4, 8)
+_t4 = _Stride("I $ i I", None, 8)
+_t5 = _Template("I $ i I f I I d d d d d d d I", None)
 _u7 = _Struct("<I").unpack_from
 
 
 class GetMapActionResult(_Message):
+    """Result of ROS 1's GetMap action, as it is sent."""
+
     header: Header = _field(default_factory=Header)
     status: GoalStatus = _field(default_factory=GoalStatus)
     result: GetMapResult = _field(default_factory=GetMapResult)
@@ -327,13 +362,13 @@ class GetMapActionResult(_Message):
             b3 = status.text.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            f4, p5 = _t4[n1, n2]
+            f4, p5 = _t3[n1, n2]
             result = m.result
             map_2 = result.map
             header_2 = map_2.header
             stamp_3 = header_2.stamp
             n6, b6 = _texts[header_2.frame_id]
-            f7, p8 = _t5[p5, n3]
+            f7, p8 = _t4[p5, n3]
             info = map_2.info
             map_load_time = info.map_load_time
             origin = info.origin
@@ -343,7 +378,11 @@ class GetMapActionResult(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n9 = len(data_2)
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, status.status), f7(n3, b3, stamp_3.sec, stamp_3.nanosec), _t6[p8, n6](n6, b6, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n9), data_2))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec,
+                stamp_2.nanosec, n2, b2, status.status), f7(n3, b3, stamp_3.sec, stamp_3.nanosec),
+                _t5[p8, n6](n6, b6, map_load_time.sec, map_load_time.nanosec, info.resolution,
+                info.width, info.height, position.x, position.y, position.z, orientation.x,
+                orientation.y, orientation.z, orientation.w, n9), data_2))
         except _FAULTS:
             return _plain(m, GetMapActionResult)
 
@@ -373,17 +412,23 @@ class GetMapActionResult(_Message):
             p = p + 3 & -4
             sec_4, nanosec_4, resolution, width, height = _u5(data, p)
             p = (p + 23 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n5 = _u6(data, p)
+            x, y, z, x_2, y_2, z_2, w, n5 = _u6(data, p)
             q = p + 60
             p = q + n5
             data_2 = _array("b", data[q : p]) if n5 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return GetMapActionResult(Header(Time(sec, nanosec), frame_id), GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text), GetMapResult(OccupancyGrid(Header(Time(sec_3, nanosec_3), frame_id_2), MapMetaData(Time(sec_4, nanosec_4), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2)))
+            return GetMapActionResult(Header(Time(sec, nanosec), frame_id),
+                GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text),
+                GetMapResult(OccupancyGrid(Header(Time(sec_3, nanosec_3), frame_id_2),
+                MapMetaData(Time(sec_4, nanosec_4), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2)))
         except _FAULTS:
             return _explain(data, GetMapActionResult)
 
 
 class GetMapFeedback(_Message):
+    """Feedback of ROS 1's GetMap action: there is none."""
+
     _type = "nav_msgs/GetMapFeedback"
     _type_name = "nav_msgs/msg/GetMapFeedback"
     _type_hash = "RIHS01_8a7adeb0dc2e1d0a2ecdaa240a2f345debafe9d3899a429500e76884299979e7"
@@ -394,7 +439,7 @@ class GetMapFeedback(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, GetMapFeedback)
 
@@ -406,11 +451,15 @@ class GetMapFeedback(_Message):
             return GetMapFeedback()
         except _FAULTS:
             return _explain(data, GetMapFeedback)
-_t7 = _Stride("I i I I $ i I I $ B", -4, 4)
-_t8 = _Stride("I $ x", None, 4)
+
+
+_t6 = _Stride("I i I I $ i I I $ B", -4, 4)
+_t7 = _Stride("I $ x", None, 4)
 
 
 class GetMapActionFeedback(_Message):
+    """Feedback of ROS 1's GetMap action, as it is sent."""
+
     header: Header = _field(default_factory=Header)
     status: GoalStatus = _field(default_factory=GoalStatus)
     feedback: GetMapFeedback = _field(default_factory=GetMapFeedback)
@@ -442,10 +491,11 @@ class GetMapActionFeedback(_Message):
             b3 = status.text.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            f4, p5 = _t7[n1, n2]
+            f4, p5 = _t6[n1, n2]
             feedback = m.feedback
-            f6, p7 = _t8[p5, n3]
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, status.status), f6(n3, b3)))
+            f6, p7 = _t7[p5, n3]
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec,
+                stamp_2.nanosec, n2, b2, status.status), f6(n3, b3)))
         except _FAULTS:
             return _plain(m, GetMapActionFeedback)
 
@@ -468,16 +518,21 @@ class GetMapActionFeedback(_Message):
             p = q + n3
             text = data[q : p - 1].decode()
             if p + 1 > len(data): raise ValueError
-            return GetMapActionFeedback(Header(Time(sec, nanosec), frame_id), GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text), GetMapFeedback())
+            return GetMapActionFeedback(Header(Time(sec, nanosec), frame_id),
+                GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text), GetMapFeedback())
         except _FAULTS:
             return _explain(data, GetMapActionFeedback)
-_t9 = _Stride("I i I I $ i I I $ x i I", -4, 8)
-_t10 = _Stride("I $ i I I $ B", None, 8)
-_t11 = _Stride("i I I $ i I I $ B", None, 8)
-_t12 = _Stride("I $ x", None, 8)
+
+
+_t8 = _Stride("I i I I $ i I I $ x i I", -4, 8)
+_t9 = _Stride("I $ i I I $ B", None, 8)
+_t10 = _Stride("i I I $ i I I $ B", None, 8)
+_t11 = _Stride("I $ x", None, 8)
 
 
 class GetMapAction(_Message):
+    """ROS 1's GetMap action as a whole: no topic carries it, it only ties the other three together."""
+
     action_goal: GetMapActionGoal = _field(default_factory=GetMapActionGoal)
     action_result: GetMapActionResult = _field(default_factory=GetMapActionResult)
     action_feedback: GetMapActionFeedback = _field(default_factory=GetMapActionFeedback)
@@ -492,7 +547,8 @@ class GetMapAction(_Message):
         "GetMapActionResult action_result\n"
         "GetMapActionFeedback action_feedback\n"
     )
-    _schema = (("action_goal", GetMapActionGoal, ""), ("action_result", GetMapActionResult, ""), ("action_feedback", GetMapActionFeedback, ""))
+    _schema = (("action_goal", GetMapActionGoal, ""), ("action_result", GetMapActionResult, ""),
+        ("action_feedback", GetMapActionFeedback, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -511,7 +567,7 @@ class GetMapAction(_Message):
             header_2 = action_result.header
             stamp_3 = header_2.stamp
             n3, b3 = _texts[header_2.frame_id]
-            f4, p5 = _t9[n1, n2]
+            f4, p5 = _t8[n1, n2]
             status = action_result.status
             goal_id_2 = status.goal_id
             stamp_4 = goal_id_2.stamp
@@ -521,13 +577,13 @@ class GetMapAction(_Message):
             b7 = status.text.encode()
             if 0 in b7: raise ValueError
             n7 = len(b7) + 1
-            f8, p9 = _t10[p5, n3, n6]
+            f8, p9 = _t9[p5, n3, n6]
             result = action_result.result
             map_2 = result.map
             header_3 = map_2.header
             stamp_5 = header_3.stamp
             n10, b10 = _texts[header_3.frame_id]
-            f11, p12 = _t5[p9, n7]
+            f11, p12 = _t4[p9, n7]
             info = map_2.info
             map_load_time = info.map_load_time
             origin = info.origin
@@ -550,10 +606,18 @@ class GetMapAction(_Message):
             b16 = status_2.text.encode()
             if 0 in b16: raise ValueError
             n16 = len(b16) + 1
-            f17, p18 = _t11[n13 + 4 & 7, n14, n15]
+            f17, p18 = _t10[n13 + 4 & 7, n14, n15]
             feedback = action_feedback.feedback
-            f19, p20 = _t12[p18, n16]
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, stamp_3.sec, stamp_3.nanosec), f8(n3, b3, stamp_4.sec, stamp_4.nanosec, n6, b6, status.status), f11(n7, b7, stamp_5.sec, stamp_5.nanosec), _t6[p12, n10](n10, b10, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n13), data_2, f17(stamp_6.sec, stamp_6.nanosec, n14, b14, stamp_7.sec, stamp_7.nanosec, n15, b15, status_2.status), f19(n16, b16)))
+            f19, p20 = _t11[p18, n16]
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec,
+                stamp_2.nanosec, n2, b2, stamp_3.sec, stamp_3.nanosec),
+                f8(n3, b3, stamp_4.sec, stamp_4.nanosec, n6, b6, status.status),
+                f11(n7, b7, stamp_5.sec, stamp_5.nanosec),
+                _t5[p12, n10](n10, b10, map_load_time.sec, map_load_time.nanosec, info.resolution,
+                info.width, info.height, position.x, position.y, position.z, orientation.x,
+                orientation.y, orientation.z, orientation.w, n13), data_2,
+                f17(stamp_6.sec, stamp_6.nanosec, n14, b14, stamp_7.sec, stamp_7.nanosec, n15, b15,
+                status_2.status), f19(n16, b16)))
         except _FAULTS:
             return _plain(m, GetMapAction)
 
@@ -593,7 +657,7 @@ class GetMapAction(_Message):
             p = p + 3 & -4
             sec_6, nanosec_6, resolution, width, height = _u5(data, p)
             p = (p + 23 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n7 = _u6(data, p)
+            x, y, z, x_2, y_2, z_2, w, n7 = _u6(data, p)
             q = p + 60
             p = q + n7
             data_2 = _array("b", data[q : p]) if n7 < 8192 else _read_block("b", data, q, p)
@@ -614,16 +678,29 @@ class GetMapAction(_Message):
             p = q + n10
             text_2 = data[q : p - 1].decode()
             if p + 1 > len(data): raise ValueError
-            return GetMapAction(GetMapActionGoal(Header(Time(sec, nanosec), frame_id), GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal()), GetMapActionResult(Header(Time(sec_3, nanosec_3), frame_id_2), GoalStatus(GoalID(Time(sec_4, nanosec_4), id_3), status, text), GetMapResult(OccupancyGrid(Header(Time(sec_5, nanosec_5), frame_id_3), MapMetaData(Time(sec_6, nanosec_6), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2))), GetMapActionFeedback(Header(Time(sec_7, nanosec_7), frame_id_4), GoalStatus(GoalID(Time(sec_8, nanosec_8), id_4), status_2, text_2), GetMapFeedback()))
+            return GetMapAction(GetMapActionGoal(Header(Time(sec, nanosec), frame_id),
+                GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal()),
+                GetMapActionResult(Header(Time(sec_3, nanosec_3), frame_id_2),
+                GoalStatus(GoalID(Time(sec_4, nanosec_4), id_3), status, text),
+                GetMapResult(OccupancyGrid(Header(Time(sec_5, nanosec_5), frame_id_3),
+                MapMetaData(Time(sec_6, nanosec_6), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2))),
+                GetMapActionFeedback(Header(Time(sec_7, nanosec_7), frame_id_4),
+                GoalStatus(GoalID(Time(sec_8, nanosec_8), id_4), status_2, text_2),
+                GetMapFeedback()))
         except _FAULTS:
             return _explain(data, GetMapAction)
-_t13 = _Stride("I i I I $ f f I", -4, 8)
-_p2 = _Struct("<3d").pack
+
+
+_t12 = _Stride("I i I I $ f f I", -4, 8)
+_p3 = _Struct("<3d").pack
 _u8 = _Struct("<2fI").unpack_from
 _i1 = _Struct("<3d").iter_unpack
 
 
 class GridCells(_Message):
+    """A set of equal rectangular cells, such as the obstacles of a costmap."""
+
     header: Header = _field(default_factory=Header)
     cell_width: float = 0.0
     cell_height: float = 0.0
@@ -640,7 +717,8 @@ class GridCells(_Message):
         "float32 cell_height          # m, along y\n"
         "geometry_msgs/Point[] cells  # m, centres\n"
     )
-    _schema = (("header", Header, ""), ("cell_width", "float32", ""), ("cell_height", "float32", ""), ("cells", Point, "[]"))
+    _schema = (("header", Header, ""), ("cell_width", "float32", ""),
+        ("cell_height", "float32", ""), ("cells", Point, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -650,9 +728,11 @@ class GridCells(_Message):
             n1, b1 = _texts[header.frame_id]
             cells = m.cells
             n2 = len(cells)
-            f3, p4 = _t13[n1]
+            f3, p4 = _t12[n1]
             p5 = 0 if n2 else p4
-            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, m.cell_width, m.cell_height, n2), (_PADDING[-(p4) & 7] if n2 else b""), b"".join([_p2(e.x, e.y, e.z) for e in cells])))
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, m.cell_width, m.cell_height,
+                n2), (_PADDING[-(p4) & 7] if n2 else b""),
+                b"".join([_p3(e.x, e.y, e.z) for e in cells])))
         except _FAULTS:
             return _plain(m, GridCells)
 
@@ -672,13 +752,17 @@ class GridCells(_Message):
             return GridCells(Header(Time(sec, nanosec), frame_id), cell_width, cell_height, cells)
         except _FAULTS:
             return _explain(data, GridCells)
-_t14 = _Template("I i I I $ I $ d d d d d d d", -4)
-_p3 = _Struct("<6d").pack
+
+
+_t13 = _Template("I i I I $ I $ d d d d d d d", -4)
+_p4 = _Struct("<6d").pack
 _u9 = _Struct("<7d").unpack_from
 _u10 = _Struct("<6d").unpack_from
 
 
 class Odometry(_Message):
+    """Where a robot estimates it is and how it moves."""
+
     header: Header = _field(default_factory=Header)
     child_frame_id: str = ""
     pose: PoseWithCovariance = _field(default_factory=PoseWithCovariance)
@@ -695,7 +779,8 @@ class Odometry(_Message):
         "geometry_msgs/PoseWithCovariance pose\n"
         "geometry_msgs/TwistWithCovariance twist\n"
     )
-    _schema = (("header", Header, ""), ("child_frame_id", "string", ""), ("pose", PoseWithCovariance, ""), ("twist", TwistWithCovariance, ""))
+    _schema = (("header", Header, ""), ("child_frame_id", "string", ""),
+        ("pose", PoseWithCovariance, ""), ("twist", TwistWithCovariance, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -709,16 +794,27 @@ class Odometry(_Message):
             position = pose_2.position
             orientation = pose_2.orientation
             covariance = pose.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
             twist = m.twist
             twist_2 = twist.twist
             linear = twist_2.linear
             angular = twist_2.angular
             covariance_2 = twist.covariance
-            if type(covariance_2) is not _array or covariance_2.typecode != "d" or len(covariance_2) != 36:
+            if (
+                type(covariance_2) is not _array
+                or covariance_2.typecode != "d"
+                or len(covariance_2) != 36
+            ):
                 covariance_2 = _numbers(covariance_2, "d", 36)
-            return b"".join((_t14[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w), covariance, _p3(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance_2))
+            return b"".join((_t13[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2,
+                position.x, position.y, position.z, orientation.x, orientation.y, orientation.z,
+                orientation.w), covariance,
+                _p4(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance_2))
         except _FAULTS:
             return _plain(m, Odometry)
 
@@ -735,23 +831,30 @@ class Odometry(_Message):
             p = q + n2
             child_frame_id = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u9(data, p)
+            x, y, z, x_2, y_2, z_2, w = _u9(data, p)
             q = p + 56
             p = q + 288
             covariance = _array("d", data[q : p])
-            x_4, y_4, z_4, x_5, y_5, z_5 = _u10(data, p)
+            x_3, y_3, z_3, x_4, y_4, z_4 = _u10(data, p)
             q = p + 48
             p = q + 288
             covariance_2 = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return Odometry(Header(Time(sec, nanosec), frame_id), child_frame_id, PoseWithCovariance(Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), covariance), TwistWithCovariance(Twist(Vector3(x_4, y_4, z_4), Vector3(x_5, y_5, z_5)), covariance_2))
+            return Odometry(Header(Time(sec, nanosec), frame_id), child_frame_id,
+                PoseWithCovariance(Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), covariance),
+                TwistWithCovariance(Twist(Vector3(x_3, y_3, z_3), Vector3(x_4, y_4, z_4)),
+                covariance_2))
         except _FAULTS:
             return _explain(data, Odometry)
-_t15 = _Stride("I i I I $ I", -4, 8)
-_t16 = _Template("i I I $ d d d d d d d", None)
+
+
+_t14 = _Stride("I i I I $ I", -4, 8)
+_t15 = _Template("i I I $ d d d d d d d", None)
 
 
 class Path(_Message):
+    """Poses for a robot to pass one after the other."""
+
     header: Header = _field(default_factory=Header)
     poses: list[PoseStamped] = []
     _type = "nav_msgs/Path"
@@ -774,7 +877,7 @@ class Path(_Message):
             n1, b1 = _texts[header.frame_id]
             poses = m.poses
             n2 = len(poses)
-            f3, p4 = _t15[n1]
+            f3, p4 = _t14[n1]
             out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
             p5 = p4
             for poses_one in poses:
@@ -784,7 +887,9 @@ class Path(_Message):
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t16[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w))
+                out.append(_t15[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x,
+                    position.y, position.z, orientation.x, orientation.y, orientation.z,
+                    orientation.w))
                 p5 = 0
             return b"".join(out)
         except _FAULTS:
@@ -807,9 +912,10 @@ class Path(_Message):
                 p = q + n3
                 frame_id_2 = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u9(data, p)
+                x, y, z, x_2, y_2, z_2, w = _u9(data, p)
                 p += 56
-                poses.append(PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))))
+                poses.append(PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                    Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))))
             if p > len(data): raise ValueError
             return Path(Header(Time(sec, nanosec), frame_id), poses)
         except _FAULTS:

@@ -44,11 +44,13 @@ __all__ = (
     "SetMapResponse",
 )
 
-_t1 = _Template("I x", -4)
+_p1 = _Struct("<Ix").pack
 _u1 = _Struct("<Ix").unpack_from
 
 
 class GetMapRequest(_Message):
+    """Ask for the current map."""
+
     _type = "nav_msgs/GetMapRequest"
     _type_name = "nav_msgs/srv/GetMap_Request"
     _type_hash = "RIHS01_b531e302f1bd6a81f8a5e03453266c378b1f711b4296000c1c0f53a40e00a7c4"
@@ -59,7 +61,7 @@ class GetMapRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, GetMapRequest)
 
@@ -71,7 +73,9 @@ class GetMapRequest(_Message):
             return GetMapRequest()
         except _FAULTS:
             return _explain(data, GetMapRequest)
-_t2 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
+
+
+_t1 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<iIf2I").unpack_from
 _u4 = _Struct("<7dI").unpack_from
@@ -102,7 +106,10 @@ class GetMapResponse(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2))
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
+                map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
+                position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
+                n2), data_2))
         except _FAULTS:
             return _plain(m, GetMapResponse)
 
@@ -116,17 +123,21 @@ class GetMapResponse(_Message):
             p = p + 3 & -4
             sec_2, nanosec_2, resolution, width, height = _u3(data, p)
             p = (p + 23 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n2 = _u4(data, p)
+            x, y, z, x_2, y_2, z_2, w, n2 = _u4(data, p)
             q = p + 60
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return GetMapResponse(OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2))
+            return GetMapResponse(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+                MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2))
         except _FAULTS:
             return _explain(data, GetMapResponse)
 
 
 class GetMap(_Service):
+    """Ask for the current map."""
+
     Request = GetMapRequest
     Response = GetMapResponse
     _type = "nav_msgs/GetMap"
@@ -138,12 +149,16 @@ class GetMap(_Service):
         "---\n"
         "OccupancyGrid map\n"
     )
-_t3 = _Template("I i I I $ d d d d d d d i I I $ d d d d d d d f", -4)
+
+
+_t2 = _Template("I i I I $ d d d d d d d i I I $ d d d d d d d f", -4)
 _u5 = _Struct("<7di2I").unpack_from
 _u6 = _Struct("<7df").unpack_from
 
 
 class GetPlanRequest(_Message):
+    """Ask a planner for a path."""
+
     start: PoseStamped = _field(default_factory=PoseStamped)
     goal: PoseStamped = _field(default_factory=PoseStamped)
     tolerance: float = 0.0
@@ -177,7 +192,10 @@ class GetPlanRequest(_Message):
             pose_2 = goal.pose
             position_2 = pose_2.position
             orientation_2 = pose_2.orientation
-            return _t3[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, stamp_2.sec, stamp_2.nanosec, n2, b2, position_2.x, position_2.y, position_2.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, m.tolerance)
+            return _t2[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y,
+                position.z, orientation.x, orientation.y, orientation.z, orientation.w,
+                stamp_2.sec, stamp_2.nanosec, n2, b2, position_2.x, position_2.y, position_2.z,
+                orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, m.tolerance)
         except _FAULTS:
             return _plain(m, GetPlanRequest)
 
@@ -189,17 +207,22 @@ class GetPlanRequest(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, sec_2, nanosec_2, n2 = _u5(data, p)
+            x, y, z, x_2, y_2, z_2, w, sec_2, nanosec_2, n2 = _u5(data, p)
             q = p + 68
             p = q + n2
             frame_id_2 = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_4, y_4, z_4, x_5, y_5, z_5, w_3, tolerance = _u6(data, p)
-            return GetPlanRequest(PoseStamped(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2), Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3))), tolerance)
+            x_3, y_3, z_3, x_4, y_4, z_4, w_2, tolerance = _u6(data, p)
+            return GetPlanRequest(PoseStamped(Header(Time(sec, nanosec), frame_id),
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))),
+                PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                Pose(Point(x_3, y_3, z_3), Quaternion(x_4, y_4, z_4, w_2))), tolerance)
         except _FAULTS:
             return _explain(data, GetPlanRequest)
-_t4 = _Stride("I i I I $ I", -4, 8)
-_t5 = _Template("i I I $ d d d d d d d", None)
+
+
+_t3 = _Stride("I i I I $ I", -4, 8)
+_t4 = _Template("i I I $ d d d d d d d", None)
 _u7 = _Struct("<I").unpack_from
 _u8 = _Struct("<i2I").unpack_from
 _u9 = _Struct("<7d").unpack_from
@@ -223,7 +246,7 @@ class GetPlanResponse(_Message):
             n1, b1 = _texts[header.frame_id]
             poses = plan.poses
             n2 = len(poses)
-            f3, p4 = _t4[n1]
+            f3, p4 = _t3[n1]
             out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
             p5 = p4
             for poses_one in poses:
@@ -233,7 +256,9 @@ class GetPlanResponse(_Message):
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t5[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w))
+                out.append(_t4[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x,
+                    position.y, position.z, orientation.x, orientation.y, orientation.z,
+                    orientation.w))
                 p5 = 0
             return b"".join(out)
         except _FAULTS:
@@ -256,9 +281,10 @@ class GetPlanResponse(_Message):
                 p = q + n3
                 frame_id_2 = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u9(data, p)
+                x, y, z, x_2, y_2, z_2, w = _u9(data, p)
                 p += 56
-                poses.append(PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))))
+                poses.append(PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                    Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))))
             if p > len(data): raise ValueError
             return GetPlanResponse(Path(Header(Time(sec, nanosec), frame_id), poses))
         except _FAULTS:
@@ -266,6 +292,8 @@ class GetPlanResponse(_Message):
 
 
 class GetPlan(_Service):
+    """Ask a planner for a path."""
+
     Request = GetPlanRequest
     Response = GetPlanResponse
     _type = "nav_msgs/GetPlan"
@@ -281,11 +309,15 @@ class GetPlan(_Service):
         "---\n"
         "Path plan  # empty if there is none\n"
     )
-_t6 = _Stride("I I $", -4, 4)
+
+
+_t5 = _Stride("I I $", -4, 4)
 _u10 = _Struct("<2I").unpack_from
 
 
 class LoadMapRequest(_Message):
+    """Tell a map server to load another map."""
+
     map_url: str = ""
     _type = "nav_msgs/LoadMapRequest"
     _type_name = "nav_msgs/srv/LoadMap_Request"
@@ -304,7 +336,7 @@ class LoadMapRequest(_Message):
             b1 = m.map_url.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t6[n1]
+            f2, p3 = _t5[n1]
             return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, LoadMapRequest)
@@ -320,7 +352,9 @@ class LoadMapRequest(_Message):
             return LoadMapRequest(map_url)
         except _FAULTS:
             return _explain(data, LoadMapRequest)
-_p1 = _Struct("<B").pack
+
+
+_p2 = _Struct("<B").pack
 
 
 class LoadMapResponse(_Message):
@@ -363,7 +397,10 @@ class LoadMapResponse(_Message):
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n2 = len(data_2)
-            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2, _p1(m.result)))
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
+                map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
+                position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
+                n2), data_2, _p2(m.result)))
         except _FAULTS:
             return _plain(m, LoadMapResponse)
 
@@ -377,17 +414,21 @@ class LoadMapResponse(_Message):
             p = p + 3 & -4
             sec_2, nanosec_2, resolution, width, height = _u3(data, p)
             p = (p + 23 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n2 = _u4(data, p)
+            x, y, z, x_2, y_2, z_2, w, n2 = _u4(data, p)
             q = p + 60
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             result = data[p]
-            return LoadMapResponse(OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2), result)
+            return LoadMapResponse(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+                MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2), result)
         except _FAULTS:
             return _explain(data, LoadMapResponse)
 
 
 class LoadMap(_Service):
+    """Tell a map server to load another map."""
+
     Request = LoadMapRequest
     Response = LoadMapResponse
     _type = "nav_msgs/LoadMap"
@@ -411,6 +452,8 @@ class LoadMap(_Service):
 
 
 class SetMapRequest(_Message):
+    """Give a robot another map, and tell it where on that map it is."""
+
     map: OccupancyGrid = _field(default_factory=OccupancyGrid)
     initial_pose: PoseWithCovarianceStamped = _field(default_factory=PoseWithCovarianceStamped)
     _type = "nav_msgs/SetMapRequest"
@@ -450,9 +493,19 @@ class SetMapRequest(_Message):
             position_2 = pose_2.position
             orientation_2 = pose_2.orientation
             covariance = pose.covariance
-            if type(covariance) is not _array or covariance.typecode != "d" or len(covariance) != 36:
+            if (
+                type(covariance) is not _array
+                or covariance.typecode != "d"
+                or len(covariance) != 36
+            ):
                 covariance = _numbers(covariance, "d", 36)
-            return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec, map_load_time.nanosec, info.resolution, info.width, info.height, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2), data_2, _t5[n2 + 4 & 7, n3](stamp_2.sec, stamp_2.nanosec, n3, b3, position_2.x, position_2.y, position_2.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w), covariance))
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
+                map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
+                position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
+                n2), data_2,
+                _t4[n2 + 4 & 7, n3](stamp_2.sec, stamp_2.nanosec, n3, b3, position_2.x,
+                position_2.y, position_2.z, orientation_2.x, orientation_2.y, orientation_2.z,
+                orientation_2.w), covariance))
         except _FAULTS:
             return _plain(m, SetMapRequest)
 
@@ -466,7 +519,7 @@ class SetMapRequest(_Message):
             p = p + 3 & -4
             sec_2, nanosec_2, resolution, width, height = _u3(data, p)
             p = (p + 23 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n2 = _u4(data, p)
+            x, y, z, x_2, y_2, z_2, w, n2 = _u4(data, p)
             q = p + 60
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
@@ -476,15 +529,22 @@ class SetMapRequest(_Message):
             p = q + n3
             frame_id_2 = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_4, y_4, z_4, x_5, y_5, z_5, w_3 = _u9(data, p)
+            x_3, y_3, z_3, x_4, y_4, z_4, w_2 = _u9(data, p)
             q = p + 56
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return SetMapRequest(OccupancyGrid(Header(Time(sec, nanosec), frame_id), MapMetaData(Time(sec_2, nanosec_2), resolution, width, height, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))), data_2), PoseWithCovarianceStamped(Header(Time(sec_3, nanosec_3), frame_id_2), PoseWithCovariance(Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)), covariance)))
+            return SetMapRequest(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+                MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2),
+                PoseWithCovarianceStamped(Header(Time(sec_3, nanosec_3), frame_id_2),
+                PoseWithCovariance(Pose(Point(x_3, y_3, z_3), Quaternion(x_4, y_4, z_4, w_2)),
+                covariance)))
         except _FAULTS:
             return _explain(data, SetMapRequest)
-_t7 = _Template("I ?", -4)
+
+
+_p3 = _Struct("<I?").pack
 _u11 = _Struct("<I?").unpack_from
 
 
@@ -500,7 +560,7 @@ class SetMapResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t7[0](256, m.success)
+            return _p3(256, m.success)
         except _FAULTS:
             return _plain(m, SetMapResponse)
 
@@ -515,6 +575,8 @@ class SetMapResponse(_Message):
 
 
 class SetMap(_Service):
+    """Give a robot another map, and tell it where on that map it is."""
+
     Request = SetMapRequest
     Response = SetMapResponse
     _type = "nav_msgs/SetMap"

@@ -48,6 +48,8 @@ _u1 = _Struct("<I3d").unpack_from
 
 
 class FloatingPointRange(_Message):
+    """The numbers that a floating-point parameter may take."""
+
     from_value: float = 0.0
     to_value: float = 0.0
     step: float = 0.0
@@ -82,11 +84,15 @@ class FloatingPointRange(_Message):
             return FloatingPointRange(from_value, to_value, step)
         except _FAULTS:
             return _explain(data, FloatingPointRange)
+
+
 _p2 = _Struct("<I2qQ").pack
 _u2 = _Struct("<I2qQ").unpack_from
 
 
 class IntegerRange(_Message):
+    """The numbers that an integer parameter may take."""
+
     from_value: int = 0
     to_value: int = 0
     step: int = 0
@@ -121,6 +127,8 @@ class IntegerRange(_Message):
             return IntegerRange(from_value, to_value, step)
         except _FAULTS:
             return _explain(data, IntegerRange)
+
+
 _s1 = _StringList()
 _p3 = _Struct("<I").pack
 _s2 = _StringList()
@@ -129,6 +137,8 @@ _u3 = _Struct("<I").unpack_from
 
 
 class ListParametersResult(_Message):
+    """The parameters of a node, as far as they were asked for."""
+
     names: list[str] = []
     prefixes: list[str] = []
     _type = "rcl_interfaces/ListParametersResult"
@@ -177,12 +187,16 @@ class ListParametersResult(_Message):
             return ListParametersResult(names, prefixes)
         except _FAULTS:
             return _explain(data, ListParametersResult)
+
+
 _t2 = _Stride("I i I B I $ I $", -4, 4)
 _t3 = _Template("I $ I $ I", None)
 _u4 = _Struct("<IiIB3xI").unpack_from
 
 
 class Log(_Message):
+    """One line of a node's log, as ROS 2 sends it on /rosout."""
+
     stamp: Time = _field(default_factory=Time)
     level: int = 0
     name: str = ""
@@ -216,7 +230,9 @@ class Log(_Message):
         "string function                # function that wrote it\n"
         "uint32 line                    # line in that file\n"
     )
-    _schema = (("stamp", Time, ""), ("level", "uint8", ""), ("name", "string", ""), ("msg", "string", ""), ("file", "string", ""), ("function", "string", ""), ("line", "uint32", ""))
+    _schema = (("stamp", Time, ""), ("level", "uint8", ""), ("name", "string", ""),
+        ("msg", "string", ""), ("file", "string", ""), ("function", "string", ""),
+        ("line", "uint32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -229,7 +245,8 @@ class Log(_Message):
             n3, b3 = _texts[m.file]
             f4, p5 = _t2[n1, n2]
             n6, b6 = _texts[m.function]
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, m.level, n1, b1, n2, b2), _t3[p5, n3, n6](n3, b3, n6, b6, m.line)))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, m.level, n1, b1, n2, b2),
+                _t3[p5, n3, n6](n3, b3, n6, b6, m.line)))
         except _FAULTS:
             return _plain(m, Log)
 
@@ -260,11 +277,15 @@ class Log(_Message):
             return Log(Time(sec, nanosec), level, name, msg, file, function, line)
         except _FAULTS:
             return _explain(data, Log)
+
+
 _t4 = _Template("I I $ I", -4)
 _u5 = _Struct("<2I").unpack_from
 
 
 class LoggerLevel(_Message):
+    """How much a logger lets through: messages of this level and above."""
+
     name: str = ""
     level: int = 0
     LOG_LEVEL_UNKNOWN = 0
@@ -312,6 +333,8 @@ class LoggerLevel(_Message):
             return LoggerLevel(name, level)
         except _FAULTS:
             return _explain(data, LoggerLevel)
+
+
 _d1 = _empty("q")
 _d2 = _empty("d")
 _t5 = _Stride("I B ? q d I $ I", -4, 8)
@@ -321,6 +344,8 @@ _u6 = _Struct("<IB?6xqdI").unpack_from
 
 
 class ParameterValue(_Message):
+    """The value of a parameter: type says which of the other fields holds it."""
+
     type: int = 0
     bool_value: bool = False
     integer_value: int = 0
@@ -350,7 +375,11 @@ class ParameterValue(_Message):
         "float64[] double_array_value  # PARAMETER_DOUBLE_ARRAY\n"
         "string[] string_array_value   # PARAMETER_STRING_ARRAY\n"
     )
-    _schema = (("type", "uint8", ""), ("bool_value", "bool", ""), ("integer_value", "int64", ""), ("double_value", "float64", ""), ("string_value", "string", ""), ("byte_array_value", "byte", "[]"), ("bool_array_value", "bool", "[]"), ("integer_array_value", "int64", "[]"), ("double_array_value", "float64", "[]"), ("string_array_value", "string", "[]"))
+    _schema = (("type", "uint8", ""), ("bool_value", "bool", ""), ("integer_value", "int64", ""),
+        ("double_value", "float64", ""), ("string_value", "string", ""),
+        ("byte_array_value", "byte", "[]"), ("bool_array_value", "bool", "[]"),
+        ("integer_array_value", "int64", "[]"), ("double_array_value", "float64", "[]"),
+        ("string_array_value", "string", "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -381,7 +410,10 @@ class ParameterValue(_Message):
             string_array_value, k = m.string_array_value, _s3.written
             b14 = k[1] if string_array_value == k[0] else _s3.put(string_array_value)
             n14 = len(b14)
-            return b"".join((f3(256, m.type, m.bool_value, m.integer_value, m.double_value, n1, b1, n2), byte_array_value, f6(n5), bool_array_value, f9(n8), (_PADDING[-(p10) & 7] if n8 else b""), integer_array_value, _p3(n12), (_PADDING[-(p11 + n8 * 8 + 4) & 7] if n12 else b""), double_array_value, b14))
+            return b"".join((f3(256, m.type, m.bool_value, m.integer_value, m.double_value, n1, b1,
+                n2), byte_array_value, f6(n5), bool_array_value, f9(n8),
+                (_PADDING[-(p10) & 7] if n8 else b""), integer_array_value, _p3(n12),
+                (_PADDING[-(p11 + n8 * 8 + 4) & 7] if n12 else b""), double_array_value, b14))
         except _FAULTS:
             return _plain(m, ParameterValue)
 
@@ -406,11 +438,13 @@ class ParameterValue(_Message):
             (n4,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n4 else p + 4
             p = q + n4 * 8
-            integer_array_value = _array("q", data[q : p]) if n4 < 8192 else _read_block("q", data, q, p)
+            integer_array_value = _array("q", data[q : p]) if n4 < 8192 else _read_block("q", data,
+                q, p)
             (n5,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n5 else p + 4
             p = q + n5 * 8
-            double_array_value = _array("d", data[q : p]) if n5 < 8192 else _read_block("d", data, q, p)
+            double_array_value = _array("d", data[q : p]) if n5 < 8192 else _read_block("d", data,
+                q, p)
             k, string_array_value = _s3.read
             if data.startswith(k, p):
                 p = p + len(k)
@@ -418,9 +452,13 @@ class ParameterValue(_Message):
             else:
                 string_array_value, p = _s3.take(data, p)
             if p > len(data): raise ValueError
-            return ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value)
+            return ParameterValue(type_2, bool_value, integer_value, double_value, string_value,
+                byte_array_value, bool_array_value, integer_array_value, double_array_value,
+                string_array_value)
         except _FAULTS:
             return _explain(data, ParameterValue)
+
+
 _t7 = _Stride("I I $ B ? q d I $ I", -4, 8)
 _s4 = _StringList()
 _u7 = _Struct("<B?").unpack_from
@@ -428,6 +466,8 @@ _u8 = _Struct("<qdI").unpack_from
 
 
 class Parameter(_Message):
+    """A parameter of a node: a name and the value it has or shall get."""
+
     name: str = ""
     value: ParameterValue = _field(default_factory=ParameterValue)
     _type = "rcl_interfaces/Parameter"
@@ -473,7 +513,10 @@ class Parameter(_Message):
             string_array_value, k = value.string_array_value, _s4.written
             b15 = k[1] if string_array_value == k[0] else _s4.put(string_array_value)
             n15 = len(b15)
-            return b"".join((f4(256, n1, b1, value.type, value.bool_value, value.integer_value, value.double_value, n2, b2, n3), byte_array_value, f7(n6), bool_array_value, f10(n9), (_PADDING[-(p11) & 7] if n9 else b""), integer_array_value, _p3(n13), (_PADDING[-(p12 + n9 * 8 + 4) & 7] if n13 else b""), double_array_value, b15))
+            return b"".join((f4(256, n1, b1, value.type, value.bool_value, value.integer_value,
+                value.double_value, n2, b2, n3), byte_array_value, f7(n6), bool_array_value,
+                f10(n9), (_PADDING[-(p11) & 7] if n9 else b""), integer_array_value, _p3(n13),
+                (_PADDING[-(p12 + n9 * 8 + 4) & 7] if n13 else b""), double_array_value, b15))
         except _FAULTS:
             return _plain(m, Parameter)
 
@@ -504,11 +547,13 @@ class Parameter(_Message):
             (n5,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n5 else p + 4
             p = q + n5 * 8
-            integer_array_value = _array("q", data[q : p]) if n5 < 8192 else _read_block("q", data, q, p)
+            integer_array_value = _array("q", data[q : p]) if n5 < 8192 else _read_block("q", data,
+                q, p)
             (n6,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n6 else p + 4
             p = q + n6 * 8
-            double_array_value = _array("d", data[q : p]) if n6 < 8192 else _read_block("d", data, q, p)
+            double_array_value = _array("d", data[q : p]) if n6 < 8192 else _read_block("d", data,
+                q, p)
             k, string_array_value = _s4.read
             if data.startswith(k, p):
                 p = p + len(k)
@@ -516,9 +561,14 @@ class Parameter(_Message):
             else:
                 string_array_value, p = _s4.take(data, p)
             if p > len(data): raise ValueError
-            return Parameter(name, ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value))
+            return Parameter(name,
+                ParameterValue(type_2, bool_value, integer_value, double_value, string_value,
+                byte_array_value, bool_array_value, integer_array_value, double_array_value,
+                string_array_value))
         except _FAULTS:
             return _explain(data, Parameter)
+
+
 _t8 = _Stride("I I $ B I $", -4, 8)
 _t9 = _Stride("I $ ? ? I", None, 8)
 _p4 = _Struct("<3d").pack
@@ -529,6 +579,8 @@ _i2 = _Struct("<2qQ").iter_unpack
 
 
 class ParameterDescriptor(_Message):
+    """What a node says about one of its parameters."""
+
     name: str = ""
     type: int = 0
     description: str = ""
@@ -555,7 +607,10 @@ class ParameterDescriptor(_Message):
         "FloatingPointRange[<=1] floating_point_range\n"
         "IntegerRange[<=1] integer_range\n"
     )
-    _schema = (("name", "string", ""), ("type", "uint8", ""), ("description", "string", ""), ("additional_constraints", "string", ""), ("read_only", "bool", ""), ("dynamic_typing", "bool", ""), ("floating_point_range", FloatingPointRange, "[<=1]"), ("integer_range", IntegerRange, "[<=1]"))
+    _schema = (("name", "string", ""), ("type", "uint8", ""), ("description", "string", ""),
+        ("additional_constraints", "string", ""), ("read_only", "bool", ""),
+        ("dynamic_typing", "bool", ""), ("floating_point_range", FloatingPointRange, "[<=1]"),
+        ("integer_range", IntegerRange, "[<=1]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -577,7 +632,12 @@ class ParameterDescriptor(_Message):
             n10 = len(integer_range)
             if n10 > 1: raise ValueError
             p11 = 0 if n10 else p9 + n6 * 24 + 4
-            return b"".join((f4(256, n1, b1, m.type, n2, b2), f7(n3, b3, m.read_only, m.dynamic_typing, n6), (_PADDING[-(p8) & 7] if n6 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p3(n10), (_PADDING[-(p9 + n6 * 24 + 4) & 7] if n10 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range])))
+            return b"".join((f4(256, n1, b1, m.type, n2, b2),
+                f7(n3, b3, m.read_only, m.dynamic_typing, n6),
+                (_PADDING[-(p8) & 7] if n6 else b""),
+                b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]),
+                _p3(n10), (_PADDING[-(p9 + n6 * 24 + 4) & 7] if n10 else b""),
+                b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range])))
         except _FAULTS:
             return _plain(m, ParameterDescriptor)
 
@@ -612,9 +672,12 @@ class ParameterDescriptor(_Message):
             p = q + n5 * 24
             integer_range = list(_starmap(IntegerRange, _i2(data[q : p])))
             if p > len(data): raise ValueError
-            return ParameterDescriptor(name, type_2, description, additional_constraints, read_only, dynamic_typing, floating_point_range, integer_range)
+            return ParameterDescriptor(name, type_2, description, additional_constraints,
+                read_only, dynamic_typing, floating_point_range, integer_range)
         except _FAULTS:
             return _explain(data, ParameterDescriptor)
+
+
 _t10 = _Stride("I i I I $ I", -4, 8)
 _t11 = _Stride("I $ B ? q d I $ I", None, 8)
 _s5 = _StringList()
@@ -624,6 +687,8 @@ _u10 = _Struct("<Ii2I").unpack_from
 
 
 class ParameterEvent(_Message):
+    """What changed among the parameters of one node, sent on /parameter_events."""
+
     stamp: Time = _field(default_factory=Time)
     node: str = ""
     new_parameters: list[Parameter] = []
@@ -643,7 +708,8 @@ class ParameterEvent(_Message):
         "Parameter[] changed_parameters  # with their new values\n"
         "Parameter[] deleted_parameters  # exist no more\n"
     )
-    _schema = (("stamp", Time, ""), ("node", "string", ""), ("new_parameters", Parameter, "[]"), ("changed_parameters", Parameter, "[]"), ("deleted_parameters", Parameter, "[]"))
+    _schema = (("stamp", Time, ""), ("node", "string", ""), ("new_parameters", Parameter, "[]"),
+        ("changed_parameters", Parameter, "[]"), ("deleted_parameters", Parameter, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -684,7 +750,11 @@ class ParameterEvent(_Message):
                 string_array_value, k = value.string_array_value, _s5.written
                 b20 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
                 n20 = len(b20)
-                out += (f9(n6, b6, value.type, value.bool_value, value.integer_value, value.double_value, n7, b7, n8), byte_array_value, f12(n11), bool_array_value, f15(n14), (_PADDING[-(p16) & 7] if n14 else b""), integer_array_value, _p3(n18), (_PADDING[-(p17 + n14 * 8 + 4) & 7] if n18 else b""), double_array_value, b20)
+                out += (f9(n6, b6, value.type, value.bool_value, value.integer_value,
+                    value.double_value, n7, b7, n8), byte_array_value, f12(n11), bool_array_value,
+                    f15(n14), (_PADDING[-(p16) & 7] if n14 else b""), integer_array_value,
+                    _p3(n18), (_PADDING[-(p17 + n14 * 8 + 4) & 7] if n18 else b""),
+                    double_array_value, b20)
                 p5 = p19 + n18 * 8 + n20 & 7
             changed_parameters = m.changed_parameters
             n21 = len(changed_parameters)
@@ -707,7 +777,10 @@ class ParameterEvent(_Message):
                 n30 = len(bool_array_value_2)
                 f31, p32 = _t6[p29 + n27 & 7]
                 integer_array_value_2 = value_2.integer_array_value
-                if type(integer_array_value_2) is not _array or integer_array_value_2.typecode != "q":
+                if (
+                    type(integer_array_value_2) is not _array
+                    or integer_array_value_2.typecode != "q"
+                ):
                     integer_array_value_2 = _numbers(integer_array_value_2, "q")
                 n33 = len(integer_array_value_2)
                 f34, p35 = _t6[p32 + n30 & 7]
@@ -720,7 +793,11 @@ class ParameterEvent(_Message):
                 string_array_value_2, k = value_2.string_array_value, _s6.written
                 b39 = k[1] if string_array_value_2 == k[0] else _s6.put(string_array_value_2)
                 n39 = len(b39)
-                out += (f28(n25, b25, value_2.type, value_2.bool_value, value_2.integer_value, value_2.double_value, n26, b26, n27), byte_array_value_2, f31(n30), bool_array_value_2, f34(n33), (_PADDING[-(p35) & 7] if n33 else b""), integer_array_value_2, _p3(n37), (_PADDING[-(p36 + n33 * 8 + 4) & 7] if n37 else b""), double_array_value_2, b39)
+                out += (f28(n25, b25, value_2.type, value_2.bool_value, value_2.integer_value,
+                    value_2.double_value, n26, b26, n27), byte_array_value_2, f31(n30),
+                    bool_array_value_2, f34(n33), (_PADDING[-(p35) & 7] if n33 else b""),
+                    integer_array_value_2, _p3(n37),
+                    (_PADDING[-(p36 + n33 * 8 + 4) & 7] if n37 else b""), double_array_value_2, b39)
                 p24 = p38 + n37 * 8 + n39 & 7
             deleted_parameters = m.deleted_parameters
             n40 = len(deleted_parameters)
@@ -743,7 +820,10 @@ class ParameterEvent(_Message):
                 n49 = len(bool_array_value_3)
                 f50, p51 = _t6[p48 + n46 & 7]
                 integer_array_value_3 = value_3.integer_array_value
-                if type(integer_array_value_3) is not _array or integer_array_value_3.typecode != "q":
+                if (
+                    type(integer_array_value_3) is not _array
+                    or integer_array_value_3.typecode != "q"
+                ):
                     integer_array_value_3 = _numbers(integer_array_value_3, "q")
                 n52 = len(integer_array_value_3)
                 f53, p54 = _t6[p51 + n49 & 7]
@@ -756,7 +836,11 @@ class ParameterEvent(_Message):
                 string_array_value_3, k = value_3.string_array_value, _s7.written
                 b58 = k[1] if string_array_value_3 == k[0] else _s7.put(string_array_value_3)
                 n58 = len(b58)
-                out += (f47(n44, b44, value_3.type, value_3.bool_value, value_3.integer_value, value_3.double_value, n45, b45, n46), byte_array_value_3, f50(n49), bool_array_value_3, f53(n52), (_PADDING[-(p54) & 7] if n52 else b""), integer_array_value_3, _p3(n56), (_PADDING[-(p55 + n52 * 8 + 4) & 7] if n56 else b""), double_array_value_3, b58)
+                out += (f47(n44, b44, value_3.type, value_3.bool_value, value_3.integer_value,
+                    value_3.double_value, n45, b45, n46), byte_array_value_3, f50(n49),
+                    bool_array_value_3, f53(n52), (_PADDING[-(p54) & 7] if n52 else b""),
+                    integer_array_value_3, _p3(n56),
+                    (_PADDING[-(p55 + n52 * 8 + 4) & 7] if n56 else b""), double_array_value_3, b58)
                 p43 = p57 + n56 * 8 + n58 & 7
             return b"".join(out)
         except _FAULTS:
@@ -799,18 +883,23 @@ class ParameterEvent(_Message):
                 (n7,) = _u3(data, p)
                 q = (p + 7 | 7) - 3 if n7 else p + 4
                 p = q + n7 * 8
-                integer_array_value = _array("q", data[q : p]) if n7 < 8192 else _read_block("q", data, q, p)
+                integer_array_value = _array("q", data[q : p]) if n7 < 8192 else _read_block("q",
+                    data, q, p)
                 (n8,) = _u3(data, p)
                 q = (p + 7 | 7) - 3 if n8 else p + 4
                 p = q + n8 * 8
-                double_array_value = _array("d", data[q : p]) if n8 < 8192 else _read_block("d", data, q, p)
+                double_array_value = _array("d", data[q : p]) if n8 < 8192 else _read_block("d",
+                    data, q, p)
                 k, string_array_value = _s5.read
                 if data.startswith(k, p):
                     p = p + len(k)
                     string_array_value = string_array_value[:]
                 else:
                     string_array_value, p = _s5.take(data, p)
-                new_parameters.append(Parameter(name, ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value)))
+                new_parameters.append(Parameter(name,
+                    ParameterValue(type_2, bool_value, integer_value, double_value, string_value,
+                    byte_array_value, bool_array_value, integer_array_value, double_array_value,
+                    string_array_value)))
             p = p + 3 & -4
             (n9,) = _u3(data, p)
             changed_parameters = []
@@ -841,18 +930,23 @@ class ParameterEvent(_Message):
                 (n14,) = _u3(data, p)
                 q = (p + 7 | 7) - 3 if n14 else p + 4
                 p = q + n14 * 8
-                integer_array_value_2 = _array("q", data[q : p]) if n14 < 8192 else _read_block("q", data, q, p)
+                integer_array_value_2 = _array("q",
+                    data[q : p]) if n14 < 8192 else _read_block("q", data, q, p)
                 (n15,) = _u3(data, p)
                 q = (p + 7 | 7) - 3 if n15 else p + 4
                 p = q + n15 * 8
-                double_array_value_2 = _array("d", data[q : p]) if n15 < 8192 else _read_block("d", data, q, p)
+                double_array_value_2 = _array("d", data[q : p]) if n15 < 8192 else _read_block("d",
+                    data, q, p)
                 k, string_array_value_2 = _s6.read
                 if data.startswith(k, p):
                     p = p + len(k)
                     string_array_value_2 = string_array_value_2[:]
                 else:
                     string_array_value_2, p = _s6.take(data, p)
-                changed_parameters.append(Parameter(name_2, ParameterValue(type_3, bool_value_2, integer_value_2, double_value_2, string_value_2, byte_array_value_2, bool_array_value_2, integer_array_value_2, double_array_value_2, string_array_value_2)))
+                changed_parameters.append(Parameter(name_2,
+                    ParameterValue(type_3, bool_value_2, integer_value_2, double_value_2,
+                    string_value_2, byte_array_value_2, bool_array_value_2, integer_array_value_2,
+                    double_array_value_2, string_array_value_2)))
             p = p + 3 & -4
             (n16,) = _u3(data, p)
             deleted_parameters = []
@@ -883,27 +977,37 @@ class ParameterEvent(_Message):
                 (n21,) = _u3(data, p)
                 q = (p + 7 | 7) - 3 if n21 else p + 4
                 p = q + n21 * 8
-                integer_array_value_3 = _array("q", data[q : p]) if n21 < 8192 else _read_block("q", data, q, p)
+                integer_array_value_3 = _array("q",
+                    data[q : p]) if n21 < 8192 else _read_block("q", data, q, p)
                 (n22,) = _u3(data, p)
                 q = (p + 7 | 7) - 3 if n22 else p + 4
                 p = q + n22 * 8
-                double_array_value_3 = _array("d", data[q : p]) if n22 < 8192 else _read_block("d", data, q, p)
+                double_array_value_3 = _array("d", data[q : p]) if n22 < 8192 else _read_block("d",
+                    data, q, p)
                 k, string_array_value_3 = _s7.read
                 if data.startswith(k, p):
                     p = p + len(k)
                     string_array_value_3 = string_array_value_3[:]
                 else:
                     string_array_value_3, p = _s7.take(data, p)
-                deleted_parameters.append(Parameter(name_3, ParameterValue(type_4, bool_value_3, integer_value_3, double_value_3, string_value_3, byte_array_value_3, bool_array_value_3, integer_array_value_3, double_array_value_3, string_array_value_3)))
+                deleted_parameters.append(Parameter(name_3,
+                    ParameterValue(type_4, bool_value_3, integer_value_3, double_value_3,
+                    string_value_3, byte_array_value_3, bool_array_value_3, integer_array_value_3,
+                    double_array_value_3, string_array_value_3)))
             if p > len(data): raise ValueError
-            return ParameterEvent(Time(sec, nanosec), node, new_parameters, changed_parameters, deleted_parameters)
+            return ParameterEvent(Time(sec, nanosec), node, new_parameters, changed_parameters,
+                deleted_parameters)
         except _FAULTS:
             return _explain(data, ParameterEvent)
+
+
 _p6 = _Struct("<2I").pack
 _t12 = _Stride("I $ B I $", None, 8)
 
 
 class ParameterEventDescriptors(_Message):
+    """What changed among the parameters of one node, told by descriptors instead of values."""
+
     new_parameters: list[ParameterDescriptor] = []
     changed_parameters: list[ParameterDescriptor] = []
     deleted_parameters: list[ParameterDescriptor] = []
@@ -918,7 +1022,9 @@ class ParameterEventDescriptors(_Message):
         "ParameterDescriptor[] changed_parameters  # as they are now\n"
         "ParameterDescriptor[] deleted_parameters  # exist no more\n"
     )
-    _schema = (("new_parameters", ParameterDescriptor, "[]"), ("changed_parameters", ParameterDescriptor, "[]"), ("deleted_parameters", ParameterDescriptor, "[]"))
+    _schema = (("new_parameters", ParameterDescriptor, "[]"),
+        ("changed_parameters", ParameterDescriptor, "[]"),
+        ("deleted_parameters", ParameterDescriptor, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -945,7 +1051,13 @@ class ParameterEventDescriptors(_Message):
                 n12 = len(integer_range)
                 if n12 > 1: raise ValueError
                 p13 = 0 if n12 else p11 + n8 * 24 + 4
-                out += (f6(n3, b3, new_parameters_one.type, n4, b4), f9(n5, b5, new_parameters_one.read_only, new_parameters_one.dynamic_typing, n8), (_PADDING[-(p10) & 7] if n8 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p3(n12), (_PADDING[-(p11 + n8 * 24 + 4) & 7] if n12 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range]))
+                out += (f6(n3, b3, new_parameters_one.type, n4, b4),
+                    f9(n5, b5, new_parameters_one.read_only, new_parameters_one.dynamic_typing,
+                    n8), (_PADDING[-(p10) & 7] if n8 else b""),
+                    b"".join([_p4(e.from_value, e.to_value,
+                    e.step) for e in floating_point_range]), _p3(n12),
+                    (_PADDING[-(p11 + n8 * 24 + 4) & 7] if n12 else b""),
+                    b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range]))
                 p2 = p13 + n12 * 24 & 7
             changed_parameters = m.changed_parameters
             n14 = len(changed_parameters)
@@ -969,7 +1081,14 @@ class ParameterEventDescriptors(_Message):
                 n25 = len(integer_range_2)
                 if n25 > 1: raise ValueError
                 p26 = 0 if n25 else p24 + n21 * 24 + 4
-                out += (f19(n16, b16, changed_parameters_one.type, n17, b17), f22(n18, b18, changed_parameters_one.read_only, changed_parameters_one.dynamic_typing, n21), (_PADDING[-(p23) & 7] if n21 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range_2]), _p3(n25), (_PADDING[-(p24 + n21 * 24 + 4) & 7] if n25 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_2]))
+                out += (f19(n16, b16, changed_parameters_one.type, n17, b17),
+                    f22(n18, b18, changed_parameters_one.read_only,
+                    changed_parameters_one.dynamic_typing, n21),
+                    (_PADDING[-(p23) & 7] if n21 else b""),
+                    b"".join([_p4(e.from_value, e.to_value,
+                    e.step) for e in floating_point_range_2]), _p3(n25),
+                    (_PADDING[-(p24 + n21 * 24 + 4) & 7] if n25 else b""),
+                    b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_2]))
                 p15 = p26 + n25 * 24 & 7
             deleted_parameters = m.deleted_parameters
             n27 = len(deleted_parameters)
@@ -993,7 +1112,14 @@ class ParameterEventDescriptors(_Message):
                 n38 = len(integer_range_3)
                 if n38 > 1: raise ValueError
                 p39 = 0 if n38 else p37 + n34 * 24 + 4
-                out += (f32(n29, b29, deleted_parameters_one.type, n30, b30), f35(n31, b31, deleted_parameters_one.read_only, deleted_parameters_one.dynamic_typing, n34), (_PADDING[-(p36) & 7] if n34 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range_3]), _p3(n38), (_PADDING[-(p37 + n34 * 24 + 4) & 7] if n38 else b""), b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_3]))
+                out += (f32(n29, b29, deleted_parameters_one.type, n30, b30),
+                    f35(n31, b31, deleted_parameters_one.read_only,
+                    deleted_parameters_one.dynamic_typing, n34),
+                    (_PADDING[-(p36) & 7] if n34 else b""),
+                    b"".join([_p4(e.from_value, e.to_value,
+                    e.step) for e in floating_point_range_3]), _p3(n38),
+                    (_PADDING[-(p37 + n34 * 24 + 4) & 7] if n38 else b""),
+                    b"".join([_p5(e.from_value, e.to_value, e.step) for e in integer_range_3]))
                 p28 = p39 + n38 * 24 & 7
             return b"".join(out)
         except _FAULTS:
@@ -1034,7 +1160,9 @@ class ParameterEventDescriptors(_Message):
                 q = (p + 7 | 7) - 3 if n6 else p + 4
                 p = q + n6 * 24
                 integer_range = list(_starmap(IntegerRange, _i2(data[q : p])))
-                new_parameters.append(ParameterDescriptor(name, type_2, description, additional_constraints, read_only, dynamic_typing, floating_point_range, integer_range))
+                new_parameters.append(ParameterDescriptor(name, type_2, description,
+                    additional_constraints, read_only, dynamic_typing, floating_point_range,
+                    integer_range))
             (n7,) = _u3(data, p)
             changed_parameters = []
             p = p + 4
@@ -1066,7 +1194,9 @@ class ParameterEventDescriptors(_Message):
                 q = (p + 7 | 7) - 3 if n12 else p + 4
                 p = q + n12 * 24
                 integer_range_2 = list(_starmap(IntegerRange, _i2(data[q : p])))
-                changed_parameters.append(ParameterDescriptor(name_2, type_3, description_2, additional_constraints_2, read_only_2, dynamic_typing_2, floating_point_range_2, integer_range_2))
+                changed_parameters.append(ParameterDescriptor(name_2, type_3, description_2,
+                    additional_constraints_2, read_only_2, dynamic_typing_2,
+                    floating_point_range_2, integer_range_2))
             (n13,) = _u3(data, p)
             deleted_parameters = []
             p = p + 4
@@ -1098,16 +1228,22 @@ class ParameterEventDescriptors(_Message):
                 q = (p + 7 | 7) - 3 if n18 else p + 4
                 p = q + n18 * 24
                 integer_range_3 = list(_starmap(IntegerRange, _i2(data[q : p])))
-                deleted_parameters.append(ParameterDescriptor(name_3, type_4, description_3, additional_constraints_3, read_only_3, dynamic_typing_3, floating_point_range_3, integer_range_3))
+                deleted_parameters.append(ParameterDescriptor(name_3, type_4, description_3,
+                    additional_constraints_3, read_only_3, dynamic_typing_3,
+                    floating_point_range_3, integer_range_3))
             if p > len(data): raise ValueError
             return ParameterEventDescriptors(new_parameters, changed_parameters, deleted_parameters)
         except _FAULTS:
             return _explain(data, ParameterEventDescriptors)
-_t13 = _Template("I x", -4)
+
+
+_p7 = _Struct("<Ix").pack
 _u11 = _Struct("<Ix").unpack_from
 
 
 class ParameterType(_Message):
+    """The types that a parameter can have; see the field type of ParameterValue and ParameterDescriptor."""
+
     PARAMETER_NOT_SET = 0
     PARAMETER_BOOL = 1
     PARAMETER_INTEGER = 2
@@ -1141,7 +1277,7 @@ class ParameterType(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t13[0](256)
+            return _p7(256)
         except _FAULTS:
             return _plain(m, ParameterType)
 
@@ -1153,11 +1289,15 @@ class ParameterType(_Message):
             return ParameterType()
         except _FAULTS:
             return _explain(data, ParameterType)
-_t14 = _Stride("I ? I $", -4, 4)
+
+
+_t13 = _Stride("I ? I $", -4, 4)
 _u12 = _Struct("<I?3xI").unpack_from
 
 
 class SetLoggerLevelsResult(_Message):
+    """Whether one logger took its new level."""
+
     successful: bool = False
     reason: str = ""
     _type = "rcl_interfaces/SetLoggerLevelsResult"
@@ -1178,7 +1318,7 @@ class SetLoggerLevelsResult(_Message):
             b1 = m.reason.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t14[n1]
+            f2, p3 = _t13[n1]
             return f2(256, m.successful, n1, b1)
         except _FAULTS:
             return _plain(m, SetLoggerLevelsResult)
@@ -1197,6 +1337,8 @@ class SetLoggerLevelsResult(_Message):
 
 
 class SetParametersResult(_Message):
+    """Whether one parameter, or one set of them, took its new value."""
+
     successful: bool = False
     reason: str = ""
     _type = "rcl_interfaces/SetParametersResult"
@@ -1217,7 +1359,7 @@ class SetParametersResult(_Message):
             b1 = m.reason.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t14[n1]
+            f2, p3 = _t13[n1]
             return f2(256, m.successful, n1, b1)
         except _FAULTS:
             return _plain(m, SetParametersResult)

@@ -67,6 +67,8 @@ _u1 = _Struct("<I").unpack_from
 
 
 class DescribeParametersRequest(_Message):
+    """Ask a node for the type and limits of some of its parameters."""
+
     names: list[str] = []
     _type = "rcl_interfaces/DescribeParametersRequest"
     _type_name = "rcl_interfaces/srv/DescribeParameters_Request"
@@ -103,6 +105,8 @@ class DescribeParametersRequest(_Message):
             return DescribeParametersRequest(names)
         except _FAULTS:
             return _explain(data, DescribeParametersRequest)
+
+
 _p2 = _Struct("<2I").pack
 _t1 = _Stride("I $ B I $", None, 8)
 _t2 = _Stride("I $ ? ? I", None, 8)
@@ -148,7 +152,13 @@ class DescribeParametersResponse(_Message):
                 n12 = len(integer_range)
                 if n12 > 1: raise ValueError
                 p13 = 0 if n12 else p11 + n8 * 24 + 4
-                out += (f6(n3, b3, descriptors_one.type, n4, b4), f9(n5, b5, descriptors_one.read_only, descriptors_one.dynamic_typing, n8), (_PADDING[-(p10) & 7] if n8 else b""), b"".join([_p3(e.from_value, e.to_value, e.step) for e in floating_point_range]), _p1(n12), (_PADDING[-(p11 + n8 * 24 + 4) & 7] if n12 else b""), b"".join([_p4(e.from_value, e.to_value, e.step) for e in integer_range]))
+                out += (f6(n3, b3, descriptors_one.type, n4, b4),
+                    f9(n5, b5, descriptors_one.read_only, descriptors_one.dynamic_typing, n8),
+                    (_PADDING[-(p10) & 7] if n8 else b""),
+                    b"".join([_p3(e.from_value, e.to_value,
+                    e.step) for e in floating_point_range]), _p1(n12),
+                    (_PADDING[-(p11 + n8 * 24 + 4) & 7] if n12 else b""),
+                    b"".join([_p4(e.from_value, e.to_value, e.step) for e in integer_range]))
                 p2 = p13 + n12 * 24 & 7
             return b"".join(out)
         except _FAULTS:
@@ -189,7 +199,9 @@ class DescribeParametersResponse(_Message):
                 q = (p + 7 | 7) - 3 if n6 else p + 4
                 p = q + n6 * 24
                 integer_range = list(_starmap(IntegerRange, _i2(data[q : p])))
-                descriptors.append(ParameterDescriptor(name, type_2, description, additional_constraints, read_only, dynamic_typing, floating_point_range, integer_range))
+                descriptors.append(ParameterDescriptor(name, type_2, description,
+                    additional_constraints, read_only, dynamic_typing, floating_point_range,
+                    integer_range))
             if p > len(data): raise ValueError
             return DescribeParametersResponse(descriptors)
         except _FAULTS:
@@ -197,6 +209,8 @@ class DescribeParametersResponse(_Message):
 
 
 class DescribeParameters(_Service):
+    """Ask a node for the type and limits of some of its parameters."""
+
     Request = DescribeParametersRequest
     Response = DescribeParametersResponse
     _type = "rcl_interfaces/DescribeParameters"
@@ -210,10 +224,14 @@ class DescribeParameters(_Service):
         "---\n"
         "ParameterDescriptor[] descriptors  # in the order of names; empty if one of them is not declared\n"
     )
+
+
 _s2 = _StringList()
 
 
 class GetLoggerLevelsRequest(_Message):
+    """Ask a node how much some of its loggers let through."""
+
     names: list[str] = []
     _type = "rcl_interfaces/GetLoggerLevelsRequest"
     _type_name = "rcl_interfaces/srv/GetLoggerLevels_Request"
@@ -250,6 +268,8 @@ class GetLoggerLevelsRequest(_Message):
             return GetLoggerLevelsRequest(names)
         except _FAULTS:
             return _explain(data, GetLoggerLevelsRequest)
+
+
 _t3 = _Template("I $ I", 0)
 
 
@@ -298,6 +318,8 @@ class GetLoggerLevelsResponse(_Message):
 
 
 class GetLoggerLevels(_Service):
+    """Ask a node how much some of its loggers let through."""
+
     Request = GetLoggerLevelsRequest
     Response = GetLoggerLevelsResponse
     _type = "rcl_interfaces/GetLoggerLevels"
@@ -311,10 +333,14 @@ class GetLoggerLevels(_Service):
         "---\n"
         "LoggerLevel[] levels  # in the order of names\n"
     )
+
+
 _s3 = _StringList()
 
 
 class GetParameterTypesRequest(_Message):
+    """Ask a node for the types of some of its parameters."""
+
     names: list[str] = []
     _type = "rcl_interfaces/GetParameterTypesRequest"
     _type_name = "rcl_interfaces/srv/GetParameterTypes_Request"
@@ -387,6 +413,8 @@ class GetParameterTypesResponse(_Message):
 
 
 class GetParameterTypes(_Service):
+    """Ask a node for the types of some of its parameters."""
+
     Request = GetParameterTypesRequest
     Response = GetParameterTypesResponse
     _type = "rcl_interfaces/GetParameterTypes"
@@ -400,10 +428,14 @@ class GetParameterTypes(_Service):
         "---\n"
         "uint8[] types  # constants of ParameterType, in the order of names; empty if one is not declared\n"
     )
+
+
 _s4 = _StringList()
 
 
 class GetParametersRequest(_Message):
+    """Ask a node for the values of some of its parameters."""
+
     names: list[str] = []
     _type = "rcl_interfaces/GetParametersRequest"
     _type_name = "rcl_interfaces/srv/GetParameters_Request"
@@ -440,6 +472,8 @@ class GetParametersRequest(_Message):
             return GetParametersRequest(names)
         except _FAULTS:
             return _explain(data, GetParametersRequest)
+
+
 _t4 = _Stride("B ? q d I $ I", None, 8)
 _t5 = _Stride("I", None, 8)
 _s5 = _StringList()
@@ -490,7 +524,11 @@ class GetParametersResponse(_Message):
                 string_array_value, k = values_one.string_array_value, _s5.written
                 b16 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
                 n16 = len(b16)
-                out += (f5(values_one.type, values_one.bool_value, values_one.integer_value, values_one.double_value, n3, b3, n4), byte_array_value, f8(n7), bool_array_value, f11(n10), (_PADDING[-(p12) & 7] if n10 else b""), integer_array_value, _p1(n14), (_PADDING[-(p13 + n10 * 8 + 4) & 7] if n14 else b""), double_array_value, b16)
+                out += (f5(values_one.type, values_one.bool_value, values_one.integer_value,
+                    values_one.double_value, n3, b3, n4), byte_array_value, f8(n7),
+                    bool_array_value, f11(n10), (_PADDING[-(p12) & 7] if n10 else b""),
+                    integer_array_value, _p1(n14),
+                    (_PADDING[-(p13 + n10 * 8 + 4) & 7] if n14 else b""), double_array_value, b16)
                 p2 = p15 + n14 * 8 + n16 & 7
             return b"".join(out)
         except _FAULTS:
@@ -524,18 +562,22 @@ class GetParametersResponse(_Message):
                 (n5,) = _u1(data, p)
                 q = (p + 7 | 7) - 3 if n5 else p + 4
                 p = q + n5 * 8
-                integer_array_value = _array("q", data[q : p]) if n5 < 8192 else _read_block("q", data, q, p)
+                integer_array_value = _array("q", data[q : p]) if n5 < 8192 else _read_block("q",
+                    data, q, p)
                 (n6,) = _u1(data, p)
                 q = (p + 7 | 7) - 3 if n6 else p + 4
                 p = q + n6 * 8
-                double_array_value = _array("d", data[q : p]) if n6 < 8192 else _read_block("d", data, q, p)
+                double_array_value = _array("d", data[q : p]) if n6 < 8192 else _read_block("d",
+                    data, q, p)
                 k, string_array_value = _s5.read
                 if data.startswith(k, p):
                     p = p + len(k)
                     string_array_value = string_array_value[:]
                 else:
                     string_array_value, p = _s5.take(data, p)
-                values.append(ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value))
+                values.append(ParameterValue(type_2, bool_value, integer_value, double_value,
+                    string_value, byte_array_value, bool_array_value, integer_array_value,
+                    double_array_value, string_array_value))
             if p > len(data): raise ValueError
             return GetParametersResponse(values)
         except _FAULTS:
@@ -543,6 +585,8 @@ class GetParametersResponse(_Message):
 
 
 class GetParameters(_Service):
+    """Ask a node for the values of some of its parameters."""
+
     Request = GetParametersRequest
     Response = GetParametersResponse
     _type = "rcl_interfaces/GetParameters"
@@ -556,12 +600,16 @@ class GetParameters(_Service):
         "---\n"
         "ParameterValue[] values  # in the order of names; empty if one of them is not declared\n"
     )
+
+
 _s6 = _StringList()
 _t6 = _Template("Q", None)
 _u6 = _Struct("<Q").unpack_from
 
 
 class ListParametersRequest(_Message):
+    """Ask a node which parameters it has."""
+
     prefixes: list[str] = []
     depth: int = 0
     DEPTH_RECURSIVE = 0
@@ -605,6 +653,8 @@ class ListParametersRequest(_Message):
             return ListParametersRequest(prefixes, depth)
         except _FAULTS:
             return _explain(data, ListParametersRequest)
+
+
 _s7 = _StringList()
 _s8 = _StringList()
 _t7 = _Template("|4", None)
@@ -657,6 +707,8 @@ class ListParametersResponse(_Message):
 
 
 class ListParameters(_Service):
+    """Ask a node which parameters it has."""
+
     Request = ListParametersRequest
     Response = ListParametersResponse
     _type = "rcl_interfaces/ListParameters"
@@ -676,6 +728,8 @@ class ListParameters(_Service):
 
 
 class SetLoggerLevelsRequest(_Message):
+    """Tell a node how much some of its loggers shall let through."""
+
     levels: list[LoggerLevel] = []
     _type = "rcl_interfaces/SetLoggerLevelsRequest"
     _type_name = "rcl_interfaces/srv/SetLoggerLevels_Request"
@@ -721,6 +775,8 @@ class SetLoggerLevelsRequest(_Message):
             return SetLoggerLevelsRequest(levels)
         except _FAULTS:
             return _explain(data, SetLoggerLevelsRequest)
+
+
 _t8 = _Stride("? I $", None, 4)
 _u7 = _Struct("<?").unpack_from
 
@@ -774,6 +830,8 @@ class SetLoggerLevelsResponse(_Message):
 
 
 class SetLoggerLevels(_Service):
+    """Tell a node how much some of its loggers shall let through."""
+
     Request = SetLoggerLevelsRequest
     Response = SetLoggerLevelsResponse
     _type = "rcl_interfaces/SetLoggerLevels"
@@ -787,11 +845,15 @@ class SetLoggerLevels(_Service):
         "---\n"
         "SetLoggerLevelsResult[] results  # in the order of levels\n"
     )
+
+
 _t9 = _Stride("I $ B ? q d I $ I", None, 8)
 _s9 = _StringList()
 
 
 class SetParametersRequest(_Message):
+    """Set parameters of a node one by one: some may be taken while others are refused."""
+
     parameters: list[Parameter] = []
     _type = "rcl_interfaces/SetParametersRequest"
     _type_name = "rcl_interfaces/srv/SetParameters_Request"
@@ -840,7 +902,11 @@ class SetParametersRequest(_Message):
                 string_array_value, k = value.string_array_value, _s9.written
                 b17 = k[1] if string_array_value == k[0] else _s9.put(string_array_value)
                 n17 = len(b17)
-                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value, value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value, f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value, _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""), double_array_value, b17)
+                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value,
+                    value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value,
+                    f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value,
+                    _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""),
+                    double_array_value, b17)
                 p2 = p16 + n15 * 8 + n17 & 7
             return b"".join(out)
         except _FAULTS:
@@ -879,18 +945,23 @@ class SetParametersRequest(_Message):
                 (n6,) = _u1(data, p)
                 q = (p + 7 | 7) - 3 if n6 else p + 4
                 p = q + n6 * 8
-                integer_array_value = _array("q", data[q : p]) if n6 < 8192 else _read_block("q", data, q, p)
+                integer_array_value = _array("q", data[q : p]) if n6 < 8192 else _read_block("q",
+                    data, q, p)
                 (n7,) = _u1(data, p)
                 q = (p + 7 | 7) - 3 if n7 else p + 4
                 p = q + n7 * 8
-                double_array_value = _array("d", data[q : p]) if n7 < 8192 else _read_block("d", data, q, p)
+                double_array_value = _array("d", data[q : p]) if n7 < 8192 else _read_block("d",
+                    data, q, p)
                 k, string_array_value = _s9.read
                 if data.startswith(k, p):
                     p = p + len(k)
                     string_array_value = string_array_value[:]
                 else:
                     string_array_value, p = _s9.take(data, p)
-                parameters.append(Parameter(name, ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value)))
+                parameters.append(Parameter(name,
+                    ParameterValue(type_2, bool_value, integer_value, double_value, string_value,
+                    byte_array_value, bool_array_value, integer_array_value, double_array_value,
+                    string_array_value)))
             if p > len(data): raise ValueError
             return SetParametersRequest(parameters)
         except _FAULTS:
@@ -946,6 +1017,8 @@ class SetParametersResponse(_Message):
 
 
 class SetParameters(_Service):
+    """Set parameters of a node one by one: some may be taken while others are refused."""
+
     Request = SetParametersRequest
     Response = SetParametersResponse
     _type = "rcl_interfaces/SetParameters"
@@ -959,10 +1032,14 @@ class SetParameters(_Service):
         "---\n"
         "SetParametersResult[] results  # in the order of parameters\n"
     )
+
+
 _s10 = _StringList()
 
 
 class SetParametersAtomicallyRequest(_Message):
+    """Set parameters of a node together: all of them are taken, or none is."""
+
     parameters: list[Parameter] = []
     _type = "rcl_interfaces/SetParametersAtomicallyRequest"
     _type_name = "rcl_interfaces/srv/SetParametersAtomically_Request"
@@ -1011,7 +1088,11 @@ class SetParametersAtomicallyRequest(_Message):
                 string_array_value, k = value.string_array_value, _s10.written
                 b17 = k[1] if string_array_value == k[0] else _s10.put(string_array_value)
                 n17 = len(b17)
-                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value, value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value, f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value, _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""), double_array_value, b17)
+                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value,
+                    value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value,
+                    f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value,
+                    _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""),
+                    double_array_value, b17)
                 p2 = p16 + n15 * 8 + n17 & 7
             return b"".join(out)
         except _FAULTS:
@@ -1050,22 +1131,29 @@ class SetParametersAtomicallyRequest(_Message):
                 (n6,) = _u1(data, p)
                 q = (p + 7 | 7) - 3 if n6 else p + 4
                 p = q + n6 * 8
-                integer_array_value = _array("q", data[q : p]) if n6 < 8192 else _read_block("q", data, q, p)
+                integer_array_value = _array("q", data[q : p]) if n6 < 8192 else _read_block("q",
+                    data, q, p)
                 (n7,) = _u1(data, p)
                 q = (p + 7 | 7) - 3 if n7 else p + 4
                 p = q + n7 * 8
-                double_array_value = _array("d", data[q : p]) if n7 < 8192 else _read_block("d", data, q, p)
+                double_array_value = _array("d", data[q : p]) if n7 < 8192 else _read_block("d",
+                    data, q, p)
                 k, string_array_value = _s10.read
                 if data.startswith(k, p):
                     p = p + len(k)
                     string_array_value = string_array_value[:]
                 else:
                     string_array_value, p = _s10.take(data, p)
-                parameters.append(Parameter(name, ParameterValue(type_2, bool_value, integer_value, double_value, string_value, byte_array_value, bool_array_value, integer_array_value, double_array_value, string_array_value)))
+                parameters.append(Parameter(name,
+                    ParameterValue(type_2, bool_value, integer_value, double_value, string_value,
+                    byte_array_value, bool_array_value, integer_array_value, double_array_value,
+                    string_array_value)))
             if p > len(data): raise ValueError
             return SetParametersAtomicallyRequest(parameters)
         except _FAULTS:
             return _explain(data, SetParametersAtomicallyRequest)
+
+
 _t10 = _Stride("I ? I $", -4, 4)
 _u8 = _Struct("<I?3xI").unpack_from
 
@@ -1105,6 +1193,8 @@ class SetParametersAtomicallyResponse(_Message):
 
 
 class SetParametersAtomically(_Service):
+    """Set parameters of a node together: all of them are taken, or none is."""
+
     Request = SetParametersAtomicallyRequest
     Response = SetParametersAtomicallyResponse
     _type = "rcl_interfaces/SetParametersAtomically"

@@ -22,6 +22,8 @@ _u2 = _Struct("<I").unpack_from
 
 
 class Logger(_Message):
+    """How much a logger of a ROS 1 node lets through."""
+
     name: str = ""
     level: str = ""
     _type = "roscpp/Logger"

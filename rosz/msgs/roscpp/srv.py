@@ -7,7 +7,6 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
@@ -27,11 +26,13 @@ __all__ = (
     "SetLoggerLevelResponse",
 )
 
-_t1 = _Template("I x", -4)
+_p1 = _Struct("<Ix").pack
 _u1 = _Struct("<Ix").unpack_from
 
 
 class EmptyRequest(_Message):
+    """Do the thing that the service is named after. No argument and no result."""
+
     _type = "roscpp/EmptyRequest"
     _type_name = "roscpp/srv/Empty_Request"
     _type_hash = "RIHS01_2c003a1569444f2e878297dfc7bbc172b22dd473a3bd4bd5d2e529f520c66a4d"
@@ -42,7 +43,7 @@ class EmptyRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, EmptyRequest)
 
@@ -67,7 +68,7 @@ class EmptyResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, EmptyResponse)
 
@@ -82,6 +83,8 @@ class EmptyResponse(_Message):
 
 
 class Empty(_Service):
+    """Do the thing that the service is named after. No argument and no result."""
+
     Request = EmptyRequest
     Response = EmptyResponse
     _type = "roscpp/Empty"
@@ -95,6 +98,8 @@ class Empty(_Service):
 
 
 class GetLoggersRequest(_Message):
+    """Ask a ROS 1 node which loggers it has."""
+
     _type = "roscpp/GetLoggersRequest"
     _type_name = "roscpp/srv/GetLoggers_Request"
     _type_hash = "RIHS01_5ffad8de11b43a2a26252ac777fa1001ef0268a3ed8d90ae476a912fc61f91fa"
@@ -105,7 +110,7 @@ class GetLoggersRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, GetLoggersRequest)
 
@@ -117,8 +122,10 @@ class GetLoggersRequest(_Message):
             return GetLoggersRequest()
         except _FAULTS:
             return _explain(data, GetLoggersRequest)
-_p1 = _Struct("<2I").pack
-_t2 = _Stride("I $ I $", None, 4)
+
+
+_p2 = _Struct("<2I").pack
+_t1 = _Stride("I $ I $", None, 4)
 _u2 = _Struct("<2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
@@ -137,14 +144,14 @@ class GetLoggersResponse(_Message):
         try:
             loggers = m.loggers
             n1 = len(loggers)
-            out = [_p1(256, n1)]
+            out = [_p2(256, n1)]
             p2 = 0
             for loggers_one in loggers:
                 n3, b3 = _texts[loggers_one.name]
                 b4 = loggers_one.level.encode()
                 if 0 in b4: raise ValueError
                 n4 = len(b4) + 1
-                f5, p6 = _t2[p2, n3, n4]
+                f5, p6 = _t1[p2, n3, n4]
                 out.append(f5(n3, b3, n4, b4))
                 p2 = p6
             return b"".join(out)
@@ -177,6 +184,8 @@ class GetLoggersResponse(_Message):
 
 
 class GetLoggers(_Service):
+    """Ask a ROS 1 node which loggers it has."""
+
     Request = GetLoggersRequest
     Response = GetLoggersResponse
     _type = "roscpp/GetLoggers"
@@ -188,11 +197,15 @@ class GetLoggers(_Service):
         "---\n"
         "Logger[] loggers\n"
     )
-_t3 = _Stride("I I $", -4, 4)
-_t4 = _Stride("I $", None, 4)
+
+
+_t2 = _Stride("I I $", -4, 4)
+_t3 = _Stride("I $", None, 4)
 
 
 class SetLoggerLevelRequest(_Message):
+    """Tell a ROS 1 node how much a logger shall let through."""
+
     logger: str = ""
     level: str = ""
     _type = "roscpp/SetLoggerLevelRequest"
@@ -216,8 +229,8 @@ class SetLoggerLevelRequest(_Message):
             b2 = m.level.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            f3, p4 = _t3[n1]
-            f5, p6 = _t4[p4, n2]
+            f3, p4 = _t2[n1]
+            f5, p6 = _t3[p4, n2]
             return b"".join((f3(256, n1, b1), f5(n2, b2)))
         except _FAULTS:
             return _plain(m, SetLoggerLevelRequest)
@@ -251,7 +264,7 @@ class SetLoggerLevelResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, SetLoggerLevelResponse)
 
@@ -266,6 +279,8 @@ class SetLoggerLevelResponse(_Message):
 
 
 class SetLoggerLevel(_Service):
+    """Tell a ROS 1 node how much a logger shall let through."""
+
     Request = SetLoggerLevelRequest
     Response = SetLoggerLevelResponse
     _type = "roscpp/SetLoggerLevel"

@@ -22,6 +22,8 @@ _u1 = _Struct("<I2q").unpack_from
 
 
 class TwoIntsRequest(_Message):
+    """Add two numbers: the first service of every tutorial."""
+
     a: int = 0
     b: int = 0
     _type = "roscpp_tutorials/TwoIntsRequest"
@@ -46,11 +48,13 @@ class TwoIntsRequest(_Message):
     @staticmethod
     def _decode(data: bytes) -> TwoIntsRequest:
         try:
-            h, a_2, b_2 = _u1(data)
+            h, a, b_2 = _u1(data)
             if h != 256: raise ValueError
-            return TwoIntsRequest(a_2, b_2)
+            return TwoIntsRequest(a, b_2)
         except _FAULTS:
             return _explain(data, TwoIntsRequest)
+
+
 _p2 = _Struct("<Iq").pack
 _u2 = _Struct("<Iq").unpack_from
 
@@ -82,6 +86,8 @@ class TwoIntsResponse(_Message):
 
 
 class TwoInts(_Service):
+    """Add two numbers: the first service of every tutorial."""
+
     Request = TwoIntsRequest
     Response = TwoIntsResponse
     _type = "roscpp_tutorials/TwoInts"

@@ -29,6 +29,8 @@ _u1 = _Struct("<IiI").unpack_from
 
 
 class Clock(_Message):
+    """The time that a simulator or a player dictates, sent on /clock."""
+
     clock: Time = _field(default_factory=Time)
     _type = "rosgraph_msgs/Clock"
     _type_name = "rosgraph_msgs/msg/Clock"
@@ -57,6 +59,8 @@ class Clock(_Message):
             return Clock(Time(sec, nanosec))
         except _FAULTS:
             return _explain(data, Clock)
+
+
 _t1 = _Stride("I i I I $ B I $", -4, 4)
 _t2 = _Stride("I $", None, 4)
 _s1 = _StringList()
@@ -66,6 +70,8 @@ _u3 = _Struct("<I").unpack_from
 
 
 class Log(_Message):
+    """One line of a node's log, as ROS 1 sends it on /rosout."""
+
     header: Header = _field(default_factory=Header)
     level: int = 0
     name: str = ""
@@ -103,7 +109,9 @@ class Log(_Message):
         "uint32 line             # line in that file\n"
         "string[] topics         # topics that the node publishes\n"
     )
-    _schema = (("header", Header, ""), ("level", "byte", ""), ("name", "string", ""), ("msg", "string", ""), ("file", "string", ""), ("function", "string", ""), ("line", "uint32", ""), ("topics", "string", "[]"))
+    _schema = (("header", Header, ""), ("level", "byte", ""), ("name", "string", ""),
+        ("msg", "string", ""), ("file", "string", ""), ("function", "string", ""),
+        ("line", "uint32", ""), ("topics", "string", "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -122,7 +130,8 @@ class Log(_Message):
             topics, k = m.topics, _s1.written
             b10 = k[1] if topics == k[0] else _s1.put(topics)
             n10 = len(b10)
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.level, n2, b2), f7(n3, b3), _t3[p8, n6, n9](n6, b6, n9, b9, m.line), b10))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.level, n2, b2),
+                f7(n3, b3), _t3[p8, n6, n9](n6, b6, n9, b9, m.line), b10))
         except _FAULTS:
             return _plain(m, Log)
 
@@ -162,9 +171,12 @@ class Log(_Message):
                 topics = topics[:]
             else:
                 topics, p = _s1.take(data, p + 4)
-            return Log(Header(Time(sec, nanosec), frame_id), level, name, msg, file, function, line, topics)
+            return Log(Header(Time(sec, nanosec), frame_id), level, name, msg, file, function,
+                line, topics)
         except _FAULTS:
             return _explain(data, Log)
+
+
 _t4 = _Stride("I I $", -4, 4)
 _t5 = _Template("I $ i I i I i i i i I i I i I i I i I i I", None)
 _u4 = _Struct("<2I").unpack_from
@@ -172,6 +184,8 @@ _u5 = _Struct("<iIiI4iIiIiIiIiIiI").unpack_from
 
 
 class TopicStatistics(_Message):
+    """What one subscriber measured on one connection during a window of time (ROS 1's /statistics)."""
+
     topic: str = ""
     node_pub: str = ""
     node_sub: str = ""
@@ -214,7 +228,12 @@ class TopicStatistics(_Message):
         "duration stamp_age_stddev\n"
         "duration stamp_age_max\n"
     )
-    _schema = (("topic", "string", ""), ("node_pub", "string", ""), ("node_sub", "string", ""), ("window_start", Time, ""), ("window_stop", Time, ""), ("delivered_msgs", "int32", ""), ("dropped_msgs", "int32", ""), ("traffic", "int32", ""), ("period_mean", Duration, ""), ("period_stddev", Duration, ""), ("period_max", Duration, ""), ("stamp_age_mean", Duration, ""), ("stamp_age_stddev", Duration, ""), ("stamp_age_max", Duration, ""))
+    _schema = (("topic", "string", ""), ("node_pub", "string", ""), ("node_sub", "string", ""),
+        ("window_start", Time, ""), ("window_stop", Time, ""), ("delivered_msgs", "int32", ""),
+        ("dropped_msgs", "int32", ""), ("traffic", "int32", ""), ("period_mean", Duration, ""),
+        ("period_stddev", Duration, ""), ("period_max", Duration, ""),
+        ("stamp_age_mean", Duration, ""), ("stamp_age_stddev", Duration, ""),
+        ("stamp_age_max", Duration, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -238,7 +257,13 @@ class TopicStatistics(_Message):
             stamp_age_mean = m.stamp_age_mean
             stamp_age_stddev = m.stamp_age_stddev
             stamp_age_max = m.stamp_age_max
-            return b"".join((f3(256, n1, b1), f6(n2, b2), _t5[p7, n5](n5, b5, window_start.sec, window_start.nanosec, window_stop.sec, window_stop.nanosec, m.delivered_msgs, m.dropped_msgs, m.traffic, period_mean.sec, period_mean.nanosec, period_stddev.sec, period_stddev.nanosec, period_max.sec, period_max.nanosec, stamp_age_mean.sec, stamp_age_mean.nanosec, stamp_age_stddev.sec, stamp_age_stddev.nanosec, stamp_age_max.sec, stamp_age_max.nanosec)))
+            return b"".join((f3(256, n1, b1), f6(n2, b2),
+                _t5[p7, n5](n5, b5, window_start.sec, window_start.nanosec, window_stop.sec,
+                window_stop.nanosec, m.delivered_msgs, m.dropped_msgs, m.traffic, period_mean.sec,
+                period_mean.nanosec, period_stddev.sec, period_stddev.nanosec, period_max.sec,
+                period_max.nanosec, stamp_age_mean.sec, stamp_age_mean.nanosec,
+                stamp_age_stddev.sec, stamp_age_stddev.nanosec, stamp_age_max.sec,
+                stamp_age_max.nanosec)))
         except _FAULTS:
             return _plain(m, TopicStatistics)
 
@@ -260,7 +285,12 @@ class TopicStatistics(_Message):
             p = q + n3
             node_sub = data[q : p - 1].decode()
             p = p + 3 & -4
-            sec, nanosec, sec_2, nanosec_2, delivered_msgs, dropped_msgs, traffic, sec_3, nanosec_3, sec_4, nanosec_4, sec_5, nanosec_5, sec_6, nanosec_6, sec_7, nanosec_7, sec_8, nanosec_8 = _u5(data, p)
-            return TopicStatistics(topic, node_pub, node_sub, Time(sec, nanosec), Time(sec_2, nanosec_2), delivered_msgs, dropped_msgs, traffic, Duration(sec_3, nanosec_3), Duration(sec_4, nanosec_4), Duration(sec_5, nanosec_5), Duration(sec_6, nanosec_6), Duration(sec_7, nanosec_7), Duration(sec_8, nanosec_8))
+            (sec, nanosec, sec_2, nanosec_2, delivered_msgs, dropped_msgs, traffic, sec_3,
+                nanosec_3, sec_4, nanosec_4, sec_5, nanosec_5, sec_6, nanosec_6, sec_7, nanosec_7,
+                sec_8, nanosec_8) = _u5(data, p)
+            return TopicStatistics(topic, node_pub, node_sub, Time(sec, nanosec),
+                Time(sec_2, nanosec_2), delivered_msgs, dropped_msgs, traffic,
+                Duration(sec_3, nanosec_3), Duration(sec_4, nanosec_4), Duration(sec_5, nanosec_5),
+                Duration(sec_6, nanosec_6), Duration(sec_7, nanosec_7), Duration(sec_8, nanosec_8))
         except _FAULTS:
             return _explain(data, TopicStatistics)

@@ -31,6 +31,8 @@ _u1 = _Struct("<2I").unpack_from
 
 
 class Floats(_Message):
+    """A list of numbers, which rospy's tutorial on numpy sends."""
+
     data: _Array[float] = _field(default_factory=_d1)
     _type = "rospy_tutorials/Floats"
     _type_name = "rospy_tutorials/msg/Floats"
@@ -65,12 +67,16 @@ class Floats(_Message):
             return Floats(data_2)
         except _FAULTS:
             return _explain(data, Floats)
+
+
 _t1 = _Stride("I i I I $ I $", -4, 4)
 _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
 
 class HeaderString(_Message):
+    """A text with a header."""
+
     header: Header = _field(default_factory=Header)
     data: str = ""
     _type = "rospy_tutorials/HeaderString"

@@ -25,6 +25,8 @@ _u1 = _Struct("<I2q").unpack_from
 
 
 class AddTwoIntsRequest(_Message):
+    """Add two numbers: the first service of every tutorial."""
+
     a: int = 0
     b: int = 0
     _type = "rospy_tutorials/AddTwoIntsRequest"
@@ -49,11 +51,13 @@ class AddTwoIntsRequest(_Message):
     @staticmethod
     def _decode(data: bytes) -> AddTwoIntsRequest:
         try:
-            h, a_2, b_2 = _u1(data)
+            h, a, b_2 = _u1(data)
             if h != 256: raise ValueError
-            return AddTwoIntsRequest(a_2, b_2)
+            return AddTwoIntsRequest(a, b_2)
         except _FAULTS:
             return _explain(data, AddTwoIntsRequest)
+
+
 _p2 = _Struct("<Iq").pack
 _u2 = _Struct("<Iq").unpack_from
 
@@ -85,6 +89,8 @@ class AddTwoIntsResponse(_Message):
 
 
 class AddTwoInts(_Service):
+    """Add two numbers: the first service of every tutorial."""
+
     Request = AddTwoIntsRequest
     Response = AddTwoIntsResponse
     _type = "rospy_tutorials/AddTwoInts"
@@ -99,11 +105,15 @@ class AddTwoInts(_Service):
         "---\n"
         "int64 sum\n"
     )
+
+
 _p3 = _Struct("<Iqi").pack
 _u3 = _Struct("<Iqi").unpack_from
 
 
 class BadTwoIntsRequest(_Message):
+    """AddTwoInts with types that do not fit it, to show what a client of the wrong type is told."""
+
     a: int = 0
     b: int = 0
     _type = "rospy_tutorials/BadTwoIntsRequest"
@@ -128,11 +138,13 @@ class BadTwoIntsRequest(_Message):
     @staticmethod
     def _decode(data: bytes) -> BadTwoIntsRequest:
         try:
-            h, a_2, b_2 = _u3(data)
+            h, a, b_2 = _u3(data)
             if h != 256: raise ValueError
-            return BadTwoIntsRequest(a_2, b_2)
+            return BadTwoIntsRequest(a, b_2)
         except _FAULTS:
             return _explain(data, BadTwoIntsRequest)
+
+
 _p4 = _Struct("<Ii").pack
 _u4 = _Struct("<Ii").unpack_from
 
@@ -164,6 +176,8 @@ class BadTwoIntsResponse(_Message):
 
 
 class BadTwoInts(_Service):
+    """AddTwoInts with types that do not fit it, to show what a client of the wrong type is told."""
+
     Request = BadTwoIntsRequest
     Response = BadTwoIntsResponse
     _type = "rospy_tutorials/BadTwoInts"

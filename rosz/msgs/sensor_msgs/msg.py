@@ -74,6 +74,8 @@ _u3 = _Struct("<I").unpack_from
 
 
 class BatteryState(_Message):
+    """State of one battery. What the hardware does not measure is NaN."""
+
     header: Header = _field(default_factory=Header)
     voltage: float = 0.0
     temperature: float = 0.0
@@ -166,7 +168,13 @@ class BatteryState(_Message):
         "string location                # where it sits, such as a slot or a plug\n"
         "string serial_number           # as printed on it, as far as known\n"
     )
-    _schema = (("header", Header, ""), ("voltage", "float32", ""), ("temperature", "float32", ""), ("current", "float32", ""), ("charge", "float32", ""), ("capacity", "float32", ""), ("design_capacity", "float32", ""), ("percentage", "float32", ""), ("power_supply_status", "uint8", ""), ("power_supply_health", "uint8", ""), ("power_supply_technology", "uint8", ""), ("present", "bool", ""), ("cell_voltage", "float32", "[]"), ("cell_temperature", "float32", "[]"), ("location", "string", ""), ("serial_number", "string", ""))
+    _schema = (("header", Header, ""), ("voltage", "float32", ""), ("temperature", "float32", ""),
+        ("current", "float32", ""), ("charge", "float32", ""), ("capacity", "float32", ""),
+        ("design_capacity", "float32", ""), ("percentage", "float32", ""),
+        ("power_supply_status", "uint8", ""), ("power_supply_health", "uint8", ""),
+        ("power_supply_technology", "uint8", ""), ("present", "bool", ""),
+        ("cell_voltage", "float32", "[]"), ("cell_temperature", "float32", "[]"),
+        ("location", "string", ""), ("serial_number", "string", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -190,7 +198,10 @@ class BatteryState(_Message):
             n5 = len(b5) + 1
             f6, p7 = _t2[n4]
             f8, p9 = _t3[p7, n5]
-            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.voltage, m.temperature, m.current, m.charge, m.capacity, m.design_capacity, m.percentage, m.power_supply_status, m.power_supply_health, m.power_supply_technology, m.present, n2), cell_voltage, _p1(n3), cell_temperature, f6(n4, b4), f8(n5, b5)))
+            return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.voltage,
+                m.temperature, m.current, m.charge, m.capacity, m.design_capacity, m.percentage,
+                m.power_supply_status, m.power_supply_health, m.power_supply_technology, m.present,
+                n2), cell_voltage, _p1(n3), cell_temperature, f6(n4, b4), f8(n5, b5)))
         except _FAULTS:
             return _plain(m, BatteryState)
 
@@ -202,14 +213,17 @@ class BatteryState(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = p + 3 & -4
-            voltage, temperature, current, charge, capacity, design_capacity, percentage, power_supply_status, power_supply_health, power_supply_technology, present, n2 = _u2(data, p)
+            (voltage, temperature, current, charge, capacity, design_capacity, percentage,
+                power_supply_status, power_supply_health, power_supply_technology, present,
+                n2) = _u2(data, p)
             q = p + 36
             p = q + n2 * 4
             cell_voltage = _array("f", data[q : p]) if n2 < 8192 else _read_block("f", data, q, p)
             (n3,) = _u3(data, p)
             q = p + 4
             p = q + n3 * 4
-            cell_temperature = _array("f", data[q : p]) if n3 < 8192 else _read_block("f", data, q, p)
+            cell_temperature = _array("f", data[q : p]) if n3 < 8192 else _read_block("f", data, q,
+                p)
             (n4,) = _u3(data, p)
             q = p + 4
             p = q + n4
@@ -220,14 +234,21 @@ class BatteryState(_Message):
             p = q + n5
             serial_number = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return BatteryState(Header(Time(sec, nanosec), frame_id), voltage, temperature, current, charge, capacity, design_capacity, percentage, power_supply_status, power_supply_health, power_supply_technology, present, cell_voltage, cell_temperature, location, serial_number)
+            return BatteryState(Header(Time(sec, nanosec), frame_id), voltage, temperature,
+                current, charge, capacity, design_capacity, percentage, power_supply_status,
+                power_supply_health, power_supply_technology, present, cell_voltage,
+                cell_temperature, location, serial_number)
         except _FAULTS:
             return _explain(data, BatteryState)
+
+
 _p2 = _Struct("<5I?").pack
 _u4 = _Struct("<5I?").unpack_from
 
 
 class RegionOfInterest(_Message):
+    """A rectangle of an image, pixels. All zero stands for the whole image."""
+
     x_offset: int = 0
     y_offset: int = 0
     height: int = 0
@@ -246,7 +267,8 @@ class RegionOfInterest(_Message):
         "uint32 width\n"
         "bool do_rectify   # the rectangle is to be cut from the rectified image\n"
     )
-    _schema = (("x_offset", "uint32", ""), ("y_offset", "uint32", ""), ("height", "uint32", ""), ("width", "uint32", ""), ("do_rectify", "bool", ""))
+    _schema = (("x_offset", "uint32", ""), ("y_offset", "uint32", ""), ("height", "uint32", ""),
+        ("width", "uint32", ""), ("do_rectify", "bool", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -263,6 +285,8 @@ class RegionOfInterest(_Message):
             return RegionOfInterest(x_offset, y_offset, height, width, do_rectify)
         except _FAULTS:
             return _explain(data, RegionOfInterest)
+
+
 _d2 = _empty("d")
 _d3 = _zeros("d", 9)
 _d4 = _zeros("d", 12)
@@ -274,6 +298,8 @@ _u6 = _Struct("<6I?").unpack_from
 
 
 class CameraInfo(_Message):
+    """How a camera maps space to pixels: calibration and the part of the sensor in use."""
+
     header: Header = _field(default_factory=Header)
     height: int = 0
     width: int = 0
@@ -352,7 +378,10 @@ class CameraInfo(_Message):
         "\n"
         "RegionOfInterest roi  # part of the sensor that was read, before binning\n"
     )
-    _schema = (("header", Header, ""), ("height", "uint32", ""), ("width", "uint32", ""), ("distortion_model", "string", ""), ("d", "float64", "[]"), ("k", "float64", "[9]"), ("r", "float64", "[9]"), ("p", "float64", "[12]"), ("binning_x", "uint32", ""), ("binning_y", "uint32", ""), ("roi", RegionOfInterest, ""))
+    _schema = (("header", Header, ""), ("height", "uint32", ""), ("width", "uint32", ""),
+        ("distortion_model", "string", ""), ("d", "float64", "[]"), ("k", "float64", "[9]"),
+        ("r", "float64", "[9]"), ("p", "float64", "[12]"), ("binning_x", "uint32", ""),
+        ("binning_y", "uint32", ""), ("roi", RegionOfInterest, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -361,23 +390,26 @@ class CameraInfo(_Message):
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
             n2, b2 = _texts[m.distortion_model]
-            d_2 = m.d
-            if type(d_2) is not _array or d_2.typecode != "d":
-                d_2 = _numbers(d_2, "d")
-            n3 = len(d_2)
+            d = m.d
+            if type(d) is not _array or d.typecode != "d":
+                d = _numbers(d, "d")
+            n3 = len(d)
             f4, p5 = _t4[n1, n2]
             p6 = 0 if n3 else p5
             k_2 = m.k
             if type(k_2) is not _array or k_2.typecode != "d" or len(k_2) != 9:
                 k_2 = _numbers(k_2, "d", 9)
-            r_2 = m.r
-            if type(r_2) is not _array or r_2.typecode != "d" or len(r_2) != 9:
-                r_2 = _numbers(r_2, "d", 9)
+            r = m.r
+            if type(r) is not _array or r.typecode != "d" or len(r) != 9:
+                r = _numbers(r, "d", 9)
             p_2 = m.p
             if type(p_2) is not _array or p_2.typecode != "d" or len(p_2) != 12:
                 p_2 = _numbers(p_2, "d", 12)
             roi = m.roi
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2, n3), (_PADDING[-(p5) & 7] if n3 else b""), d_2, _t5[p6 + n3 * 8 & 7](), k_2, r_2, p_2, _p3(m.binning_x, m.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify)))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2,
+                n3), (_PADDING[-(p5) & 7] if n3 else b""), d, _t5[p6 + n3 * 8 & 7](), k_2, r, p_2,
+                _p3(m.binning_x, m.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width,
+                roi.do_rectify)))
         except _FAULTS:
             return _plain(m, CameraInfo)
 
@@ -397,25 +429,31 @@ class CameraInfo(_Message):
             (n3,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n3 else p + 4
             p = q + n3 * 8
-            d_2 = _array("d", data[q : p]) if n3 < 8192 else _read_block("d", data, q, p)
+            d = _array("d", data[q : p]) if n3 < 8192 else _read_block("d", data, q, p)
             q = (p + 3 | 7) - 3
             p = q + 72
             k_2 = _array("d", data[q : p])
             q = p
             p = q + 72
-            r_2 = _array("d", data[q : p])
+            r = _array("d", data[q : p])
             q = p
             p = q + 96
             p_2 = _array("d", data[q : p])
             binning_x, binning_y, x_offset, y_offset, height_2, width_2, do_rectify = _u6(data, p)
-            return CameraInfo(Header(Time(sec, nanosec), frame_id), height, width, distortion_model, d_2, k_2, r_2, p_2, binning_x, binning_y, RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify))
+            return CameraInfo(Header(Time(sec, nanosec), frame_id), height, width,
+                distortion_model, d, k_2, r, p_2, binning_x, binning_y,
+                RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify))
         except _FAULTS:
             return _explain(data, CameraInfo)
+
+
 _t6 = _Template("I I $ I", -4)
 _u7 = _Struct("<2I").unpack_from
 
 
 class ChannelFloat32(_Message):
+    """One further value for each point of a PointCloud, such as its brightness."""
+
     name: str = ""
     values: _Array[float] = _field(default_factory=_d1)
     _type = "sensor_msgs/ChannelFloat32"
@@ -458,10 +496,14 @@ class ChannelFloat32(_Message):
             return ChannelFloat32(name, values)
         except _FAULTS:
             return _explain(data, ChannelFloat32)
+
+
 _t7 = _Template("I i I I $ I $ I", -4)
 
 
 class CompressedImage(_Message):
+    """A compressed picture."""
+
     header: Header = _field(default_factory=Header)
     format: str = ""
     data: _Bytes = b""
@@ -489,7 +531,8 @@ class CompressedImage(_Message):
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            return b"".join((_t7[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, n3), data_2))
+            return b"".join((_t7[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, n3),
+                data_2))
         except _FAULTS:
             return _plain(m, CompressedImage)
 
@@ -514,11 +557,15 @@ class CompressedImage(_Message):
             return CompressedImage(Header(Time(sec, nanosec), frame_id), format_2, data_2)
         except _FAULTS:
             return _explain(data, CompressedImage)
+
+
 _t8 = _Template("I i I I $ d d", -4)
 _u8 = _Struct("<2d").unpack_from
 
 
 class FluidPressure(_Message):
+    """Pressure of air or of another fluid around the sensor."""
+
     header: Header = _field(default_factory=Header)
     fluid_pressure: float = 0.0
     variance: float = 0.0
@@ -533,7 +580,8 @@ class FluidPressure(_Message):
         "float64 fluid_pressure  # Pa, absolute\n"
         "float64 variance        # Pa^2; 0: unknown\n"
     )
-    _schema = (("header", Header, ""), ("fluid_pressure", "float64", ""), ("variance", "float64", ""))
+    _schema = (("header", Header, ""), ("fluid_pressure", "float64", ""),
+        ("variance", "float64", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -560,6 +608,8 @@ class FluidPressure(_Message):
 
 
 class Illuminance(_Message):
+    """How bright it is where the sensor looks, as the eye sees it."""
+
     header: Header = _field(default_factory=Header)
     illuminance: float = 0.0
     variance: float = 0.0
@@ -598,10 +648,14 @@ class Illuminance(_Message):
             return Illuminance(Header(Time(sec, nanosec), frame_id), illuminance, variance)
         except _FAULTS:
             return _explain(data, Illuminance)
+
+
 _t9 = _Template("I i I I $ I I I $ B I I", -4)
 
 
 class Image(_Message):
+    """A picture without compression. Rows run from top to bottom, pixels from left to right."""
+
     header: Header = _field(default_factory=Header)
     height: int = 0
     width: int = 0
@@ -624,7 +678,9 @@ class Image(_Message):
         "uint32 step             # bytes in a row, padding included\n"
         "uint8[] data            # step * height bytes\n"
     )
-    _schema = (("header", Header, ""), ("height", "uint32", ""), ("width", "uint32", ""), ("encoding", "string", ""), ("is_bigendian", "uint8", ""), ("step", "uint32", ""), ("data", "uint8", "[]"))
+    _schema = (("header", Header, ""), ("height", "uint32", ""), ("width", "uint32", ""),
+        ("encoding", "string", ""), ("is_bigendian", "uint8", ""), ("step", "uint32", ""),
+        ("data", "uint8", "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -637,7 +693,8 @@ class Image(_Message):
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            return b"".join((_t9[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2, m.is_bigendian, m.step, n3), data_2))
+            return b"".join((_t9[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width,
+                n2, b2, m.is_bigendian, m.step, n3), data_2))
         except _FAULTS:
             return _plain(m, Image)
 
@@ -660,9 +717,12 @@ class Image(_Message):
             p = q + n3
             data_2 = data[q : p]
             if p > len(data): raise ValueError
-            return Image(Header(Time(sec, nanosec), frame_id), height, width, encoding, is_bigendian, step, data_2)
+            return Image(Header(Time(sec, nanosec), frame_id), height, width, encoding,
+                is_bigendian, step, data_2)
         except _FAULTS:
             return _explain(data, Image)
+
+
 _t10 = _Template("I i I I $ d d d d", -4)
 _p4 = _Struct("<3d").pack
 _u9 = _Struct("<4d").unpack_from
@@ -670,6 +730,8 @@ _u10 = _Struct("<3d").unpack_from
 
 
 class Imu(_Message):
+    """Readings of an inertial measurement unit in its own frame."""
+
     header: Header = _field(default_factory=Header)
     orientation: Quaternion = _field(default_factory=Quaternion)
     orientation_covariance: _Array[float] = _field(default_factory=_d3)
@@ -698,7 +760,10 @@ class Imu(_Message):
         "geometry_msgs/Vector3 linear_acceleration  # m/s^2; at rest it shows gravity, upwards\n"
         "float64[9] linear_acceleration_covariance  # (m/s^2)^2\n"
     )
-    _schema = (("header", Header, ""), ("orientation", Quaternion, ""), ("orientation_covariance", "float64", "[9]"), ("angular_velocity", Vector3, ""), ("angular_velocity_covariance", "float64", "[9]"), ("linear_acceleration", Vector3, ""), ("linear_acceleration_covariance", "float64", "[9]"))
+    _schema = (("header", Header, ""), ("orientation", Quaternion, ""),
+        ("orientation_covariance", "float64", "[9]"), ("angular_velocity", Vector3, ""),
+        ("angular_velocity_covariance", "float64", "[9]"), ("linear_acceleration", Vector3, ""),
+        ("linear_acceleration_covariance", "float64", "[9]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -708,17 +773,34 @@ class Imu(_Message):
             n1, b1 = _texts[header.frame_id]
             orientation = m.orientation
             orientation_covariance = m.orientation_covariance
-            if type(orientation_covariance) is not _array or orientation_covariance.typecode != "d" or len(orientation_covariance) != 9:
+            if (
+                type(orientation_covariance) is not _array
+                or orientation_covariance.typecode != "d"
+                or len(orientation_covariance) != 9
+            ):
                 orientation_covariance = _numbers(orientation_covariance, "d", 9)
             angular_velocity = m.angular_velocity
             angular_velocity_covariance = m.angular_velocity_covariance
-            if type(angular_velocity_covariance) is not _array or angular_velocity_covariance.typecode != "d" or len(angular_velocity_covariance) != 9:
+            if (
+                type(angular_velocity_covariance) is not _array
+                or angular_velocity_covariance.typecode != "d"
+                or len(angular_velocity_covariance) != 9
+            ):
                 angular_velocity_covariance = _numbers(angular_velocity_covariance, "d", 9)
             linear_acceleration = m.linear_acceleration
             linear_acceleration_covariance = m.linear_acceleration_covariance
-            if type(linear_acceleration_covariance) is not _array or linear_acceleration_covariance.typecode != "d" or len(linear_acceleration_covariance) != 9:
+            if (
+                type(linear_acceleration_covariance) is not _array
+                or linear_acceleration_covariance.typecode != "d"
+                or len(linear_acceleration_covariance) != 9
+            ):
                 linear_acceleration_covariance = _numbers(linear_acceleration_covariance, "d", 9)
-            return b"".join((_t10[n1](256, stamp.sec, stamp.nanosec, n1, b1, orientation.x, orientation.y, orientation.z, orientation.w), orientation_covariance, _p4(angular_velocity.x, angular_velocity.y, angular_velocity.z), angular_velocity_covariance, _p4(linear_acceleration.x, linear_acceleration.y, linear_acceleration.z), linear_acceleration_covariance))
+            return b"".join((_t10[n1](256, stamp.sec, stamp.nanosec, n1, b1, orientation.x,
+                orientation.y, orientation.z, orientation.w), orientation_covariance,
+                _p4(angular_velocity.x, angular_velocity.y, angular_velocity.z),
+                angular_velocity_covariance,
+                _p4(linear_acceleration.x, linear_acceleration.y, linear_acceleration.z),
+                linear_acceleration_covariance))
         except _FAULTS:
             return _plain(m, Imu)
 
@@ -730,28 +812,34 @@ class Imu(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, w_2 = _u9(data, p)
+            x, y, z, w = _u9(data, p)
             q = p + 32
             p = q + 72
             orientation_covariance = _array("d", data[q : p])
-            x_3, y_3, z_3 = _u10(data, p)
+            x_2, y_2, z_2 = _u10(data, p)
             q = p + 24
             p = q + 72
             angular_velocity_covariance = _array("d", data[q : p])
-            x_4, y_4, z_4 = _u10(data, p)
+            x_3, y_3, z_3 = _u10(data, p)
             q = p + 24
             p = q + 72
             linear_acceleration_covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return Imu(Header(Time(sec, nanosec), frame_id), Quaternion(x_2, y_2, z_2, w_2), orientation_covariance, Vector3(x_3, y_3, z_3), angular_velocity_covariance, Vector3(x_4, y_4, z_4), linear_acceleration_covariance)
+            return Imu(Header(Time(sec, nanosec), frame_id), Quaternion(x, y, z, w),
+                orientation_covariance, Vector3(x_2, y_2, z_2), angular_velocity_covariance,
+                Vector3(x_3, y_3, z_3), linear_acceleration_covariance)
         except _FAULTS:
             return _explain(data, Imu)
+
+
 _s1 = _StringList()
 _t11 = _Stride("I i I I $ |4", -4, 8)
 _t12 = _Stride("I", None, 8)
 
 
 class JointState(_Message):
+    """State of a set of joints. Element i of each list belongs to name[i]."""
+
     header: Header = _field(default_factory=Header)
     name: list[str] = []
     position: _Array[float] = _field(default_factory=_d2)
@@ -772,7 +860,8 @@ class JointState(_Message):
         "float64[] velocity  # rad/s or m/s\n"
         "float64[] effort    # N m or N\n"
     )
-    _schema = (("header", Header, ""), ("name", "string", "[]"), ("position", "float64", "[]"), ("velocity", "float64", "[]"), ("effort", "float64", "[]"))
+    _schema = (("header", Header, ""), ("name", "string", "[]"), ("position", "float64", "[]"),
+        ("velocity", "float64", "[]"), ("effort", "float64", "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -800,7 +889,10 @@ class JointState(_Message):
                 effort = _numbers(effort, "d")
             n11 = len(effort)
             p12 = 0 if n11 else p10 + n9 * 8 + 4
-            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5), (_PADDING[-(p7) & 7] if n5 else b""), position, _p1(n9), (_PADDING[-(p8 + n5 * 8 + 4) & 7] if n9 else b""), velocity, _p1(n11), (_PADDING[-(p10 + n9 * 8 + 4) & 7] if n11 else b""), effort))
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5),
+                (_PADDING[-(p7) & 7] if n5 else b""), position, _p1(n9),
+                (_PADDING[-(p8 + n5 * 8 + 4) & 7] if n9 else b""), velocity, _p1(n11),
+                (_PADDING[-(p10 + n9 * 8 + 4) & 7] if n11 else b""), effort))
         except _FAULTS:
             return _plain(m, JointState)
 
@@ -832,14 +924,19 @@ class JointState(_Message):
             p = q + n4 * 8
             effort = _array("d", data[q : p]) if n4 < 8192 else _read_block("d", data, q, p)
             if p > len(data): raise ValueError
-            return JointState(Header(Time(sec, nanosec), frame_id), name, position, velocity, effort)
+            return JointState(Header(Time(sec, nanosec), frame_id), name, position, velocity,
+                effort)
         except _FAULTS:
             return _explain(data, JointState)
+
+
 _d5 = _empty("i")
 _t13 = _Template("I i I I $ I", -4)
 
 
 class Joy(_Message):
+    """Sticks and buttons of a joystick or game pad."""
+
     header: Header = _field(default_factory=Header)
     axes: _Array[float] = _field(default_factory=_d1)
     buttons: _Array[int] = _field(default_factory=_d5)
@@ -870,7 +967,8 @@ class Joy(_Message):
             if type(buttons) is not _array or buttons.typecode != "i":
                 buttons = _numbers(buttons, "i")
             n3 = len(buttons)
-            return b"".join((_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), axes, _p1(n3), buttons))
+            return b"".join((_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), axes, _p1(n3),
+                buttons))
         except _FAULTS:
             return _plain(m, Joy)
 
@@ -894,11 +992,15 @@ class Joy(_Message):
             return Joy(Header(Time(sec, nanosec), frame_id), axes, buttons)
         except _FAULTS:
             return _explain(data, Joy)
+
+
 _p5 = _Struct("<I2B2xf").pack
 _u11 = _Struct("<I2B2xf").unpack_from
 
 
 class JoyFeedback(_Message):
+    """Something that a game pad shall do to be noticed."""
+
     type: int = 0
     id: int = 0
     intensity: float = 0.0
@@ -937,12 +1039,16 @@ class JoyFeedback(_Message):
             return JoyFeedback(type_2, id_2, intensity)
         except _FAULTS:
             return _explain(data, JoyFeedback)
+
+
 _p6 = _Struct("<2B2xf").pack
 _p7 = _Struct("<2I").pack
 _i1 = _Struct("<2B2xf").iter_unpack
 
 
 class JoyFeedbackArray(_Message):
+    """Several things that a game pad shall do at once."""
+
     array: list[JoyFeedback] = []
     _type = "sensor_msgs/JoyFeedbackArray"
     _type_name = "sensor_msgs/msg/JoyFeedbackArray"
@@ -960,7 +1066,8 @@ class JoyFeedbackArray(_Message):
         try:
             array = m.array
             n1 = len(array)
-            return b"".join((_p7(256, n1), b"".join([_p6(e.type, e.id, e.intensity) for e in array])))
+            return b"".join((_p7(256, n1),
+                b"".join([_p6(e.type, e.id, e.intensity) for e in array])))
         except _FAULTS:
             return _plain(m, JoyFeedbackArray)
 
@@ -978,6 +1085,8 @@ class JoyFeedbackArray(_Message):
 
 
 class LaserEcho(_Message):
+    """What came back of one beam of a laser scanner that tells several echoes apart."""
+
     echoes: _Array[float] = _field(default_factory=_d1)
     _type = "sensor_msgs/LaserEcho"
     _type_name = "sensor_msgs/msg/LaserEcho"
@@ -1012,11 +1121,15 @@ class LaserEcho(_Message):
             return LaserEcho(echoes)
         except _FAULTS:
             return _explain(data, LaserEcho)
+
+
 _t14 = _Template("I i I I $ f f f f f f f I", -4)
 _u12 = _Struct("<7fI").unpack_from
 
 
 class LaserScan(_Message):
+    """One sweep of a planar laser scanner."""
+
     header: Header = _field(default_factory=Header)
     angle_min: float = 0.0
     angle_max: float = 0.0
@@ -1048,7 +1161,10 @@ class LaserScan(_Message):
         "float32[] ranges          # m\n"
         "float32[] intensities     # strength of each return, unit of the device; empty if not measured\n"
     )
-    _schema = (("header", Header, ""), ("angle_min", "float32", ""), ("angle_max", "float32", ""), ("angle_increment", "float32", ""), ("time_increment", "float32", ""), ("scan_time", "float32", ""), ("range_min", "float32", ""), ("range_max", "float32", ""), ("ranges", "float32", "[]"), ("intensities", "float32", "[]"))
+    _schema = (("header", Header, ""), ("angle_min", "float32", ""), ("angle_max", "float32", ""),
+        ("angle_increment", "float32", ""), ("time_increment", "float32", ""),
+        ("scan_time", "float32", ""), ("range_min", "float32", ""), ("range_max", "float32", ""),
+        ("ranges", "float32", "[]"), ("intensities", "float32", "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1064,7 +1180,9 @@ class LaserScan(_Message):
             if type(intensities) is not _array or intensities.typecode != "f":
                 intensities = _numbers(intensities, "f")
             n3 = len(intensities)
-            return b"".join((_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min, m.range_max, n2), ranges, _p1(n3), intensities))
+            return b"".join((_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min,
+                m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min,
+                m.range_max, n2), ranges, _p1(n3), intensities))
         except _FAULTS:
             return _plain(m, LaserScan)
 
@@ -1076,7 +1194,8 @@ class LaserScan(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = p + 3 & -4
-            angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max, n2 = _u12(data, p)
+            (angle_min, angle_max, angle_increment, time_increment, scan_time, range_min,
+                range_max, n2) = _u12(data, p)
             q = p + 32
             p = q + n2 * 4
             ranges = _array("f", data[q : p]) if n2 < 8192 else _read_block("f", data, q, p)
@@ -1085,13 +1204,19 @@ class LaserScan(_Message):
             p = q + n3 * 4
             intensities = _array("f", data[q : p]) if n3 < 8192 else _read_block("f", data, q, p)
             if p > len(data): raise ValueError
-            return LaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max, ranges, intensities)
+            return LaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max,
+                angle_increment, time_increment, scan_time, range_min, range_max, ranges,
+                intensities)
         except _FAULTS:
             return _explain(data, LaserScan)
+
+
 _t15 = _Template("I i I I $ d d d", -4)
 
 
 class MagneticField(_Message):
+    """The magnetic field at the sensor."""
+
     header: Header = _field(default_factory=Header)
     magnetic_field: Vector3 = _field(default_factory=Vector3)
     magnetic_field_covariance: _Array[float] = _field(default_factory=_d3)
@@ -1106,7 +1231,8 @@ class MagneticField(_Message):
         "geometry_msgs/Vector3 magnetic_field   # T; NaN for an axis that is not measured\n"
         "float64[9] magnetic_field_covariance   # T^2, 3x3 by rows about x, y, z; all zero: unknown\n"
     )
-    _schema = (("header", Header, ""), ("magnetic_field", Vector3, ""), ("magnetic_field_covariance", "float64", "[9]"))
+    _schema = (("header", Header, ""), ("magnetic_field", Vector3, ""),
+        ("magnetic_field_covariance", "float64", "[9]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1116,9 +1242,14 @@ class MagneticField(_Message):
             n1, b1 = _texts[header.frame_id]
             magnetic_field = m.magnetic_field
             magnetic_field_covariance = m.magnetic_field_covariance
-            if type(magnetic_field_covariance) is not _array or magnetic_field_covariance.typecode != "d" or len(magnetic_field_covariance) != 9:
+            if (
+                type(magnetic_field_covariance) is not _array
+                or magnetic_field_covariance.typecode != "d"
+                or len(magnetic_field_covariance) != 9
+            ):
                 magnetic_field_covariance = _numbers(magnetic_field_covariance, "d", 9)
-            return b"".join((_t15[n1](256, stamp.sec, stamp.nanosec, n1, b1, magnetic_field.x, magnetic_field.y, magnetic_field.z), magnetic_field_covariance))
+            return b"".join((_t15[n1](256, stamp.sec, stamp.nanosec, n1, b1, magnetic_field.x,
+                magnetic_field.y, magnetic_field.z), magnetic_field_covariance))
         except _FAULTS:
             return _plain(m, MagneticField)
 
@@ -1130,14 +1261,17 @@ class MagneticField(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2 = _u10(data, p)
+            x, y, z = _u10(data, p)
             q = p + 24
             p = q + 72
             magnetic_field_covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return MagneticField(Header(Time(sec, nanosec), frame_id), Vector3(x_2, y_2, z_2), magnetic_field_covariance)
+            return MagneticField(Header(Time(sec, nanosec), frame_id), Vector3(x, y, z),
+                magnetic_field_covariance)
         except _FAULTS:
             return _explain(data, MagneticField)
+
+
 _s2 = _StringList()
 _p8 = _Struct("<7d").pack
 _p9 = _Struct("<6d").pack
@@ -1146,6 +1280,9 @@ _i3 = _Struct("<6d").iter_unpack
 
 
 class MultiDOFJointState(_Message):
+    """State of a set of joints with several degrees of freedom. Element i of each list belongs to
+    joint_names[i]; a list of what is not known is empty."""
+
     header: Header = _field(default_factory=Header)
     joint_names: list[str] = []
     transforms: list[Transform] = []
@@ -1165,7 +1302,8 @@ class MultiDOFJointState(_Message):
         "geometry_msgs/Twist[] twist           # m/s and rad/s\n"
         "geometry_msgs/Wrench[] wrench         # N and N m\n"
     )
-    _schema = (("header", Header, ""), ("joint_names", "string", "[]"), ("transforms", Transform, "[]"), ("twist", Twist, "[]"), ("wrench", Wrench, "[]"))
+    _schema = (("header", Header, ""), ("joint_names", "string", "[]"),
+        ("transforms", Transform, "[]"), ("twist", Twist, "[]"), ("wrench", Wrench, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1187,7 +1325,17 @@ class MultiDOFJointState(_Message):
             wrench = m.wrench
             n11 = len(wrench)
             p12 = 0 if n11 else p10 + n9 * 48 + 4
-            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5), (_PADDING[-(p7) & 7] if n5 else b""), b"".join([_p8(e_translation.x, e_translation.y, e_translation.z, e_rotation.x, e_rotation.y, e_rotation.z, e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]), _p1(n9), (_PADDING[-(p8 + n5 * 56 + 4) & 7] if n9 else b""), b"".join([_p9(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in twist for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p1(n11), (_PADDING[-(p10 + n9 * 48 + 4) & 7] if n11 else b""), b"".join([_p9(e_force.x, e_force.y, e_force.z, e_torque.x, e_torque.y, e_torque.z) for e in wrench for e_force in (e.force,) for e_torque in (e.torque,)])))
+            return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5),
+                (_PADDING[-(p7) & 7] if n5 else b""),
+                b"".join([_p8(e_translation.x, e_translation.y, e_translation.z, e_rotation.x,
+                e_rotation.y, e_rotation.z,
+                e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]),
+                _p1(n9), (_PADDING[-(p8 + n5 * 56 + 4) & 7] if n9 else b""),
+                b"".join([_p9(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y,
+                e_angular.z) for e in twist for e_linear in (e.linear,) for e_angular in (e.angular,)]),
+                _p1(n11), (_PADDING[-(p10 + n9 * 48 + 4) & 7] if n11 else b""),
+                b"".join([_p9(e_force.x, e_force.y, e_force.z, e_torque.x, e_torque.y,
+                e_torque.z) for e in wrench for e_force in (e.force,) for e_torque in (e.torque,)])))
         except _FAULTS:
             return _plain(m, MultiDOFJointState)
 
@@ -1209,22 +1357,32 @@ class MultiDOFJointState(_Message):
             (n2,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n2 else p + 4
             p = q + n2 * 56
-            transforms = [Transform(Vector3(e_translation_x, e_translation_y, e_translation_z), Quaternion(e_rotation_x, e_rotation_y, e_rotation_z, e_rotation_w)) for e_translation_x, e_translation_y, e_translation_z, e_rotation_x, e_rotation_y, e_rotation_z, e_rotation_w in _i2(data[q : p])]
+            transforms = [Transform(Vector3(e_translation_x, e_translation_y, e_translation_z),
+                Quaternion(e_rotation_x, e_rotation_y, e_rotation_z,
+                e_rotation_w)) for e_translation_x, e_translation_y, e_translation_z, e_rotation_x,
+                e_rotation_y, e_rotation_z, e_rotation_w in _i2(data[q : p])]
             (n3,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n3 else p + 4
             p = q + n3 * 48
-            twist = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z), Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y, e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i3(data[q : p])]
+            twist = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z),
+                Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y,
+                e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i3(data[q : p])]
             (n4,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n4 else p + 4
             p = q + n4 * 48
-            wrench = [Wrench(Vector3(e_force_x, e_force_y, e_force_z), Vector3(e_torque_x, e_torque_y, e_torque_z)) for e_force_x, e_force_y, e_force_z, e_torque_x, e_torque_y, e_torque_z in _i3(data[q : p])]
+            wrench = [Wrench(Vector3(e_force_x, e_force_y, e_force_z),
+                Vector3(e_torque_x, e_torque_y, e_torque_z)) for e_force_x, e_force_y, e_force_z,
+                e_torque_x, e_torque_y, e_torque_z in _i3(data[q : p])]
             if p > len(data): raise ValueError
-            return MultiDOFJointState(Header(Time(sec, nanosec), frame_id), joint_names, transforms, twist, wrench)
+            return MultiDOFJointState(Header(Time(sec, nanosec), frame_id), joint_names,
+                transforms, twist, wrench)
         except _FAULTS:
             return _explain(data, MultiDOFJointState)
 
 
 class MultiEchoLaserScan(_Message):
+    """One sweep of a planar laser scanner that tells several echoes of a beam apart."""
+
     header: Header = _field(default_factory=Header)
     angle_min: float = 0.0
     angle_max: float = 0.0
@@ -1255,7 +1413,10 @@ class MultiEchoLaserScan(_Message):
         "LaserEcho[] ranges        # m; +inf: out of reach, -inf: too near to measure\n"
         "LaserEcho[] intensities   # strength of each return, unit of the device; empty if not measured\n"
     )
-    _schema = (("header", Header, ""), ("angle_min", "float32", ""), ("angle_max", "float32", ""), ("angle_increment", "float32", ""), ("time_increment", "float32", ""), ("scan_time", "float32", ""), ("range_min", "float32", ""), ("range_max", "float32", ""), ("ranges", LaserEcho, "[]"), ("intensities", LaserEcho, "[]"))
+    _schema = (("header", Header, ""), ("angle_min", "float32", ""), ("angle_max", "float32", ""),
+        ("angle_increment", "float32", ""), ("time_increment", "float32", ""),
+        ("scan_time", "float32", ""), ("range_min", "float32", ""), ("range_max", "float32", ""),
+        ("ranges", LaserEcho, "[]"), ("intensities", LaserEcho, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1265,7 +1426,8 @@ class MultiEchoLaserScan(_Message):
             n1, b1 = _texts[header.frame_id]
             ranges = m.ranges
             n2 = len(ranges)
-            out = [_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min, m.range_max, n2)]
+            out = [_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min, m.angle_max,
+                m.angle_increment, m.time_increment, m.scan_time, m.range_min, m.range_max, n2)]
             for ranges_one in ranges:
                 echoes = ranges_one.echoes
                 if type(echoes) is not _array or echoes.typecode != "f":
@@ -1293,7 +1455,8 @@ class MultiEchoLaserScan(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = p + 3 & -4
-            angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max, n2 = _u12(data, p)
+            (angle_min, angle_max, angle_increment, time_increment, scan_time, range_min,
+                range_max, n2) = _u12(data, p)
             ranges = []
             p = p + 32
             for _ in range(n2):
@@ -1312,14 +1475,20 @@ class MultiEchoLaserScan(_Message):
                 echoes_2 = _array("f", data[q : p]) if n5 < 8192 else _read_block("f", data, q, p)
                 intensities.append(LaserEcho(echoes_2))
             if p > len(data): raise ValueError
-            return MultiEchoLaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max, ranges, intensities)
+            return MultiEchoLaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max,
+                angle_increment, time_increment, scan_time, range_min, range_max, ranges,
+                intensities)
         except _FAULTS:
             return _explain(data, MultiEchoLaserScan)
-_t16 = _Template("I b H", -4)
+
+
+_p10 = _Struct("<IbxH").pack
 _u13 = _Struct("<IbxH").unpack_from
 
 
 class NavSatStatus(_Message):
+    """How good a satellite fix is and where it comes from."""
+
     status: int = -2
     service: int = 0
     STATUS_UNKNOWN = -2
@@ -1360,7 +1529,7 @@ class NavSatStatus(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t16[0](256, m.status, m.service)
+            return _p10(256, m.status, m.service)
         except _FAULTS:
             return _plain(m, NavSatStatus)
 
@@ -1372,13 +1541,17 @@ class NavSatStatus(_Message):
             return NavSatStatus(status, service)
         except _FAULTS:
             return _explain(data, NavSatStatus)
-_t17 = _Template("I i I I $ b H d d d", -4)
-_p10 = _Struct("<B").pack
+
+
+_t16 = _Template("I i I I $ b H d d d", -4)
+_p11 = _Struct("<B").pack
 _u14 = _Struct("<b").unpack_from
 _u15 = _Struct("<H").unpack_from
 
 
 class NavSatFix(_Message):
+    """A position from satellites, on the WGS 84 ellipsoid."""
+
     header: Header = _field(default_factory=Header)
     status: NavSatStatus = _field(default_factory=NavSatStatus)
     latitude: float = 0.0
@@ -1411,7 +1584,9 @@ class NavSatFix(_Message):
         "float64[9] position_covariance  # m^2, 3x3 by rows; order: east, north, up at the position\n"
         "uint8 position_covariance_type  # one of the constants above\n"
     )
-    _schema = (("header", Header, ""), ("status", NavSatStatus, ""), ("latitude", "float64", ""), ("longitude", "float64", ""), ("altitude", "float64", ""), ("position_covariance", "float64", "[9]"), ("position_covariance_type", "uint8", ""))
+    _schema = (("header", Header, ""), ("status", NavSatStatus, ""), ("latitude", "float64", ""),
+        ("longitude", "float64", ""), ("altitude", "float64", ""),
+        ("position_covariance", "float64", "[9]"), ("position_covariance_type", "uint8", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1421,9 +1596,15 @@ class NavSatFix(_Message):
             n1, b1 = _texts[header.frame_id]
             status = m.status
             position_covariance = m.position_covariance
-            if type(position_covariance) is not _array or position_covariance.typecode != "d" or len(position_covariance) != 9:
+            if (
+                type(position_covariance) is not _array
+                or position_covariance.typecode != "d"
+                or len(position_covariance) != 9
+            ):
                 position_covariance = _numbers(position_covariance, "d", 9)
-            return b"".join((_t17[n1](256, stamp.sec, stamp.nanosec, n1, b1, status.status, status.service, m.latitude, m.longitude, m.altitude), position_covariance, _p10(m.position_covariance_type)))
+            return b"".join((_t16[n1](256, stamp.sec, stamp.nanosec, n1, b1, status.status,
+                status.service, m.latitude, m.longitude, m.altitude), position_covariance,
+                _p11(m.position_covariance_type)))
         except _FAULTS:
             return _plain(m, NavSatFix)
 
@@ -1443,15 +1624,20 @@ class NavSatFix(_Message):
             p = q + 72
             position_covariance = _array("d", data[q : p])
             position_covariance_type = data[p]
-            return NavSatFix(Header(Time(sec, nanosec), frame_id), NavSatStatus(status, service), latitude, longitude, altitude, position_covariance, position_covariance_type)
+            return NavSatFix(Header(Time(sec, nanosec), frame_id), NavSatStatus(status, service),
+                latitude, longitude, altitude, position_covariance, position_covariance_type)
         except _FAULTS:
             return _explain(data, NavSatFix)
-_p11 = _Struct("<3f").pack
-_t18 = _Template("I $ I", 0)
+
+
+_p12 = _Struct("<3f").pack
+_t17 = _Template("I $ I", 0)
 _i4 = _Struct("<3f").iter_unpack
 
 
 class PointCloud(_Message):
+    """A set of points in single precision, each with any number of further values."""
+
     header: Header = _field(default_factory=Header)
     points: list[Point32] = []
     channels: list[ChannelFloat32] = []
@@ -1468,7 +1654,8 @@ class PointCloud(_Message):
         "geometry_msgs/Point32[] points  # m\n"
         "ChannelFloat32[] channels       # further values of the points\n"
     )
-    _schema = (("header", Header, ""), ("points", Point32, "[]"), ("channels", ChannelFloat32, "[]"))
+    _schema = (("header", Header, ""), ("points", Point32, "[]"),
+        ("channels", ChannelFloat32, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1480,14 +1667,15 @@ class PointCloud(_Message):
             n2 = len(points)
             channels = m.channels
             n3 = len(channels)
-            out = [_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), b"".join([_p11(e.x, e.y, e.z) for e in points]), _p1(n3)]
+            out = [_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2),
+                b"".join([_p12(e.x, e.y, e.z) for e in points]), _p1(n3)]
             for channels_one in channels:
                 n4, b4 = _texts[channels_one.name]
                 values = channels_one.values
                 if type(values) is not _array or values.typecode != "f":
                     values = _numbers(values, "f")
                 n5 = len(values)
-                out += (_t18[n4](n4, b4, n5), values)
+                out += (_t17[n4](n4, b4, n5), values)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, PointCloud)
@@ -1522,11 +1710,15 @@ class PointCloud(_Message):
             return PointCloud(Header(Time(sec, nanosec), frame_id), points, channels)
         except _FAULTS:
             return _explain(data, PointCloud)
-_t19 = _Template("I I $ I B I", -4)
+
+
+_t18 = _Template("I I $ I B I", -4)
 _u16 = _Struct("<IB3xI").unpack_from
 
 
 class PointField(_Message):
+    """One value, or a run of equal values, in the bytes of a point of PointCloud2."""
+
     name: str = ""
     offset: int = 0
     datatype: int = 0
@@ -1560,13 +1752,14 @@ class PointField(_Message):
         "uint8 datatype  # one of the constants above\n"
         "uint32 count    # how many of them\n"
     )
-    _schema = (("name", "string", ""), ("offset", "uint32", ""), ("datatype", "uint8", ""), ("count", "uint32", ""))
+    _schema = (("name", "string", ""), ("offset", "uint32", ""), ("datatype", "uint8", ""),
+        ("count", "uint32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t19[n1](256, n1, b1, m.offset, m.datatype, m.count)
+            return _t18[n1](256, n1, b1, m.offset, m.datatype, m.count)
         except _FAULTS:
             return _plain(m, PointField)
 
@@ -1582,15 +1775,19 @@ class PointField(_Message):
             return PointField(name, offset, datatype, count)
         except _FAULTS:
             return _explain(data, PointField)
-_t20 = _Template("I i I I $ I I I", -4)
-_t21 = _Template("I $ I B I", 0)
-_p12 = _Struct("<?3x3I").pack
-_p13 = _Struct("<?").pack
+
+
+_t19 = _Template("I i I I $ I I I", -4)
+_t20 = _Template("I $ I B I", 0)
+_p13 = _Struct("<?3x3I").pack
+_p14 = _Struct("<?").pack
 _u17 = _Struct("<?3x3I").unpack_from
 _u18 = _Struct("<?").unpack_from
 
 
 class PointCloud2(_Message):
+    """A set of points, each a block of bytes that fields explains."""
+
     header: Header = _field(default_factory=Header)
     height: int = 0
     width: int = 0
@@ -1619,7 +1816,9 @@ class PointCloud2(_Message):
         "uint8[] data          # row_step * height bytes\n"
         "bool is_dense         # every point is valid\n"
     )
-    _schema = (("header", Header, ""), ("height", "uint32", ""), ("width", "uint32", ""), ("fields", PointField, "[]"), ("is_bigendian", "bool", ""), ("point_step", "uint32", ""), ("row_step", "uint32", ""), ("data", "uint8", "[]"), ("is_dense", "bool", ""))
+    _schema = (("header", Header, ""), ("height", "uint32", ""), ("width", "uint32", ""),
+        ("fields", PointField, "[]"), ("is_bigendian", "bool", ""), ("point_step", "uint32", ""),
+        ("row_step", "uint32", ""), ("data", "uint8", "[]"), ("is_dense", "bool", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1629,15 +1828,16 @@ class PointCloud2(_Message):
             n1, b1 = _texts[header.frame_id]
             fields = m.fields
             n2 = len(fields)
-            out = [_t20[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2)]
+            out = [_t19[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2)]
             for fields_one in fields:
                 n3, b3 = _texts[fields_one.name]
-                out.append(_t21[n3](n3, b3, fields_one.offset, fields_one.datatype, fields_one.count))
+                out.append(_t20[n3](n3, b3, fields_one.offset, fields_one.datatype,
+                    fields_one.count))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n4 = len(data_2)
-            out += (_p12(m.is_bigendian, m.point_step, m.row_step, n4), data_2, _p13(m.is_dense))
+            out += (_p13(m.is_bigendian, m.point_step, m.row_step, n4), data_2, _p14(m.is_dense))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, PointCloud2)
@@ -1667,14 +1867,19 @@ class PointCloud2(_Message):
             p = q + n4
             data_2 = data[q : p]
             (is_dense,) = _u18(data, p)
-            return PointCloud2(Header(Time(sec, nanosec), frame_id), height, width, fields, is_bigendian, point_step, row_step, data_2, is_dense)
+            return PointCloud2(Header(Time(sec, nanosec), frame_id), height, width, fields,
+                is_bigendian, point_step, row_step, data_2, is_dense)
         except _FAULTS:
             return _explain(data, PointCloud2)
-_t22 = _Template("I i I I $ B f f f f f", -4)
+
+
+_t21 = _Template("I i I I $ B f f f f f", -4)
 _u19 = _Struct("<5f").unpack_from
 
 
 class Range(_Message):
+    """A distance that one beam of sound or light measured, along the x axis of the frame."""
+
     header: Header = _field(default_factory=Header)
     radiation_type: int = 0
     field_of_view: float = 0.0
@@ -1706,7 +1911,9 @@ class Range(_Message):
         "float32 range           # m\n"
         "float32 variance        # m^2; 0: unknown\n"
     )
-    _schema = (("header", Header, ""), ("radiation_type", "uint8", ""), ("field_of_view", "float32", ""), ("min_range", "float32", ""), ("max_range", "float32", ""), ("range", "float32", ""), ("variance", "float32", ""))
+    _schema = (("header", Header, ""), ("radiation_type", "uint8", ""),
+        ("field_of_view", "float32", ""), ("min_range", "float32", ""),
+        ("max_range", "float32", ""), ("range", "float32", ""), ("variance", "float32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1714,7 +1921,8 @@ class Range(_Message):
             header = m.header
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
-            return _t22[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.radiation_type, m.field_of_view, m.min_range, m.max_range, m.range, m.variance)
+            return _t21[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.radiation_type,
+                m.field_of_view, m.min_range, m.max_range, m.range, m.variance)
         except _FAULTS:
             return _plain(m, Range)
 
@@ -1728,12 +1936,15 @@ class Range(_Message):
             radiation_type = data[p]
             p = p + 4 & -4
             field_of_view, min_range, max_range, range_2, variance = _u19(data, p)
-            return Range(Header(Time(sec, nanosec), frame_id), radiation_type, field_of_view, min_range, max_range, range_2, variance)
+            return Range(Header(Time(sec, nanosec), frame_id), radiation_type, field_of_view,
+                min_range, max_range, range_2, variance)
         except _FAULTS:
             return _explain(data, Range)
 
 
 class RelativeHumidity(_Message):
+    """How close the air at the sensor is to holding all the water that it can."""
+
     header: Header = _field(default_factory=Header)
     relative_humidity: float = 0.0
     variance: float = 0.0
@@ -1748,7 +1959,8 @@ class RelativeHumidity(_Message):
         "float64 relative_humidity  # 0 dry to 1 saturated\n"
         "float64 variance           # 0: unknown\n"
     )
-    _schema = (("header", Header, ""), ("relative_humidity", "float64", ""), ("variance", "float64", ""))
+    _schema = (("header", Header, ""), ("relative_humidity", "float64", ""),
+        ("variance", "float64", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1769,12 +1981,15 @@ class RelativeHumidity(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             relative_humidity, variance = _u8(data, p)
-            return RelativeHumidity(Header(Time(sec, nanosec), frame_id), relative_humidity, variance)
+            return RelativeHumidity(Header(Time(sec, nanosec), frame_id), relative_humidity,
+                variance)
         except _FAULTS:
             return _explain(data, RelativeHumidity)
 
 
 class Temperature(_Message):
+    """The temperature at the sensor."""
+
     header: Header = _field(default_factory=Header)
     temperature: float = 0.0
     variance: float = 0.0
@@ -1813,11 +2028,15 @@ class Temperature(_Message):
             return Temperature(Header(Time(sec, nanosec), frame_id), temperature, variance)
         except _FAULTS:
             return _explain(data, Temperature)
-_t23 = _Stride("I i I I $ i I I $", -4, 4)
+
+
+_t22 = _Stride("I i I I $ i I I $", -4, 4)
 _u20 = _Struct("<i2I").unpack_from
 
 
 class TimeReference(_Message):
+    """What a foreign clock showed at a moment, so that its offset can be worked out."""
+
     header: Header = _field(default_factory=Header)
     time_ref: Time = _field(default_factory=Time)
     source: str = ""
@@ -1844,7 +2063,7 @@ class TimeReference(_Message):
             b2 = m.source.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            f3, p4 = _t23[n1, n2]
+            f3, p4 = _t22[n1, n2]
             return f3(256, stamp.sec, stamp.nanosec, n1, b1, time_ref.sec, time_ref.nanosec, n2, b2)
         except _FAULTS:
             return _plain(m, TimeReference)
@@ -1862,6 +2081,7 @@ class TimeReference(_Message):
             p = q + n2
             source = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return TimeReference(Header(Time(sec, nanosec), frame_id), Time(sec_2, nanosec_2), source)
+            return TimeReference(Header(Time(sec, nanosec), frame_id), Time(sec_2, nanosec_2),
+                source)
         except _FAULTS:
             return _explain(data, TimeReference)

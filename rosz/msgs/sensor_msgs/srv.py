@@ -39,6 +39,8 @@ _u4 = _Struct("<6I?").unpack_from
 
 
 class SetCameraInfoRequest(_Message):
+    """Give a camera its calibration to keep."""
+
     camera_info: CameraInfo = _field(default_factory=CameraInfo)
     _type = "sensor_msgs/SetCameraInfoRequest"
     _type_name = "sensor_msgs/srv/SetCameraInfo_Request"
@@ -59,23 +61,27 @@ class SetCameraInfoRequest(_Message):
             stamp = header.stamp
             n1, b1 = _texts[header.frame_id]
             n2, b2 = _texts[camera_info.distortion_model]
-            d_2 = camera_info.d
-            if type(d_2) is not _array or d_2.typecode != "d":
-                d_2 = _numbers(d_2, "d")
-            n3 = len(d_2)
+            d = camera_info.d
+            if type(d) is not _array or d.typecode != "d":
+                d = _numbers(d, "d")
+            n3 = len(d)
             f4, p5 = _t1[n1, n2]
             p6 = 0 if n3 else p5
             k_2 = camera_info.k
             if type(k_2) is not _array or k_2.typecode != "d" or len(k_2) != 9:
                 k_2 = _numbers(k_2, "d", 9)
-            r_2 = camera_info.r
-            if type(r_2) is not _array or r_2.typecode != "d" or len(r_2) != 9:
-                r_2 = _numbers(r_2, "d", 9)
+            r = camera_info.r
+            if type(r) is not _array or r.typecode != "d" or len(r) != 9:
+                r = _numbers(r, "d", 9)
             p_2 = camera_info.p
             if type(p_2) is not _array or p_2.typecode != "d" or len(p_2) != 12:
                 p_2 = _numbers(p_2, "d", 12)
             roi = camera_info.roi
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, camera_info.height, camera_info.width, n2, b2, n3), (_PADDING[-(p5) & 7] if n3 else b""), d_2, _t2[p6 + n3 * 8 & 7](), k_2, r_2, p_2, _p1(camera_info.binning_x, camera_info.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify)))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, camera_info.height,
+                camera_info.width, n2, b2, n3), (_PADDING[-(p5) & 7] if n3 else b""), d,
+                _t2[p6 + n3 * 8 & 7](), k_2, r, p_2,
+                _p1(camera_info.binning_x, camera_info.binning_y, roi.x_offset, roi.y_offset,
+                roi.height, roi.width, roi.do_rectify)))
         except _FAULTS:
             return _plain(m, SetCameraInfoRequest)
 
@@ -95,20 +101,24 @@ class SetCameraInfoRequest(_Message):
             (n3,) = _u3(data, p)
             q = (p + 7 | 7) - 3 if n3 else p + 4
             p = q + n3 * 8
-            d_2 = _array("d", data[q : p]) if n3 < 8192 else _read_block("d", data, q, p)
+            d = _array("d", data[q : p]) if n3 < 8192 else _read_block("d", data, q, p)
             q = (p + 3 | 7) - 3
             p = q + 72
             k_2 = _array("d", data[q : p])
             q = p
             p = q + 72
-            r_2 = _array("d", data[q : p])
+            r = _array("d", data[q : p])
             q = p
             p = q + 96
             p_2 = _array("d", data[q : p])
             binning_x, binning_y, x_offset, y_offset, height_2, width_2, do_rectify = _u4(data, p)
-            return SetCameraInfoRequest(CameraInfo(Header(Time(sec, nanosec), frame_id), height, width, distortion_model, d_2, k_2, r_2, p_2, binning_x, binning_y, RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify)))
+            return SetCameraInfoRequest(CameraInfo(Header(Time(sec, nanosec), frame_id), height,
+                width, distortion_model, d, k_2, r, p_2, binning_x, binning_y,
+                RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify)))
         except _FAULTS:
             return _explain(data, SetCameraInfoRequest)
+
+
 _t3 = _Stride("I ? I $", -4, 4)
 _u5 = _Struct("<I?3xI").unpack_from
 
@@ -151,6 +161,8 @@ class SetCameraInfoResponse(_Message):
 
 
 class SetCameraInfo(_Service):
+    """Give a camera its calibration to keep."""
+
     Request = SetCameraInfoRequest
     Response = SetCameraInfoResponse
     _type = "sensor_msgs/SetCameraInfo"

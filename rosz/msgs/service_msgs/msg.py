@@ -24,6 +24,9 @@ _u1 = _Struct("<IB3xiI16s4xq").unpack_from
 
 
 class ServiceEventInfo(_Message):
+    """What happened to a service call, where and when: the part of a service event that is the same for
+    every service type."""
+
     event_type: int = 0
     stamp: Time = _field(default_factory=Time)
     client_gid: _Bytes = _z1
@@ -51,7 +54,8 @@ class ServiceEventInfo(_Message):
         "char[16] client_gid            # global id of the client that called\n"
         "int64 sequence_number          # running number of the call, unique per client\n"
     )
-    _schema = (("event_type", "uint8", ""), ("stamp", Time, ""), ("client_gid", "char", "[16]"), ("sequence_number", "int64", ""))
+    _schema = (("event_type", "uint8", ""), ("stamp", Time, ""), ("client_gid", "char", "[16]"),
+        ("sequence_number", "int64", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:

@@ -35,6 +35,8 @@ _u1 = _Struct("<I").unpack_from
 
 
 class MeshTriangle(_Message):
+    """One triangle of a Mesh."""
+
     vertex_indices: _Array[int] = _field(default_factory=_d1)
     _type = "shape_msgs/MeshTriangle"
     _type_name = "shape_msgs/msg/MeshTriangle"
@@ -51,7 +53,11 @@ class MeshTriangle(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             vertex_indices = m.vertex_indices
-            if type(vertex_indices) is not _array or vertex_indices.typecode != "I" or len(vertex_indices) != 3:
+            if (
+                type(vertex_indices) is not _array
+                or vertex_indices.typecode != "I"
+                or len(vertex_indices) != 3
+            ):
                 vertex_indices = _numbers(vertex_indices, "I", 3)
             return b"".join((_p1(256), vertex_indices))
         except _FAULTS:
@@ -68,6 +74,8 @@ class MeshTriangle(_Message):
             return MeshTriangle(vertex_indices)
         except _FAULTS:
             return _explain(data, MeshTriangle)
+
+
 _p2 = _Struct("<2I").pack
 _p3 = _Struct("<3d").pack
 _u2 = _Struct("<2I").unpack_from
@@ -75,6 +83,8 @@ _i1 = _Struct("<3d").iter_unpack
 
 
 class Mesh(_Message):
+    """A surface of triangles."""
+
     triangles: list[MeshTriangle] = []
     vertices: list[Point] = []
     _type = "shape_msgs/Mesh"
@@ -98,14 +108,19 @@ class Mesh(_Message):
             p2 = 4
             for triangles_one in triangles:
                 vertex_indices = triangles_one.vertex_indices
-                if type(vertex_indices) is not _array or vertex_indices.typecode != "I" or len(vertex_indices) != 3:
+                if (
+                    type(vertex_indices) is not _array
+                    or vertex_indices.typecode != "I"
+                    or len(vertex_indices) != 3
+                ):
                     vertex_indices = _numbers(vertex_indices, "I", 3)
                 out.append(vertex_indices)
                 p2 = p2 + 4 & 7
             vertices = m.vertices
             n3 = len(vertices)
             p4 = 0 if n3 else p2 + 4
-            out += (_p1(n3), (_PADDING[-(p2 + 4) & 7] if n3 else b""), b"".join([_p3(e.x, e.y, e.z) for e in vertices]))
+            out += (_p1(n3), (_PADDING[-(p2 + 4) & 7] if n3 else b""),
+                b"".join([_p3(e.x, e.y, e.z) for e in vertices]))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Mesh)
@@ -131,10 +146,14 @@ class Mesh(_Message):
             return Mesh(triangles, vertices)
         except _FAULTS:
             return _explain(data, Mesh)
+
+
 _d2 = _zeros("d", 4)
 
 
 class Plane(_Message):
+    """A plane: all points with a x + b y + c z + d = 0."""
+
     coef: _Array[float] = _field(default_factory=_d2)
     _type = "shape_msgs/Plane"
     _type_name = "shape_msgs/msg/Plane"
@@ -168,6 +187,8 @@ class Plane(_Message):
             return Plane(coef)
         except _FAULTS:
             return _explain(data, Plane)
+
+
 _d3 = _empty("d")
 _p4 = _Struct("<IB3xI").pack
 _p5 = _Struct("<3f").pack
@@ -176,6 +197,8 @@ _i2 = _Struct("<3f").iter_unpack
 
 
 class SolidPrimitive(_Message):
+    """A simple solid about the origin of its frame."""
+
     type: int = 0
     dimensions: _Array[float] = _field(default_factory=_d3)
     polygon: Polygon = _field(default_factory=Polygon)
@@ -247,7 +270,8 @@ class SolidPrimitive(_Message):
             polygon = m.polygon
             points = polygon.points
             n2 = len(points)
-            return b"".join((_p4(256, m.type, n1), dimensions, _p1(n2), b"".join([_p5(e.x, e.y, e.z) for e in points])))
+            return b"".join((_p4(256, m.type, n1), dimensions, _p1(n2),
+                b"".join([_p5(e.x, e.y, e.z) for e in points])))
         except _FAULTS:
             return _plain(m, SolidPrimitive)
 

@@ -60,11 +60,13 @@ __all__ = (
     "UInt8MultiArray",
 )
 
-_t1 = _Template("I ?", -4)
+_p1 = _Struct("<I?").pack
 _u1 = _Struct("<I?").unpack_from
 
 
 class Bool(_Message):
+    """A truth value on its own."""
+
     data: bool = False
     _type = "std_msgs/Bool"
     _type_name = "std_msgs/msg/Bool"
@@ -80,7 +82,7 @@ class Bool(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256, m.data)
+            return _p1(256, m.data)
         except _FAULTS:
             return _plain(m, Bool)
 
@@ -92,11 +94,15 @@ class Bool(_Message):
             return Bool(data_2)
         except _FAULTS:
             return _explain(data, Bool)
-_t2 = _Template("I B", -4)
+
+
+_p2 = _Struct("<IB").pack
 _u2 = _Struct("<IB").unpack_from
 
 
 class Byte(_Message):
+    """One octet without numeric meaning."""
+
     data: int = 0
     _type = "std_msgs/Byte"
     _type_name = "std_msgs/msg/Byte"
@@ -112,7 +118,7 @@ class Byte(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.data)
+            return _p2(256, m.data)
         except _FAULTS:
             return _plain(m, Byte)
 
@@ -124,11 +130,15 @@ class Byte(_Message):
             return Byte(data_2)
         except _FAULTS:
             return _explain(data, Byte)
-_t3 = _Template("I I $ I I", -4)
+
+
+_t1 = _Template("I I $ I I", -4)
 _u3 = _Struct("<2I").unpack_from
 
 
 class MultiArrayDimension(_Message):
+    """One dimension of a multi-dimensional array; see MultiArrayLayout."""
+
     label: str = ""
     size: int = 0
     stride: int = 0
@@ -150,7 +160,7 @@ class MultiArrayDimension(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.label]
-            return _t3[n1](256, n1, b1, m.size, m.stride)
+            return _t1[n1](256, n1, b1, m.size, m.stride)
         except _FAULTS:
             return _plain(m, MultiArrayDimension)
 
@@ -166,13 +176,17 @@ class MultiArrayDimension(_Message):
             return MultiArrayDimension(label, size, stride)
         except _FAULTS:
             return _explain(data, MultiArrayDimension)
-_p1 = _Struct("<2I").pack
-_t4 = _Template("I $ I I", 0)
-_p2 = _Struct("<I").pack
+
+
+_p3 = _Struct("<2I").pack
+_t2 = _Template("I $ I I", 0)
+_p4 = _Struct("<I").pack
 _u4 = _Struct("<I").unpack_from
 
 
 class MultiArrayLayout(_Message):
+    """How the flat data of a multi-dimensional array is to be read."""
+
     dim: list[MultiArrayDimension] = []
     data_offset: int = 0
     _type = "std_msgs/MultiArrayLayout"
@@ -197,11 +211,11 @@ class MultiArrayLayout(_Message):
         try:
             dim = m.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
-            out.append(_p2(m.data_offset))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
+            out.append(_p4(m.data_offset))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, MultiArrayLayout)
@@ -229,6 +243,8 @@ class MultiArrayLayout(_Message):
 
 
 class ByteMultiArray(_Message):
+    """A multi-dimensional array of octets."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Bytes = b""
     _type = "std_msgs/ByteMultiArray"
@@ -249,15 +265,15 @@ class ByteMultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, ByteMultiArray)
@@ -289,6 +305,8 @@ class ByteMultiArray(_Message):
 
 
 class Char(_Message):
+    """One 8-bit character code (unsigned, as on the wire)."""
+
     data: int = 0
     _type = "std_msgs/Char"
     _type_name = "std_msgs/msg/Char"
@@ -304,7 +322,7 @@ class Char(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.data)
+            return _p2(256, m.data)
         except _FAULTS:
             return _plain(m, Char)
 
@@ -316,11 +334,15 @@ class Char(_Message):
             return Char(data_2)
         except _FAULTS:
             return _explain(data, Char)
-_p3 = _Struct("<I4f").pack
+
+
+_p5 = _Struct("<I4f").pack
 _u5 = _Struct("<I4f").unpack_from
 
 
 class ColorRGBA(_Message):
+    """A colour with opacity. Every channel lies in [0, 1]."""
+
     r: float = 0.0
     g: float = 0.0
     b: float = 0.0
@@ -337,28 +359,33 @@ class ColorRGBA(_Message):
         "float32 b  # blue\n"
         "float32 a  # opacity: 0 invisible, 1 solid\n"
     )
-    _schema = (("r", "float32", ""), ("g", "float32", ""), ("b", "float32", ""), ("a", "float32", ""))
+    _schema = (("r", "float32", ""), ("g", "float32", ""), ("b", "float32", ""),
+        ("a", "float32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p3(256, m.r, m.g, m.b, m.a)
+            return _p5(256, m.r, m.g, m.b, m.a)
         except _FAULTS:
             return _plain(m, ColorRGBA)
 
     @staticmethod
     def _decode(data: bytes) -> ColorRGBA:
         try:
-            h, r_2, g_2, b_2, a_2 = _u5(data)
+            h, r, g, b_2, a = _u5(data)
             if h != 256: raise ValueError
-            return ColorRGBA(r_2, g_2, b_2, a_2)
+            return ColorRGBA(r, g, b_2, a)
         except _FAULTS:
             return _explain(data, ColorRGBA)
-_p4 = _Struct("<IiI").pack
+
+
+_p6 = _Struct("<IiI").pack
 _u6 = _Struct("<IiI").unpack_from
 
 
 class Duration(_Message):
+    """A span of time on its own (ROS 1; ROS 2 has builtin_interfaces/Duration only)."""
+
     data: builtin_interfaces_msg_Duration = _field(default_factory=builtin_interfaces_msg_Duration)
     _type = "std_msgs/Duration"
     _type_name = "std_msgs/msg/Duration"
@@ -375,7 +402,7 @@ class Duration(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             data_2 = m.data
-            return _p4(256, data_2.sec, data_2.nanosec)
+            return _p6(256, data_2.sec, data_2.nanosec)
         except _FAULTS:
             return _plain(m, Duration)
 
@@ -387,11 +414,15 @@ class Duration(_Message):
             return Duration(builtin_interfaces_msg_Duration(sec, nanosec))
         except _FAULTS:
             return _explain(data, Duration)
-_t5 = _Template("I x", -4)
+
+
+_p7 = _Struct("<Ix").pack
 _u7 = _Struct("<Ix").unpack_from
 
 
 class Empty(_Message):
+    """Carries nothing: that it arrives is the information."""
+
     _type = "std_msgs/Empty"
     _type_name = "std_msgs/msg/Empty"
     _type_hash = "RIHS01_20b625256f32d5dbc0d04fee44f43c41e51c70d3502f84b4a08e7a9c26a96312"
@@ -402,7 +433,7 @@ class Empty(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t5[0](256)
+            return _p7(256)
         except _FAULTS:
             return _plain(m, Empty)
 
@@ -414,11 +445,15 @@ class Empty(_Message):
             return Empty()
         except _FAULTS:
             return _explain(data, Empty)
-_p5 = _Struct("<If").pack
+
+
+_p8 = _Struct("<If").pack
 _u8 = _Struct("<If").unpack_from
 
 
 class Float32(_Message):
+    """A single-precision number."""
+
     data: float = 0.0
     _type = "std_msgs/Float32"
     _type_name = "std_msgs/msg/Float32"
@@ -434,7 +469,7 @@ class Float32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p5(256, m.data)
+            return _p8(256, m.data)
         except _FAULTS:
             return _plain(m, Float32)
 
@@ -446,10 +481,14 @@ class Float32(_Message):
             return Float32(data_2)
         except _FAULTS:
             return _explain(data, Float32)
+
+
 _d1 = _empty("f")
 
 
 class Float32MultiArray(_Message):
+    """A multi-dimensional array of single-precision numbers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[float] = _field(default_factory=_d1)
     _type = "std_msgs/Float32MultiArray"
@@ -470,15 +509,15 @@ class Float32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "f":
                 data_2 = _numbers(data_2, "f")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float32MultiArray)
@@ -507,11 +546,15 @@ class Float32MultiArray(_Message):
             return Float32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float32MultiArray)
-_p6 = _Struct("<Id").pack
+
+
+_p9 = _Struct("<Id").pack
 _u9 = _Struct("<Id").unpack_from
 
 
 class Float64(_Message):
+    """A double-precision number."""
+
     data: float = 0.0
     _type = "std_msgs/Float64"
     _type_name = "std_msgs/msg/Float64"
@@ -527,7 +570,7 @@ class Float64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p6(256, m.data)
+            return _p9(256, m.data)
         except _FAULTS:
             return _plain(m, Float64)
 
@@ -539,11 +582,15 @@ class Float64(_Message):
             return Float64(data_2)
         except _FAULTS:
             return _explain(data, Float64)
+
+
 _d2 = _empty("d")
-_t6 = _Stride("I $ I I", None, 8)
+_t3 = _Stride("I $ I I", None, 8)
 
 
 class Float64MultiArray(_Message):
+    """A multi-dimensional array of double-precision numbers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[float] = _field(default_factory=_d2)
     _type = "std_msgs/Float64MultiArray"
@@ -564,11 +611,11 @@ class Float64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                f4, p5 = _t6[p2, n3]
+                f4, p5 = _t3[p2, n3]
                 out.append(f4(n3, b3, dim_one.size, dim_one.stride))
                 p2 = p5
             data_2 = m.data
@@ -576,7 +623,7 @@ class Float64MultiArray(_Message):
                 data_2 = _numbers(data_2, "d")
             n6 = len(data_2)
             p7 = 0 if n6 else p2
-            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
+            out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Float64MultiArray)
@@ -605,11 +652,15 @@ class Float64MultiArray(_Message):
             return Float64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Float64MultiArray)
-_t7 = _Stride("I i I I $", -4, 4)
+
+
+_t4 = _Stride("I i I I $", -4, 4)
 _u10 = _Struct("<Ii2I").unpack_from
 
 
 class Header(_Sequenced):
+    """When and where stamped data was taken. Most messages with a time or a frame begin with it."""
+
     stamp: builtin_interfaces_msg_Time = _field(default_factory=builtin_interfaces_msg_Time)
     frame_id: str = ""
     _type = "std_msgs/Header"
@@ -631,7 +682,7 @@ class Header(_Sequenced):
         try:
             stamp = m.stamp
             n1, b1 = _texts[m.frame_id]
-            f2, p3 = _t7[n1]
+            f2, p3 = _t4[n1]
             return f2(256, stamp.sec, stamp.nanosec, n1, b1)
         except _FAULTS:
             return _plain(m, Header)
@@ -647,11 +698,15 @@ class Header(_Sequenced):
             return Header(builtin_interfaces_msg_Time(sec, nanosec), frame_id)
         except _FAULTS:
             return _explain(data, Header)
-_t8 = _Template("I h", -4)
+
+
+_p10 = _Struct("<Ih").pack
 _u11 = _Struct("<Ih").unpack_from
 
 
 class Int16(_Message):
+    """A signed 16-bit integer."""
+
     data: int = 0
     _type = "std_msgs/Int16"
     _type_name = "std_msgs/msg/Int16"
@@ -667,7 +722,7 @@ class Int16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t8[0](256, m.data)
+            return _p10(256, m.data)
         except _FAULTS:
             return _plain(m, Int16)
 
@@ -679,10 +734,14 @@ class Int16(_Message):
             return Int16(data_2)
         except _FAULTS:
             return _explain(data, Int16)
+
+
 _d3 = _empty("h")
 
 
 class Int16MultiArray(_Message):
+    """A multi-dimensional array of signed 16-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d3)
     _type = "std_msgs/Int16MultiArray"
@@ -703,15 +762,15 @@ class Int16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "h":
                 data_2 = _numbers(data_2, "h")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int16MultiArray)
@@ -740,11 +799,15 @@ class Int16MultiArray(_Message):
             return Int16MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int16MultiArray)
-_p7 = _Struct("<Ii").pack
+
+
+_p11 = _Struct("<Ii").pack
 _u12 = _Struct("<Ii").unpack_from
 
 
 class Int32(_Message):
+    """A signed 32-bit integer."""
+
     data: int = 0
     _type = "std_msgs/Int32"
     _type_name = "std_msgs/msg/Int32"
@@ -760,7 +823,7 @@ class Int32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p7(256, m.data)
+            return _p11(256, m.data)
         except _FAULTS:
             return _plain(m, Int32)
 
@@ -772,10 +835,14 @@ class Int32(_Message):
             return Int32(data_2)
         except _FAULTS:
             return _explain(data, Int32)
+
+
 _d4 = _empty("i")
 
 
 class Int32MultiArray(_Message):
+    """A multi-dimensional array of signed 32-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d4)
     _type = "std_msgs/Int32MultiArray"
@@ -796,15 +863,15 @@ class Int32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "i":
                 data_2 = _numbers(data_2, "i")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int32MultiArray)
@@ -833,11 +900,15 @@ class Int32MultiArray(_Message):
             return Int32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int32MultiArray)
-_p8 = _Struct("<Iq").pack
+
+
+_p12 = _Struct("<Iq").pack
 _u13 = _Struct("<Iq").unpack_from
 
 
 class Int64(_Message):
+    """A signed 64-bit integer."""
+
     data: int = 0
     _type = "std_msgs/Int64"
     _type_name = "std_msgs/msg/Int64"
@@ -853,7 +924,7 @@ class Int64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p8(256, m.data)
+            return _p12(256, m.data)
         except _FAULTS:
             return _plain(m, Int64)
 
@@ -865,10 +936,14 @@ class Int64(_Message):
             return Int64(data_2)
         except _FAULTS:
             return _explain(data, Int64)
+
+
 _d5 = _empty("q")
 
 
 class Int64MultiArray(_Message):
+    """A multi-dimensional array of signed 64-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d5)
     _type = "std_msgs/Int64MultiArray"
@@ -889,11 +964,11 @@ class Int64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                f4, p5 = _t6[p2, n3]
+                f4, p5 = _t3[p2, n3]
                 out.append(f4(n3, b3, dim_one.size, dim_one.stride))
                 p2 = p5
             data_2 = m.data
@@ -901,7 +976,7 @@ class Int64MultiArray(_Message):
                 data_2 = _numbers(data_2, "q")
             n6 = len(data_2)
             p7 = 0 if n6 else p2
-            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
+            out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int64MultiArray)
@@ -930,11 +1005,15 @@ class Int64MultiArray(_Message):
             return Int64MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int64MultiArray)
-_t9 = _Template("I b", -4)
+
+
+_p13 = _Struct("<Ib").pack
 _u14 = _Struct("<Ib").unpack_from
 
 
 class Int8(_Message):
+    """A signed 8-bit integer."""
+
     data: int = 0
     _type = "std_msgs/Int8"
     _type_name = "std_msgs/msg/Int8"
@@ -950,7 +1029,7 @@ class Int8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t9[0](256, m.data)
+            return _p13(256, m.data)
         except _FAULTS:
             return _plain(m, Int8)
 
@@ -962,10 +1041,14 @@ class Int8(_Message):
             return Int8(data_2)
         except _FAULTS:
             return _explain(data, Int8)
+
+
 _d6 = _empty("b")
 
 
 class Int8MultiArray(_Message):
+    """A multi-dimensional array of signed 8-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d6)
     _type = "std_msgs/Int8MultiArray"
@@ -986,15 +1069,15 @@ class Int8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "b":
                 data_2 = _numbers(data_2, "b")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, Int8MultiArray)
@@ -1023,10 +1106,14 @@ class Int8MultiArray(_Message):
             return Int8MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, Int8MultiArray)
-_t10 = _Stride("I I $", -4, 4)
+
+
+_t5 = _Stride("I I $", -4, 4)
 
 
 class String(_Message):
+    """A piece of text, UTF-8 encoded on the wire."""
+
     data: str = ""
     _type = "std_msgs/String"
     _type_name = "std_msgs/msg/String"
@@ -1045,7 +1132,7 @@ class String(_Message):
             b1 = m.data.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t10[n1]
+            f2, p3 = _t5[n1]
             return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, String)
@@ -1064,6 +1151,8 @@ class String(_Message):
 
 
 class Time(_Message):
+    """A point in time on its own (ROS 1; ROS 2 has builtin_interfaces/Time only)."""
+
     data: builtin_interfaces_msg_Time = _field(default_factory=builtin_interfaces_msg_Time)
     _type = "std_msgs/Time"
     _type_name = "std_msgs/msg/Time"
@@ -1080,7 +1169,7 @@ class Time(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             data_2 = m.data
-            return _p4(256, data_2.sec, data_2.nanosec)
+            return _p6(256, data_2.sec, data_2.nanosec)
         except _FAULTS:
             return _plain(m, Time)
 
@@ -1092,11 +1181,15 @@ class Time(_Message):
             return Time(builtin_interfaces_msg_Time(sec, nanosec))
         except _FAULTS:
             return _explain(data, Time)
-_t11 = _Template("I H", -4)
+
+
+_p14 = _Struct("<IH").pack
 _u15 = _Struct("<IH").unpack_from
 
 
 class UInt16(_Message):
+    """An unsigned 16-bit integer."""
+
     data: int = 0
     _type = "std_msgs/UInt16"
     _type_name = "std_msgs/msg/UInt16"
@@ -1112,7 +1205,7 @@ class UInt16(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t11[0](256, m.data)
+            return _p14(256, m.data)
         except _FAULTS:
             return _plain(m, UInt16)
 
@@ -1124,10 +1217,14 @@ class UInt16(_Message):
             return UInt16(data_2)
         except _FAULTS:
             return _explain(data, UInt16)
+
+
 _d7 = _empty("H")
 
 
 class UInt16MultiArray(_Message):
+    """A multi-dimensional array of unsigned 16-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d7)
     _type = "std_msgs/UInt16MultiArray"
@@ -1148,15 +1245,15 @@ class UInt16MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "H":
                 data_2 = _numbers(data_2, "H")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt16MultiArray)
@@ -1188,6 +1285,8 @@ class UInt16MultiArray(_Message):
 
 
 class UInt32(_Message):
+    """An unsigned 32-bit integer."""
+
     data: int = 0
     _type = "std_msgs/UInt32"
     _type_name = "std_msgs/msg/UInt32"
@@ -1203,7 +1302,7 @@ class UInt32(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.data)
+            return _p3(256, m.data)
         except _FAULTS:
             return _plain(m, UInt32)
 
@@ -1215,10 +1314,14 @@ class UInt32(_Message):
             return UInt32(data_2)
         except _FAULTS:
             return _explain(data, UInt32)
+
+
 _d8 = _empty("I")
 
 
 class UInt32MultiArray(_Message):
+    """A multi-dimensional array of unsigned 32-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d8)
     _type = "std_msgs/UInt32MultiArray"
@@ -1239,15 +1342,15 @@ class UInt32MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "I":
                 data_2 = _numbers(data_2, "I")
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt32MultiArray)
@@ -1276,11 +1379,15 @@ class UInt32MultiArray(_Message):
             return UInt32MultiArray(MultiArrayLayout(dim, data_offset), data_2)
         except _FAULTS:
             return _explain(data, UInt32MultiArray)
-_p9 = _Struct("<IQ").pack
+
+
+_p15 = _Struct("<IQ").pack
 _u16 = _Struct("<IQ").unpack_from
 
 
 class UInt64(_Message):
+    """An unsigned 64-bit integer."""
+
     data: int = 0
     _type = "std_msgs/UInt64"
     _type_name = "std_msgs/msg/UInt64"
@@ -1296,7 +1403,7 @@ class UInt64(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p9(256, m.data)
+            return _p15(256, m.data)
         except _FAULTS:
             return _plain(m, UInt64)
 
@@ -1308,10 +1415,14 @@ class UInt64(_Message):
             return UInt64(data_2)
         except _FAULTS:
             return _explain(data, UInt64)
+
+
 _d9 = _empty("Q")
 
 
 class UInt64MultiArray(_Message):
+    """A multi-dimensional array of unsigned 64-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Array[int] = _field(default_factory=_d9)
     _type = "std_msgs/UInt64MultiArray"
@@ -1332,11 +1443,11 @@ class UInt64MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             p2 = 4
             for dim_one in dim:
                 n3, b3 = _texts[dim_one.label]
-                f4, p5 = _t6[p2, n3]
+                f4, p5 = _t3[p2, n3]
                 out.append(f4(n3, b3, dim_one.size, dim_one.stride))
                 p2 = p5
             data_2 = m.data
@@ -1344,7 +1455,7 @@ class UInt64MultiArray(_Message):
                 data_2 = _numbers(data_2, "Q")
             n6 = len(data_2)
             p7 = 0 if n6 else p2
-            out += (_p1(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
+            out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt64MultiArray)
@@ -1376,6 +1487,8 @@ class UInt64MultiArray(_Message):
 
 
 class UInt8(_Message):
+    """An unsigned 8-bit integer."""
+
     data: int = 0
     _type = "std_msgs/UInt8"
     _type_name = "std_msgs/msg/UInt8"
@@ -1391,7 +1504,7 @@ class UInt8(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.data)
+            return _p2(256, m.data)
         except _FAULTS:
             return _plain(m, UInt8)
 
@@ -1406,6 +1519,8 @@ class UInt8(_Message):
 
 
 class UInt8MultiArray(_Message):
+    """A multi-dimensional array of unsigned 8-bit integers."""
+
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
     data: _Bytes = b""
     _type = "std_msgs/UInt8MultiArray"
@@ -1426,15 +1541,15 @@ class UInt8MultiArray(_Message):
             layout = m.layout
             dim = layout.dim
             n1 = len(dim)
-            out = [_p1(256, n1)]
+            out = [_p3(256, n1)]
             for dim_one in dim:
                 n2, b2 = _texts[dim_one.label]
-                out.append(_t4[n2](n2, b2, dim_one.size, dim_one.stride))
+                out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n3 = len(data_2)
-            out += (_p1(layout.data_offset, n3), data_2)
+            out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
             return _plain(m, UInt8MultiArray)

@@ -7,7 +7,6 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from struct import Struct as _Struct
@@ -25,11 +24,13 @@ __all__ = (
     "TriggerResponse",
 )
 
-_t1 = _Template("I x", -4)
+_p1 = _Struct("<Ix").pack
 _u1 = _Struct("<Ix").unpack_from
 
 
 class EmptyRequest(_Message):
+    """Do the thing that the service is named after. No argument and no result."""
+
     _type = "std_srvs/EmptyRequest"
     _type_name = "std_srvs/srv/Empty_Request"
     _type_hash = "RIHS01_458eaf200a3f63d9cc53d19436edebc0c140ef4c93ca75d5bd4ce19fd7759e35"
@@ -40,7 +41,7 @@ class EmptyRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, EmptyRequest)
 
@@ -65,7 +66,7 @@ class EmptyResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, EmptyResponse)
 
@@ -80,6 +81,8 @@ class EmptyResponse(_Message):
 
 
 class Empty(_Service):
+    """Do the thing that the service is named after. No argument and no result."""
+
     Request = EmptyRequest
     Response = EmptyResponse
     _type = "std_srvs/Empty"
@@ -90,11 +93,15 @@ class Empty(_Service):
         "# Do the thing that the service is named after. No argument and no result.\n"
         "---\n"
     )
-_t2 = _Template("I ?", -4)
+
+
+_p2 = _Struct("<I?").pack
 _u2 = _Struct("<I?").unpack_from
 
 
 class SetBoolRequest(_Message):
+    """Switch something on or off."""
+
     data: bool = False
     _type = "std_srvs/SetBoolRequest"
     _type_name = "std_srvs/srv/SetBool_Request"
@@ -110,7 +117,7 @@ class SetBoolRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256, m.data)
+            return _p2(256, m.data)
         except _FAULTS:
             return _plain(m, SetBoolRequest)
 
@@ -122,7 +129,9 @@ class SetBoolRequest(_Message):
             return SetBoolRequest(data_2)
         except _FAULTS:
             return _explain(data, SetBoolRequest)
-_t3 = _Stride("I ? I $", -4, 4)
+
+
+_t1 = _Stride("I ? I $", -4, 4)
 _u3 = _Struct("<I?3xI").unpack_from
 
 
@@ -145,7 +154,7 @@ class SetBoolResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t3[n1]
+            f2, p3 = _t1[n1]
             return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, SetBoolResponse)
@@ -164,6 +173,8 @@ class SetBoolResponse(_Message):
 
 
 class SetBool(_Service):
+    """Switch something on or off."""
+
     Request = SetBoolRequest
     Response = SetBoolResponse
     _type = "std_srvs/SetBool"
@@ -181,6 +192,8 @@ class SetBool(_Service):
 
 
 class TriggerRequest(_Message):
+    """Do the thing that the service is named after, and tell how it went."""
+
     _type = "std_srvs/TriggerRequest"
     _type_name = "std_srvs/srv/Trigger_Request"
     _type_hash = "RIHS01_d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199"
@@ -191,7 +204,7 @@ class TriggerRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, TriggerRequest)
 
@@ -224,7 +237,7 @@ class TriggerResponse(_Message):
             b1 = m.message.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t3[n1]
+            f2, p3 = _t1[n1]
             return f2(256, m.success, n1, b1)
         except _FAULTS:
             return _plain(m, TriggerResponse)
@@ -243,6 +256,8 @@ class TriggerResponse(_Message):
 
 
 class Trigger(_Service):
+    """Do the thing that the service is named after, and tell how it went."""
+
     Request = TriggerRequest
     Response = TriggerResponse
     _type = "std_srvs/Trigger"

@@ -33,6 +33,9 @@ _u5 = _Struct("<2f4I?3x3f").unpack_from
 
 
 class DisparityImage(_Message):
+    """The disparity of each pixel of a rectified stereo pair: how far a point moves from one image to
+    the other. Depth is f * t / disparity."""
+
     header: Header = _field(default_factory=Header)
     image: Image = _field(default_factory=Image)
     f: float = 0.0
@@ -67,7 +70,10 @@ class DisparityImage(_Message):
         "float32 max_disparity                       # pixels; near limit of the search\n"
         "float32 delta_d                             # pixels; smallest step that can be told apart\n"
     )
-    _schema = (("header", Header, ""), ("image", Image, ""), ("f", "float32", ""), ("t", "float32", ""), ("valid_window", RegionOfInterest, ""), ("min_disparity", "float32", ""), ("max_disparity", "float32", ""), ("delta_d", "float32", ""))
+    _schema = (("header", Header, ""), ("image", Image, ""), ("f", "float32", ""),
+        ("t", "float32", ""), ("valid_window", RegionOfInterest, ""),
+        ("min_disparity", "float32", ""), ("max_disparity", "float32", ""),
+        ("delta_d", "float32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -85,7 +91,12 @@ class DisparityImage(_Message):
                 data_2 = _octets(data_2)
             n4 = len(data_2)
             valid_window = m.valid_window
-            return b"".join((_t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec, stamp_2.nanosec, n2, b2, image.height, image.width), _t2[n3](n3, b3, image.is_bigendian, image.step, n4), data_2, _t3[n4 & 3](m.f, m.t, valid_window.x_offset, valid_window.y_offset, valid_window.height, valid_window.width, valid_window.do_rectify, m.min_disparity, m.max_disparity, m.delta_d)))
+            return b"".join((_t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec,
+                stamp_2.nanosec, n2, b2, image.height, image.width),
+                _t2[n3](n3, b3, image.is_bigendian, image.step, n4), data_2,
+                _t3[n4 & 3](m.f, m.t, valid_window.x_offset, valid_window.y_offset,
+                valid_window.height, valid_window.width, valid_window.do_rectify, m.min_disparity,
+                m.max_disparity, m.delta_d)))
         except _FAULTS:
             return _plain(m, DisparityImage)
 
@@ -113,7 +124,12 @@ class DisparityImage(_Message):
             p = q + n4
             data_2 = data[q : p]
             p = p + 3 & -4
-            f_2, t_2, x_offset, y_offset, height_2, width_2, do_rectify, min_disparity, max_disparity, delta_d = _u5(data, p)
-            return DisparityImage(Header(Time(sec, nanosec), frame_id), Image(Header(Time(sec_2, nanosec_2), frame_id_2), height, width, encoding, is_bigendian, step, data_2), f_2, t_2, RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify), min_disparity, max_disparity, delta_d)
+            (f_2, t, x_offset, y_offset, height_2, width_2, do_rectify, min_disparity,
+                max_disparity, delta_d) = _u5(data, p)
+            return DisparityImage(Header(Time(sec, nanosec), frame_id),
+                Image(Header(Time(sec_2, nanosec_2), frame_id_2), height, width, encoding,
+                is_bigendian, step, data_2), f_2, t,
+                RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify), min_disparity,
+                max_disparity, delta_d)
         except _FAULTS:
             return _explain(data, DisparityImage)

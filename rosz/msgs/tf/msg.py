@@ -31,6 +31,8 @@ _u4 = _Struct("<7d").unpack_from
 
 
 class tfMessage(_Message):
+    """Poses of frames in their parent frames, under the name that ROS 1's tf gave it."""
+
     transforms: list[TransformStamped] = []
     _type = "tf/tfMessage"
     _type_name = "tf/msg/tfMessage"
@@ -58,7 +60,8 @@ class tfMessage(_Message):
                 transform = transforms_one.transform
                 translation = transform.translation
                 rotation = transform.rotation
-                out.append(_t1[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
+                out.append(_t1[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x,
+                    translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
                 p2 = 0
             return b"".join(out)
         except _FAULTS:
@@ -82,9 +85,10 @@ class tfMessage(_Message):
                 p = q + n3
                 child_frame_id = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u4(data, p)
+                x, y, z, x_2, y_2, z_2, w = _u4(data, p)
                 p += 56
-                transforms.append(TransformStamped(Header(Time(sec, nanosec), frame_id), child_frame_id, Transform(Vector3(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))))
+                transforms.append(TransformStamped(Header(Time(sec, nanosec), frame_id),
+                    child_frame_id, Transform(Vector3(x, y, z), Quaternion(x_2, y_2, z_2, w))))
             if p > len(data): raise ValueError
             return tfMessage(transforms)
         except _FAULTS:

@@ -29,6 +29,8 @@ _u1 = _Struct("<IB3xI").unpack_from
 
 
 class TF2Error(_Message):
+    """Why a transform could not be given."""
+
     error: int = 0
     error_string: str = ""
     NO_ERROR = 0
@@ -80,6 +82,8 @@ class TF2Error(_Message):
             return TF2Error(error, error_string)
         except _FAULTS:
             return _explain(data, TF2Error)
+
+
 _p1 = _Struct("<2I").pack
 _t2 = _Template("i I I $ I $ d d d d d d d", None)
 _u2 = _Struct("<2I").unpack_from
@@ -89,6 +93,8 @@ _u5 = _Struct("<7d").unpack_from
 
 
 class TFMessage(_Message):
+    """Poses of frames in their parent frames, sent on /tf and /tf_static."""
+
     transforms: list[TransformStamped] = []
     _type = "tf2_msgs/TFMessage"
     _type_name = "tf2_msgs/msg/TFMessage"
@@ -116,7 +122,8 @@ class TFMessage(_Message):
                 transform = transforms_one.transform
                 translation = transform.translation
                 rotation = transform.rotation
-                out.append(_t2[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
+                out.append(_t2[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, translation.x,
+                    translation.y, translation.z, rotation.x, rotation.y, rotation.z, rotation.w))
                 p2 = 0
             return b"".join(out)
         except _FAULTS:
@@ -140,9 +147,10 @@ class TFMessage(_Message):
                 p = q + n3
                 child_frame_id = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2 = _u5(data, p)
+                x, y, z, x_2, y_2, z_2, w = _u5(data, p)
                 p += 56
-                transforms.append(TransformStamped(Header(Time(sec, nanosec), frame_id), child_frame_id, Transform(Vector3(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2))))
+                transforms.append(TransformStamped(Header(Time(sec, nanosec), frame_id),
+                    child_frame_id, Transform(Vector3(x, y, z), Quaternion(x_2, y_2, z_2, w))))
             if p > len(data): raise ValueError
             return TFMessage(transforms)
         except _FAULTS:

@@ -7,7 +7,6 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from struct import Struct as _Struct
@@ -19,11 +18,13 @@ __all__ = (
     "FrameGraphResponse",
 )
 
-_t1 = _Template("I x", -4)
+_p1 = _Struct("<Ix").pack
 _u1 = _Struct("<Ix").unpack_from
 
 
 class FrameGraphRequest(_Message):
+    """Ask a transform buffer which frames it knows."""
+
     _type = "tf2_msgs/FrameGraphRequest"
     _type_name = "tf2_msgs/srv/FrameGraph_Request"
     _type_hash = "RIHS01_4cc565da6b64726d0b0be1ce20f3a3a695679b841a79abfca2fcdc94f562b08d"
@@ -34,7 +35,7 @@ class FrameGraphRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, FrameGraphRequest)
 
@@ -46,7 +47,9 @@ class FrameGraphRequest(_Message):
             return FrameGraphRequest()
         except _FAULTS:
             return _explain(data, FrameGraphRequest)
-_t2 = _Stride("I I $", -4, 4)
+
+
+_t1 = _Stride("I I $", -4, 4)
 _u2 = _Struct("<2I").unpack_from
 
 
@@ -65,7 +68,7 @@ class FrameGraphResponse(_Message):
             b1 = m.frame_yaml.encode()
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
-            f2, p3 = _t2[n1]
+            f2, p3 = _t1[n1]
             return f2(256, n1, b1)
         except _FAULTS:
             return _plain(m, FrameGraphResponse)
@@ -84,6 +87,8 @@ class FrameGraphResponse(_Message):
 
 
 class FrameGraph(_Service):
+    """Ask a transform buffer which frames it knows."""
+
     Request = FrameGraphRequest
     Response = FrameGraphResponse
     _type = "tf2_msgs/FrameGraph"

@@ -8,7 +8,6 @@ from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from struct import Struct as _Struct
@@ -46,6 +45,8 @@ _u1 = _Struct("<2I").unpack_from
 
 
 class DemuxAddRequest(_Message):
+    """Give a demux one more topic to send to."""
+
     topic: str = ""
     _type = "topic_tools/DemuxAddRequest"
     _type_name = "topic_tools/srv/DemuxAdd_Request"
@@ -80,7 +81,9 @@ class DemuxAddRequest(_Message):
             return DemuxAddRequest(topic)
         except _FAULTS:
             return _explain(data, DemuxAddRequest)
-_t2 = _Template("I x", -4)
+
+
+_p1 = _Struct("<Ix").pack
 _u2 = _Struct("<Ix").unpack_from
 
 
@@ -95,7 +98,7 @@ class DemuxAddResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, DemuxAddResponse)
 
@@ -110,6 +113,8 @@ class DemuxAddResponse(_Message):
 
 
 class DemuxAdd(_Service):
+    """Give a demux one more topic to send to."""
+
     Request = DemuxAddRequest
     Response = DemuxAddResponse
     _type = "topic_tools/DemuxAdd"
@@ -125,6 +130,8 @@ class DemuxAdd(_Service):
 
 
 class DemuxDeleteRequest(_Message):
+    """Take a topic to send to from a demux."""
+
     topic: str = ""
     _type = "topic_tools/DemuxDeleteRequest"
     _type_name = "topic_tools/srv/DemuxDelete_Request"
@@ -172,7 +179,7 @@ class DemuxDeleteResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, DemuxDeleteResponse)
 
@@ -187,6 +194,8 @@ class DemuxDeleteResponse(_Message):
 
 
 class DemuxDelete(_Service):
+    """Take a topic to send to from a demux."""
+
     Request = DemuxDeleteRequest
     Response = DemuxDeleteResponse
     _type = "topic_tools/DemuxDelete"
@@ -202,6 +211,8 @@ class DemuxDelete(_Service):
 
 
 class DemuxListRequest(_Message):
+    """Ask a demux to which topics it can send."""
+
     _type = "topic_tools/DemuxListRequest"
     _type_name = "topic_tools/srv/DemuxList_Request"
     _type_hash = "RIHS01_4292a276bdbc682afd8e7fa1fc3e94b76e654cb778cdd1bc93d2e902c19efaef"
@@ -212,7 +223,7 @@ class DemuxListRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, DemuxListRequest)
 
@@ -224,8 +235,10 @@ class DemuxListRequest(_Message):
             return DemuxListRequest()
         except _FAULTS:
             return _explain(data, DemuxListRequest)
+
+
 _s1 = _StringList()
-_p1 = _Struct("<I").pack
+_p2 = _Struct("<I").pack
 _u3 = _Struct("<I").unpack_from
 
 
@@ -244,7 +257,7 @@ class DemuxListResponse(_Message):
             topics, k = m.topics, _s1.written
             b1 = k[1] if topics == k[0] else _s1.put(topics)
             n1 = len(b1)
-            return b"".join((_p1(256), b1))
+            return b"".join((_p2(256), b1))
         except _FAULTS:
             return _plain(m, DemuxListResponse)
 
@@ -265,6 +278,8 @@ class DemuxListResponse(_Message):
 
 
 class DemuxList(_Service):
+    """Ask a demux to which topics it can send."""
+
     Request = DemuxListRequest
     Response = DemuxListResponse
     _type = "topic_tools/DemuxList"
@@ -279,6 +294,8 @@ class DemuxList(_Service):
 
 
 class DemuxSelectRequest(_Message):
+    """Let a demux send to another topic."""
+
     topic: str = ""
     _type = "topic_tools/DemuxSelectRequest"
     _type_name = "topic_tools/srv/DemuxSelect_Request"
@@ -349,6 +366,8 @@ class DemuxSelectResponse(_Message):
 
 
 class DemuxSelect(_Service):
+    """Let a demux send to another topic."""
+
     Request = DemuxSelectRequest
     Response = DemuxSelectResponse
     _type = "topic_tools/DemuxSelect"
@@ -365,6 +384,8 @@ class DemuxSelect(_Service):
 
 
 class MuxAddRequest(_Message):
+    """Let a mux listen to one more topic."""
+
     topic: str = ""
     _type = "topic_tools/MuxAddRequest"
     _type_name = "topic_tools/srv/MuxAdd_Request"
@@ -412,7 +433,7 @@ class MuxAddResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, MuxAddResponse)
 
@@ -427,6 +448,8 @@ class MuxAddResponse(_Message):
 
 
 class MuxAdd(_Service):
+    """Let a mux listen to one more topic."""
+
     Request = MuxAddRequest
     Response = MuxAddResponse
     _type = "topic_tools/MuxAdd"
@@ -442,6 +465,8 @@ class MuxAdd(_Service):
 
 
 class MuxDeleteRequest(_Message):
+    """Let a mux no longer listen to a topic."""
+
     topic: str = ""
     _type = "topic_tools/MuxDeleteRequest"
     _type_name = "topic_tools/srv/MuxDelete_Request"
@@ -489,7 +514,7 @@ class MuxDeleteResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, MuxDeleteResponse)
 
@@ -504,6 +529,8 @@ class MuxDeleteResponse(_Message):
 
 
 class MuxDelete(_Service):
+    """Let a mux no longer listen to a topic."""
+
     Request = MuxDeleteRequest
     Response = MuxDeleteResponse
     _type = "topic_tools/MuxDelete"
@@ -519,6 +546,8 @@ class MuxDelete(_Service):
 
 
 class MuxListRequest(_Message):
+    """Ask a mux to which topics it listens."""
+
     _type = "topic_tools/MuxListRequest"
     _type_name = "topic_tools/srv/MuxList_Request"
     _type_hash = "RIHS01_3253d5bc2b5f9e0084439a144778ac23604e772ea5623a3bba30ae15a78e1cf9"
@@ -529,7 +558,7 @@ class MuxListRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, MuxListRequest)
 
@@ -541,6 +570,8 @@ class MuxListRequest(_Message):
             return MuxListRequest()
         except _FAULTS:
             return _explain(data, MuxListRequest)
+
+
 _s2 = _StringList()
 
 
@@ -559,7 +590,7 @@ class MuxListResponse(_Message):
             topics, k = m.topics, _s2.written
             b1 = k[1] if topics == k[0] else _s2.put(topics)
             n1 = len(b1)
-            return b"".join((_p1(256), b1))
+            return b"".join((_p2(256), b1))
         except _FAULTS:
             return _plain(m, MuxListResponse)
 
@@ -580,6 +611,8 @@ class MuxListResponse(_Message):
 
 
 class MuxList(_Service):
+    """Ask a mux to which topics it listens."""
+
     Request = MuxListRequest
     Response = MuxListResponse
     _type = "topic_tools/MuxList"
@@ -594,6 +627,8 @@ class MuxList(_Service):
 
 
 class MuxSelectRequest(_Message):
+    """Let a mux pass on another topic."""
+
     topic: str = ""
     _type = "topic_tools/MuxSelectRequest"
     _type_name = "topic_tools/srv/MuxSelect_Request"
@@ -664,6 +699,8 @@ class MuxSelectResponse(_Message):
 
 
 class MuxSelect(_Service):
+    """Let a mux pass on another topic."""
+
     Request = MuxSelectRequest
     Response = MuxSelectResponse
     _type = "topic_tools/MuxSelect"

@@ -44,6 +44,9 @@ _u3 = _Struct("<iI").unpack_from
 
 
 class JointTrajectoryPoint(_Message):
+    """What the joints of a JointTrajectory shall do at one moment. Lists follow the order of its
+    joint_names; one that does not matter is empty."""
+
     positions: _Array[float] = _field(default_factory=_d1)
     velocities: _Array[float] = _field(default_factory=_d1)
     accelerations: _Array[float] = _field(default_factory=_d1)
@@ -64,7 +67,9 @@ class JointTrajectoryPoint(_Message):
         "\n"
         "builtin_interfaces/Duration time_from_start  # since the start of the trajectory\n"
     )
-    _schema = (("positions", "float64", "[]"), ("velocities", "float64", "[]"), ("accelerations", "float64", "[]"), ("effort", "float64", "[]"), ("time_from_start", Duration, ""))
+    _schema = (("positions", "float64", "[]"), ("velocities", "float64", "[]"),
+        ("accelerations", "float64", "[]"), ("effort", "float64", "[]"),
+        ("time_from_start", Duration, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -90,7 +95,11 @@ class JointTrajectoryPoint(_Message):
             n7 = len(effort)
             p8 = 0 if n7 else p6 + n5 * 8 + 4
             time_from_start = m.time_from_start
-            return b"".join((_p1(256, n1), (_PADDING[4] if n1 else b""), positions, _p2(n3), (_PADDING[-(p2 + n1 * 8 + 4) & 7] if n3 else b""), velocities, _p2(n5), (_PADDING[-(p4 + n3 * 8 + 4) & 7] if n5 else b""), accelerations, _p2(n7), (_PADDING[-(p6 + n5 * 8 + 4) & 7] if n7 else b""), effort, _p3(time_from_start.sec, time_from_start.nanosec)))
+            return b"".join((_p1(256, n1), (_PADDING[4] if n1 else b""), positions, _p2(n3),
+                (_PADDING[-(p2 + n1 * 8 + 4) & 7] if n3 else b""), velocities, _p2(n5),
+                (_PADDING[-(p4 + n3 * 8 + 4) & 7] if n5 else b""), accelerations, _p2(n7),
+                (_PADDING[-(p6 + n5 * 8 + 4) & 7] if n7 else b""), effort,
+                _p3(time_from_start.sec, time_from_start.nanosec)))
         except _FAULTS:
             return _plain(m, JointTrajectoryPoint)
 
@@ -115,9 +124,12 @@ class JointTrajectoryPoint(_Message):
             p = q + n4 * 8
             effort = _array("d", data[q : p]) if n4 < 8192 else _read_block("d", data, q, p)
             sec, nanosec = _u3(data, p)
-            return JointTrajectoryPoint(positions, velocities, accelerations, effort, Duration(sec, nanosec))
+            return JointTrajectoryPoint(positions, velocities, accelerations, effort,
+                Duration(sec, nanosec))
         except _FAULTS:
             return _explain(data, JointTrajectoryPoint)
+
+
 _s1 = _StringList()
 _t1 = _Stride("I i I I $ |4", -4, 8)
 _t2 = _Stride("I", None, 8)
@@ -125,6 +137,8 @@ _u4 = _Struct("<Ii2I").unpack_from
 
 
 class JointTrajectory(_Message):
+    """How a set of joints shall move."""
+
     header: Header = _field(default_factory=Header)
     joint_names: list[str] = []
     points: list[JointTrajectoryPoint] = []
@@ -139,7 +153,8 @@ class JointTrajectory(_Message):
         "string[] joint_names\n"
         "JointTrajectoryPoint[] points    # in order of time\n"
     )
-    _schema = (("header", Header, ""), ("joint_names", "string", "[]"), ("points", JointTrajectoryPoint, "[]"))
+    _schema = (("header", Header, ""), ("joint_names", "string", "[]"),
+        ("points", JointTrajectoryPoint, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -178,7 +193,11 @@ class JointTrajectory(_Message):
                 n15 = len(effort)
                 p16 = 0 if n15 else p14 + n13 * 8 + 4
                 time_from_start = points_one.time_from_start
-                out += (_p2(n9), (_PADDING[-(p8 + 4) & 7] if n9 else b""), positions, _p2(n11), (_PADDING[-(p10 + n9 * 8 + 4) & 7] if n11 else b""), velocities, _p2(n13), (_PADDING[-(p12 + n11 * 8 + 4) & 7] if n13 else b""), accelerations, _p2(n15), (_PADDING[-(p14 + n13 * 8 + 4) & 7] if n15 else b""), effort, _p3(time_from_start.sec, time_from_start.nanosec))
+                out += (_p2(n9), (_PADDING[-(p8 + 4) & 7] if n9 else b""), positions, _p2(n11),
+                    (_PADDING[-(p10 + n9 * 8 + 4) & 7] if n11 else b""), velocities, _p2(n13),
+                    (_PADDING[-(p12 + n11 * 8 + 4) & 7] if n13 else b""), accelerations, _p2(n15),
+                    (_PADDING[-(p14 + n13 * 8 + 4) & 7] if n15 else b""), effort,
+                    _p3(time_from_start.sec, time_from_start.nanosec))
                 p8 = p16 + n15 * 8 & 7
             return b"".join(out)
         except _FAULTS:
@@ -214,18 +233,22 @@ class JointTrajectory(_Message):
                 (n5,) = _u2(data, p)
                 q = (p + 7 | 7) - 3 if n5 else p + 4
                 p = q + n5 * 8
-                accelerations = _array("d", data[q : p]) if n5 < 8192 else _read_block("d", data, q, p)
+                accelerations = _array("d", data[q : p]) if n5 < 8192 else _read_block("d", data,
+                    q, p)
                 (n6,) = _u2(data, p)
                 q = (p + 7 | 7) - 3 if n6 else p + 4
                 p = q + n6 * 8
                 effort = _array("d", data[q : p]) if n6 < 8192 else _read_block("d", data, q, p)
                 sec_2, nanosec_2 = _u3(data, p)
                 p += 8
-                points.append(JointTrajectoryPoint(positions, velocities, accelerations, effort, Duration(sec_2, nanosec_2)))
+                points.append(JointTrajectoryPoint(positions, velocities, accelerations, effort,
+                    Duration(sec_2, nanosec_2)))
             if p > len(data): raise ValueError
             return JointTrajectory(Header(Time(sec, nanosec), frame_id), joint_names, points)
         except _FAULTS:
             return _explain(data, JointTrajectory)
+
+
 _p4 = _Struct("<7d").pack
 _p5 = _Struct("<6d").pack
 _i1 = _Struct("<7d").iter_unpack
@@ -233,6 +256,9 @@ _i2 = _Struct("<6d").iter_unpack
 
 
 class MultiDOFJointTrajectoryPoint(_Message):
+    """What the joints of a MultiDOFJointTrajectory shall do at one moment. Lists follow the order of its
+    joint_names; one that does not matter is empty."""
+
     transforms: list[Transform] = []
     velocities: list[Twist] = []
     accelerations: list[Twist] = []
@@ -251,7 +277,8 @@ class MultiDOFJointTrajectoryPoint(_Message):
         "\n"
         "builtin_interfaces/Duration time_from_start  # since the start of the trajectory\n"
     )
-    _schema = (("transforms", Transform, "[]"), ("velocities", Twist, "[]"), ("accelerations", Twist, "[]"), ("time_from_start", Duration, ""))
+    _schema = (("transforms", Transform, "[]"), ("velocities", Twist, "[]"),
+        ("accelerations", Twist, "[]"), ("time_from_start", Duration, ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -266,7 +293,17 @@ class MultiDOFJointTrajectoryPoint(_Message):
             n5 = len(accelerations)
             p6 = 0 if n5 else p4 + n3 * 48 + 4
             time_from_start = m.time_from_start
-            return b"".join((_p1(256, n1), (_PADDING[4] if n1 else b""), b"".join([_p4(e_translation.x, e_translation.y, e_translation.z, e_rotation.x, e_rotation.y, e_rotation.z, e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]), _p2(n3), (_PADDING[-(p2 + n1 * 56 + 4) & 7] if n3 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in velocities for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p2(n5), (_PADDING[-(p4 + n3 * 48 + 4) & 7] if n5 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in accelerations for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p3(time_from_start.sec, time_from_start.nanosec)))
+            return b"".join((_p1(256, n1), (_PADDING[4] if n1 else b""),
+                b"".join([_p4(e_translation.x, e_translation.y, e_translation.z, e_rotation.x,
+                e_rotation.y, e_rotation.z,
+                e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]),
+                _p2(n3), (_PADDING[-(p2 + n1 * 56 + 4) & 7] if n3 else b""),
+                b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y,
+                e_angular.z) for e in velocities for e_linear in (e.linear,) for e_angular in (e.angular,)]),
+                _p2(n5), (_PADDING[-(p4 + n3 * 48 + 4) & 7] if n5 else b""),
+                b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y,
+                e_angular.z) for e in accelerations for e_linear in (e.linear,) for e_angular in (e.angular,)]),
+                _p3(time_from_start.sec, time_from_start.nanosec)))
         except _FAULTS:
             return _plain(m, MultiDOFJointTrajectoryPoint)
 
@@ -277,23 +314,35 @@ class MultiDOFJointTrajectoryPoint(_Message):
             if h != 256: raise ValueError
             q = 12 if n1 else 8
             p = q + n1 * 56
-            transforms = [Transform(Vector3(e_translation_x, e_translation_y, e_translation_z), Quaternion(e_rotation_x, e_rotation_y, e_rotation_z, e_rotation_w)) for e_translation_x, e_translation_y, e_translation_z, e_rotation_x, e_rotation_y, e_rotation_z, e_rotation_w in _i1(data[q : p])]
+            transforms = [Transform(Vector3(e_translation_x, e_translation_y, e_translation_z),
+                Quaternion(e_rotation_x, e_rotation_y, e_rotation_z,
+                e_rotation_w)) for e_translation_x, e_translation_y, e_translation_z, e_rotation_x,
+                e_rotation_y, e_rotation_z, e_rotation_w in _i1(data[q : p])]
             (n2,) = _u2(data, p)
             q = (p + 7 | 7) - 3 if n2 else p + 4
             p = q + n2 * 48
-            velocities = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z), Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y, e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
+            velocities = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z),
+                Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y,
+                e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
             (n3,) = _u2(data, p)
             q = (p + 7 | 7) - 3 if n3 else p + 4
             p = q + n3 * 48
-            accelerations = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z), Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y, e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
+            accelerations = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z),
+                Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y,
+                e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
             sec, nanosec = _u3(data, p)
-            return MultiDOFJointTrajectoryPoint(transforms, velocities, accelerations, Duration(sec, nanosec))
+            return MultiDOFJointTrajectoryPoint(transforms, velocities, accelerations,
+                Duration(sec, nanosec))
         except _FAULTS:
             return _explain(data, MultiDOFJointTrajectoryPoint)
+
+
 _s2 = _StringList()
 
 
 class MultiDOFJointTrajectory(_Message):
+    """How a set of joints with several degrees of freedom, or of free bodies, shall move."""
+
     header: Header = _field(default_factory=Header)
     joint_names: list[str] = []
     points: list[MultiDOFJointTrajectoryPoint] = []
@@ -308,7 +357,8 @@ class MultiDOFJointTrajectory(_Message):
         "string[] joint_names\n"
         "MultiDOFJointTrajectoryPoint[] points  # in order of time\n"
     )
-    _schema = (("header", Header, ""), ("joint_names", "string", "[]"), ("points", MultiDOFJointTrajectoryPoint, "[]"))
+    _schema = (("header", Header, ""), ("joint_names", "string", "[]"),
+        ("points", MultiDOFJointTrajectoryPoint, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -336,7 +386,17 @@ class MultiDOFJointTrajectory(_Message):
                 n13 = len(accelerations)
                 p14 = 0 if n13 else p12 + n11 * 48 + 4
                 time_from_start = points_one.time_from_start
-                out += (_p2(n9), (_PADDING[-(p8 + 4) & 7] if n9 else b""), b"".join([_p4(e_translation.x, e_translation.y, e_translation.z, e_rotation.x, e_rotation.y, e_rotation.z, e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]), _p2(n11), (_PADDING[-(p10 + n9 * 56 + 4) & 7] if n11 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in velocities for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p2(n13), (_PADDING[-(p12 + n11 * 48 + 4) & 7] if n13 else b""), b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y, e_angular.z) for e in accelerations for e_linear in (e.linear,) for e_angular in (e.angular,)]), _p3(time_from_start.sec, time_from_start.nanosec))
+                out += (_p2(n9), (_PADDING[-(p8 + 4) & 7] if n9 else b""),
+                    b"".join([_p4(e_translation.x, e_translation.y, e_translation.z, e_rotation.x,
+                    e_rotation.y, e_rotation.z,
+                    e_rotation.w) for e in transforms for e_translation in (e.translation,) for e_rotation in (e.rotation,)]),
+                    _p2(n11), (_PADDING[-(p10 + n9 * 56 + 4) & 7] if n11 else b""),
+                    b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y,
+                    e_angular.z) for e in velocities for e_linear in (e.linear,) for e_angular in (e.angular,)]),
+                    _p2(n13), (_PADDING[-(p12 + n11 * 48 + 4) & 7] if n13 else b""),
+                    b"".join([_p5(e_linear.x, e_linear.y, e_linear.z, e_angular.x, e_angular.y,
+                    e_angular.z) for e in accelerations for e_linear in (e.linear,) for e_angular in (e.angular,)]),
+                    _p3(time_from_start.sec, time_from_start.nanosec))
                 p8 = p14 + n13 * 48 & 7
             return b"".join(out)
         except _FAULTS:
@@ -364,19 +424,28 @@ class MultiDOFJointTrajectory(_Message):
                 (n3,) = _u2(data, p)
                 q = (p + 7 | 7) - 3 if n3 else p + 4
                 p = q + n3 * 56
-                transforms = [Transform(Vector3(e_translation_x, e_translation_y, e_translation_z), Quaternion(e_rotation_x, e_rotation_y, e_rotation_z, e_rotation_w)) for e_translation_x, e_translation_y, e_translation_z, e_rotation_x, e_rotation_y, e_rotation_z, e_rotation_w in _i1(data[q : p])]
+                transforms = [Transform(Vector3(e_translation_x, e_translation_y, e_translation_z),
+                    Quaternion(e_rotation_x, e_rotation_y, e_rotation_z,
+                    e_rotation_w)) for e_translation_x, e_translation_y, e_translation_z,
+                    e_rotation_x, e_rotation_y, e_rotation_z, e_rotation_w in _i1(data[q : p])]
                 (n4,) = _u2(data, p)
                 q = (p + 7 | 7) - 3 if n4 else p + 4
                 p = q + n4 * 48
-                velocities = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z), Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y, e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
+                velocities = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z),
+                    Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y,
+                    e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
                 (n5,) = _u2(data, p)
                 q = (p + 7 | 7) - 3 if n5 else p + 4
                 p = q + n5 * 48
-                accelerations = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z), Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y, e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
+                accelerations = [Twist(Vector3(e_linear_x, e_linear_y, e_linear_z),
+                    Vector3(e_angular_x, e_angular_y, e_angular_z)) for e_linear_x, e_linear_y,
+                    e_linear_z, e_angular_x, e_angular_y, e_angular_z in _i2(data[q : p])]
                 sec_2, nanosec_2 = _u3(data, p)
                 p += 8
-                points.append(MultiDOFJointTrajectoryPoint(transforms, velocities, accelerations, Duration(sec_2, nanosec_2)))
+                points.append(MultiDOFJointTrajectoryPoint(transforms, velocities, accelerations,
+                    Duration(sec_2, nanosec_2)))
             if p > len(data): raise ValueError
-            return MultiDOFJointTrajectory(Header(Time(sec, nanosec), frame_id), joint_names, points)
+            return MultiDOFJointTrajectory(Header(Time(sec, nanosec), frame_id), joint_names,
+                points)
         except _FAULTS:
             return _explain(data, MultiDOFJointTrajectory)

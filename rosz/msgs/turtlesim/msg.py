@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from rosz.message import Message as _Message
 from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from struct import Struct as _Struct
@@ -16,11 +15,13 @@ __all__ = (
     "Pose",
 )
 
-_t1 = _Template("I B B B", -4)
+_p1 = _Struct("<I3B").pack
 _u1 = _Struct("<I3B").unpack_from
 
 
 class Color(_Message):
+    """The colour below a turtle. Every channel runs from 0 to 255."""
+
     r: int = 0
     g: int = 0
     b: int = 0
@@ -40,23 +41,27 @@ class Color(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256, m.r, m.g, m.b)
+            return _p1(256, m.r, m.g, m.b)
         except _FAULTS:
             return _plain(m, Color)
 
     @staticmethod
     def _decode(data: bytes) -> Color:
         try:
-            h, r_2, g_2, b_2 = _u1(data)
+            h, r, g, b_2 = _u1(data)
             if h != 256: raise ValueError
-            return Color(r_2, g_2, b_2)
+            return Color(r, g, b_2)
         except _FAULTS:
             return _explain(data, Color)
-_p1 = _Struct("<I5f").pack
+
+
+_p2 = _Struct("<I5f").pack
 _u2 = _Struct("<I5f").unpack_from
 
 
 class Pose(_Message):
+    """Where a turtle is and how it moves. The origin is the lower left corner of the window."""
+
     x: float = 0.0
     y: float = 0.0
     theta: float = 0.0
@@ -75,20 +80,21 @@ class Pose(_Message):
         "float32 linear_velocity   # units per s, forwards\n"
         "float32 angular_velocity  # rad/s\n"
     )
-    _schema = (("x", "float32", ""), ("y", "float32", ""), ("theta", "float32", ""), ("linear_velocity", "float32", ""), ("angular_velocity", "float32", ""))
+    _schema = (("x", "float32", ""), ("y", "float32", ""), ("theta", "float32", ""),
+        ("linear_velocity", "float32", ""), ("angular_velocity", "float32", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.x, m.y, m.theta, m.linear_velocity, m.angular_velocity)
+            return _p2(256, m.x, m.y, m.theta, m.linear_velocity, m.angular_velocity)
         except _FAULTS:
             return _plain(m, Pose)
 
     @staticmethod
     def _decode(data: bytes) -> Pose:
         try:
-            h, x_2, y_2, theta, linear_velocity, angular_velocity = _u2(data)
+            h, x, y, theta, linear_velocity, angular_velocity = _u2(data)
             if h != 256: raise ValueError
-            return Pose(x_2, y_2, theta, linear_velocity, angular_velocity)
+            return Pose(x, y, theta, linear_velocity, angular_velocity)
         except _FAULTS:
             return _explain(data, Pose)

@@ -7,7 +7,6 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
@@ -37,6 +36,8 @@ _u1 = _Struct("<2I").unpack_from
 
 
 class KillRequest(_Message):
+    """Remove a turtle."""
+
     name: str = ""
     _type = "turtlesim/KillRequest"
     _type_name = "turtlesim/srv/Kill_Request"
@@ -69,7 +70,9 @@ class KillRequest(_Message):
             return KillRequest(name)
         except _FAULTS:
             return _explain(data, KillRequest)
-_t2 = _Template("I x", -4)
+
+
+_p1 = _Struct("<Ix").pack
 _u2 = _Struct("<Ix").unpack_from
 
 
@@ -84,7 +87,7 @@ class KillResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, KillResponse)
 
@@ -99,6 +102,8 @@ class KillResponse(_Message):
 
 
 class Kill(_Service):
+    """Remove a turtle."""
+
     Request = KillRequest
     Response = KillResponse
     _type = "turtlesim/Kill"
@@ -111,11 +116,15 @@ class Kill(_Service):
         "string name\n"
         "---\n"
     )
-_t3 = _Template("I B B B B B", -4)
+
+
+_p2 = _Struct("<I5B").pack
 _u3 = _Struct("<I5B").unpack_from
 
 
 class SetPenRequest(_Message):
+    """Change the line that a turtle draws."""
+
     r: int = 0
     g: int = 0
     b: int = 0
@@ -134,21 +143,22 @@ class SetPenRequest(_Message):
         "uint8 width  # pixels\n"
         "uint8 off    # 1 to stop drawing, 0 to draw"
     )
-    _schema = (("r", "uint8", ""), ("g", "uint8", ""), ("b", "uint8", ""), ("width", "uint8", ""), ("off", "uint8", ""))
+    _schema = (("r", "uint8", ""), ("g", "uint8", ""), ("b", "uint8", ""), ("width", "uint8", ""),
+        ("off", "uint8", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t3[0](256, m.r, m.g, m.b, m.width, m.off)
+            return _p2(256, m.r, m.g, m.b, m.width, m.off)
         except _FAULTS:
             return _plain(m, SetPenRequest)
 
     @staticmethod
     def _decode(data: bytes) -> SetPenRequest:
         try:
-            h, r_2, g_2, b_2, width, off = _u3(data)
+            h, r, g, b_2, width, off = _u3(data)
             if h != 256: raise ValueError
-            return SetPenRequest(r_2, g_2, b_2, width, off)
+            return SetPenRequest(r, g, b_2, width, off)
         except _FAULTS:
             return _explain(data, SetPenRequest)
 
@@ -164,7 +174,7 @@ class SetPenResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, SetPenResponse)
 
@@ -179,6 +189,8 @@ class SetPenResponse(_Message):
 
 
 class SetPen(_Service):
+    """Change the line that a turtle draws."""
+
     Request = SetPenRequest
     Response = SetPenResponse
     _type = "turtlesim/SetPen"
@@ -195,11 +207,15 @@ class SetPen(_Service):
         "uint8 off    # 1 to stop drawing, 0 to draw\n"
         "---\n"
     )
-_t4 = _Stride("I f f f I $", -4, 4)
+
+
+_t2 = _Stride("I f f f I $", -4, 4)
 _u4 = _Struct("<I3fI").unpack_from
 
 
 class SpawnRequest(_Message):
+    """Put a turtle into the window."""
+
     x: float = 0.0
     y: float = 0.0
     theta: float = 0.0
@@ -216,13 +232,14 @@ class SpawnRequest(_Message):
         "float32 theta  # rad, counter-clockwise from the x axis\n"
         "string name    # empty: pick one"
     )
-    _schema = (("x", "float32", ""), ("y", "float32", ""), ("theta", "float32", ""), ("name", "string", ""))
+    _schema = (("x", "float32", ""), ("y", "float32", ""), ("theta", "float32", ""),
+        ("name", "string", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            f2, p3 = _t4[n1]
+            f2, p3 = _t2[n1]
             return f2(256, m.x, m.y, m.theta, n1, b1)
         except _FAULTS:
             return _plain(m, SpawnRequest)
@@ -230,12 +247,12 @@ class SpawnRequest(_Message):
     @staticmethod
     def _decode(data: bytes) -> SpawnRequest:
         try:
-            h, x_2, y_2, theta, n1 = _u4(data)
+            h, x, y, theta, n1 = _u4(data)
             if h != 256: raise ValueError
             p = 20 + n1
             name = data[20 : p - 1].decode()
             if p > len(data): raise ValueError
-            return SpawnRequest(x_2, y_2, theta, name)
+            return SpawnRequest(x, y, theta, name)
         except _FAULTS:
             return _explain(data, SpawnRequest)
 
@@ -272,6 +289,8 @@ class SpawnResponse(_Message):
 
 
 class Spawn(_Service):
+    """Put a turtle into the window."""
+
     Request = SpawnRequest
     Response = SpawnResponse
     _type = "turtlesim/Spawn"
@@ -288,11 +307,15 @@ class Spawn(_Service):
         "---\n"
         "string name    # the name it got\n"
     )
-_p1 = _Struct("<I3f").pack
+
+
+_p3 = _Struct("<I3f").pack
 _u5 = _Struct("<I3f").unpack_from
 
 
 class TeleportAbsoluteRequest(_Message):
+    """Take a turtle to a place."""
+
     x: float = 0.0
     y: float = 0.0
     theta: float = 0.0
@@ -312,16 +335,16 @@ class TeleportAbsoluteRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.x, m.y, m.theta)
+            return _p3(256, m.x, m.y, m.theta)
         except _FAULTS:
             return _plain(m, TeleportAbsoluteRequest)
 
     @staticmethod
     def _decode(data: bytes) -> TeleportAbsoluteRequest:
         try:
-            h, x_2, y_2, theta = _u5(data)
+            h, x, y, theta = _u5(data)
             if h != 256: raise ValueError
-            return TeleportAbsoluteRequest(x_2, y_2, theta)
+            return TeleportAbsoluteRequest(x, y, theta)
         except _FAULTS:
             return _explain(data, TeleportAbsoluteRequest)
 
@@ -337,7 +360,7 @@ class TeleportAbsoluteResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, TeleportAbsoluteResponse)
 
@@ -352,6 +375,8 @@ class TeleportAbsoluteResponse(_Message):
 
 
 class TeleportAbsolute(_Service):
+    """Take a turtle to a place."""
+
     Request = TeleportAbsoluteRequest
     Response = TeleportAbsoluteResponse
     _type = "turtlesim/TeleportAbsolute"
@@ -366,11 +391,15 @@ class TeleportAbsolute(_Service):
         "float32 theta  # rad, counter-clockwise from the x axis\n"
         "---\n"
     )
-_p2 = _Struct("<I2f").pack
+
+
+_p4 = _Struct("<I2f").pack
 _u6 = _Struct("<I2f").unpack_from
 
 
 class TeleportRelativeRequest(_Message):
+    """Take a turtle away from where it is: turn it, then move it."""
+
     linear: float = 0.0
     angular: float = 0.0
     _type = "turtlesim/TeleportRelativeRequest"
@@ -388,7 +417,7 @@ class TeleportRelativeRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.linear, m.angular)
+            return _p4(256, m.linear, m.angular)
         except _FAULTS:
             return _plain(m, TeleportRelativeRequest)
 
@@ -413,7 +442,7 @@ class TeleportRelativeResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t2[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, TeleportRelativeResponse)
 
@@ -428,6 +457,8 @@ class TeleportRelativeResponse(_Message):
 
 
 class TeleportRelative(_Service):
+    """Take a turtle away from where it is: turn it, then move it."""
+
     Request = TeleportRelativeRequest
     Response = TeleportRelativeResponse
     _type = "turtlesim/TeleportRelative"

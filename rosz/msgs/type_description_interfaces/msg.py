@@ -27,6 +27,8 @@ _u1 = _Struct("<IB7x2QI").unpack_from
 
 
 class FieldType(_Message):
+    """The type of a field."""
+
     type_id: int = 0
     capacity: int = 0
     string_capacity: int = 0
@@ -232,7 +234,8 @@ class FieldType(_Message):
         "uint64 string_capacity        # of a fixed or bounded string, else 0\n"
         "string<=255 nested_type_name  # full name of the other message, else empty\n"
     )
-    _schema = (("type_id", "uint8", ""), ("capacity", "uint64", ""), ("string_capacity", "uint64", ""), ("nested_type_name", "string<=255", ""))
+    _schema = (("type_id", "uint8", ""), ("capacity", "uint64", ""),
+        ("string_capacity", "uint64", ""), ("nested_type_name", "string<=255", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -258,6 +261,8 @@ class FieldType(_Message):
             return FieldType(type_id, capacity, string_capacity, nested_type_name)
         except _FAULTS:
             return _explain(data, FieldType)
+
+
 _t2 = _Stride("I I $ B Q Q I $", -4, 8)
 _t3 = _Stride("I $", None, 8)
 _u2 = _Struct("<2I").unpack_from
@@ -266,6 +271,8 @@ _u4 = _Struct("<I").unpack_from
 
 
 class Field(_Message):
+    """A field of a type."""
+
     name: str = ""
     type: FieldType = _field(default_factory=FieldType)
     default_value: str = ""
@@ -296,7 +303,8 @@ class Field(_Message):
             n3 = len(b3) + 1
             f4, p5 = _t2[n1, n2]
             f6, p7 = _t3[p5, n3]
-            return b"".join((f4(256, n1, b1, type_2.type_id, type_2.capacity, type_2.string_capacity, n2, b2), f6(n3, b3)))
+            return b"".join((f4(256, n1, b1, type_2.type_id, type_2.capacity,
+                type_2.string_capacity, n2, b2), f6(n3, b3)))
         except _FAULTS:
             return _plain(m, Field)
 
@@ -320,14 +328,19 @@ class Field(_Message):
             p = q + n3
             default_value = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return Field(name, FieldType(type_id, capacity, string_capacity, nested_type_name), default_value)
+            return Field(name, FieldType(type_id, capacity, string_capacity, nested_type_name),
+                default_value)
         except _FAULTS:
             return _explain(data, Field)
+
+
 _t4 = _Stride("I I $ I", -4, 8)
 _t5 = _Stride("I $ B Q Q I $", None, 8)
 
 
 class IndividualTypeDescription(_Message):
+    """The fields of one type, without those of the types that it refers to."""
+
     type_name: str = ""
     fields: list[Field] = []
     _type = "type_description_interfaces/IndividualTypeDescription"
@@ -366,7 +379,8 @@ class IndividualTypeDescription(_Message):
                 n8 = len(b8) + 1
                 f9, p10 = _t5[p5, n6, n7]
                 f11, p12 = _t3[p10, n8]
-                out += (f9(n6, b6, type_2.type_id, type_2.capacity, type_2.string_capacity, n7, b7), f11(n8, b8))
+                out += (f9(n6, b6, type_2.type_id, type_2.capacity, type_2.string_capacity, n7,
+                    b7), f11(n8, b8))
                 p5 = p12
             return b"".join(out)
         except _FAULTS:
@@ -402,15 +416,20 @@ class IndividualTypeDescription(_Message):
                 q = p + 4
                 p = q + n5
                 default_value = data[q : p - 1].decode()
-                fields.append(Field(name, FieldType(type_id, capacity, string_capacity, nested_type_name), default_value))
+                fields.append(Field(name,
+                    FieldType(type_id, capacity, string_capacity, nested_type_name), default_value))
             if p > len(data): raise ValueError
             return IndividualTypeDescription(type_name, fields)
         except _FAULTS:
             return _explain(data, IndividualTypeDescription)
+
+
 _t6 = _Stride("I I $ I $", -4, 4)
 
 
 class KeyValue(_Message):
+    """A remark on a type."""
+
     key: str = ""
     value: str = ""
     _type = "type_description_interfaces/KeyValue"
@@ -453,11 +472,15 @@ class KeyValue(_Message):
             return KeyValue(key, value)
         except _FAULTS:
             return _explain(data, KeyValue)
+
+
 _t7 = _Stride("I", None, 8)
 _t8 = _Stride("I $ I", None, 8)
 
 
 class TypeDescription(_Message):
+    """Everything needed to decode a type."""
+
     type_description: IndividualTypeDescription = _field(default_factory=IndividualTypeDescription)
     referenced_type_descriptions: list[IndividualTypeDescription] = []
     _type = "type_description_interfaces/TypeDescription"
@@ -472,7 +495,8 @@ class TypeDescription(_Message):
         "# Every type that it refers to, directly or not, ordered by name.\n"
         "IndividualTypeDescription[] referenced_type_descriptions\n"
     )
-    _schema = (("type_description", IndividualTypeDescription, ""), ("referenced_type_descriptions", IndividualTypeDescription, "[]"))
+    _schema = (("type_description", IndividualTypeDescription, ""),
+        ("referenced_type_descriptions", IndividualTypeDescription, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -499,7 +523,8 @@ class TypeDescription(_Message):
                 n8 = len(b8) + 1
                 f9, p10 = _t5[p5, n6, n7]
                 f11, p12 = _t3[p10, n8]
-                out += (f9(n6, b6, type_2.type_id, type_2.capacity, type_2.string_capacity, n7, b7), f11(n8, b8))
+                out += (f9(n6, b6, type_2.type_id, type_2.capacity, type_2.string_capacity, n7,
+                    b7), f11(n8, b8))
                 p5 = p12
             referenced_type_descriptions = m.referenced_type_descriptions
             n13 = len(referenced_type_descriptions)
@@ -528,7 +553,8 @@ class TypeDescription(_Message):
                     n24 = len(b24) + 1
                     f25, p26 = _t5[p21, n22, n23]
                     f27, p28 = _t3[p26, n24]
-                    out += (f25(n22, b22, type_3.type_id, type_3.capacity, type_3.string_capacity, n23, b23), f27(n24, b24))
+                    out += (f25(n22, b22, type_3.type_id, type_3.capacity, type_3.string_capacity,
+                        n23, b23), f27(n24, b24))
                     p21 = p28
                 p16 = p21
             return b"".join(out)
@@ -565,7 +591,8 @@ class TypeDescription(_Message):
                 q = p + 4
                 p = q + n5
                 default_value = data[q : p - 1].decode()
-                fields.append(Field(name, FieldType(type_id, capacity, string_capacity, nested_type_name), default_value))
+                fields.append(Field(name,
+                    FieldType(type_id, capacity, string_capacity, nested_type_name), default_value))
             p = p + 3 & -4
             (n6,) = _u4(data, p)
             referenced_type_descriptions = []
@@ -599,17 +626,25 @@ class TypeDescription(_Message):
                     q = p + 4
                     p = q + n11
                     default_value_2 = data[q : p - 1].decode()
-                    fields_2.append(Field(name_2, FieldType(type_id_2, capacity_2, string_capacity_2, nested_type_name_2), default_value_2))
-                referenced_type_descriptions.append(IndividualTypeDescription(type_name_2, fields_2))
+                    fields_2.append(Field(name_2,
+                        FieldType(type_id_2, capacity_2, string_capacity_2, nested_type_name_2),
+                        default_value_2))
+                referenced_type_descriptions.append(IndividualTypeDescription(type_name_2,
+                    fields_2))
             if p > len(data): raise ValueError
-            return TypeDescription(IndividualTypeDescription(type_name, fields), referenced_type_descriptions)
+            return TypeDescription(IndividualTypeDescription(type_name, fields),
+                referenced_type_descriptions)
         except _FAULTS:
             return _explain(data, TypeDescription)
+
+
 _t9 = _Stride("I I $", -4, 4)
 _t10 = _Stride("I $ I $", None, 4)
 
 
 class TypeSource(_Message):
+    """The text that defines a type."""
+
     type_name: str = ""
     encoding: str = ""
     raw_file_contents: str = ""
@@ -624,7 +659,8 @@ class TypeSource(_Message):
         "string encoding           # \"msg\", \"srv\", \"action\" or \"idl\"; \"implicit\" if another text implies it\n"
         "string raw_file_contents  # as it was written, comments included\n"
     )
-    _schema = (("type_name", "string", ""), ("encoding", "string", ""), ("raw_file_contents", "string", ""))
+    _schema = (("type_name", "string", ""), ("encoding", "string", ""),
+        ("raw_file_contents", "string", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:

@@ -34,6 +34,8 @@ _u3 = _Struct("<?").unpack_from
 
 
 class GetTypeDescriptionRequest(_Message):
+    """Ask a node how a type that it uses is defined."""
+
     type_name: str = ""
     type_hash: str = ""
     include_type_sources: bool = True
@@ -48,7 +50,8 @@ class GetTypeDescriptionRequest(_Message):
         "string type_hash                 # such as \"RIHS01_...\"; the node must use this very version\n"
         "bool include_type_sources true   # whether to send the texts as well"
     )
-    _schema = (("type_name", "string", ""), ("type_hash", "string", ""), ("include_type_sources", "bool", ""))
+    _schema = (("type_name", "string", ""), ("type_hash", "string", ""),
+        ("include_type_sources", "bool", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -81,6 +84,8 @@ class GetTypeDescriptionRequest(_Message):
             return GetTypeDescriptionRequest(type_name, type_hash, include_type_sources)
         except _FAULTS:
             return _explain(data, GetTypeDescriptionRequest)
+
+
 _t3 = _Stride("I ? I $", -4, 8)
 _t4 = _Stride("I $ I", None, 8)
 _t5 = _Stride("I $ B Q Q I $", None, 8)
@@ -108,7 +113,9 @@ class GetTypeDescriptionResponse(_Message):
         "TypeSource[] type_sources        # empty unless asked for\n"
         "KeyValue[] extra_information\n"
     )
-    _schema = (("successful", "bool", ""), ("failure_reason", "string", ""), ("type_description", TypeDescription, ""), ("type_sources", TypeSource, "[]"), ("extra_information", KeyValue, "[]"))
+    _schema = (("successful", "bool", ""), ("failure_reason", "string", ""),
+        ("type_description", TypeDescription, ""), ("type_sources", TypeSource, "[]"),
+        ("extra_information", KeyValue, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -140,7 +147,8 @@ class GetTypeDescriptionResponse(_Message):
                 n11 = len(b11) + 1
                 f12, p13 = _t5[p8, n9, n10]
                 f14, p15 = _t6[p13, n11]
-                out += (f12(n9, b9, type_2.type_id, type_2.capacity, type_2.string_capacity, n10, b10), f14(n11, b11))
+                out += (f12(n9, b9, type_2.type_id, type_2.capacity, type_2.string_capacity, n10,
+                    b10), f14(n11, b11))
                 p8 = p15
             referenced_type_descriptions = type_description.referenced_type_descriptions
             n16 = len(referenced_type_descriptions)
@@ -169,7 +177,8 @@ class GetTypeDescriptionResponse(_Message):
                     n27 = len(b27) + 1
                     f28, p29 = _t5[p24, n25, n26]
                     f30, p31 = _t6[p29, n27]
-                    out += (f28(n25, b25, type_3.type_id, type_3.capacity, type_3.string_capacity, n26, b26), f30(n27, b27))
+                    out += (f28(n25, b25, type_3.type_id, type_3.capacity, type_3.string_capacity,
+                        n26, b26), f30(n27, b27))
                     p24 = p31
                 p19 = p24
             type_sources = m.type_sources
@@ -241,7 +250,8 @@ class GetTypeDescriptionResponse(_Message):
                 q = p + 4
                 p = q + n6
                 default_value = data[q : p - 1].decode()
-                fields.append(Field(name, FieldType(type_id, capacity, string_capacity, nested_type_name), default_value))
+                fields.append(Field(name,
+                    FieldType(type_id, capacity, string_capacity, nested_type_name), default_value))
             p = p + 3 & -4
             (n7,) = _u2(data, p)
             referenced_type_descriptions = []
@@ -275,8 +285,11 @@ class GetTypeDescriptionResponse(_Message):
                     q = p + 4
                     p = q + n12
                     default_value_2 = data[q : p - 1].decode()
-                    fields_2.append(Field(name_2, FieldType(type_id_2, capacity_2, string_capacity_2, nested_type_name_2), default_value_2))
-                referenced_type_descriptions.append(IndividualTypeDescription(type_name_2, fields_2))
+                    fields_2.append(Field(name_2,
+                        FieldType(type_id_2, capacity_2, string_capacity_2, nested_type_name_2),
+                        default_value_2))
+                referenced_type_descriptions.append(IndividualTypeDescription(type_name_2,
+                    fields_2))
             p = p + 3 & -4
             (n13,) = _u2(data, p)
             type_sources = []
@@ -315,12 +328,16 @@ class GetTypeDescriptionResponse(_Message):
                 value = data[q : p - 1].decode()
                 extra_information.append(KeyValue(key, value))
             if p > len(data): raise ValueError
-            return GetTypeDescriptionResponse(successful, failure_reason, TypeDescription(IndividualTypeDescription(type_name, fields), referenced_type_descriptions), type_sources, extra_information)
+            return GetTypeDescriptionResponse(successful, failure_reason,
+                TypeDescription(IndividualTypeDescription(type_name, fields),
+                referenced_type_descriptions), type_sources, extra_information)
         except _FAULTS:
             return _explain(data, GetTypeDescriptionResponse)
 
 
 class GetTypeDescription(_Service):
+    """Ask a node how a type that it uses is defined."""
+
     Request = GetTypeDescriptionRequest
     Response = GetTypeDescriptionResponse
     _type = "type_description_interfaces/GetTypeDescription"

@@ -6,7 +6,6 @@ from __future__ import annotations
 from rosz.message import Bytes as _Bytes
 from rosz.message import Message as _Message
 from rosz.message.runtime import FAULTS as _FAULTS
-from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import octets as _octets
@@ -18,11 +17,13 @@ __all__ = (
 )
 
 _z1 = bytes(16)
-_t1 = _Template("I 16s", -4)
+_p1 = _Struct("<I16s").pack
 _u1 = _Struct("<I16s").unpack_from
 
 
 class UUID(_Message):
+    """A universally unique identifier (RFC 9562)."""
+
     uuid: _Bytes = _z1
     _type = "unique_identifier_msgs/UUID"
     _type_name = "unique_identifier_msgs/msg/UUID"
@@ -41,7 +42,7 @@ class UUID(_Message):
             uuid = m.uuid
             if type(uuid) is not bytes or len(uuid) != 16:
                 uuid = bytes(_octets(uuid, 16))
-            return _t1[0](256, uuid)
+            return _p1(256, uuid)
         except _FAULTS:
             return _plain(m, UUID)
 

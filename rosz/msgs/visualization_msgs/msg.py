@@ -56,6 +56,8 @@ _i2 = _Struct("<4f").iter_unpack
 
 
 class ImageMarker(_Message):
+    """A drawing on top of an image. Coordinates are pixels."""
+
     header: Header = _field(default_factory=Header)
     ns: str = ""
     id: int = 0
@@ -109,7 +111,11 @@ class ImageMarker(_Message):
         "geometry_msgs/Point[] points\n"
         "std_msgs/ColorRGBA[] outline_colors   # one per point or per line, or none\n"
     )
-    _schema = (("header", Header, ""), ("ns", "string", ""), ("id", "int32", ""), ("type", "int32", ""), ("action", "int32", ""), ("position", Point, ""), ("scale", "float32", ""), ("outline_color", ColorRGBA, ""), ("filled", "uint8", ""), ("fill_color", ColorRGBA, ""), ("lifetime", Duration, ""), ("points", Point, "[]"), ("outline_colors", ColorRGBA, "[]"))
+    _schema = (("header", Header, ""), ("ns", "string", ""), ("id", "int32", ""),
+        ("type", "int32", ""), ("action", "int32", ""), ("position", Point, ""),
+        ("scale", "float32", ""), ("outline_color", ColorRGBA, ""), ("filled", "uint8", ""),
+        ("fill_color", ColorRGBA, ""), ("lifetime", Duration, ""), ("points", Point, "[]"),
+        ("outline_colors", ColorRGBA, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -127,7 +133,12 @@ class ImageMarker(_Message):
             p4 = 0 if n3 else 4
             outline_colors = m.outline_colors
             n5 = len(outline_colors)
-            return b"".join((_t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, m.id, m.type, m.action, position.x, position.y, position.z, m.scale, outline_color.r, outline_color.g, outline_color.b, outline_color.a, m.filled, fill_color.r, fill_color.g, fill_color.b, fill_color.a, lifetime.sec, lifetime.nanosec, n3), (_PADDING[4] if n3 else b""), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n5), b"".join([_p2(e.r, e.g, e.b, e.a) for e in outline_colors])))
+            return b"".join((_t1[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, m.id,
+                m.type, m.action, position.x, position.y, position.z, m.scale, outline_color.r,
+                outline_color.g, outline_color.b, outline_color.a, m.filled, fill_color.r,
+                fill_color.g, fill_color.b, fill_color.a, lifetime.sec, lifetime.nanosec, n3),
+                (_PADDING[4] if n3 else b""), b"".join([_p1(e.x, e.y, e.z) for e in points]),
+                _p3(n5), b"".join([_p2(e.r, e.g, e.b, e.a) for e in outline_colors])))
         except _FAULTS:
             return _plain(m, ImageMarker)
 
@@ -146,7 +157,8 @@ class ImageMarker(_Message):
             p = p + 3 & -4
             id_2, type_2, action = _u3(data, p)
             p = (p + 15 | 7) - 3
-            x_2, y_2, z_2, scale, r_2, g_2, b_2, a_2, filled, r_3, g_3, b_3, a_3, sec_2, nanosec_2, n3 = _u4(data, p)
+            (x, y, z, scale, r, g, b_2, a, filled, r_2, g_2, b_3, a_2, sec_2, nanosec_2,
+                n3) = _u4(data, p)
             q = p + 80 if n3 else p + 76
             p = q + n3 * 24
             points = list(_starmap(Point, _i1(data[q : p])))
@@ -155,15 +167,21 @@ class ImageMarker(_Message):
             p = q + n4 * 16
             outline_colors = list(_starmap(ColorRGBA, _i2(data[q : p])))
             if p > len(data): raise ValueError
-            return ImageMarker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action, Point(x_2, y_2, z_2), scale, ColorRGBA(r_2, g_2, b_2, a_2), filled, ColorRGBA(r_3, g_3, b_3, a_3), Duration(sec_2, nanosec_2), points, outline_colors)
+            return ImageMarker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action,
+                Point(x, y, z), scale, ColorRGBA(r, g, b_2, a), filled,
+                ColorRGBA(r_2, g_2, b_3, a_2), Duration(sec_2, nanosec_2), points, outline_colors)
         except _FAULTS:
             return _explain(data, ImageMarker)
+
+
 _t2 = _Stride("I I I I $", -4, 4)
 _t3 = _Stride("I $ B", None, 4)
 _u5 = _Struct("<4I").unpack_from
 
 
 class MenuEntry(_Message):
+    """An entry of the menu of an interactive marker."""
+
     id: int = 0
     parent_id: int = 0
     title: str = ""
@@ -191,7 +209,8 @@ class MenuEntry(_Message):
         "\n"
         "uint8 command_type\n"
     )
-    _schema = (("id", "uint32", ""), ("parent_id", "uint32", ""), ("title", "string", ""), ("command", "string", ""), ("command_type", "uint8", ""))
+    _schema = (("id", "uint32", ""), ("parent_id", "uint32", ""), ("title", "string", ""),
+        ("command", "string", ""), ("command_type", "uint8", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -224,11 +243,15 @@ class MenuEntry(_Message):
             return MenuEntry(id_2, parent_id, title, command, command_type)
         except _FAULTS:
             return _explain(data, MenuEntry)
+
+
 _p4 = _Struct("<I2f").pack
 _u6 = _Struct("<I2f").unpack_from
 
 
 class UVCoordinate(_Message):
+    """A place on a texture, from its lower left corner (0, 0) to its upper right (1, 1)."""
+
     u: float = 0.0
     v: float = 0.0
     _type = "visualization_msgs/UVCoordinate"
@@ -253,16 +276,20 @@ class UVCoordinate(_Message):
     @staticmethod
     def _decode(data: bytes) -> UVCoordinate:
         try:
-            h, u_2, v_2 = _u6(data)
+            h, u, v = _u6(data)
             if h != 256: raise ValueError
-            return UVCoordinate(u_2, v_2)
+            return UVCoordinate(u, v)
         except _FAULTS:
             return _explain(data, UVCoordinate)
+
+
 _t4 = _Template("I I $ I", -4)
 _u7 = _Struct("<2I").unpack_from
 
 
 class MeshFile(_Message):
+    """The contents of a mesh file."""
+
     filename: str = ""
     data: _Bytes = b""
     _type = "visualization_msgs/MeshFile"
@@ -307,6 +334,8 @@ class MeshFile(_Message):
             return MeshFile(filename, data_2)
         except _FAULTS:
             return _explain(data, MeshFile)
+
+
 _t5 = _Template("I i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", -4)
 _t6 = _Stride("I $ i I", 4, 8)
 _t7 = _Stride("I $ I $ I", None, 8)
@@ -322,6 +351,8 @@ _u10 = _Struct("<?").unpack_from
 
 
 class Marker(_Message):
+    """Something to draw in a 3D view."""
+
     header: Header = _field(default_factory=Header)
     ns: str = ""
     id: int = 0
@@ -417,7 +448,13 @@ class Marker(_Message):
         "MeshFile mesh_file\n"
         "bool mesh_use_embedded_materials       # the mesh's own colours instead of color\n"
     )
-    _schema = (("header", Header, ""), ("ns", "string", ""), ("id", "int32", ""), ("type", "int32", ""), ("action", "int32", ""), ("pose", Pose, ""), ("scale", Vector3, ""), ("color", ColorRGBA, ""), ("lifetime", Duration, ""), ("frame_locked", "bool", ""), ("points", Point, "[]"), ("colors", ColorRGBA, "[]"), ("texture_resource", "string", ""), ("texture", CompressedImage, ""), ("uv_coordinates", UVCoordinate, "[]"), ("text", "string", ""), ("mesh_resource", "string", ""), ("mesh_file", MeshFile, ""), ("mesh_use_embedded_materials", "bool", ""))
+    _schema = (("header", Header, ""), ("ns", "string", ""), ("id", "int32", ""),
+        ("type", "int32", ""), ("action", "int32", ""), ("pose", Pose, ""), ("scale", Vector3, ""),
+        ("color", ColorRGBA, ""), ("lifetime", Duration, ""), ("frame_locked", "bool", ""),
+        ("points", Point, "[]"), ("colors", ColorRGBA, "[]"), ("texture_resource", "string", ""),
+        ("texture", CompressedImage, ""), ("uv_coordinates", UVCoordinate, "[]"),
+        ("text", "string", ""), ("mesh_resource", "string", ""), ("mesh_file", MeshFile, ""),
+        ("mesh_use_embedded_materials", "bool", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -470,7 +507,15 @@ class Marker(_Message):
                 data_3 = _octets(data_3)
             n23 = len(data_3)
             f24, p25 = _t10[p22, n20]
-            return b"".join((_t5[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, m.id, m.type, m.action, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, m.frame_locked, n3), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n4), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f7(n5, b5, stamp_2.sec, stamp_2.nanosec), f11(n6, b6, n9, b9, n10), data_2, f14(n13), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f18(n16, b16), f21(n17, b17), f24(n20, b20, n23), data_3, _p6(m.mesh_use_embedded_materials)))
+            return b"".join((_t5[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, m.id,
+                m.type, m.action, position.x, position.y, position.z, orientation.x, orientation.y,
+                orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b,
+                color.a, lifetime.sec, lifetime.nanosec, m.frame_locked, n3),
+                b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n4),
+                b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
+                f7(n5, b5, stamp_2.sec, stamp_2.nanosec), f11(n6, b6, n9, b9, n10), data_2,
+                f14(n13), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f18(n16, b16),
+                f21(n17, b17), f24(n20, b20, n23), data_3, _p6(m.mesh_use_embedded_materials)))
         except _FAULTS:
             return _plain(m, Marker)
 
@@ -489,7 +534,8 @@ class Marker(_Message):
             p = p + 3 & -4
             id_2, type_2, action = _u3(data, p)
             p = (p + 15 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, x_4, y_4, z_4, r_2, g_2, b_2, a_2, sec_2, nanosec_2, frame_locked, n3 = _u8(data, p)
+            (x, y, z, x_2, y_2, z_2, w, x_3, y_3, z_3, r, g, b_2, a, sec_2, nanosec_2,
+                frame_locked, n3) = _u8(data, p)
             q = p + 112
             p = q + n3 * 24
             points = list(_starmap(Point, _i1(data[q : p])))
@@ -541,9 +587,17 @@ class Marker(_Message):
             p = q + n13
             data_3 = data[q : p]
             (mesh_use_embedded_materials,) = _u10(data, p)
-            return Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), Vector3(x_4, y_4, z_4), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_2, nanosec_2), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials)
+            return Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), Vector3(x_3, y_3, z_3),
+                ColorRGBA(r, g, b_2, a), Duration(sec_2, nanosec_2), frame_locked, points, colors,
+                texture_resource,
+                CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2),
+                uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
+                mesh_use_embedded_materials)
         except _FAULTS:
             return _explain(data, Marker)
+
+
 _t11 = _Template("I I $ d d d d B B ? I", -4)
 _t12 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
 _t13 = _Stride("? I $", None, 8)
@@ -551,6 +605,8 @@ _u11 = _Struct("<4d2B?xI").unpack_from
 
 
 class InteractiveMarkerControl(_Message):
+    """A handle of an interactive marker: what it looks like and what can be done with it."""
+
     name: str = ""
     orientation: Quaternion = _field(default_factory=Quaternion)
     orientation_mode: int = 0
@@ -610,7 +666,10 @@ class InteractiveMarkerControl(_Message):
         "bool independent_marker_orientation  # of a VIEW_FACING handle: the markers do not face the viewer\n"
         "string description                   # what it does, as a hint\n"
     )
-    _schema = (("name", "string", ""), ("orientation", Quaternion, ""), ("orientation_mode", "uint8", ""), ("interaction_mode", "uint8", ""), ("always_visible", "bool", ""), ("markers", Marker, "[]"), ("independent_marker_orientation", "bool", ""), ("description", "string", ""))
+    _schema = (("name", "string", ""), ("orientation", Quaternion, ""),
+        ("orientation_mode", "uint8", ""), ("interaction_mode", "uint8", ""),
+        ("always_visible", "bool", ""), ("markers", Marker, "[]"),
+        ("independent_marker_orientation", "bool", ""), ("description", "string", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -619,7 +678,8 @@ class InteractiveMarkerControl(_Message):
             orientation = m.orientation
             markers = m.markers
             n2 = len(markers)
-            out = [_t11[n1](256, n1, b1, orientation.x, orientation.y, orientation.z, orientation.w, m.orientation_mode, m.interaction_mode, m.always_visible, n2)]
+            out = [_t11[n1](256, n1, b1, orientation.x, orientation.y, orientation.z,
+                orientation.w, m.orientation_mode, m.interaction_mode, m.always_visible, n2)]
             p3 = 0
             for markers_one in markers:
                 header = markers_one.header
@@ -670,7 +730,17 @@ class InteractiveMarkerControl(_Message):
                     data_3 = _octets(data_3)
                 n26 = len(data_3)
                 f27, p28 = _t10[p25, n23]
-                out += (_t12[p3, n4, n5](stamp.sec, stamp.nanosec, n4, b4, n5, b5, markers_one.id, markers_one.type, markers_one.action, position.x, position.y, position.z, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n6), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n7), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f10(n8, b8, stamp_2.sec, stamp_2.nanosec), f14(n9, b9, n12, b12, n13), data_2, f17(n16), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f21(n19, b19), f24(n20, b20), f27(n23, b23, n26), data_3, _p6(markers_one.mesh_use_embedded_materials))
+                out += (_t12[p3, n4, n5](stamp.sec, stamp.nanosec, n4, b4, n5, b5, markers_one.id,
+                    markers_one.type, markers_one.action, position.x, position.y, position.z,
+                    orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, scale.x,
+                    scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
+                    lifetime.nanosec, markers_one.frame_locked, n6),
+                    b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n7),
+                    b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
+                    f10(n8, b8, stamp_2.sec, stamp_2.nanosec), f14(n9, b9, n12, b12, n13), data_2,
+                    f17(n16), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f21(n19, b19),
+                    f24(n20, b20), f27(n23, b23, n26), data_3,
+                    _p6(markers_one.mesh_use_embedded_materials))
                 p3 = p28 + n26 + 1 & 7
             b29 = m.description.encode()
             if 0 in b29: raise ValueError
@@ -689,7 +759,7 @@ class InteractiveMarkerControl(_Message):
             p = 8 + n1
             name = data[8 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, w_2, orientation_mode, interaction_mode, always_visible, n2 = _u11(data, p)
+            x, y, z, w, orientation_mode, interaction_mode, always_visible, n2 = _u11(data, p)
             markers = []
             p = p + 40
             for _ in range(n2):
@@ -706,7 +776,8 @@ class InteractiveMarkerControl(_Message):
                 p = p + 3 & -4
                 id_2, type_2, action = _u3(data, p)
                 p = (p + 15 | 7) - 3
-                x_3, y_3, z_3, x_4, y_4, z_4, w_3, x_5, y_5, z_5, r_2, g_2, b_2, a_2, sec_2, nanosec_2, frame_locked, n5 = _u8(data, p)
+                (x_2, y_2, z_2, x_3, y_3, z_3, w_2, x_4, y_4, z_4, r, g, b_2, a, sec_2, nanosec_2,
+                    frame_locked, n5) = _u8(data, p)
                 q = p + 112
                 p = q + n5 * 24
                 points = list(_starmap(Point, _i1(data[q : p])))
@@ -759,7 +830,13 @@ class InteractiveMarkerControl(_Message):
                 data_3 = data[q : p]
                 (mesh_use_embedded_materials,) = _u10(data, p)
                 p += 1
-                markers.append(Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action, Pose(Point(x_3, y_3, z_3), Quaternion(x_4, y_4, z_4, w_3)), Vector3(x_5, y_5, z_5), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_2, nanosec_2), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials))
+                markers.append(Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2,
+                    action, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)),
+                    Vector3(x_4, y_4, z_4), ColorRGBA(r, g, b_2, a), Duration(sec_2, nanosec_2),
+                    frame_locked, points, colors, texture_resource,
+                    CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2),
+                    uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
+                    mesh_use_embedded_materials))
             (independent_marker_orientation,) = _u10(data, p)
             p = p + 4 & -4
             (n16,) = _u2(data, p)
@@ -767,9 +844,13 @@ class InteractiveMarkerControl(_Message):
             p = q + n16
             description = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return InteractiveMarkerControl(name, Quaternion(x_2, y_2, z_2, w_2), orientation_mode, interaction_mode, always_visible, markers, independent_marker_orientation, description)
+            return InteractiveMarkerControl(name, Quaternion(x, y, z, w), orientation_mode,
+                interaction_mode, always_visible, markers, independent_marker_orientation,
+                description)
         except _FAULTS:
             return _explain(data, InteractiveMarkerControl)
+
+
 _t14 = _Stride("I i I I $ d d d d d d d I $", -4, 8)
 _t15 = _Stride("I $ f I", None, 8)
 _t16 = _Stride("I I I $", None, 8)
@@ -781,6 +862,8 @@ _u14 = _Struct("<3I").unpack_from
 
 
 class InteractiveMarker(_Message):
+    """A thing in a 3D view that a person can drag, turn, click or call a menu on."""
+
     header: Header = _field(default_factory=Header)
     pose: Pose = _field(default_factory=Pose)
     name: str = ""
@@ -805,7 +888,9 @@ class InteractiveMarker(_Message):
         "MenuEntry[] menu_entries              # all levels of the menu in one list\n"
         "InteractiveMarkerControl[] controls\n"
     )
-    _schema = (("header", Header, ""), ("pose", Pose, ""), ("name", "string", ""), ("description", "string", ""), ("scale", "float32", ""), ("menu_entries", MenuEntry, "[]"), ("controls", InteractiveMarkerControl, "[]"))
+    _schema = (("header", Header, ""), ("pose", Pose, ""), ("name", "string", ""),
+        ("description", "string", ""), ("scale", "float32", ""), ("menu_entries", MenuEntry, "[]"),
+        ("controls", InteractiveMarkerControl, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -824,7 +909,9 @@ class InteractiveMarker(_Message):
             menu_entries = m.menu_entries
             n6 = len(menu_entries)
             f7, p8 = _t15[p5, n3]
-            out = [f4(256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2, b2), f7(n3, b3, m.scale, n6)]
+            out = [f4(256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z,
+                orientation.x, orientation.y, orientation.z, orientation.w, n2, b2),
+                f7(n3, b3, m.scale, n6)]
             p9 = p8
             for menu_entries_one in menu_entries:
                 b10 = menu_entries_one.title.encode()
@@ -835,7 +922,8 @@ class InteractiveMarker(_Message):
                 n11 = len(b11) + 1
                 f12, p13 = _t16[p9, n10]
                 f14, p15 = _t17[p13, n11]
-                out += (f12(menu_entries_one.id, menu_entries_one.parent_id, n10, b10), f14(n11, b11, menu_entries_one.command_type))
+                out += (f12(menu_entries_one.id, menu_entries_one.parent_id, n10, b10),
+                    f14(n11, b11, menu_entries_one.command_type))
                 p9 = p15
             controls = m.controls
             n16 = len(controls)
@@ -847,7 +935,9 @@ class InteractiveMarker(_Message):
                 orientation_2 = controls_one.orientation
                 markers = controls_one.markers
                 n21 = len(markers)
-                out.append(_t18[p19, n20](n20, b20, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n21))
+                out.append(_t18[p19, n20](n20, b20, orientation_2.x, orientation_2.y,
+                    orientation_2.z, orientation_2.w, controls_one.orientation_mode,
+                    controls_one.interaction_mode, controls_one.always_visible, n21))
                 p22 = 0
                 for markers_one in markers:
                     header_2 = markers_one.header
@@ -898,7 +988,18 @@ class InteractiveMarker(_Message):
                         data_3 = _octets(data_3)
                     n45 = len(data_3)
                     f46, p47 = _t10[p44, n42]
-                    out += (_t12[p22, n23, n24](stamp_2.sec, stamp_2.nanosec, n23, b23, n24, b24, markers_one.id, markers_one.type, markers_one.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n25), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n26), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f29(n27, b27, stamp_3.sec, stamp_3.nanosec), f33(n28, b28, n31, b31, n32), data_2, f36(n35), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f40(n38, b38), f43(n39, b39), f46(n42, b42, n45), data_3, _p6(markers_one.mesh_use_embedded_materials))
+                    out += (_t12[p22, n23, n24](stamp_2.sec, stamp_2.nanosec, n23, b23, n24, b24,
+                        markers_one.id, markers_one.type, markers_one.action, position_2.x,
+                        position_2.y, position_2.z, orientation_3.x, orientation_3.y,
+                        orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r,
+                        color.g, color.b, color.a, lifetime.sec, lifetime.nanosec,
+                        markers_one.frame_locked, n25),
+                        b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n26),
+                        b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
+                        f29(n27, b27, stamp_3.sec, stamp_3.nanosec), f33(n28, b28, n31, b31, n32),
+                        data_2, f36(n35), b"".join([_p5(e.u, e.v) for e in uv_coordinates]),
+                        f40(n38, b38), f43(n39, b39), f46(n42, b42, n45), data_3,
+                        _p6(markers_one.mesh_use_embedded_materials))
                     p22 = p47 + n45 + 1 & 7
                 b48 = controls_one.description.encode()
                 if 0 in b48: raise ValueError
@@ -918,7 +1019,7 @@ class InteractiveMarker(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n2 = _u12(data, p)
+            x, y, z, x_2, y_2, z_2, w, n2 = _u12(data, p)
             q = p + 60
             p = q + n2
             name = data[q : p - 1].decode()
@@ -956,7 +1057,8 @@ class InteractiveMarker(_Message):
                 p = q + n8
                 name_2 = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_4, y_4, z_4, w_3, orientation_mode, interaction_mode, always_visible, n9 = _u11(data, p)
+                (x_3, y_3, z_3, w_2, orientation_mode, interaction_mode, always_visible,
+                    n9) = _u11(data, p)
                 markers = []
                 p = p + 40
                 for _ in range(n9):
@@ -973,7 +1075,8 @@ class InteractiveMarker(_Message):
                     p = p + 3 & -4
                     id_3, type_2, action = _u3(data, p)
                     p = (p + 15 | 7) - 3
-                    x_5, y_5, z_5, x_6, y_6, z_6, w_4, x_7, y_7, z_7, r_2, g_2, b_2, a_2, sec_3, nanosec_3, frame_locked, n12 = _u8(data, p)
+                    (x_4, y_4, z_4, x_5, y_5, z_5, w_3, x_6, y_6, z_6, r, g, b_2, a, sec_3,
+                        nanosec_3, frame_locked, n12) = _u8(data, p)
                     q = p + 112
                     p = q + n12 * 24
                     points = list(_starmap(Point, _i1(data[q : p])))
@@ -1026,24 +1129,38 @@ class InteractiveMarker(_Message):
                     data_3 = data[q : p]
                     (mesh_use_embedded_materials,) = _u10(data, p)
                     p += 1
-                    markers.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns, id_3, type_2, action, Pose(Point(x_5, y_5, z_5), Quaternion(x_6, y_6, z_6, w_4)), Vector3(x_7, y_7, z_7), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_3, nanosec_3), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials))
+                    markers.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns, id_3,
+                        type_2, action, Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
+                        Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
+                        Duration(sec_3, nanosec_3), frame_locked, points, colors, texture_resource,
+                        CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
+                        data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
+                        mesh_use_embedded_materials))
                 (independent_marker_orientation,) = _u10(data, p)
                 p = p + 4 & -4
                 (n23,) = _u2(data, p)
                 q = p + 4
                 p = q + n23
                 description_2 = data[q : p - 1].decode()
-                controls.append(InteractiveMarkerControl(name_2, Quaternion(x_4, y_4, z_4, w_3), orientation_mode, interaction_mode, always_visible, markers, independent_marker_orientation, description_2))
+                controls.append(InteractiveMarkerControl(name_2, Quaternion(x_3, y_3, z_3, w_2),
+                    orientation_mode, interaction_mode, always_visible, markers,
+                    independent_marker_orientation, description_2))
             if p > len(data): raise ValueError
-            return InteractiveMarker(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name, description, scale, menu_entries, controls)
+            return InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
+                menu_entries, controls)
         except _FAULTS:
             return _explain(data, InteractiveMarker)
+
+
 _t19 = _Stride("I i I I $ I $", -4, 8)
 _t20 = _Template("I $ B d d d d d d d I d d d ?", None)
 _u15 = _Struct("<7dI4x3d?").unpack_from
 
 
 class InteractiveMarkerFeedback(_Message):
+    """What a person did with an interactive marker."""
+
     header: Header = _field(default_factory=Header)
     client_id: str = ""
     marker_name: str = ""
@@ -1086,7 +1203,10 @@ class InteractiveMarkerFeedback(_Message):
         "geometry_msgs/Point mouse_point  # where on the handle\n"
         "bool mouse_point_valid           # whether mouse_point tells anything\n"
     )
-    _schema = (("header", Header, ""), ("client_id", "string", ""), ("marker_name", "string", ""), ("control_name", "string", ""), ("event_type", "uint8", ""), ("pose", Pose, ""), ("menu_entry_id", "uint32", ""), ("mouse_point", Point, ""), ("mouse_point_valid", "bool", ""))
+    _schema = (("header", Header, ""), ("client_id", "string", ""), ("marker_name", "string", ""),
+        ("control_name", "string", ""), ("event_type", "uint8", ""), ("pose", Pose, ""),
+        ("menu_entry_id", "uint32", ""), ("mouse_point", Point, ""),
+        ("mouse_point_valid", "bool", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1109,7 +1229,10 @@ class InteractiveMarkerFeedback(_Message):
             position = pose.position
             orientation = pose.orientation
             mouse_point = m.mouse_point
-            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2), f7(n3, b3), _t20[p8, n6](n6, b6, m.event_type, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, m.menu_entry_id, mouse_point.x, mouse_point.y, mouse_point.z, m.mouse_point_valid)))
+            return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2), f7(n3, b3),
+                _t20[p8, n6](n6, b6, m.event_type, position.x, position.y, position.z,
+                orientation.x, orientation.y, orientation.z, orientation.w, m.menu_entry_id,
+                mouse_point.x, mouse_point.y, mouse_point.z, m.mouse_point_valid)))
         except _FAULTS:
             return _plain(m, InteractiveMarkerFeedback)
 
@@ -1137,16 +1260,24 @@ class InteractiveMarkerFeedback(_Message):
             control_name = data[q : p - 1].decode()
             event_type = data[p]
             p = (p + 4 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, menu_entry_id, x_4, y_4, z_4, mouse_point_valid = _u15(data, p)
-            return InteractiveMarkerFeedback(Header(Time(sec, nanosec), frame_id), client_id, marker_name, control_name, event_type, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), menu_entry_id, Point(x_4, y_4, z_4), mouse_point_valid)
+            (x, y, z, x_2, y_2, z_2, w, menu_entry_id, x_3, y_3, z_3,
+                mouse_point_valid) = _u15(data, p)
+            return InteractiveMarkerFeedback(Header(Time(sec, nanosec), frame_id), client_id,
+                marker_name, control_name, event_type,
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), menu_entry_id,
+                Point(x_3, y_3, z_3), mouse_point_valid)
         except _FAULTS:
             return _explain(data, InteractiveMarkerFeedback)
+
+
 _t21 = _Template("I I $ Q I", -4)
 _t22 = _Stride("i I I $ d d d d d d d I $", None, 8)
 _u16 = _Struct("<QI").unpack_from
 
 
 class InteractiveMarkerInit(_Message):
+    """All interactive markers of a server, for views that come later."""
+
     server_id: str = ""
     seq_num: int = 0
     markers: list[InteractiveMarker] = []
@@ -1161,7 +1292,8 @@ class InteractiveMarkerInit(_Message):
         "uint64 seq_num               # of the last update that is contained\n"
         "InteractiveMarker[] markers\n"
     )
-    _schema = (("server_id", "string", ""), ("seq_num", "uint64", ""), ("markers", InteractiveMarker, "[]"))
+    _schema = (("server_id", "string", ""), ("seq_num", "uint64", ""),
+        ("markers", InteractiveMarker, "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1188,7 +1320,9 @@ class InteractiveMarkerInit(_Message):
                 menu_entries = markers_one.menu_entries
                 n9 = len(menu_entries)
                 f10, p11 = _t15[p8, n6]
-                out += (f7(stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n5, b5), f10(n6, b6, markers_one.scale, n9))
+                out += (f7(stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z,
+                    orientation.x, orientation.y, orientation.z, orientation.w, n5, b5),
+                    f10(n6, b6, markers_one.scale, n9))
                 p12 = p11
                 for menu_entries_one in menu_entries:
                     b13 = menu_entries_one.title.encode()
@@ -1199,7 +1333,8 @@ class InteractiveMarkerInit(_Message):
                     n14 = len(b14) + 1
                     f15, p16 = _t16[p12, n13]
                     f17, p18 = _t17[p16, n14]
-                    out += (f15(menu_entries_one.id, menu_entries_one.parent_id, n13, b13), f17(n14, b14, menu_entries_one.command_type))
+                    out += (f15(menu_entries_one.id, menu_entries_one.parent_id, n13, b13),
+                        f17(n14, b14, menu_entries_one.command_type))
                     p12 = p18
                 controls = markers_one.controls
                 n19 = len(controls)
@@ -1211,7 +1346,9 @@ class InteractiveMarkerInit(_Message):
                     orientation_2 = controls_one.orientation
                     markers_2 = controls_one.markers
                     n24 = len(markers_2)
-                    out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n24))
+                    out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y,
+                        orientation_2.z, orientation_2.w, controls_one.orientation_mode,
+                        controls_one.interaction_mode, controls_one.always_visible, n24))
                     p25 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
@@ -1262,7 +1399,19 @@ class InteractiveMarkerInit(_Message):
                             data_3 = _octets(data_3)
                         n48 = len(data_3)
                         f49, p50 = _t10[p47, n45]
-                        out += (_t12[p25, n26, n27](stamp_2.sec, stamp_2.nanosec, n26, b26, n27, b27, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n28), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f32(n30, b30, stamp_3.sec, stamp_3.nanosec), f36(n31, b31, n34, b34, n35), data_2, f39(n38), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41), f46(n42, b42), f49(n45, b45, n48), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
+                        out += (_t12[p25, n26, n27](stamp_2.sec, stamp_2.nanosec, n26, b26, n27,
+                            b27, markers_one_2.id, markers_one_2.type, markers_one_2.action,
+                            position_2.x, position_2.y, position_2.z, orientation_3.x,
+                            orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y,
+                            scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
+                            lifetime.nanosec, markers_one_2.frame_locked, n28),
+                            b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29),
+                            b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
+                            f32(n30, b30, stamp_3.sec, stamp_3.nanosec),
+                            f36(n31, b31, n34, b34, n35), data_2, f39(n38),
+                            b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41),
+                            f46(n42, b42), f49(n45, b45, n48), data_3,
+                            _p6(markers_one_2.mesh_use_embedded_materials))
                         p25 = p50 + n48 + 1 & 7
                     b51 = controls_one.description.encode()
                     if 0 in b51: raise ValueError
@@ -1293,7 +1442,7 @@ class InteractiveMarkerInit(_Message):
                 p = q + n3
                 frame_id = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2, n4 = _u12(data, p)
+                x, y, z, x_2, y_2, z_2, w, n4 = _u12(data, p)
                 q = p + 60
                 p = q + n4
                 name = data[q : p - 1].decode()
@@ -1331,7 +1480,8 @@ class InteractiveMarkerInit(_Message):
                     p = q + n10
                     name_2 = data[q : p - 1].decode()
                     p = (p + 3 | 7) - 3
-                    x_4, y_4, z_4, w_3, orientation_mode, interaction_mode, always_visible, n11 = _u11(data, p)
+                    (x_3, y_3, z_3, w_2, orientation_mode, interaction_mode, always_visible,
+                        n11) = _u11(data, p)
                     markers_2 = []
                     p = p + 40
                     for _ in range(n11):
@@ -1348,7 +1498,8 @@ class InteractiveMarkerInit(_Message):
                         p = p + 3 & -4
                         id_3, type_2, action = _u3(data, p)
                         p = (p + 15 | 7) - 3
-                        x_5, y_5, z_5, x_6, y_6, z_6, w_4, x_7, y_7, z_7, r_2, g_2, b_2, a_2, sec_3, nanosec_3, frame_locked, n14 = _u8(data, p)
+                        (x_4, y_4, z_4, x_5, y_5, z_5, w_3, x_6, y_6, z_6, r, g, b_2, a, sec_3,
+                            nanosec_3, frame_locked, n14) = _u8(data, p)
                         q = p + 112
                         p = q + n14 * 24
                         points = list(_starmap(Point, _i1(data[q : p])))
@@ -1401,15 +1552,27 @@ class InteractiveMarkerInit(_Message):
                         data_3 = data[q : p]
                         (mesh_use_embedded_materials,) = _u10(data, p)
                         p += 1
-                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns, id_3, type_2, action, Pose(Point(x_5, y_5, z_5), Quaternion(x_6, y_6, z_6, w_4)), Vector3(x_7, y_7, z_7), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_3, nanosec_3), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials))
+                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns,
+                            id_3, type_2, action,
+                            Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
+                            Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
+                            Duration(sec_3, nanosec_3), frame_locked, points, colors,
+                            texture_resource,
+                            CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
+                            data_2), uv_coordinates, text, mesh_resource,
+                            MeshFile(filename, data_3), mesh_use_embedded_materials))
                     (independent_marker_orientation,) = _u10(data, p)
                     p = p + 4 & -4
                     (n25,) = _u2(data, p)
                     q = p + 4
                     p = q + n25
                     description_2 = data[q : p - 1].decode()
-                    controls.append(InteractiveMarkerControl(name_2, Quaternion(x_4, y_4, z_4, w_3), orientation_mode, interaction_mode, always_visible, markers_2, independent_marker_orientation, description_2))
-                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name, description, scale, menu_entries, controls))
+                    controls.append(InteractiveMarkerControl(name_2,
+                        Quaternion(x_3, y_3, z_3, w_2), orientation_mode, interaction_mode,
+                        always_visible, markers_2, independent_marker_orientation, description_2))
+                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+                    Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
+                    menu_entries, controls))
             if p > len(data): raise ValueError
             return InteractiveMarkerInit(server_id, seq_num, markers)
         except _FAULTS:
@@ -1417,6 +1580,8 @@ class InteractiveMarkerInit(_Message):
 
 
 class InteractiveMarkerPose(_Message):
+    """A new place for an interactive marker."""
+
     header: Header = _field(default_factory=Header)
     pose: Pose = _field(default_factory=Pose)
     name: str = ""
@@ -1444,7 +1609,8 @@ class InteractiveMarkerPose(_Message):
             orientation = pose.orientation
             n2, b2 = _texts[m.name]
             f3, p4 = _t14[n1, n2]
-            return f3(256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n2, b2)
+            return f3(256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y, position.z,
+                orientation.x, orientation.y, orientation.z, orientation.w, n2, b2)
         except _FAULTS:
             return _plain(m, InteractiveMarkerPose)
 
@@ -1456,14 +1622,17 @@ class InteractiveMarkerPose(_Message):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x_2, y_2, z_2, x_3, y_3, z_3, w_2, n2 = _u12(data, p)
+            x, y, z, x_2, y_2, z_2, w, n2 = _u12(data, p)
             q = p + 60
             p = q + n2
             name = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return InteractiveMarkerPose(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name)
+            return InteractiveMarkerPose(Header(Time(sec, nanosec), frame_id),
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name)
         except _FAULTS:
             return _explain(data, InteractiveMarkerPose)
+
+
 _t23 = _Template("I I $ Q B I", -4)
 _s1 = _StringList()
 _t24 = _Stride("|4", None, 8)
@@ -1471,6 +1640,8 @@ _u17 = _Struct("<QB3xI").unpack_from
 
 
 class InteractiveMarkerUpdate(_Message):
+    """What changed among the interactive markers of a server."""
+
     server_id: str = ""
     seq_num: int = 0
     type: int = 0
@@ -1501,7 +1672,9 @@ class InteractiveMarkerUpdate(_Message):
         "InteractiveMarkerPose[] poses  # moved ones\n"
         "string[] erases                # names of those that are gone\n"
     )
-    _schema = (("server_id", "string", ""), ("seq_num", "uint64", ""), ("type", "uint8", ""), ("markers", InteractiveMarker, "[]"), ("poses", InteractiveMarkerPose, "[]"), ("erases", "string", "[]"))
+    _schema = (("server_id", "string", ""), ("seq_num", "uint64", ""), ("type", "uint8", ""),
+        ("markers", InteractiveMarker, "[]"), ("poses", InteractiveMarkerPose, "[]"),
+        ("erases", "string", "[]"))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
@@ -1528,7 +1701,9 @@ class InteractiveMarkerUpdate(_Message):
                 menu_entries = markers_one.menu_entries
                 n9 = len(menu_entries)
                 f10, p11 = _t15[p8, n6]
-                out += (f7(stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n5, b5), f10(n6, b6, markers_one.scale, n9))
+                out += (f7(stamp.sec, stamp.nanosec, n4, b4, position.x, position.y, position.z,
+                    orientation.x, orientation.y, orientation.z, orientation.w, n5, b5),
+                    f10(n6, b6, markers_one.scale, n9))
                 p12 = p11
                 for menu_entries_one in menu_entries:
                     b13 = menu_entries_one.title.encode()
@@ -1539,7 +1714,8 @@ class InteractiveMarkerUpdate(_Message):
                     n14 = len(b14) + 1
                     f15, p16 = _t16[p12, n13]
                     f17, p18 = _t17[p16, n14]
-                    out += (f15(menu_entries_one.id, menu_entries_one.parent_id, n13, b13), f17(n14, b14, menu_entries_one.command_type))
+                    out += (f15(menu_entries_one.id, menu_entries_one.parent_id, n13, b13),
+                        f17(n14, b14, menu_entries_one.command_type))
                     p12 = p18
                 controls = markers_one.controls
                 n19 = len(controls)
@@ -1551,7 +1727,9 @@ class InteractiveMarkerUpdate(_Message):
                     orientation_2 = controls_one.orientation
                     markers_2 = controls_one.markers
                     n24 = len(markers_2)
-                    out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n24))
+                    out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y,
+                        orientation_2.z, orientation_2.w, controls_one.orientation_mode,
+                        controls_one.interaction_mode, controls_one.always_visible, n24))
                     p25 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
@@ -1602,7 +1780,19 @@ class InteractiveMarkerUpdate(_Message):
                             data_3 = _octets(data_3)
                         n48 = len(data_3)
                         f49, p50 = _t10[p47, n45]
-                        out += (_t12[p25, n26, n27](stamp_2.sec, stamp_2.nanosec, n26, b26, n27, b27, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n28), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f32(n30, b30, stamp_3.sec, stamp_3.nanosec), f36(n31, b31, n34, b34, n35), data_2, f39(n38), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41), f46(n42, b42), f49(n45, b45, n48), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
+                        out += (_t12[p25, n26, n27](stamp_2.sec, stamp_2.nanosec, n26, b26, n27,
+                            b27, markers_one_2.id, markers_one_2.type, markers_one_2.action,
+                            position_2.x, position_2.y, position_2.z, orientation_3.x,
+                            orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y,
+                            scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
+                            lifetime.nanosec, markers_one_2.frame_locked, n28),
+                            b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29),
+                            b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
+                            f32(n30, b30, stamp_3.sec, stamp_3.nanosec),
+                            f36(n31, b31, n34, b34, n35), data_2, f39(n38),
+                            b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41),
+                            f46(n42, b42), f49(n45, b45, n48), data_3,
+                            _p6(markers_one_2.mesh_use_embedded_materials))
                         p25 = p50 + n48 + 1 & 7
                     b51 = controls_one.description.encode()
                     if 0 in b51: raise ValueError
@@ -1625,7 +1815,9 @@ class InteractiveMarkerUpdate(_Message):
                 orientation_4 = pose_3.orientation
                 n59, b59 = _texts[poses_one.name]
                 f60, p61 = _t22[p57, n58, n59]
-                out.append(f60(stamp_4.sec, stamp_4.nanosec, n58, b58, position_3.x, position_3.y, position_3.z, orientation_4.x, orientation_4.y, orientation_4.z, orientation_4.w, n59, b59))
+                out.append(f60(stamp_4.sec, stamp_4.nanosec, n58, b58, position_3.x, position_3.y,
+                    position_3.z, orientation_4.x, orientation_4.y, orientation_4.z,
+                    orientation_4.w, n59, b59))
                 p57 = p61
             erases, k = m.erases, _s1.written
             b62 = k[1] if erases == k[0] else _s1.put(erases)
@@ -1654,7 +1846,7 @@ class InteractiveMarkerUpdate(_Message):
                 p = q + n3
                 frame_id = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2, n4 = _u12(data, p)
+                x, y, z, x_2, y_2, z_2, w, n4 = _u12(data, p)
                 q = p + 60
                 p = q + n4
                 name = data[q : p - 1].decode()
@@ -1692,7 +1884,8 @@ class InteractiveMarkerUpdate(_Message):
                     p = q + n10
                     name_2 = data[q : p - 1].decode()
                     p = (p + 3 | 7) - 3
-                    x_4, y_4, z_4, w_3, orientation_mode, interaction_mode, always_visible, n11 = _u11(data, p)
+                    (x_3, y_3, z_3, w_2, orientation_mode, interaction_mode, always_visible,
+                        n11) = _u11(data, p)
                     markers_2 = []
                     p = p + 40
                     for _ in range(n11):
@@ -1709,7 +1902,8 @@ class InteractiveMarkerUpdate(_Message):
                         p = p + 3 & -4
                         id_3, type_3, action = _u3(data, p)
                         p = (p + 15 | 7) - 3
-                        x_5, y_5, z_5, x_6, y_6, z_6, w_4, x_7, y_7, z_7, r_2, g_2, b_2, a_2, sec_3, nanosec_3, frame_locked, n14 = _u8(data, p)
+                        (x_4, y_4, z_4, x_5, y_5, z_5, w_3, x_6, y_6, z_6, r, g, b_2, a, sec_3,
+                            nanosec_3, frame_locked, n14) = _u8(data, p)
                         q = p + 112
                         p = q + n14 * 24
                         points = list(_starmap(Point, _i1(data[q : p])))
@@ -1762,15 +1956,27 @@ class InteractiveMarkerUpdate(_Message):
                         data_3 = data[q : p]
                         (mesh_use_embedded_materials,) = _u10(data, p)
                         p += 1
-                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns, id_3, type_3, action, Pose(Point(x_5, y_5, z_5), Quaternion(x_6, y_6, z_6, w_4)), Vector3(x_7, y_7, z_7), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_3, nanosec_3), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials))
+                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns,
+                            id_3, type_3, action,
+                            Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
+                            Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
+                            Duration(sec_3, nanosec_3), frame_locked, points, colors,
+                            texture_resource,
+                            CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
+                            data_2), uv_coordinates, text, mesh_resource,
+                            MeshFile(filename, data_3), mesh_use_embedded_materials))
                     (independent_marker_orientation,) = _u10(data, p)
                     p = p + 4 & -4
                     (n25,) = _u2(data, p)
                     q = p + 4
                     p = q + n25
                     description_2 = data[q : p - 1].decode()
-                    controls.append(InteractiveMarkerControl(name_2, Quaternion(x_4, y_4, z_4, w_3), orientation_mode, interaction_mode, always_visible, markers_2, independent_marker_orientation, description_2))
-                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name, description, scale, menu_entries, controls))
+                    controls.append(InteractiveMarkerControl(name_2,
+                        Quaternion(x_3, y_3, z_3, w_2), orientation_mode, interaction_mode,
+                        always_visible, markers_2, independent_marker_orientation, description_2))
+                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+                    Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
+                    menu_entries, controls))
             p = p + 3 & -4
             (n26,) = _u2(data, p)
             poses = []
@@ -1782,11 +1988,12 @@ class InteractiveMarkerUpdate(_Message):
                 p = q + n27
                 frame_id_4 = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_8, y_8, z_8, x_9, y_9, z_9, w_5, n28 = _u12(data, p)
+                x_7, y_7, z_7, x_8, y_8, z_8, w_4, n28 = _u12(data, p)
                 q = p + 60
                 p = q + n28
                 name_3 = data[q : p - 1].decode()
-                poses.append(InteractiveMarkerPose(Header(Time(sec_5, nanosec_5), frame_id_4), Pose(Point(x_8, y_8, z_8), Quaternion(x_9, y_9, z_9, w_5)), name_3))
+                poses.append(InteractiveMarkerPose(Header(Time(sec_5, nanosec_5), frame_id_4),
+                    Pose(Point(x_7, y_7, z_7), Quaternion(x_8, y_8, z_8, w_4)), name_3))
             p = p + 3 & -4
             k, erases = _s1.read
             if data.startswith(k, p):
@@ -1798,10 +2005,14 @@ class InteractiveMarkerUpdate(_Message):
             return InteractiveMarkerUpdate(server_id, seq_num, type_2, markers, poses, erases)
         except _FAULTS:
             return _explain(data, InteractiveMarkerUpdate)
+
+
 _p7 = _Struct("<2I").pack
 
 
 class MarkerArray(_Message):
+    """Several markers at once."""
+
     markers: list[Marker] = []
     _type = "visualization_msgs/MarkerArray"
     _type_name = "visualization_msgs/msg/MarkerArray"
@@ -1870,7 +2081,16 @@ class MarkerArray(_Message):
                     data_3 = _octets(data_3)
                 n25 = len(data_3)
                 f26, p27 = _t10[p24, n22]
-                out += (_t12[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, markers_one.id, markers_one.type, markers_one.action, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one.frame_locked, n5), b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n6), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]), f9(n7, b7, stamp_2.sec, stamp_2.nanosec), f13(n8, b8, n11, b11, n12), data_2, f16(n15), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f20(n18, b18), f23(n19, b19), f26(n22, b22, n25), data_3, _p6(markers_one.mesh_use_embedded_materials))
+                out += (_t12[p2, n3, n4](stamp.sec, stamp.nanosec, n3, b3, n4, b4, markers_one.id,
+                    markers_one.type, markers_one.action, position.x, position.y, position.z,
+                    orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y,
+                    scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec,
+                    markers_one.frame_locked, n5), b"".join([_p1(e.x, e.y, e.z) for e in points]),
+                    _p3(n6), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
+                    f9(n7, b7, stamp_2.sec, stamp_2.nanosec), f13(n8, b8, n11, b11, n12), data_2,
+                    f16(n15), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f20(n18, b18),
+                    f23(n19, b19), f26(n22, b22, n25), data_3,
+                    _p6(markers_one.mesh_use_embedded_materials))
                 p2 = p27 + n25 + 1 & 7
             return b"".join(out)
         except _FAULTS:
@@ -1897,7 +2117,8 @@ class MarkerArray(_Message):
                 p = p + 3 & -4
                 id_2, type_2, action = _u3(data, p)
                 p = (p + 15 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2, x_4, y_4, z_4, r_2, g_2, b_2, a_2, sec_2, nanosec_2, frame_locked, n4 = _u8(data, p)
+                (x, y, z, x_2, y_2, z_2, w, x_3, y_3, z_3, r, g, b_2, a, sec_2, nanosec_2,
+                    frame_locked, n4) = _u8(data, p)
                 q = p + 112
                 p = q + n4 * 24
                 points = list(_starmap(Point, _i1(data[q : p])))
@@ -1950,7 +2171,13 @@ class MarkerArray(_Message):
                 data_3 = data[q : p]
                 (mesh_use_embedded_materials,) = _u10(data, p)
                 p += 1
-                markers.append(Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), Vector3(x_4, y_4, z_4), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_2, nanosec_2), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials))
+                markers.append(Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2,
+                    action, Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)),
+                    Vector3(x_3, y_3, z_3), ColorRGBA(r, g, b_2, a), Duration(sec_2, nanosec_2),
+                    frame_locked, points, colors, texture_resource,
+                    CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2),
+                    uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
+                    mesh_use_embedded_materials))
             if p > len(data): raise ValueError
             return MarkerArray(markers)
         except _FAULTS:

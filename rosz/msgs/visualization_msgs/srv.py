@@ -37,11 +37,13 @@ __all__ = (
     "GetInteractiveMarkersResponse",
 )
 
-_t1 = _Template("I x", -4)
+_p1 = _Struct("<Ix").pack
 _u1 = _Struct("<Ix").unpack_from
 
 
 class GetInteractiveMarkersRequest(_Message):
+    """Ask a server for all its interactive markers."""
+
     _type = "visualization_msgs/GetInteractiveMarkersRequest"
     _type_name = "visualization_msgs/srv/GetInteractiveMarkers_Request"
     _type_hash = "RIHS01_7fa7e0830e3cbe9c15927a29fdc09fedcd9a86757e375f29ce6b0744cb0b6905"
@@ -52,7 +54,7 @@ class GetInteractiveMarkersRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _t1[0](256)
+            return _p1(256)
         except _FAULTS:
             return _plain(m, GetInteractiveMarkersRequest)
 
@@ -64,24 +66,26 @@ class GetInteractiveMarkersRequest(_Message):
             return GetInteractiveMarkersRequest()
         except _FAULTS:
             return _explain(data, GetInteractiveMarkersRequest)
-_p1 = _Struct("<IQI").pack
-_t2 = _Stride("i I I $ d d d d d d d I $", None, 8)
-_t3 = _Stride("I $ f I", None, 8)
-_t4 = _Stride("I I I $", None, 8)
-_t5 = _Stride("I $ B", None, 8)
-_t6 = _Stride("I", None, 8)
-_t7 = _Template("I $ d d d d B B ? I", None)
-_p2 = _Struct("<3d").pack
-_t8 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
-_p3 = _Struct("<4f").pack
-_p4 = _Struct("<I").pack
-_t9 = _Stride("I $ i I", 4, 8)
-_t10 = _Stride("I $ I $ I", None, 8)
-_p5 = _Struct("<2f").pack
-_t11 = _Stride("I $", None, 8)
-_t12 = _Stride("I $ I", None, 8)
-_p6 = _Struct("<?").pack
-_t13 = _Stride("? I $", None, 8)
+
+
+_p2 = _Struct("<IQI").pack
+_t1 = _Stride("i I I $ d d d d d d d I $", None, 8)
+_t2 = _Stride("I $ f I", None, 8)
+_t3 = _Stride("I I I $", None, 8)
+_t4 = _Stride("I $ B", None, 8)
+_t5 = _Stride("I", None, 8)
+_t6 = _Template("I $ d d d d B B ? I", None)
+_p3 = _Struct("<3d").pack
+_t7 = _Template("i I I $ I $ i i i d d d d d d d d d d f f f f i I ? I", None)
+_p4 = _Struct("<4f").pack
+_p5 = _Struct("<I").pack
+_t8 = _Stride("I $ i I", 4, 8)
+_t9 = _Stride("I $ I $ I", None, 8)
+_p6 = _Struct("<2f").pack
+_t10 = _Stride("I $", None, 8)
+_t11 = _Stride("I $ I", None, 8)
+_p7 = _Struct("<?").pack
+_t12 = _Stride("? I $", None, 8)
 _u2 = _Struct("<IQI").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 _u4 = _Struct("<7dI").unpack_from
@@ -115,7 +119,7 @@ class GetInteractiveMarkersResponse(_Message):
         try:
             markers = m.markers
             n1 = len(markers)
-            out = [_p1(256, m.sequence_number, n1)]
+            out = [_p2(256, m.sequence_number, n1)]
             p2 = 4
             for markers_one in markers:
                 header = markers_one.header
@@ -128,11 +132,13 @@ class GetInteractiveMarkersResponse(_Message):
                 b5 = markers_one.description.encode()
                 if 0 in b5: raise ValueError
                 n5 = len(b5) + 1
-                f6, p7 = _t2[p2, n3, n4]
+                f6, p7 = _t1[p2, n3, n4]
                 menu_entries = markers_one.menu_entries
                 n8 = len(menu_entries)
-                f9, p10 = _t3[p7, n5]
-                out += (f6(stamp.sec, stamp.nanosec, n3, b3, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w, n4, b4), f9(n5, b5, markers_one.scale, n8))
+                f9, p10 = _t2[p7, n5]
+                out += (f6(stamp.sec, stamp.nanosec, n3, b3, position.x, position.y, position.z,
+                    orientation.x, orientation.y, orientation.z, orientation.w, n4, b4),
+                    f9(n5, b5, markers_one.scale, n8))
                 p11 = p10
                 for menu_entries_one in menu_entries:
                     b12 = menu_entries_one.title.encode()
@@ -141,13 +147,14 @@ class GetInteractiveMarkersResponse(_Message):
                     b13 = menu_entries_one.command.encode()
                     if 0 in b13: raise ValueError
                     n13 = len(b13) + 1
-                    f14, p15 = _t4[p11, n12]
-                    f16, p17 = _t5[p15, n13]
-                    out += (f14(menu_entries_one.id, menu_entries_one.parent_id, n12, b12), f16(n13, b13, menu_entries_one.command_type))
+                    f14, p15 = _t3[p11, n12]
+                    f16, p17 = _t4[p15, n13]
+                    out += (f14(menu_entries_one.id, menu_entries_one.parent_id, n12, b12),
+                        f16(n13, b13, menu_entries_one.command_type))
                     p11 = p17
                 controls = markers_one.controls
                 n18 = len(controls)
-                f19, p20 = _t6[p11]
+                f19, p20 = _t5[p11]
                 out.append(f19(n18))
                 p21 = p20
                 for controls_one in controls:
@@ -155,7 +162,9 @@ class GetInteractiveMarkersResponse(_Message):
                     orientation_2 = controls_one.orientation
                     markers_2 = controls_one.markers
                     n23 = len(markers_2)
-                    out.append(_t7[p21, n22](n22, b22, orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, controls_one.orientation_mode, controls_one.interaction_mode, controls_one.always_visible, n23))
+                    out.append(_t6[p21, n22](n22, b22, orientation_2.x, orientation_2.y,
+                        orientation_2.z, orientation_2.w, controls_one.orientation_mode,
+                        controls_one.interaction_mode, controls_one.always_visible, n23))
                     p24 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
@@ -179,39 +188,51 @@ class GetInteractiveMarkersResponse(_Message):
                         header_3 = texture.header
                         stamp_3 = header_3.stamp
                         n30, b30 = _texts[header_3.frame_id]
-                        f31, p32 = _t9[n29]
+                        f31, p32 = _t8[n29]
                         n33, b33 = _texts[texture.format]
                         data_2 = texture.data
                         if type(data_2) is not bytes:
                             data_2 = _octets(data_2)
                         n34 = len(data_2)
-                        f35, p36 = _t10[p32, n30, n33]
+                        f35, p36 = _t9[p32, n30, n33]
                         uv_coordinates = markers_one_2.uv_coordinates
                         n37 = len(uv_coordinates)
-                        f38, p39 = _t6[p36 + n34 & 7]
+                        f38, p39 = _t5[p36 + n34 & 7]
                         b40 = markers_one_2.text.encode()
                         if 0 in b40: raise ValueError
                         n40 = len(b40) + 1
                         b41 = markers_one_2.mesh_resource.encode()
                         if 0 in b41: raise ValueError
                         n41 = len(b41) + 1
-                        f42, p43 = _t11[p39 + n37 * 8 & 7, n40]
+                        f42, p43 = _t10[p39 + n37 * 8 & 7, n40]
                         mesh_file = markers_one_2.mesh_file
                         b44 = mesh_file.filename.encode()
                         if 0 in b44: raise ValueError
                         n44 = len(b44) + 1
-                        f45, p46 = _t11[p43, n41]
+                        f45, p46 = _t10[p43, n41]
                         data_3 = mesh_file.data
                         if type(data_3) is not bytes:
                             data_3 = _octets(data_3)
                         n47 = len(data_3)
-                        f48, p49 = _t12[p46, n44]
-                        out += (_t8[p24, n25, n26](stamp_2.sec, stamp_2.nanosec, n25, b25, n26, b26, markers_one_2.id, markers_one_2.type, markers_one_2.action, position_2.x, position_2.y, position_2.z, orientation_3.x, orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec, markers_one_2.frame_locked, n27), b"".join([_p2(e.x, e.y, e.z) for e in points]), _p4(n28), b"".join([_p3(e.r, e.g, e.b, e.a) for e in colors]), f31(n29, b29, stamp_3.sec, stamp_3.nanosec), f35(n30, b30, n33, b33, n34), data_2, f38(n37), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f42(n40, b40), f45(n41, b41), f48(n44, b44, n47), data_3, _p6(markers_one_2.mesh_use_embedded_materials))
+                        f48, p49 = _t11[p46, n44]
+                        out += (_t7[p24, n25, n26](stamp_2.sec, stamp_2.nanosec, n25, b25, n26,
+                            b26, markers_one_2.id, markers_one_2.type, markers_one_2.action,
+                            position_2.x, position_2.y, position_2.z, orientation_3.x,
+                            orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y,
+                            scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
+                            lifetime.nanosec, markers_one_2.frame_locked, n27),
+                            b"".join([_p3(e.x, e.y, e.z) for e in points]), _p5(n28),
+                            b"".join([_p4(e.r, e.g, e.b, e.a) for e in colors]),
+                            f31(n29, b29, stamp_3.sec, stamp_3.nanosec),
+                            f35(n30, b30, n33, b33, n34), data_2, f38(n37),
+                            b"".join([_p6(e.u, e.v) for e in uv_coordinates]), f42(n40, b40),
+                            f45(n41, b41), f48(n44, b44, n47), data_3,
+                            _p7(markers_one_2.mesh_use_embedded_materials))
                         p24 = p49 + n47 + 1 & 7
                     b50 = controls_one.description.encode()
                     if 0 in b50: raise ValueError
                     n50 = len(b50) + 1
-                    f51, p52 = _t13[p24, n50]
+                    f51, p52 = _t12[p24, n50]
                     out.append(f51(controls_one.independent_marker_orientation, n50, b50))
                     p21 = p52
                 p2 = p21
@@ -233,7 +254,7 @@ class GetInteractiveMarkersResponse(_Message):
                 p = q + n2
                 frame_id = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x_2, y_2, z_2, x_3, y_3, z_3, w_2, n3 = _u4(data, p)
+                x, y, z, x_2, y_2, z_2, w, n3 = _u4(data, p)
                 q = p + 60
                 p = q + n3
                 name = data[q : p - 1].decode()
@@ -271,7 +292,8 @@ class GetInteractiveMarkersResponse(_Message):
                     p = q + n9
                     name_2 = data[q : p - 1].decode()
                     p = (p + 3 | 7) - 3
-                    x_4, y_4, z_4, w_3, orientation_mode, interaction_mode, always_visible, n10 = _u8(data, p)
+                    (x_3, y_3, z_3, w_2, orientation_mode, interaction_mode, always_visible,
+                        n10) = _u8(data, p)
                     markers_2 = []
                     p = p + 40
                     for _ in range(n10):
@@ -288,7 +310,8 @@ class GetInteractiveMarkersResponse(_Message):
                         p = p + 3 & -4
                         id_3, type_2, action = _u9(data, p)
                         p = (p + 15 | 7) - 3
-                        x_5, y_5, z_5, x_6, y_6, z_6, w_4, x_7, y_7, z_7, r_2, g_2, b_2, a_2, sec_3, nanosec_3, frame_locked, n13 = _u10(data, p)
+                        (x_4, y_4, z_4, x_5, y_5, z_5, w_3, x_6, y_6, z_6, r, g, b_2, a, sec_3,
+                            nanosec_3, frame_locked, n13) = _u10(data, p)
                         q = p + 112
                         p = q + n13 * 24
                         points = list(_starmap(Point, _i1(data[q : p])))
@@ -341,15 +364,27 @@ class GetInteractiveMarkersResponse(_Message):
                         data_3 = data[q : p]
                         (mesh_use_embedded_materials,) = _u11(data, p)
                         p += 1
-                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns, id_3, type_2, action, Pose(Point(x_5, y_5, z_5), Quaternion(x_6, y_6, z_6, w_4)), Vector3(x_7, y_7, z_7), ColorRGBA(r_2, g_2, b_2, a_2), Duration(sec_3, nanosec_3), frame_locked, points, colors, texture_resource, CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2, data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3), mesh_use_embedded_materials))
+                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns,
+                            id_3, type_2, action,
+                            Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
+                            Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
+                            Duration(sec_3, nanosec_3), frame_locked, points, colors,
+                            texture_resource,
+                            CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
+                            data_2), uv_coordinates, text, mesh_resource,
+                            MeshFile(filename, data_3), mesh_use_embedded_materials))
                     (independent_marker_orientation,) = _u11(data, p)
                     p = p + 4 & -4
                     (n24,) = _u5(data, p)
                     q = p + 4
                     p = q + n24
                     description_2 = data[q : p - 1].decode()
-                    controls.append(InteractiveMarkerControl(name_2, Quaternion(x_4, y_4, z_4, w_3), orientation_mode, interaction_mode, always_visible, markers_2, independent_marker_orientation, description_2))
-                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id), Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)), name, description, scale, menu_entries, controls))
+                    controls.append(InteractiveMarkerControl(name_2,
+                        Quaternion(x_3, y_3, z_3, w_2), orientation_mode, interaction_mode,
+                        always_visible, markers_2, independent_marker_orientation, description_2))
+                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+                    Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
+                    menu_entries, controls))
             if p > len(data): raise ValueError
             return GetInteractiveMarkersResponse(sequence_number, markers)
         except _FAULTS:
@@ -357,6 +392,8 @@ class GetInteractiveMarkersResponse(_Message):
 
 
 class GetInteractiveMarkers(_Service):
+    """Ask a server for all its interactive markers."""
+
     Request = GetInteractiveMarkersRequest
     Response = GetInteractiveMarkersResponse
     _type = "visualization_msgs/GetInteractiveMarkers"
