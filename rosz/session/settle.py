@@ -77,17 +77,17 @@ class Settling:
 
     def _settle(self) -> None:
         deadline = time.monotonic() + self._timeout
-        while time.monotonic() < deadline and not self._stop.wait(_POLL):
-            if self._session.peers() and self._neighbours() <= self._linked():
+        while (left := deadline - time.monotonic()) > 0 and not self._stop.wait(_POLL):
+            if self._session.peers() and self._neighbours(left) <= self._linked():
                 return
 
     def _linked(self) -> set[str]:
         return {self._session.zid, *self._session.peers()}
 
-    def _neighbours(self) -> set[str]:
+    def _neighbours(self, timeout: float) -> set[str]:
         """Return everybody that those who are linked to this session are linked to."""
         found: set[str] = set()
-        for reply in self._session.get(f"{_SPACE}/*", timeout=_ASK_TIMEOUT):
+        for reply in self._session.get(f"{_SPACE}/*", timeout=min(timeout, _ASK_TIMEOUT)):
             if reply.ok:
                 try:
                     found.update(msgspec.msgpack.decode(reply.payload, type=list[str]))

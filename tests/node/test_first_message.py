@@ -1,0 +1,100 @@
+"""The first message arrives, and the last: a program may publish once and end."""
+
+from __future__ import annotations
+
+import time
+from queue import SimpleQueue
+
+import pytest
+from network import PATIENCE, Network, repeats
+
+from rosz.msgs.std_msgs.msg import String
+from rosz.node import Context
+from rosz.session.settle import Settling
+
+ONE_SHOT = """
+    import sys
+    import rosz
+    from rosz.msgs.std_msgs.msg import String
+
+    with rosz.Node("one_shot", anonymous=True) as node:
+        node.publisher("chatter", String, latch=sys.argv[2] == "latch").publish(sys.argv[1])
+"""
+
+NEVER_CLOSED = """
+    import sys
+    import rosz
+    from rosz.msgs.std_msgs.msg import String
+
+    node = rosz.Node("one_shot", anonymous=True)
+    node.publisher("chatter", String).publish(sys.argv[1])
+"""
+
+
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("kind", ["plain", "latch"])
+def test_published_once_by_a_program_that_ends(network: Network, kind: str) -> None:
+    """The subscriber is not the meeting point: the programs have to find it first."""
+    network.context()
+    got: SimpleQueue[str] = SimpleQueue()
+    listener = network.node("listener")
+    listener.subscription("chatter", String, lambda m: got.put(m.data))
+    listener.context.settled.wait(PATIENCE)
+    lost = []
+    for number in range(repeats(10, 1000)):
+        program = network.program(ONE_SHOT, str(number), kind)
+        assert program.exit_code() == 0, program.output
+        program.close()
+        try:
+            assert got.get(timeout=1) == str(number)
+        except Exception:  # noqa: BLE001  # counted, not told one by one
+            lost.append(number)
+    assert not lost
+
+
+def test_never_closed(network: Network) -> None:
+    network.context()
+    subscription = network.node("listener").subscription("chatter", String)
+    program = network.program(NEVER_CLOSED, "hello")
+    assert subscription.get().data == "hello"
+    assert program.exit_code() == 0
+
+
+def test_order_of_what_is_held(network: Network) -> None:
+    """What was held comes first, then what follows, all of it numbered."""
+    network.context()
+    got: SimpleQueue[tuple[str, int]] = SimpleQueue()
+    network.node("listener").subscription(
+        "chatter",
+        String,
+        lambda m, info: got.put((m.data, info.sequence)),
+        queue_size=2000,
+        with_info=True,
+    )
+    talker = network.node("talker")
+    publisher = talker.publisher("chatter", String)
+    for number in range(500):
+        publisher.publish(str(number))
+    assert talker.context.settled.wait(PATIENCE)
+    publisher.publish("500")
+    assert [got.get(timeout=PATIENCE) for _ in range(501)] == [(str(n), n + 1) for n in range(501)]
+
+
+def test_holding_is_bounded(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The newest thousand are kept, and the time is bounded, too, whoever does not answer."""
+    network.context()
+    subscription = network.node("listener").subscription("chatter", String, queue_size=2000)
+    monkeypatch.setattr(Settling, "_neighbours", lambda *_: {"somebody who is never linked"})
+    monkeypatch.setattr(Context, "SETTLED_BY", 1.0)
+    began = time.monotonic()
+    publisher = network.node("talker").publisher("chatter", String)
+    for number in range(1500):
+        publisher.publish(str(number))
+    assert subscription.get().data == "500"
+    assert 1.0 <= time.monotonic() - began < 1.0 + PATIENCE
+
+
+def test_nobody_else_no_wait(network: Network) -> None:
+    """Who comes first has nobody to wait for."""
+    talker = network.node("talker")
+    assert talker.context.settled.is_set()
