@@ -17,7 +17,7 @@ from rosz.errors import NotFoundError, UsageError
 
 if TYPE_CHECKING:
     from rosz.launch.plan import LaunchText, Plan
-    from rosz.launch.run import Options, Workplace
+    from rosz.launch.run import Hub, Options, Workplace
     from rosz.node.context import Context
     from rosz.packages import PackageIndex
 
@@ -240,16 +240,31 @@ class _Job:
 
     def run(self, options: Options, *, wait: bool) -> int:
         """Carry the plan out."""
+        from rosz.launch.run import Hub, wants_hub
+
+        plan = self.plan()
+        if not wants_hub(len(plan.nodes), self.environment, self.environ):
+            return self._carry_out(plan, options, wait=wait)
+        with Hub(self.environment, self.environ) as hub:
+            self.environment, self.environ = hub.environment, hub.environ
+            return self._carry_out(plan, options, wait=wait, hub=hub)
+
+    def _carry_out(
+        self, plan: Plan, options: Options, *, wait: bool, hub: Hub | None = None
+    ) -> int:
         from rosz.launch.run import Network, Runner
         from rosz.node.context import Context
 
-        plan = self.plan()
         with Context(self.environment) as context:
             if wait:
                 _await_others(context)
-            network = Network.of(context)
             runner = Runner(
-                plan, self.workplace(), network, options, out=sys.stdout, err=sys.stderr
+                plan,
+                self.workplace(),
+                Network.of(context, hub),
+                options,
+                out=sys.stdout,
+                err=sys.stderr,
             )
             return runner.run()
 

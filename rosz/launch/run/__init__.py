@@ -7,6 +7,7 @@ import floors 0 to 5. Programs that are no part of the launch process: `relay`.
 from rosz.launch.run.command import Command, Workplace, run_command
 from rosz.launch.run.control import LaunchStatus, NodeStatus, order, statuses
 from rosz.launch.run.host import Child, Host, Job
+from rosz.launch.run.hub import Hub, wants_hub
 from rosz.launch.run.network import GraphReadiness, Network
 from rosz.launch.run.parameters import ParamStore, core_params
 from rosz.launch.run.process import Readiness, Timeouts
@@ -17,6 +18,7 @@ __all__ = (
     "Command",
     "GraphReadiness",
     "Host",
+    "Hub",
     "Job",
     "LaunchStatus",
     "Network",
@@ -31,4 +33,5 @@ __all__ = (
     "order",
     "run_command",
     "statuses",
+    "wants_hub",
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.launch.plan.model import Condition
+from rosz.launch.run.hub import Hub
 from rosz.launch.run.parameters import ParamStore
 from rosz.launch.run.process import Readiness
 from rosz.params import DELETED, Change, condense, normalise, split
@@ -30,6 +31,7 @@ class Network(msgspec.Struct, frozen=True, kw_only=True):
         session: Where it answers for itself; None to answer nobody.
         domain: The ROS domain.
         alone: Whether nobody else holds the parameters.
+        hub: The core that the nodes are clients of; None where they form a mesh.
     """
 
     store: ParamStore
@@ -37,13 +39,15 @@ class Network(msgspec.Struct, frozen=True, kw_only=True):
     session: Session | None = None
     domain: int = 0
     alone: bool = True
+    hub: Hub | None = None
 
     @classmethod
-    def of(cls, context: Context) -> Network:
+    def of(cls, context: Context, hub: Hub | None = None) -> Network:
         """Return the network of a context.
 
         Args:
             context: The context of the launch process.
+            hub: The core that was started for it.
         """
         replica = context.params
         store = ReplicaStore(replica)
@@ -53,6 +57,7 @@ class Network(msgspec.Struct, frozen=True, kw_only=True):
             session=context.session,
             domain=context.domain,
             alone=not replica.members(),
+            hub=hub,
         )
 
 

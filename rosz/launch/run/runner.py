@@ -163,6 +163,10 @@ class Runner:
             prefixed=self._options.prefixed,
         )
         hosts = self._hosts(local)
+        if network.hub is not None:
+            console.say("auto-starting new core")
+            console.strong(f"process[core]: started with pid [{network.hub.pid}]")
+            network.hub.keep(self._loop, console)
         if fresh:
             console.strong(f"setting {RUN_ID} to {self.run_id}")
         extra = core_params(self.run_id) if fresh else {}

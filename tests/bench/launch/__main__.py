@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import signal
 import socket
@@ -22,12 +23,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT))
+
+from rosz.launch.run.command import TAG  # noqa: E402  # of this tree
+from rosz.launch.run.family import kill_family  # noqa: E402
+
 ROSZ = [sys.executable, "-P", "-m", "rosz", "launch"]
 PATIENCE = 60.0
 TALKERS = 20
 MANY = 100
 
-ROSPY_TALKER = """#!/usr/bin/env python3
+ROSPY_TALKER = """#!/usr/bin/python3
 import rospy
 from std_msgs.msg import String
 rospy.init_node("talker")
@@ -37,7 +43,7 @@ while not rospy.is_shutdown():
     chatter.publish(rospy.get_name())
     rate.sleep()
 """
-ROSPY_LISTENER = """#!/usr/bin/env python3
+ROSPY_LISTENER = """#!/usr/bin/python3
 import sys
 import rospy
 from std_msgs.msg import String
@@ -50,7 +56,7 @@ rospy.init_node("listener")
 rospy.Subscriber("/chatter", String, hear)
 rospy.spin()
 """
-ROSZ_TALKER = """#!/usr/bin/env python3
+ROSZ_TALKER = """#!/usr/bin/python3
 import rosz
 from std_msgs.msg import String
 with rosz.Node("talker") as node:
@@ -58,7 +64,7 @@ with rosz.Node("talker") as node:
     for _ in node.rate(20):
         chatter.publish(String(data=node.name))
 """
-ROSZ_LISTENER = """#!/usr/bin/env python3
+ROSZ_LISTENER = """#!/usr/bin/python3
 import sys
 import rosz
 from std_msgs.msg import String
@@ -71,7 +77,7 @@ with rosz.Node("listener") as node:
     node.subscription("/chatter", String, hear, queue_size=1000)
     node.spin()
 """
-SLEEPER = """#!/usr/bin/env python3
+SLEEPER = """#!/usr/bin/python3
 import sys, time
 sys.stdout.write("up\\n")
 sys.stdout.flush()
@@ -80,7 +86,7 @@ try:
 except KeyboardInterrupt:
     pass
 """
-STUBBORN = """#!/usr/bin/env python3
+STUBBORN = """#!/usr/bin/python3
 import signal, sys, time
 for number in (signal.SIGINT, signal.SIGTERM):
     signal.signal(number, signal.SIG_IGN)
@@ -161,6 +167,7 @@ class Bench:
     def launch(self, which: str, *words: str) -> Iterator[subprocess.Popen[str]]:
         """Run one of the two while the block runs."""
         port = free_port()
+        tag = secrets.token_hex(8)
         environ = {
             **os.environ,
             "HOME": str(self.folder / "home"),
@@ -171,6 +178,7 @@ class Bench:
             "ROS_PACKAGE_PATH": str(self.folder / which),
             "PYTHONPATH": str(ROOT) if which == "rosz" else "",
             "PYTHONUNBUFFERED": "1",
+            TAG: tag,
         }
         command = ROSZ if which == "rosz" else ["roslaunch", "--skip-log-check"]
         with subprocess.Popen(
@@ -180,7 +188,7 @@ class Bench:
             stderr=subprocess.STDOUT,
             text=True,
         ) as process:
-            watchdog = threading.Timer(PATIENCE, process.kill)
+            watchdog = threading.Timer(PATIENCE, kill_family, (tag,))
             watchdog.start()
             try:
                 yield process
@@ -189,6 +197,7 @@ class Bench:
                 if process.poll() is None:
                     process.send_signal(signal.SIGTERM)
                     process.communicate(timeout=PATIENCE)
+                kill_family(tag)
 
 
 def free_port() -> int:
