@@ -190,22 +190,30 @@ def _number(kind: str, value: Any) -> Any:
 
     Raises:
         TypeError: It is not of such a kind.
-        OverflowError: A float is too large.
-        struct.error: An integer is outside the range (raised later, by struct).
+        OverflowError: It is outside the range of the type.
     """
     if kind == "bool":
         return bool(value)
     if kind in ("float32", "float64"):
         if isinstance(value, str | bytes | bytearray):
             raise TypeError(f"'{type(value).__name__}' is no number")
+        try:
+            struct.pack(SCALAR_CODES[kind], value)
+        except OverflowError:
+            raise OverflowError("it is outside the range of the type") from None
         return float(value)
     if kind in _BYTES and isinstance(value, bytes) and len(value) == 1:
         return value[0]
     number = value.__index__() if hasattr(value, "__index__") else None
     if number is None:
         raise TypeError(f"'{type(value).__name__}' is no integer")
-    signed_byte = kind == "byte" and _LEAST_BYTE <= number < 0  # ROS 1's byte is an int8
-    return number + 0x100 if signed_byte else number
+    if kind == "byte" and _LEAST_BYTE <= number < 0:  # ROS 1's byte is an int8
+        number += 0x100
+    bits = 8 * _SIZES[kind]
+    low, high = (-1 << bits - 1, (1 << bits - 1) - 1) if kind[0] == "i" else (0, (1 << bits) - 1)
+    if not low <= number <= high:
+        raise OverflowError(f"the range of the type is {low} to {high}")
+    return number
 
 
 class _Reader:
