@@ -198,7 +198,7 @@ def _number(kind: str, value: Any) -> Any:
         if isinstance(value, str | bytes | bytearray):
             raise TypeError(f"'{type(value).__name__}' is no number")
         try:
-            struct.pack(SCALAR_CODES[kind], value)
+            struct.pack("<" + SCALAR_CODES[kind], value)
         except OverflowError:
             raise OverflowError("it is outside the range of the type") from None
         return float(value)
