@@ -20,6 +20,7 @@ __all__ = ("Channel", "MessageInfo", "Taken")
 
 _KINDS_OF_DAMAGE = 10
 _SENDERS = 1000
+"""Publishers remembered at most; the oldest are forgotten, for nothing tells when it is safe."""
 
 
 class MessageInfo(msgspec.Struct, frozen=True):
@@ -49,6 +50,16 @@ Taken = tuple[Any, MessageInfo]
 """A message with its info."""
 
 
+class _Sender:
+    """What is remembered of a publisher."""
+
+    __slots__ = ("last", "replays")
+
+    def __init__(self) -> None:
+        self.last = 0
+        self.replays = False
+
+
 class Channel:
     """Decodes samples, numbers them, and drops what is damaged or was there before.
 
@@ -70,18 +81,15 @@ class Channel:
             self._decode = message_type._decode
             self._has_header = message_type._has_header
         self._log = log
-        self._last: dict[bytes, int] = {}
-        self._replayed: set[bytes] = set()
+        self._senders: dict[bytes, _Sender] = {}
         self._complained: set[str] = set()
 
     def expect_replay(self, gid: bytes) -> None:
-        """Take note that samples of a publisher may come twice: live, and from its cache."""
-        self._replayed.add(gid)
+        """Take note that samples of a publisher may come twice: live, and from its cache.
 
-    def forget(self, gid: bytes) -> None:
-        """Take note that a publisher is gone."""
-        self._last.pop(gid, None)
-        self._replayed.discard(gid)
+        That holds beyond its end: what its cache answered may still be on the way.
+        """
+        self._sender(gid).replays = True
 
     def take(self, sample: Sample | Reply) -> Taken | None:
         """Decode one sample; ``None`` when it is damaged or was there before."""
@@ -108,20 +116,22 @@ class Channel:
         gid, sequence = origin.gid, origin.sequence
         lost = 0
         if sequence > 0:
-            last = self._last.get(gid)
-            if last is None:
-                self._make_room()
-            elif sequence <= last and gid in self._replayed:
-                return None
-            else:
+            sender = self._sender(gid)
+            last, sender.last = sender.last, sequence
+            if last:
+                if sequence <= last and sender.replays:
+                    sender.last = last
+                    return None
                 lost = max(sequence - last - 1, 0)
-            self._last[gid] = sequence
         return MessageInfo(origin.source_time, now, sequence, gid, lost, self._type_name)
 
-    def _make_room(self) -> None:
-        """Forget the oldest sender: those that are not in the graph are never told to have gone."""
-        if len(self._last) >= _SENDERS:
-            self._last.pop(next(iter(self._last)), None)
+    def _sender(self, gid: bytes) -> _Sender:
+        sender = self._senders.get(gid)
+        if sender is None:
+            if len(self._senders) >= _SENDERS:
+                self._senders.pop(next(iter(self._senders)), None)
+            sender = self._senders[gid] = _Sender()
+        return sender
 
     def _complain(self, error: DecodeError) -> None:
         """Log damage once per kind, so that a broken sender does not fill the disk."""

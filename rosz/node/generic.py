@@ -109,18 +109,14 @@ class GenericSubscription(Reader[Any]):
         return Channel(self.name, type_name, message_type, log)
 
     def _follow(self, publisher: Token, alive: bool) -> None:
-        if publisher.kind is not Kind.PUBLISHER or publisher.name != self.name or self.closed:
+        if not alive or publisher.kind is not Kind.PUBLISHER or publisher.name != self.name:
             return
         channel = self._channel(publisher.type_name, publisher.type_hash)
         if channel is None or publisher.qos is None:
             return
-        sender = gid(format_token(publisher))
-        if not alive:
-            channel.forget(sender)
-            return
         self._show(publisher, channel)
         if publisher.qos.latched:
-            channel.expect_replay(sender)
+            channel.expect_replay(gid(format_token(publisher)))
             ask_for_history(self.node, publisher, partial(self._put, channel.take), self._depth)
 
     def _show(self, publisher: Token, channel: Channel) -> None:

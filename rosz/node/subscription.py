@@ -64,14 +64,10 @@ class Subscription(Reader[M], Endpoint):
 
     def _follow(self, publisher: Token, alive: bool) -> None:
         """Ask a latching publisher for what it sent before it knew of this subscription."""
-        if not self.matches(publisher) or publisher.qos is None or not publisher.qos.latched:
-            return
-        sender = gid(format_token(publisher))
-        if alive:
-            self._channel.expect_replay(sender)
+        latched = publisher.qos is not None and publisher.qos.latched
+        if alive and latched and self.matches(publisher):
+            self._channel.expect_replay(gid(format_token(publisher)))
             ask_for_history(self.node, publisher, self._deliver, self._depth)
-        else:
-            self._channel.forget(sender)
 
     def publishers(self) -> list[Token]:
         """Return the publishers that this subscription hears: same topic, type and hash."""
