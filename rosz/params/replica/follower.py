@@ -44,8 +44,8 @@ class Follower(Reading):
         self._sync = Synchroniser(session, keys, self._state, self._members, self._worker)
         self._subscriber = session.subscriber(keys.change, self._on_change)
         try:
-            self._members.follow(lambda _member, _alive: None)
-            self._join(timeout)
+            self._members.follow(lambda _member, _alive: None, timeout)
+            self._join()
         except BaseException:
             self.close()
             raise
@@ -69,8 +69,7 @@ class Follower(Reading):
     ) -> None:
         self.close()
 
-    def _join(self, timeout: float) -> None:
-        self._members.look(timeout)
+    def _join(self) -> None:
         if not self._members.zids:
             raise NoReplica(NOBODY)
         self._sync.join()

@@ -33,15 +33,19 @@ class Members:
         self._changed: Callable[[Member, bool], None] | None = None
         self._watch: Closable | None = None
 
-    def follow(self, changed: Callable[[Member, bool], None]) -> None:
-        """Begin to look.
+    def follow(self, changed: Callable[[Member, bool], None], timeout: float) -> None:
+        """Find those that are there, and look out for all that come and go from then on.
 
         Args:
-            changed: Gets a replica and whether it appeared, on a Zenoh thread.
+            changed: Gets a replica and whether it appeared, on a Zenoh thread; not those that are
+                there already.
+            timeout: Seconds to look for those.
 
         Raises:
             ClosedError: The session is closed.
         """
+        # In this order: once tokens are watched, Zenoh answers from what the watch has seen so far.
+        self.look(timeout)
         self._changed = changed
         self._watch = self._session.tokens(self._keys.tokens, self._on_token)
 

@@ -116,9 +116,11 @@ class Replica(Reading):
             session.queryable(keys.sync(session.zid), self._sync.serve, complete=True),
             session.queryable(keys.ask(session.zid), server.serve, complete=True),
         ]
-        self._members.follow(self._on_member)
+        if settled is not None:
+            settled.wait(_SETTLED_BY)
+        self._members.follow(self._on_member, _TOKENS_BY)
         self._token = session.token(keys.token(self._own))
-        self._join(settled)
+        self._join()
         Keeper(self._own, self._sync, self._mirror, self._trim)
 
     def set(
@@ -274,11 +276,7 @@ class Replica(Reading):
         if self._saver is not None:
             self._saver.trim(self._state.writes)
 
-    def _join(self, settled: threading.Event | None) -> None:
-        if settled is not None:
-            settled.wait(_SETTLED_BY)
-        if not self._members.zids:
-            self._members.look(_TOKENS_BY)
+    def _join(self) -> None:
         known = self._members.zids
         if known:
             self._sync.join()
