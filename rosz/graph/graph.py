@@ -38,6 +38,7 @@ GraphListener = Callable[[Token, bool], None]
 ProcessListener = Callable[[ProcessToken, bool], None]
 """Gets a rosz node as a process, and whether it appeared (true) or went (false)."""
 
+_LOOK_TIMEOUT = 2.0
 _log = logging.getLogger("rosz.graph")
 
 
@@ -64,6 +65,10 @@ class Graph:
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="rosz-graph", daemon=True)
         self._thread.start()
+        # In this order: once tokens are watched, Zenoh answers from what the watch has seen so far.
+        for space in (tokens_key(domain), processes_key(domain)):
+            for key in session.live_tokens(space, _LOOK_TIMEOUT):
+                self._events.put((key, True))
         self._watches = [
             session.tokens(key, lambda key, alive: self._events.put((key, alive)))
             for key in (tokens_key(domain), processes_key(domain))

@@ -243,7 +243,9 @@ def test_service_client(network: Network, plain: Plain) -> None:
 def test_service_without_fields(network: Network, plain: Plain) -> None:
     """An empty message has a byte, for there are no empty payloads."""
     node = network.node()
+    tokens = plain.tokens("@ros2_lv/42/**")
     node.service("reset", Empty, lambda _: None)
+    next_token(tokens, "/SS/")
     kind = Empty._type_hash
     attachment = struct.pack("<qqB16s", 1, 1, 16, bytes(16))
     (reply,) = plain.ask(
@@ -255,8 +257,11 @@ def test_service_without_fields(network: Network, plain: Plain) -> None:
 
 def test_service_is_complete(network: Network, plain: Plain) -> None:
     """ROS 2 clients ask complete servers only, and several of one name answer all."""
+    tokens = plain.tokens("@ros2_lv/42/**")
     network.node("first").service("which", AddTwoInts, lambda _: 1)
     network.node("second").service("which", AddTwoInts, lambda _: 2)
+    for _ in range(2):
+        next_token(tokens, "/SS/")
     attachment = struct.pack("<qqB16s", 1, 1, 16, bytes(16))
     request = struct.pack("<4sqq", b"\0\1\0\0", 0, 0)
     replies = plain.ask(f"42/which/{ADD}", payload=request, attachment=attachment)
@@ -268,7 +273,9 @@ def test_error_of_a_handler(network: Network, plain: Plain) -> None:
     def fail(_request: object) -> None:
         raise ValueError("no such thing")
 
+    tokens = plain.tokens("@ros2_lv/42/**")
     network.node().service("add", AddTwoInts, fail)
+    next_token(tokens, "/SS/")
     attachment = struct.pack("<qqB16s", 1, 1, 16, bytes(16))
     request = struct.pack("<4sqq", b"\0\1\0\0", 0, 0)
     (reply,) = plain.ask(f"42/add/{ADD}", payload=request, attachment=attachment)
