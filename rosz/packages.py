@@ -7,7 +7,6 @@ The index looks in the folders that it is given, in order, and the first package
 from __future__ import annotations
 
 import os
-import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -160,6 +159,9 @@ def _crawl(root: Path) -> Iterator[Path]:
 
 
 def _name_in(manifest: Path) -> str:
+    # Most programs read no manifest, and this takes longer to load than all else here.
+    import xml.etree.ElementTree as ET
+
     try:
         root = ET.parse(manifest).getroot()  # noqa: S314  # expat bounds entities
     except ET.ParseError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import threading
 import time
 from collections import deque
@@ -113,6 +112,8 @@ class Feed:
 
     async def __aiter__(self) -> AsyncIterator[Any]:
         """Yield messages in an asyncio program until closed."""
+        import asyncio  # a third of what a node would load, for the few that use it
+
         loop = asyncio.get_running_loop()
         arrived = asyncio.Event()
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from hashlib import blake2b
+from _blake2 import blake2b  # hashlib's, without OpenSSL, which every node would load
 from typing import Final
 
 from rosz.errors import DecodeError

@@ -9,7 +9,7 @@ named in a warning: the write stands, and that replica gets it when it answers a
 from __future__ import annotations
 
 import os
-import platform
+import socket
 import sys
 import threading
 from collections.abc import Callable, Iterable
@@ -63,7 +63,7 @@ class Outcome(msgspec.Struct, frozen=True):
 def process_label() -> str:
     """Return what people call this process: its program, number and host."""
     program = PurePath(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
-    return f"{program} (pid {os.getpid()} on {platform.node() or 'this host'})"
+    return f"{program} (pid {os.getpid()} on {socket.gethostname()})"
 
 
 class Replica(Reading):
