@@ -57,7 +57,7 @@ class Context:
         settled: Set when the process is linked to all its neighbours.
         when_settled: Has a function called when it is, or at once if it is already.
         inbox: What comes for single subscriptions of this process.
-        reason: Why it was shut down, once it is.
+        reason: Why it is shut down, or about to be.
         passing: Whether this is a command rather than a part of the system: it holds no parameters.
         cooperative: Whether the program has shown that it asks for the end by itself.
         forked: Whether this is the copy in a forked child, which can do nothing.
@@ -103,8 +103,9 @@ class Context:
         self.inbox = Inbox(self.session, self.domain)
         settling = Settling(
             self.session,
-            self.SETTLED_BY if config.mode == "peer" and not alone else 0,
+            0 if alone or self.passing else self.SETTLED_BY,
             self._flushed,
+            mesh=config.mode == "peer",
         )
         self.settled = settling.settled
         self.when_settled = settling.when_settled
@@ -201,7 +202,7 @@ class Context:
         with self._lock:
             begun = self._stopping.is_set()
             if not begun:
-                self.reason = reason
+                self.reason = reason = reason or self.reason
                 self._closer = threading.current_thread()
                 self._stopping.set()
         if begun:

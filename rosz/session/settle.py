@@ -38,16 +38,20 @@ class Settling:
         session: It.
         timeout: Seconds after which it counts as settled, come what may; 0 if it is already.
         stop: Ends the waiting when set.
+        mesh: Whether it links to all its neighbours, rather than to one as a client does.
 
     Attributes:
         settled: Set in the end.
     """
 
-    def __init__(self, session: Session, timeout: float, stop: threading.Event) -> None:
+    def __init__(
+        self, session: Session, timeout: float, stop: threading.Event, *, mesh: bool = True
+    ) -> None:
         self.settled = threading.Event()
         self._session = session
         self._timeout = timeout
         self._stop = stop
+        self._mesh = mesh
         self._lock = threading.Lock()
         self._waiting: list[Callable[[], None]] = []
         if timeout:
@@ -78,7 +82,9 @@ class Settling:
     def _settle(self) -> None:
         deadline = time.monotonic() + self._timeout
         while (left := deadline - time.monotonic()) > 0 and not self._stop.wait(_POLL):
-            if self._session.peers() and self._neighbours(left) <= self._linked():
+            if self._session.peers() and (
+                not self._mesh or self._neighbours(left) <= self._linked()
+            ):
                 return
 
     def _linked(self) -> set[str]:

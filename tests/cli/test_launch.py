@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
+import secrets
 import signal
 import subprocess
 import time
@@ -13,6 +13,9 @@ from pathlib import Path
 
 import pytest
 from network import Network, Program, eventually
+
+from rosz.launch.run.command import TAG
+from rosz.launch.run.family import kill_family
 
 from .command import ROOT, ROSZ, package
 
@@ -47,16 +50,22 @@ def hears(program: Program, at_least: int = 0) -> None:
 
     The first ones may be missed: the publisher does not wait for the subscriber to start.
     """
-    eventually(lambda: max(heard(program), default=-1) >= at_least, f"a number from {at_least} on")
+    try:
+        eventually(
+            lambda: max(heard(program), default=-1) >= at_least, f"a number from {at_least} on"
+        )
+    except pytest.fail.Exception as error:
+        raise AssertionError(program.output) from error
 
 
 @pytest.fixture
 def launch(network: Network) -> Iterator[Start]:
     """Starts launches on a network of the test's own, and leaves none behind."""
+    tag = secrets.token_hex(8)
     programs: list[Program] = []
 
     def start(*words: str, **variables: str) -> Program:
-        environ = network.variables(**variables)
+        environ = network.variables(**{TAG: tag}, **variables)
         program = Program([*ROSZ, "launch", *words], environ)
         programs.append(program)
         return program
@@ -67,11 +76,8 @@ def launch(network: Network) -> Iterator[Start]:
             program.send(signal.SIGTERM)
         with suppress(subprocess.TimeoutExpired):
             program.process.wait(10)
-        for pid in started(program).values():
-            with suppress(ProcessLookupError, PermissionError):
-                if runs(pid):
-                    os.killpg(pid, signal.SIGKILL)
         program.close()
+    kill_family(tag)
 
 
 def rosz(network: Network, *words: str) -> subprocess.CompletedProcess[str]:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import select
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from rosz.launch.plan.model import NodePlan, Plan
+from rosz.launch.run.command import TAG
+from rosz.launch.run.family import kill_family
 
-from .scene import PATIENCE, alive
+from .scene import PATIENCE
 
 PROGRAM = Path(__file__).with_name("program.py")
 ROOT = Path(__file__).parents[3]
@@ -82,6 +85,7 @@ def outside(
         prefix: What to put before its command.
         separate: Whether its errors go elsewhere than its output: to ``FOLDER/err``.
     """
+    tag = secrets.token_hex(8)
     plan = folder / "plan.json"
     plan.write_bytes(Plan(nodes=nodes).to_json())
     ours, theirs = os.openpty() if terminal else os.pipe()
@@ -92,7 +96,7 @@ def outside(
         stdin=theirs if terminal else subprocess.DEVNULL,
         stdout=theirs,
         stderr=err or theirs,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT), TAG: tag},
     )
     os.close(theirs)
     if err is not None:
@@ -104,8 +108,5 @@ def outside(
         if process.poll() is None:
             process.kill()
             process.wait()
-        for pid in running.pids():
-            if alive(pid):
-                with suppress(ProcessLookupError):
-                    os.killpg(pid, 9)
+        kill_family(tag)
         os.close(ours)

@@ -156,7 +156,7 @@ def _relays_of(pipe: int) -> list[str]:
 
 def test_a_relay_is_found_while_it_runs(tmp_path: Path) -> None:
     with outside(tmp_path, shell("n", "echo hello; exec sleep 600", output="screen")) as run:
-        run.expect("hello")
+        run.expect(r"\nhello\n")
         assert len(_relays_of(run._reading)) == 1
 
 
