@@ -30,6 +30,7 @@ from rosz.session.declared import (
 )
 from rosz.session.ending import ClosedSession
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
+from rosz.session.segments import sweep
 from rosz.session.stamp import HybridClock, Stamp
 
 if TYPE_CHECKING:
@@ -92,6 +93,7 @@ class Session:
                 settings = zenoh.Config.from_json5(json.dumps(zenoh_settings(config)))
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
+        sweep()
         with mapped(f"open a session ({', '.join(config.endpoints)})"), _one_receiver():
             return cls(zenoh.open(settings))
 
@@ -441,6 +443,7 @@ class Session:
                 return
             raw, self._raw = self._raw, ClosedSession("the session is closed")
             raw.close()
+            sweep()
 
     def __enter__(self) -> Self:
         return self
