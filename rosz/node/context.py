@@ -253,6 +253,7 @@ class Context:
         Returns:
             Whether it has.
         """
+        self.cooperative = self.cooperative or threading.current_thread() is threading.main_thread()
         return self._stopping.wait(timeout)
 
     def close(self) -> None:

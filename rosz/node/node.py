@@ -388,7 +388,7 @@ class Node:
             self.clock.close()
             for hook in hooks:
                 try:
-                    hook(reason)
+                    hook(reason or self.context.reason)
                 except Exception:  # the callback boundary
                     self.log.exception("a shutdown hook failed")
             self.log.flush()

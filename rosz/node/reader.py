@@ -133,4 +133,5 @@ class Reader(Generic[M]):
 
     def __aiter__(self) -> AsyncIterator[M]:
         """Yield messages in an asyncio program until the subscription or its context is closed."""
+        self._owner.context.cooperative = True
         return aiter(self._feed)

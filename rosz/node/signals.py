@@ -4,9 +4,10 @@ A program that asks whether it is shut down, or waits through rosz, is told in t
 itself. One that never does, such as a loop around ``time.sleep``, is interrupted by an exception.
 
 Python runs a signal's handler in the main thread between two steps, and one that comes right before
-that thread begins to wait for a lock is not seen until the wait ends. So a thread of its own is
-told as well, through a pipe that the interpreter writes to from the signal itself, and acts. Where
-the pipe belongs to somebody else, such as an event loop, the handler has to.
+that thread begins to wait is not seen until the wait ends. So a thread of its own is told as well,
+through a pipe that the interpreter writes to from the signal itself. It acts, and where the handler
+does not run soon it sends the main thread the signal once more. Where the pipe belongs to somebody
+else, such as an event loop, the handler has to act.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ __all__ = ("install", "release")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_FD = -1
+_SOON = 0.05
+_REMINDERS = 20
 
 
 def install(context: Context) -> None:
@@ -65,6 +68,8 @@ class _Handler:
         self._numbers = numbers
         self._contexts: list[Context] = []
         self._asked = False
+        self._ran = threading.Event()
+        self._echoes = 0
         self._reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)
         previous = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
@@ -79,14 +84,18 @@ class _Handler:
 
     def __call__(self, number: int, _frame: FrameType | None) -> None:
         """Run in the main thread, between two of its steps."""
+        self._ran.set()
         contexts = self._contexts
         if not self._asked and all(context.is_shutdown for context in contexts):
             self.let_go(number)
             signal.raise_signal(number)
             return
+        for context in contexts:
+            # The main thread may get to the end before the thread that shuts down.
+            context.reason = context.reason or signal.Signals(number).name
         if not self._is_watching():
             self._hear(number)
-        if not all(context.cooperative for context in contexts):
+        if not any(context.cooperative for context in contexts):
             if number == signal.SIGINT:
                 raise KeyboardInterrupt
             raise SystemExit(128 + number)
@@ -108,8 +117,23 @@ class _Handler:
     def _watch(self) -> None:
         while data := self._reader.recv(64):
             for number in data:
-                if number in self._numbers:
-                    self._hear(number)
+                if number not in self._numbers:
+                    continue
+                if self._echoes:
+                    self._echoes -= 1
+                    continue
+                self._hear(number)
+                self._remind(number)
+
+    def _remind(self, number: int) -> None:
+        """See to it that the main thread takes note."""
+        main = threading.main_thread().ident
+        for _ in range(_REMINDERS):
+            if self._ran.wait(_SOON) or main is None:
+                break
+            self._echoes += 1
+            signal.pthread_kill(main, number)
+        self._ran.clear()
 
     def _hear(self, number: int) -> None:
         if self._asked:
@@ -118,11 +142,9 @@ class _Handler:
             os._exit(128 + number)
         live = [context for context in self._contexts if not context.is_shutdown]
         self._asked = bool(live)
+        reason = signal.Signals(number).name
         for context in live:
             # On another thread: this one may hold a lock that is needed, or has to hear of more.
             threading.Thread(
-                target=context.shutdown,
-                args=(signal.Signals(number).name,),
-                name="rosz-signal",
-                daemon=True,
+                target=context.shutdown, args=(reason,), name="rosz-signal", daemon=True
             ).start()
