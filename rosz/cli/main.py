@@ -27,10 +27,7 @@ COMMANDS = {
     "gen": "write Python modules for the messages of a package",
     "pkg": "list, find and create packages",
     "log": "follow the log of all nodes, set levels",
-    "reconfigure": "dynamic_reconfigure from the command line",
-    "doctor": "find out what is wrong",
     "env": "print what to eval in a shell",
-    "turtlesim": "the turtle simulator",
 }
 _INTERRUPTED = 130
 
@@ -92,7 +89,10 @@ def _invoke(app: object, argv: list[str], program: str) -> int:
     import typer
     from typer.exceptions import TyperException
 
+    from rosz.cli.light import make_light
+
     assert isinstance(app, typer.Typer)  # noqa: S101  # every group module defines one
+    make_light(app)
     if not argv and app.info.no_args_is_help is True:
         app(args=["--help"], prog_name=program, standalone_mode=False)
         return 2

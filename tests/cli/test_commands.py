@@ -1,0 +1,62 @@
+"""What holds for all commands: they exist, start light, and end in a line and a code."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+import typer
+
+from rosz.cli.main import COMMANDS, run
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_its_module(name: str) -> None:
+    assert isinstance(import_module(f"rosz.cli.{name}").app, typer.Typer)
+
+
+def test_the_overview_loads_nothing() -> None:
+    code = (
+        "import sys; from rosz.cli.main import run; run(['--help']); "
+        "print(sorted({'zenoh', 'typer', 'yaml', 'msgspec', 'numpy'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("name", [*COMMANDS])
+def test_a_command_loads_little(name: str) -> None:
+    heavy = {"asyncio", "numpy", "rosz.node", "rosz.msgs.std_msgs", "rich"}
+    code = f"import sys, rosz.cli.{name}; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    ("argv", "code", "text"),
+    [
+        (["parma"], 2, "'parma' is no command; did you mean 'param'?"),
+        (["param", "gte"], 2, "No such command 'gte'"),
+        (["param", "get"], 2, "Missing argument 'NAME'"),
+    ],
+)
+def test_wrong_usage(
+    argv: list[str], code: int, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(argv) == code
+    written = capsys.readouterr()
+    assert text in written.err
+    assert written.err.count("\n") == 1
+    assert not written.out
+
+
+def test_a_meaningless_setting_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "many")
+    assert run(["topic", "list"]) == 2
+    assert capsys.readouterr().err == (
+        "rosz: ROS_DOMAIN_ID is 'many'; expected a number from 0 to 232\n"
+    )
