@@ -13,9 +13,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import typer
-from typer.core import TyperGroup
 
 from rosz import names, remap
+from rosz.cli.light import LightGroup
 from rosz.environment import Environment
 from rosz.introspect.reach import open_context, open_session
 
@@ -111,7 +111,7 @@ def call_of(context: typer.Context) -> Call:
     return Call(argv or ())
 
 
-class _Group(TyperGroup):
+class _Group(LightGroup):
     """Takes remappings out of the arguments before anything else looks at them."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

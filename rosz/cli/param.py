@@ -9,10 +9,10 @@ from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
 
 from rosz import names, remap
 from rosz.cli.group import print_json, print_lines, until_stopped, warn
+from rosz.cli.light import LightCommand, LightGroup
 from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, YamlError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _TOOL = "rosparam"
 _FAILED = 1
 
 
-class _Group(TyperGroup):
+class _Group(LightGroup):
     """Takes ``__ns:=`` and its like out of the arguments; all else may be a value."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -35,7 +35,7 @@ class _Group(TyperGroup):
         return super().parse_args(ctx, [word for word in args if not _is_special(word)])
 
 
-class _SetCommand(TyperCommand):
+class _SetCommand(LightCommand):
     """Takes ``-1`` for a value and not for an option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

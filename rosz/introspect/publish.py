@@ -109,9 +109,9 @@ class Sender:
 
     def _latch(self, arguments: Sequence[Any], *, once: bool) -> None:
         message = self._make(arguments)
-        shown = f" [{message}]" if self._options.verbose else ""
+        shown = f"[{message}]" if self._options.verbose else "message"
         end = f" for {ONCE_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
-        self._say(f"publishing and latching message{shown}{end}")
+        self._say(f"publishing and latching {shown}{end}")
         self._publisher.publish(message)
 
     def _stay(self, seconds: float | None) -> None:
