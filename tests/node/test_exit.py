@@ -1,0 +1,111 @@
+"""Programs end: those that close what they opened, and those that forget."""
+
+from __future__ import annotations
+
+import gc
+import os
+import threading
+import time
+
+import pytest
+from network import Network, eventually, repeats
+
+from rosz.msgs.example_interfaces.srv import AddTwoInts
+from rosz.msgs.std_msgs.msg import String
+from rosz.node import Context, Node
+from rosz.qos import LATCHED
+
+EVERYTHING = """
+    import time
+    began = time.monotonic()
+    import threading
+    import rosz
+    from rosz.msgs.example_interfaces.srv import AddTwoInts
+    from rosz.msgs.std_msgs.msg import String
+
+    node = rosz.Node("forgetful", anonymous=True)
+    other = rosz.Node("other", anonymous=True)
+    latched = node.publisher("latched", String, latch=True)
+    latched.publish("still here")
+    publisher = node.publisher("chatter", String, queue_size=0)
+    publisher.on_connection(lambda link: link.publish(String("hello")))
+    got = threading.Event()
+    node.subscription("chatter", String, lambda m: got.set())
+    other.subscription("latched", String, lambda m: got.set())
+    node.subscription("anything", None, print)
+    waiting = node.subscription("never", String)
+    threading.Thread(target=lambda: list(waiting), daemon=True).start()
+    node.service("add", AddTwoInts, lambda request: request.a + request.b)
+    client = other.client("add", AddTwoInts)
+    client.wait_for_service()
+    assert client(1, 2).sum == 3
+    node.timer(0.001, lambda event: publisher.publish("tick"))
+    node.log.info("all declared")
+    node.params["/forgotten"] = 1
+    assert got.wait(10)
+    print("ended", time.monotonic(), flush=True)
+"""
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("company", [False, True], ids=["alone", "in company"])
+def test_a_program_that_closes_nothing_ends_at_once(network: Network, company: bool) -> None:
+    if company:
+        network.node("neighbour").subscription("chatter", String, lambda _: None)
+    for _ in range(repeats(3, 100)):
+        program = network.program(EVERYTHING)
+        assert program.exit_code() == 0, program.output
+        ended = time.monotonic()
+        said = float(program.wait_for("ended").split()[1])
+        assert ended - said < 1.0, program.output
+        assert "Traceback" not in program.output
+        program.close()
+
+
+@pytest.mark.timeout(600)
+def test_an_exception_ends_it_too(network: Network) -> None:
+    program = network.program(
+        """
+        import rosz
+
+        node = rosz.Node("failing")
+        node.timer(0.01, print)
+        raise ValueError("no more")
+        """
+    )
+    assert program.exit_code() == 1
+    assert program.lines[-1] == "ValueError: no more"
+
+
+def open_files() -> int:
+    return len(os.listdir("/proc/self/fd"))  # noqa: PTH208  # no need to look at each of them
+
+
+def cycle(network: Network, number: int) -> None:
+    with Context(network.environment()) as context, Node(f"n{number % 3}", context=context) as node:
+        node.publisher("chatter", String).publish("hello")
+        node.publisher("latched", String, qos=LATCHED).publish("hello")
+        node.subscription("chatter", String, lambda _: None)
+        node.service("add", AddTwoInts, lambda _: 0)
+        node.client("add", AddTwoInts)
+        node.timer(0.001, lambda _: None)
+
+
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("company", [False, True], ids=["alone", "in company"])
+def test_start_and_stop(network: Network, company: bool) -> None:
+    """Cycles of everything leave no thread, no file and no memory to speak of behind."""
+    if company:
+        network.node("neighbour").subscription("chatter", String, lambda _: None)
+    for number in range(5):
+        cycle(network, number)
+    eventually(lambda: threading.active_count() < 25, "threads ended")
+    threads, files = threading.active_count(), open_files()
+    began = time.monotonic()
+    cycles = repeats(15, 500)
+    for number in range(cycles):
+        cycle(network, number)
+    assert (time.monotonic() - began) / cycles < 1.0
+    eventually(lambda: threading.active_count() <= threads + 2, "threads ended")
+    gc.collect()
+    eventually(lambda: open_files() <= files + 8, "files closed")
