@@ -159,19 +159,28 @@ def _crawl(root: Path) -> Iterator[Path]:
 
 
 def _name_in(manifest: Path) -> str:
-    # Most programs read no manifest, and this takes longer to load than all else here.
-    import xml.etree.ElementTree as ET
+    # Expat itself: what is built on it imports modules that may be on their way in just now, as an
+    # import hook looks for packages here.
+    from xml.parsers import expat
 
+    opened: list[str] = []
+    name: list[str] = []
+
+    def read(text: str) -> None:
+        if opened == ["package", "name"]:
+            name.append(text)
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda tag, _: opened.append(tag)
+    parser.EndElementHandler = lambda _: opened.pop()
+    parser.CharacterDataHandler = read
     try:
-        root = ET.parse(manifest).getroot()  # noqa: S314  # expat bounds entities
-    except ET.ParseError as error:
-        line, column = error.position
-        raise PackageError(
-            f"not well-formed XML: {error.msg}", str(manifest), line, column + 1
-        ) from error
+        parser.Parse(manifest.read_bytes(), True)
+    except expat.ExpatError as error:
+        reason = f"not well-formed XML: {expat.ErrorString(error.code)}"
+        raise PackageError(reason, str(manifest), error.lineno, error.offset + 1) from error
     except OSError as error:
         raise PackageError(f"cannot be read: {error.strerror}", str(manifest)) from error
-    name = (root.findtext("name") or "").strip()
-    if root.tag != "package" or not name:
+    if not "".join(name).strip():
         raise PackageError("expected <package> with a <name> in it", str(manifest))
-    return name
+    return "".join(name).strip()

@@ -26,7 +26,8 @@ __all__ = ("Output", "Streams")
 
 _DRAIN_SECONDS = 0.5
 """How long the relay may take to show the last lines before a death is reported without them."""
-_END_SECONDS = 1.0
+_END_SECONDS = 5.0
+"""How long a screen that takes nothing, such as a stopped terminal, holds up the end."""
 
 Told = Callable[[tuple[str, ...]], None]
 
