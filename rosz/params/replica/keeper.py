@@ -54,6 +54,7 @@ class Keeper:
         now = time.monotonic()
         late = now - self._last - _TICK
         self._last = now
+        self._sync.members.drop_ghosts()
         if late > _STOPPED or now >= self._compare_at:
             self._compare_at = now + random.uniform(*_COMPARE_EVERY)  # noqa: S311  # nothing secret
             self._sync.compare_with_one()

@@ -32,6 +32,7 @@ class Members:
         self._found: dict[str, Member] = {}
         self._changed: Callable[[Member, bool], None] | None = None
         self._watch: Closable | None = None
+        self._watched: set[str] = set()
 
     def follow(self, changed: Callable[[Member, bool], None], timeout: float) -> None:
         """Find those that are there, and look out for all that come and go from then on.
@@ -47,7 +48,7 @@ class Members:
         # In this order: once tokens are watched, Zenoh answers from what the watch has seen so far.
         self.look(timeout)
         self._changed = changed
-        self._watch = self._session.tokens(self._keys.tokens, self._on_token)
+        self._watch = self._session.tokens(self._keys.tokens, self._on_watched)
 
     def look(self, timeout: float) -> None:
         """Ask for those that are there now.
@@ -59,7 +60,16 @@ class Members:
             ClosedError: The session is closed.
         """
         for token in self._session.live_tokens(self._keys.tokens, timeout):
-            self._on_token(token, True)
+            member = self._read(token)
+            if member is not None:
+                self._take(member, True)
+
+    def drop_ghosts(self) -> None:
+        """Forget those that were gone before the watch began; call it some time after that."""
+        for zid in self.zids - self._watched:
+            member = self._found.get(zid)
+            if member is not None:
+                self._take(member, False)
 
     def all(self) -> list[Member]:
         """Return them, the oldest first."""
@@ -75,13 +85,26 @@ class Members:
         if self._watch is not None:
             self._watch.close()
 
-    def _on_token(self, token: str, alive: bool) -> None:
+    def _on_watched(self, token: str, alive: bool) -> None:
+        member = self._read(token)
+        if member is None:
+            return
+        if alive:
+            self._watched.add(member.zid)
+        else:
+            self._watched.discard(member.zid)
+        self._take(member, alive)
+
+    def _read(self, token: str) -> Member | None:
         try:
             member = self._keys.member(token)
         except DecodeError as error:
             _log.warning("%s", error)
-            return
-        if member.zid == self._session.zid or (alive and self._found.get(member.zid) == member):
+            return None
+        return None if member.zid == self._session.zid else member
+
+    def _take(self, member: Member, alive: bool) -> None:
+        if alive and self._found.get(member.zid) == member:
             return
         if alive:
             self._found[member.zid] = member

@@ -1,0 +1,243 @@
+"""Replicas as processes, and a cable between them that can be cut."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import IO, Any
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 50.0
+
+
+class Process:
+    """One member; `tell` and `answer` are apart so that many can work at a time."""
+
+    def __init__(
+        self,
+        endpoint: str,
+        *,
+        mode: str = "peer",
+        connect: Iterable[str] = (),
+        skew: float = 0.0,
+        file: str = "",
+    ) -> None:
+        settings = {
+            "endpoint": endpoint,
+            "mode": mode,
+            "connect": list(connect),
+            "skew": skew,
+            "file": file,
+        }
+        self._process = subprocess.Popen(
+            [
+                sys.executable,
+                "-P",
+                str(Path(__file__).with_name("member.py")),
+                json.dumps(settings),
+            ],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )
+        self._rest = b""
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def tell(self, verb: str, **arguments: Any) -> None:
+        stdin = _pipe(self._process.stdin)
+        stdin.write(json.dumps([verb, arguments]).encode() + b"\n")
+        stdin.flush()
+
+    def answer(self, timeout: float = PATIENCE) -> Any:
+        stdout = _pipe(self._process.stdout).fileno()
+        deadline = time.monotonic() + timeout
+        while b"\n" not in self._rest:
+            ready = select.select([stdout], [], [], max(0.0, deadline - time.monotonic()))[0]
+            assert ready, f"no answer within {timeout} s"
+            chunk = os.read(stdout, 1 << 20)
+            assert chunk, "the member ended"
+            self._rest += chunk
+        line, _, self._rest = self._rest.partition(b"\n")
+        return json.loads(line)
+
+    def do(self, verb: str, **arguments: Any) -> Any:
+        self.tell(verb, **arguments)
+        return self.answer()
+
+    def stop(self) -> None:
+        """Keep it from running, and wait until it does not."""
+        os.kill(self.pid, signal.SIGSTOP)
+        status = Path(f"/proc/{self.pid}/stat")
+        while status.read_text().rpartition(")")[2].split()[0] != "T":
+            time.sleep(0.001)
+
+    def resume(self) -> None:
+        """Let it run again."""
+        os.kill(self.pid, signal.SIGCONT)
+
+    def kill(self) -> None:
+        """End it as a power cut would; again is no error."""
+        if self._process.returncode is None:
+            self._process.kill()
+            self._process.wait(10)
+            _pipe(self._process.stdin).close()
+            _pipe(self._process.stdout).close()
+
+
+class Fleet:
+    """All members of one test."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.rendezvous = f"unixsock-stream/{folder / 'z'}"
+        self._all: list[Process] = []
+
+    def start(self, *, endpoint: str = "", wait: bool = True, **settings: Any) -> Process:
+        process = Process(endpoint or self.rendezvous, **settings)
+        self._all.append(process)
+        if wait:
+            assert process.answer() == "up"
+        return process
+
+    def start_many(self, count: int, **settings: Any) -> list[Process]:
+        found = [self.start(wait=False, **settings) for _ in range(count)]
+        for process in found:
+            assert process.answer() == "up"
+        until_known(found)
+        return found
+
+    def close(self) -> None:
+        for process in self._all:
+            process.kill()
+
+
+def states(processes: Iterable[Process]) -> list[dict[str, Any]]:
+    every = list(processes)
+    for process in every:
+        process.tell("state")
+    return [process.answer() for process in every]
+
+
+def until_known(processes: list[Process]) -> None:
+    """Wait until all know all."""
+    deadline = time.monotonic() + PATIENCE
+    pause = threading.Event()
+    while any(state["members"] < len(processes) - 1 for state in states(processes)):
+        assert time.monotonic() < deadline, "they do not find each other"
+        pause.wait(0.01)
+
+
+def until_same(processes: list[Process], what: str) -> float:
+    """Wait until all hold the same; print and return how long that took."""
+    begun = time.monotonic()
+    pause = threading.Event()
+    while len({state["digest"] for state in states(processes)}) > 1:
+        assert time.monotonic() - begun < PATIENCE, "they do not become the same"
+        pause.wait(0.005)
+    took = time.monotonic() - begun
+    print(f"{what}: the same on {len(processes)} replicas after {took:.3f} s")
+    roots = [process.do("root") for process in processes]
+    assert all(root == roots[0] for root in roots)
+    return took
+
+
+class Cable:
+    """A TCP connection through here, to be cut or held up."""
+
+    def __init__(self, target: int) -> None:
+        self._target = target
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._ends: list[socket.socket] = []
+        self._lock = threading.Lock()
+        self._whole = threading.Event()
+        self._flowing = threading.Event()
+        self._whole.set()
+        self._flowing.set()
+        self.port = int(self._listener.getsockname()[1])
+        self._closed = False
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def cut(self) -> None:
+        """Break the connection, and refuse new ones."""
+        self._whole.clear()
+        self._drop()
+
+    def mend(self) -> None:
+        """Let connections through again."""
+        self._whole.set()
+
+    def hold(self) -> None:
+        """Keep the connection, and let nothing through."""
+        self._flowing.clear()
+
+    def release(self) -> None:
+        """Let through what was held."""
+        self._flowing.set()
+
+    def close(self) -> None:
+        self._closed = True
+        self._flowing.set()
+        self._listener.close()
+        self._drop()
+
+    def _drop(self) -> None:
+        with self._lock:
+            for end in self._ends:
+                try:
+                    end.shutdown(socket.SHUT_RDWR)
+                except OSError:
+                    continue
+            self._ends.clear()
+
+    def _accept(self) -> None:
+        while not self._closed:
+            try:
+                near, _ = self._listener.accept()
+            except OSError:
+                return
+            if not self._whole.is_set():
+                near.close()
+                continue
+            try:
+                far = socket.create_connection(("127.0.0.1", self._target))
+            except OSError:
+                near.close()
+                continue
+            with self._lock:
+                self._ends += [near, far]
+            for source, sink in ((near, far), (far, near)):
+                threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+
+    def _carry(self, source: socket.socket, sink: socket.socket) -> None:
+        try:
+            while data := source.recv(65536):
+                self._flowing.wait()
+                sink.sendall(data)
+        except OSError:
+            pass
+        finally:
+            source.close()
+            sink.close()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
+    assert pipe is not None
+    return pipe

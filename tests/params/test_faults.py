@@ -1,0 +1,206 @@
+"""What goes wrong between real processes, and what is left afterwards.
+
+ROSZ_FAULTS=full tries it at full length; without it each fault is shorter, and the same.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+from .fleet import Cable, Fleet, Process, free_port, until_known, until_same
+
+FULL = os.environ.get("ROSZ_FAULTS", "") == "full"
+WRITES = 10_000 if FULL else 1_500
+SECONDS = 20.0 if FULL else 1.5
+STOPPED = 10.0 if FULL else 3.5
+LOADED = 5_000
+
+pytestmark = pytest.mark.timeout(300)
+
+
+@pytest.fixture
+def fleet() -> Iterator[Fleet]:
+    with TemporaryDirectory(prefix="rosz") as folder:
+        found = Fleet(Path(folder))
+        yield found
+        found.close()
+
+
+def pass_time(seconds: float) -> None:
+    """Let a fault last: its length is what is tried."""
+    threading.Event().wait(seconds)
+
+
+def acknowledged(log: Path) -> dict[str, int]:
+    names = log.read_text().split()
+    return {name: int(name.rpartition("x")[2]) for name in names}
+
+
+def nothing_is_missing(process: Process, *logs: Path) -> int:
+    root = process.do("root")
+    count = 0
+    for log in logs:
+        for name, value in acknowledged(log).items():
+            space, _, leaf = name[1:].partition("/")
+            assert root[space][leaf] == value, f"{name} was acknowledged and is gone"
+            count += 1
+    return count
+
+
+def test_kills_during_a_storm_lose_nothing(fleet: Fleet) -> None:
+    first, writer, other, victim = fleet.start_many(4)
+    logs = [fleet.folder / "one", fleet.folder / "two"]
+    writer.tell("storm", prefix="/one/x", count=WRITES, log=str(logs[0]))
+    other.tell("storm", prefix="/two/x", count=WRITES, log=str(logs[1]))
+    while not all(log.exists() and log.stat().st_size > 2000 for log in logs):
+        pass_time(0.005)
+    victim.kill()
+    while logs[1].stat().st_size < 4000:
+        pass_time(0.005)
+    other.kill()
+    first.kill()
+    late = fleet.start()
+    assert writer.answer() > 0
+    until_same([writer, late], "kill -9 of three of four replicas during a storm")
+    count = nothing_is_missing(late, *logs)
+    print(f"{count} acknowledged writes are all there")
+    assert count >= WRITES
+
+
+@pytest.mark.parametrize("kind", ["cut", "held up"])
+def test_two_halves_that_were_cut_apart_become_one(fleet: Fleet, kind: str) -> None:
+    ports = free_port(), free_port()
+    cable = Cable(ports[0])
+    left_router = fleet.start(endpoint=f"tcp/127.0.0.1:{ports[0]}", mode="router")
+    right_router = fleet.start(
+        endpoint=f"tcp/127.0.0.1:{ports[1]}",
+        mode="router",
+        connect=[f"tcp/127.0.0.1:{cable.port}"],
+    )
+    left = [left_router, fleet.start(endpoint=f"tcp/127.0.0.1:{ports[0]}", mode="client")]
+    right = [right_router, fleet.start(endpoint=f"tcp/127.0.0.1:{ports[1]}", mode="client")]
+    until_known(left + right)
+    left[1].do("set", name="/both/shared", value="before")
+    left[1].do("set", name="/doomed", value={"a": 1, "b": 2})
+    if kind == "cut":
+        cable.cut()
+    else:
+        cable.hold()
+    logs = [fleet.folder / name for name in ("left", "right")]
+    left[1].tell("storm", prefix="/left/x", count=300, log=str(logs[0]), timeout=0.3)
+    right[1].tell("storm", prefix="/right/x", count=300, log=str(logs[1]), timeout=0.3)
+    left[1].answer()
+    right[1].answer()
+    left[0].do("set", name="/both/shared", value="left", timeout=0.1)
+    right[1].do("set", name="/both/shared", value="right, and later", timeout=0.1)
+    left[0].do("delete", name="/doomed/a")
+    right[0].do("set", name="/doomed/c", value=3, timeout=0.1)
+    pass_time(SECONDS)
+    if kind == "cut":
+        cable.mend()
+    else:
+        cable.release()
+    until_known(left + right)
+    until_same(left + right, f"two halves {kind} for {SECONDS:g} s while both wrote")
+    assert nothing_is_missing(left[1], *logs) == 600
+    root = right[1].do("root")
+    assert root["both"] == {"shared": "right, and later"}
+    assert root["doomed"] == {"b": 2, "c": 3}
+    assert left[1].do("set", name="/after", value=1)["slow"] == []
+    assert right[1].do("get", name="/after") == 1
+    cable.close()
+
+
+@pytest.mark.parametrize("skew", [-10.0, 10.0])
+def test_a_writer_whose_clock_is_wrong_loses_and_hides_nothing(fleet: Fleet, skew: float) -> None:
+    right = fleet.start()
+    wrong = fleet.start(skew=skew)
+    until_known([right, wrong])
+    logs = [fleet.folder / "right", fleet.folder / "wrong"]
+    right.tell("storm", prefix="/right/x", count=300, log=str(logs[0]))
+    wrong.tell("storm", prefix="/wrong/x", count=300, log=str(logs[1]))
+    right.answer()
+    wrong.answer()
+    for number in range(10):
+        right.do("set", name="/turn", value=["right", number])
+        assert wrong.do("get", name="/turn") == ["right", number]
+        wrong.do("set", name="/turn", value=["wrong", number])
+        assert right.do("get", name="/turn") == ["wrong", number]
+    late = fleet.start()
+    until_same([right, wrong, late], f"a writer whose clock is off by {skew:+g} s")
+    assert nothing_is_missing(late, *logs) == 600
+
+
+def test_a_replica_that_was_stopped_catches_up(fleet: Fleet) -> None:
+    one, other, stopped = fleet.start_many(3)
+    stopped.stop()
+    first = one.do("set", name="/first", value=1, timeout=0.5)
+    assert first["slow"] == [f"member {stopped.pid}"]
+    log = fleet.folder / "log"
+    took = one.do("storm", prefix="/ns/x", count=300, log=str(log))
+    assert took < 5, "only the first write waits for the one that is stopped"
+    other.do("set", name="/other", value=1, timeout=0.5)
+    pass_time(STOPPED)
+    stopped.resume()
+    until_same([one, other, stopped], f"a replica stopped for {STOPPED:g} s")
+    assert nothing_is_missing(stopped, log) == 300
+    assert one.do("set", name="/again", value=2)["slow"] == []
+    assert stopped.do("get", name="/again") == 2
+    assert stopped.do("set", name="/mine", value=3)["slow"] == []
+
+
+def test_joining_during_a_storm_misses_nothing(fleet: Fleet) -> None:
+    writers = fleet.start_many(2)
+    logs = [fleet.folder / "one", fleet.folder / "two"]
+    for writer, log in zip(writers, logs, strict=True):
+        writer.tell("storm", prefix=f"/{log.name}/x", count=WRITES, log=str(log))
+    while not all(log.exists() and log.stat().st_size > 1000 for log in logs):
+        pass_time(0.005)
+    joined = []
+    for _ in range(3):
+        before = [acknowledged(log) for log in logs]
+        joined.append(fleet.start())
+        root = joined[-1].do("root")
+        for log, names in zip(logs, before, strict=True):
+            missing = {n for n in names if n.rpartition("/")[2] not in root[log.name]}
+            assert not missing, "what was acknowledged before it came is there when it has joined"
+    for writer in writers:
+        writer.answer()
+    until_same([*writers, *joined], "three that joined during a storm of writes")
+    assert nothing_is_missing(joined[0], *logs) == 2 * WRITES
+
+
+def test_two_loads_at_once_end_the_same_everywhere(fleet: Fleet) -> None:
+    one, other, third = fleet.start_many(3)
+    values = {f"ns{number % 50}/p{number}": number for number in range(LOADED)}
+    one.tell("load", namespace="/", values={**values, "by": "one", "only": {"one": 1}})
+    other.tell("load", namespace="/", values={**values, "by": "other", "only": {"other": 1}})
+    print("two loads of 5000 at once took", one.answer(), other.answer())
+    until_same([one, other, third], "two loads of 5000 parameters at once")
+    root = third.do("root")
+    assert root["only"] == {"one": 1, "other": 1}
+    assert len(third.do("root")) == 52
+
+
+def test_a_kept_store_survives_the_kill_of_everybody(fleet: Fleet) -> None:
+    file = str(fleet.folder / "params")
+    keeper = fleet.start(file=file)
+    writer = fleet.start()
+    until_known([keeper, writer])
+    log = fleet.folder / "log"
+    writer.tell("storm", prefix="/ns/x", count=200, log=str(log))
+    while not (log.exists() and log.stat().st_size > 200):
+        pass_time(0.005)
+    sure = acknowledged(log)
+    keeper.kill()
+    writer.kill()
+    again = fleet.start(file=file)
+    root = again.do("root")["ns"]
+    assert all(root[name.rpartition("/")[2]] == value for name, value in sure.items())
+    print(f"{len(sure)} writes acknowledged before kill -9 of all are back from the file")
