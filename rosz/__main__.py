@@ -1,6 +1,11 @@
 """``python -m rosz``: the ``rosz`` command."""
 
-from rosz.cli.main import main
+import sys
 
 if __name__ == "__main__":
-    main()
+    try:
+        from rosz.cli.main import main
+
+        main()
+    except KeyboardInterrupt:  # so early that the command could not see to it itself
+        sys.exit(130)

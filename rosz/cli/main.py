@@ -100,6 +100,9 @@ def _invoke(app: object, argv: list[str], program: str) -> int:
         code = app(args=argv, prog_name=program, standalone_mode=False)
     except typer.Abort:
         return _INTERRUPTED
+    except SystemExit as error:
+        # The only case in which typer does so here: nobody reads the output any more.
+        raise BrokenPipeError from error
     except TyperException as error:
         format_message = getattr(error, "format_message", error.__str__)
         text = f"{format_message().rstrip('.')}; see '{program} --help'"

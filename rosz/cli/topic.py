@@ -209,7 +209,7 @@ def hz_command(
     from rosz.introspect.expression import Filter
 
     chosen = Filter(condition) if condition else None
-    hz(call_of(context), topics, window=_window(window, -1), condition=chosen, wall_time=wall_time)
+    hz(call_of(context), topics, window=_window(window), condition=chosen, wall_time=wall_time)
 
 
 @app.command("bw")
@@ -217,7 +217,7 @@ def bw_command(context: typer.Context, topic: _TopicName, *, window: _Window = N
     """Print every second how many bytes come."""
     from rosz.cli.topic_follow import bw
 
-    bw(call_of(context), topic, window=_window(window, 100))
+    bw(call_of(context), topic, window=_window(window))
 
 
 @app.command("delay")
@@ -225,12 +225,12 @@ def delay_command(context: typer.Context, topic: _TopicName, *, window: _Window 
     """Print every second how old messages are, by the stamp in their header."""
     from rosz.cli.topic_follow import delay
 
-    delay(call_of(context), topic, window=_window(window, -1))
+    delay(call_of(context), topic, window=_window(window))
 
 
-def _window(given: int | None, default: int) -> int:
+def _window(given: int | None) -> int | None:
     if given is None or given < 0:
-        return default
+        return None  # as for ROS 1's tools
     if given < 2:  # noqa: PLR2004  # there is no time between fewer
         raise UsageError(f"-w is {given}; expected at least 2 messages")
     return given

@@ -139,7 +139,12 @@ class _Run:
 
 
 def hz(
-    call: Call, topics: Sequence[str], *, window: int, condition: Filter | None, wall_time: bool
+    call: Call,
+    topics: Sequence[str],
+    *,
+    window: int | None,
+    condition: Filter | None,
+    wall_time: bool,
 ) -> None:
     """Print rates."""
     from rosz.introspect.rate import RateMeter, report, report_all
@@ -177,7 +182,7 @@ def _filtered(node: Node, token: Token, condition: Filter, meter: Any, clock: An
     print_lines([f"subscribed to [{token.name}]"])
 
 
-def bw(call: Call, topic: str, *, window: int) -> None:
+def bw(call: Call, topic: str, *, window: int | None) -> None:
     """Print bandwidth."""
     from rosz.introspect.bandwidth import BandwidthMeter, report
 
@@ -192,7 +197,7 @@ def bw(call: Call, topic: str, *, window: int) -> None:
                 print_lines([report(stats)])
 
 
-def delay(call: Call, topic: str, *, window: int) -> None:
+def delay(call: Call, topic: str, *, window: int | None) -> None:
     """Print ages."""
     from rosz.introspect.delay import DelayMeter, read_stamp, report
 

@@ -36,11 +36,14 @@ class BandwidthMeter:
     """Adds sizes up; one thread adds, another one asks.
 
     Args:
-        window: Messages to calculate from, the newest.
+        window: Messages to calculate from, the newest. When not given, the newest 100, and more
+            where that many come within a second, so that high rates are told as truly as low ones.
     """
 
-    def __init__(self, window: int = DEFAULT_WINDOW) -> None:
-        self._seen: deque[tuple[int, int]] = deque(maxlen=max(window, 1))
+    def __init__(self, window: int | None = None) -> None:
+        self._window = DEFAULT_WINDOW if window is None else max(window, 1)
+        self._span = _SECOND if window is None else 0
+        self._seen: deque[tuple[int, int]] = deque()
 
     def add(self, size: int, now: int) -> None:
         """Count a message.
@@ -49,7 +52,10 @@ class BandwidthMeter:
             size: Its bytes.
             now: Nanoseconds, of a clock that never goes back.
         """
-        self._seen.append((now, size))
+        seen = self._seen
+        seen.append((now, size))
+        while len(seen) > self._window and now - seen[0][0] >= self._span:
+            seen.popleft()
 
     def stats(self, now: int) -> BandwidthStats | None:
         """Return what was measured; ``None`` before the second message."""

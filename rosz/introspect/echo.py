@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable
+from keyword import iskeyword
+from math import isfinite, isnan
 from typing import Any
 
 import msgspec
@@ -112,14 +115,23 @@ def _json(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Return a value of messages as dictionaries and lists."""
+    """Return a message, or a value in one, as what JSON has; see `rosz.message.values.to_json`."""
     if hasattr(value, "_schema"):
-        return {name: plain(getattr(value, name)) for name in type(value).__slots__}
+        return {_shown(name): plain(getattr(value, name)) for name in type(value).__slots__}
+    if isinstance(value, bytes | bytearray):
+        return b64encode(value).decode()
+    if hasattr(value, "tolist"):
+        value = value.tolist()
     if isinstance(value, list | tuple):
         return [plain(one) for one in value]
-    if isinstance(value, bytes):
-        return list(value)
-    return value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, float) and not isfinite(value):
+        return "NaN" if isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
+
+
+def _shown(name: str) -> str:
+    """Return the name of a field without what sets it apart from a word of Python."""
+    return name[:-1] if name.endswith("_") and iskeyword(name[:-1]) else name
 
 
 def dump_bytes(data: bytes) -> str:

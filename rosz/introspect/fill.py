@@ -1,8 +1,4 @@
-"""Messages from the values of a YAML text (ROS wiki, YAML command line).
-
-A dictionary names fields, a list gives all of them in order. A time may also be ``now`` or a number
-of nanoseconds; a header may be ``auto``: stamped now.
-"""
+"""Messages from the values of a command line, and the names of the values that they take."""
 
 from __future__ import annotations
 
@@ -12,11 +8,10 @@ from typing import Any
 from rosz.errors import EncodeError
 from rosz.message.fill import fill_message_args
 from rosz.message.schema import slots
+from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.time import DurationValue, TimeValue
 
 __all__ = ("fill", "list_arguments", "with_arguments")
-
-_SECOND = 1_000_000_000
 
 
 def fill(cls: type[Any], arguments: Sequence[Any], now: int) -> Any:
@@ -30,11 +25,9 @@ def fill(cls: type[Any], arguments: Sequence[Any], now: int) -> Any:
     Raises:
         EncodeError: They do not fit; it names the field, and what was expected.
     """
-    from rosz.msgs.builtin_interfaces.msg import Time
-
     message = cls()
-    fill_message_args(message, list(arguments), {"now": Time(*divmod(now, _SECOND))})
-    cls._encode(message)  # so that a value which does not fit is told before anything is sent
+    fill_message_args(message, list(arguments), {"now": Time.from_nsec(now)})
+    cls._encode(message)  # so that what does not fit is told before anything is sent
     return message
 
 
@@ -55,12 +48,9 @@ def _arguments(cls: type[Any], prefix: str) -> list[str]:
     kinds = {slot.name: slot for slot in slots(cls)}
     for name in cls.__slots__:
         slot = kinds.get(name)
-        if slot is not None and slot.shape == "one" and _is_message(slot.kind):
-            found += _arguments(slot.kind, f"{prefix}{name}.")  # type: ignore[arg-type]  # a class
+        kind = slot.kind if slot is not None and slot.shape == "one" else ""
+        if isinstance(kind, type) and not issubclass(kind, TimeValue | DurationValue):
+            found += _arguments(kind, f"{prefix}{name}.")
         else:
             found.append(prefix + name)
     return found
-
-
-def _is_message(kind: Any) -> bool:
-    return isinstance(kind, type) and not issubclass(kind, TimeValue | DurationValue)

@@ -37,11 +37,11 @@ class RateMeter:
     """Counts messages; one thread ticks, another one asks.
 
     Args:
-        window: Messages to calculate from, the newest; 50 000 when negative.
+        window: Messages to calculate from, the newest; 50 000 when not given.
     """
 
-    def __init__(self, window: int = -1) -> None:
-        size = LONGEST_WINDOW if window < 0 else window
+    def __init__(self, window: int | None = None) -> None:
+        size = LONGEST_WINDOW if window is None else window
         self._deltas: deque[int] = deque(maxlen=max(size - 1, 0))
         self._last = -1
         self._told = -1
