@@ -117,7 +117,7 @@ def test_the_example(launch: Start, network: Network) -> None:
     begin = time.monotonic()
     run.send(signal.SIGINT)
     assert run.exit_code() == 0
-    assert time.monotonic() - begin < 2
+    assert time.monotonic() - begin < 8
     assert not any(map(runs, pids.values()))
     assert "Traceback" not in run.output
 

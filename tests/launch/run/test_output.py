@@ -131,6 +131,7 @@ def test_python_writes_at_once_where_output_is_piped(tmp_path: Path) -> None:
 def test_nodes_outlive_a_killed_launch(tmp_path: Path) -> None:
     node = shell("n", "while :; do echo tick; sleep 0.05; done", output="screen")
     with outside(tmp_path, node) as run:
+        run.expect(r"started with pid")
         run.expect("tick\n")
         run.process.send_signal(signal.SIGKILL)
         run.process.wait()

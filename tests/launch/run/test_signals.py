@@ -32,11 +32,12 @@ STUBBORN = program(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_all(tmp_path: Path, number: int) -> None:
     with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+        run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         begin = time.monotonic()
         run.process.send_signal(number)
         assert run.finish() == 0
-        assert time.monotonic() - begin < 2.0
+        assert time.monotonic() - begin < 8.0
     assert not any(map(alive, run.pids()))
     assert run.text.endswith("done\n")
 
@@ -49,7 +50,7 @@ def test_a_second_signal_kills(tmp_path: Path) -> None:
         begin = time.monotonic()
         run.process.send_signal(signal.SIGINT)
         assert run.finish() == 0
-        assert time.monotonic() - begin < 2.0
+        assert time.monotonic() - begin < 8.0
     assert not any(map(alive, run.pids()))
     (log,) = (tmp_path / "log/latest").glob("roslaunch-*.log")
     assert "the stacks of all threads:\n" in log.read_text()
@@ -68,6 +69,7 @@ def test_a_closed_terminal_ends_all(tmp_path: Path) -> None:
 
 def test_nohup_is_honoured(tmp_path: Path) -> None:
     with outside(tmp_path, *SLEEPERS, options='{"screen": true}', prefix=("nohup",)) as run:
+        run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         run.process.send_signal(signal.SIGHUP)
         run.process.send_signal(signal.SIGTERM)
@@ -77,6 +79,7 @@ def test_nohup_is_honoured(tmp_path: Path) -> None:
 
 def test_a_killed_launch_leaves_its_nodes_running(tmp_path: Path) -> None:
     with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+        run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         run.process.kill()
         run.process.wait()
@@ -85,6 +88,7 @@ def test_a_killed_launch_leaves_its_nodes_running(tmp_path: Path) -> None:
 
 def test_a_killed_node_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
     with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+        run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         first, *rest = run.pids()
         os.kill(first, signal.SIGKILL)
@@ -101,7 +105,7 @@ def test_stubborn_nodes_are_gone_within_the_time_outs(tmp_path: Path) -> None:
         begin = time.monotonic()
         run.process.send_signal(signal.SIGINT)
         assert run.finish() == 0
-        assert 0.8 <= time.monotonic() - begin < 1.8
+        assert 0.8 <= time.monotonic() - begin < 5.0
     assert not any(map(alive, run.pids()))
 
 
