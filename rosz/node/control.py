@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = ("NodeInfo", "attach", "control_key")
 
 _REPLACED = "new node registered with same name"
+_ANSWER_BY = 1.0
+_TOGETHER = 0.2
 
 
 class NodeInfo(msgspec.Struct, frozen=True):
@@ -31,6 +33,7 @@ class NodeInfo(msgspec.Struct, frozen=True):
         host: Host name.
         argv: Command line.
         started: Nanoseconds since the Unix epoch.
+        age: Seconds since then, by no clock that anybody sets.
     """
 
     name: str
@@ -38,6 +41,7 @@ class NodeInfo(msgspec.Struct, frozen=True):
     host: str
     argv: list[str]
     started: int
+    age: float = 0.0
 
 
 class Request(msgspec.Struct, frozen=True):
@@ -65,31 +69,58 @@ def attach(node: Node) -> None:
     """Have a node answer for itself, and give way to a newer one of its name."""
     context = node.context
     key = control_key(context.domain, context.session.zid, node.node_id)
+    began = time.monotonic()
 
     def arrived(query: Query) -> None:
         threading.Thread(
-            target=_serve, args=(node, key, query), name=f"rosz-control{node.name}", daemon=True
+            target=_serve,
+            args=(node, key, query, began),
+            name=f"rosz-control{node.name}",
+            daemon=True,
         ).start()
 
     def appeared(other: ProcessToken, alive: bool) -> None:
-        if not alive or other.node != node.name or other == node.process:
-            return
-        if other.newer_than(node.process):
-            node.log.warning(
-                "shutdown request: %s (process %d on %s)", _REPLACED, other.pid, other.host
-            )
-            threading.Thread(target=node.shutdown, args=(_REPLACED,), daemon=True).start()
+        if alive and other.node == node.name and other != node.process:
+            threading.Thread(target=_contend, args=(node, other, began), daemon=True).start()
 
     node.keep(context.session.queryable(key, arrived))
     node.keep(Withdrawal(context.graph.listen_to_processes(appeared)))
 
 
-def _serve(node: Node, key: str, query: Query) -> None:
+def _contend(node: Node, other: ProcessToken, began: float) -> None:
+    """End a node if another one of its name is newer."""
+    if _is_newer(node, other, began):
+        node.log.warning(
+            "shutdown request: %s (process %d on %s)", _REPLACED, other.pid, other.host
+        )
+        node.shutdown(_REPLACED)
+
+
+def _is_newer(node: Node, other: ProcessToken, began: float) -> bool:
+    """Tell whether another node came later, whatever the clocks of the two machines say."""
+    key = control_key(other.domain, other.zid, other.node_id)
+    ask = msgspec.msgpack.encode(Request("info"))
+    asked = time.monotonic()
+    try:
+        replies = node.context.session.get(key, payload=ask, timeout=_ANSWER_BY)
+        infos = [msgspec.msgpack.decode(r.payload, type=NodeInfo) for r in replies if r.ok]
+    except (RoszError, msgspec.DecodeError):
+        infos = []
+    if infos:
+        journey = time.monotonic() - asked
+        lead = asked + journey / 2 - began - infos[0].age
+        if abs(lead) > max(_TOGETHER, journey):
+            return lead > 0
+    # Two that start together, or one that does not answer, go by the times they gave themselves.
+    return other.newer_than(node.process)
+
+
+def _serve(node: Node, key: str, query: Query, began: float) -> None:
     shut_down = ""
     with query:
         try:
             request = msgspec.msgpack.decode(query.payload or b"\x80", type=Request)
-            answer, shut_down = _answer(node, request)
+            answer, shut_down = _answer(node, request, time.monotonic() - began)
             query.reply(key, msgspec.msgpack.encode(answer))
         except (msgspec.MsgspecError, RoszError, ValueError) as error:
             query.reply_error(str(error))
@@ -97,15 +128,13 @@ def _serve(node: Node, key: str, query: Query) -> None:
         node.shutdown(shut_down)
 
 
-def _answer(node: Node, request: Request) -> tuple[Any, str]:
+def _answer(node: Node, request: Request, age: float) -> tuple[Any, str]:
     """Return what to answer, and the reason of a shutdown to carry out after that."""
     match request.action:
         case "info":
+            command = [sys.executable, *sys.argv]
             process = node.process
-            info = NodeInfo(
-                node.name, os.getpid(), process.host, [sys.executable, *sys.argv], process.started
-            )
-            return info, ""
+            return NodeInfo(node.name, process.pid, process.host, command, process.started, age), ""
         case "shutdown":
             return True, request.reason or "requested"
         case "levels":

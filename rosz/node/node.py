@@ -118,8 +118,9 @@ class Node:
         self._withdraw = context.on_shutdown(self._end)
         try:
             standard.set_initial_params(self)
-            self.process = standard.announce(self)
+            self.process = standard.process_of(self)
             control.attach(self)
+            standard.announce(self)
             if not context.passing:
                 standard.follow_clock(self)
         except BaseException:

@@ -14,34 +14,34 @@ from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 if TYPE_CHECKING:
     from rosz.node.node import Node
 
-__all__ = ("announce", "follow_clock", "open_rosout", "set_initial_params")
+__all__ = ("announce", "follow_clock", "open_rosout", "process_of", "set_initial_params")
 
 _SECOND = 1_000_000_000
 
 
-def announce(node: Node) -> ProcessToken:
-    """Make a node known, to ROS 2 by its token and to rosz by that of its process.
-
-    Returns:
-        What it is as a process.
-    """
+def process_of(node: Node) -> ProcessToken:
+    """Return what a node is as a process, as of now."""
     context = node.context
-    zid = context.session.zid
-    token = Token(
-        context.domain, zid, node.node_id, node.node_id, Kind.NODE, node.namespace, node.base_name
-    )
-    process = ProcessToken(
+    return ProcessToken(
         context.domain,
-        zid,
+        context.session.zid,
         node.node_id,
         context.session.stamp().time,
         os.getpid(),
         socket.gethostname(),
         node.name,
     )
-    for key in (format_token(token), format_process(process)):
-        node.keep(context.session.token(key))
-    return process
+
+
+def announce(node: Node) -> None:
+    """Make a node known, to ROS 2 by its token and to rosz by that of its process."""
+    session = node.context.session
+    number, namespace = node.node_id, node.namespace
+    token = Token(
+        node.context.domain, session.zid, number, number, Kind.NODE, namespace, node.base_name
+    )
+    for key in (format_token(token), format_process(node.process)):
+        node.keep(session.token(key))
 
 
 def set_initial_params(node: Node) -> None:

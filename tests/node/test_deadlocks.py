@@ -18,7 +18,7 @@ from rosz.msgs.std_msgs.msg import Int32
 from rosz.node import Node
 
 WATCHDOG = 10.0
-ROUNDS = repeats(2, 50)
+ROUNDS = repeats(4, 50)
 
 PARTNER = """
     import rosz

@@ -1,0 +1,88 @@
+"""Two nodes of one name: the older gives way and says why."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from network import PATIENCE, Network, eventually
+
+from rosz.msgs.std_msgs.msg import String
+from rosz.node import Node, control
+
+LOSER = """
+    import rosz
+    from rosz.msgs.std_msgs.msg import String
+
+    with rosz.Node("king") as node:
+        node.publisher("reign", String)
+        node.on_shutdown(lambda reason: print("because:", reason, flush=True))
+        print("ready", flush=True)
+        node.spin()
+"""
+
+
+def test_older_process_ends(network: Network) -> None:
+    program = network.program(LOSER)
+    program.wait_for("ready")
+    king = network.node("king")
+    assert program.exit_code() == 0
+    assert "because: new node registered with same name" in program.lines
+    warning = program.wait_for("shutdown request")
+    assert f"(process {king.process.pid} on {king.process.host})" in warning
+    assert not king.is_shutdown
+    graph = king.context.graph
+    graph.wait_for(lambda view: view.nodes() == ["/king"], PATIENCE, "one king")
+
+
+def test_only_that_node_ends(network: Network) -> None:
+    """The others of its context go on, and so does what they declared."""
+    context = network.context()
+    old, neighbour = Node("king", context=context), Node("queen", context=context)
+    subscription = neighbour.subscription("reign", String)
+    network.node("king")
+    eventually(lambda: old.is_shutdown, "the older one is shut down")
+    assert not neighbour.is_shutdown
+    neighbour.publisher("reign", String).publish("long live")
+    assert subscription.get().data == "long live"
+
+
+def test_in_one_context(network: Network) -> None:
+    context = network.context()
+    old = Node("king", context=context)
+    new = Node("king", context=context)
+    eventually(lambda: old.is_shutdown, "the older one is shut down")
+    assert not new.is_shutdown
+
+
+def test_same_base_name_elsewhere_is_another_node(network: Network) -> None:
+    nodes = [
+        network.node("king"),
+        network.node("king", namespace="/north"),
+        network.node("king", context=network.context(domain=7)),
+    ]
+    nodes[0].context.graph.wait_for_node("/north/king", PATIENCE)
+    time.sleep(0.1)  # for what must not happen there is nothing to wait for
+    assert not any(node.is_shutdown for node in nodes)
+
+
+def test_age_counts_and_not_the_clock(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A newer node takes over, though the clock of its machine is behind."""
+    monkeypatch.setattr(control, "_TOGETHER", 0)
+    old = network.node("king")
+    time.sleep(0.1)  # longer than two messages take
+    real = time.time_ns
+    monkeypatch.setattr(time, "time_ns", lambda: real() - 3600 * 10**9)
+    new = network.node("king")
+    eventually(lambda: old.is_shutdown, "the older one is shut down")
+    assert not new.is_shutdown
+
+
+def test_a_chain_of_successors(network: Network) -> None:
+    kings = [network.node("king") for _ in range(5)]
+    eventually(lambda: [k.is_shutdown for k in kings] == [True] * 4 + [False], "one is left")
+
+
+def test_anonymous_nodes_do_not_collide(network: Network) -> None:
+    nodes = [network.node("king", anonymous=True) for _ in range(3)]
+    assert len({node.name for node in nodes}) == 3
