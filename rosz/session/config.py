@@ -20,6 +20,9 @@ __all__ = ("SessionConfig", "zenoh_settings")
 
 _RETRY_MS = 200
 _LEASE_MS = 60_000
+_ROUTER_BY = 10.0
+"""Seconds that a node waits for its router, which may have been started just before it."""
+
 _EPHEMERAL = "tcp/127.0.0.1:0"
 
 
@@ -33,7 +36,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
         listen: Further endpoints to listen on.
         hold_rendezvous: Whether a peer may become the meeting point; short-lived ones should not.
         must_connect: Whether opening fails, after ``open_timeout``, when nobody answers.
-        open_timeout: Seconds, for ``must_connect``.
+        open_timeout: Seconds that a client, or who must connect, waits for somebody to be there.
         multicast: Whether to look for others on the local network.
         shared_memory: Payloads of at least so many bytes go by shared memory; 0 is off.
         config_file: Zenoh configuration file to start from.
@@ -68,6 +71,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
             listen=() if client else env.listen,
             multicast=env.multicast,
             shared_memory=env.shared_memory,
+            open_timeout=_ROUTER_BY,
             config_file=env.zenoh_config,
             override=env.zenoh_override,
         )
@@ -103,12 +107,13 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
         held = [config.rendezvous] if config.hold_rendezvous else []
         listen = [*held, _EPHEMERAL, *listen]
     must_listen = config.mode == "router"
+    must_connect = config.must_connect or config.mode == "client"
     return {
         "mode": config.mode,
         "connect": {
             "endpoints": connect,
-            "exit_on_failure": config.must_connect,
-            "timeout_ms": int(config.open_timeout * 1000) if config.must_connect else 0,
+            "exit_on_failure": must_connect,
+            "timeout_ms": int(config.open_timeout * 1000) if must_connect else 0,
             "retry": {
                 "period_init_ms": _RETRY_MS,
                 "period_max_ms": _RETRY_MS,
@@ -118,8 +123,8 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
         "listen": {"endpoints": listen, "exit_on_failure": must_listen, "timeout_ms": 0},
         "open": {
             "return_conditions": {
-                "connect_scouted": config.must_connect,
-                "declares": config.must_connect,
+                "connect_scouted": must_connect,
+                "declares": must_connect,
             }
         },
         "scouting": {

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import zenoh
 
+from rosz.errors import TransportError
 from rosz.session.advanced import advanced_publisher, advanced_subscriber
 from rosz.session.answers import Answers, AskOptions, Target
 from rosz.session.config import SessionConfig, overrides, zenoh_settings
@@ -44,6 +45,7 @@ _TARGETS = {
     "best": zenoh.QueryTarget.BEST_MATCHING,
 }
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
+_NOBODY = "Unable to connect to any of"
 _RUNTIME = "ZENOH_RUNTIME"
 
 
@@ -94,8 +96,17 @@ class Session:
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
         sweep()
-        with mapped(f"open a session ({', '.join(config.endpoints)})"), _one_receiver():
-            return cls(zenoh.open(settings))
+        where = ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
+        try:
+            with mapped(f"open a session ({where})"), _one_receiver():
+                return cls(zenoh.open(settings))
+        except TransportError as error:
+            if _NOBODY not in str(error):
+                raise
+            raise TransportError(
+                f"nobody answers at {where} within {config.open_timeout:g} s: start 'rosz core', a"
+                " launch or a node there first, or name another place in ROSZ_RENDEZVOUS"
+            ) from error
 
     def stamp(self) -> Stamp:
         """Return a new stamp, later than all that this session gave or was shown."""

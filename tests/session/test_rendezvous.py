@@ -1,0 +1,189 @@
+"""Where sessions of one machine meet, and what happens when the first of them dies."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+from network import PATIENCE, Network, Program, eventually
+
+from rosz.environment import Environment
+from rosz.errors import TransportError
+from rosz.node import Context, Node
+from rosz.session import Session, SessionConfig, config
+
+PEER = """
+    import sys
+    import rosz
+    from rosz.msgs.std_msgs.msg import String
+
+    with rosz.Node(sys.argv[1]) as node:
+        heard = set()
+
+        def hear(message):
+            if message.data not in heard:
+                heard.add(message.data)
+                print("heard", message.data, flush=True)
+
+        node.subscription("names", String, hear)
+        names = node.publisher("names", String)
+        print("ready", flush=True)
+        for tick in node.rate(50):
+            names.publish(sys.argv[1])
+"""
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(params=["unixsock", "tcp"])
+def place(request: pytest.FixtureRequest) -> Iterator[Network]:
+    made = Network()
+    if request.param == "tcp":
+        made.rendezvous = f"tcp/127.0.0.1:{free_port()}"
+    yield made
+    made.close()
+
+
+def peer(place: Network, name: str) -> Program:
+    program = place.program(PEER, name)
+    program.wait_for("ready")
+    return program
+
+
+def test_two_scripts_find_each_other(place: Network) -> None:
+    one, two = peer(place, "one"), peer(place, "two")
+    one.wait_for("heard two")
+    two.wait_for("heard one")
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "ended"])
+def test_the_first_dies(place: Network, number: signal.Signals) -> None:
+    """The others keep their links, the next newcomer is found, and finds them."""
+    first, second, third = (peer(place, name) for name in ("first", "second", "third"))
+    third.wait_for("heard second")
+    second.wait_for("heard third")
+    first.send(number)
+    first.exit_code()
+    for name in ("fourth", "fifth"):
+        newcomer = peer(place, name)
+        for other in (second, third):
+            other.wait_for(f"heard {name}")
+        newcomer.wait_for("heard second")
+        newcomer.wait_for("heard third")
+
+
+def test_many_at_once(place: Network) -> None:
+    """Whoever is first, all meet."""
+    names = [f"n{number}" for number in range(4)]
+    programs = [place.program(PEER, name) for name in names]
+    for name, program in zip(names, programs, strict=True):
+        for other in names:
+            if other != name:
+                program.wait_for(f"heard {other}", 30)
+
+
+def test_a_router_takes_the_place(place: Network) -> None:
+    """Peers and clients find each other by way of it; so does who comes after its death."""
+    router = Session.open(SessionConfig(mode="router", rendezvous=place.rendezvous))
+    with router:
+        nodes = [
+            place.node("peer", context=place.context()),
+            place.node("client", context=place.context(mode="client")),
+        ]
+        for node in nodes:
+            graph = node.context.graph
+            graph.wait_for(lambda view: len(view.nodes()) == 2, PATIENCE, "the other node")
+
+
+def test_client_waits_for_its_router(place: Network) -> None:
+    """Whoever starts both cannot tell which of them is up first."""
+    program = place.program(PEER, "early", ROSZ_MODE="client")
+    with Session.open(SessionConfig(mode="router", rendezvous=place.rendezvous)):
+        program.wait_for("ready")
+        late = place.node("late", context=place.context(mode="client"))
+        late.context.graph.wait_for_node("/early", PATIENCE)
+
+
+def test_client_without_a_router(place: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(config, "_ROUTER_BY", 0.2)
+    with pytest.raises(
+        TransportError,
+        match=f"^nobody answers at '{place.rendezvous}' within 0.2 s: start 'rosz core', ",
+    ):
+        place.context(mode="client")
+
+
+def test_command_finds_nobody(place: Network) -> None:
+    began = time.monotonic()
+    with pytest.raises(TransportError, match="nobody answers at"):
+        Session.open(SessionConfig.command(place.environment(), timeout=0.2))
+    assert time.monotonic() - began < 3
+
+
+def test_command_sees_all_at_once(place: Network) -> None:
+    """What a command asks when it has just come is complete."""
+    for name in ("one", "two", "three"):
+        place.node(name)
+    for _ in range(5):
+        with Session.open(SessionConfig.command(place.environment())) as session:
+            tokens = session.live_tokens("@ros2_lv/42/*/*/*/NN/**", PATIENCE)
+        assert sorted(token.rpartition("/")[2] for token in tokens) == ["one", "three", "two"]
+
+
+def test_links_heal(network: Network) -> None:
+    """A peer whose rendezvous comes and goes finds the next one."""
+    node = network.node("lasting")
+    for number in range(3):
+        with Session.open(SessionConfig.node(network.environment())) as session:
+            eventually(lambda: node.context.session.zid in session.peers(), f"link {number}")
+        eventually(lambda: not node.context.session.peers(), f"end of link {number}")
+
+
+def test_domain_and_rendezvous_of_the_environment() -> None:
+    env = Environment.read({"ROS_DOMAIN_ID": "7", "ROSZ_RENDEZVOUS": "tcp/localhost:7448"})
+    found = SessionConfig.node(env)
+    assert (found.mode, found.rendezvous) == ("peer", "tcp/localhost:7448")
+
+
+def test_several_contexts_of_one_process(network: Network) -> None:
+    """Each has a session of its own; those of one domain meet, the others do not."""
+    one, two, other = network.context(), network.context(), network.context(domain=7)
+    nodes = [
+        Node(name, context=context) for name, context in zip("abc", (one, two, other), strict=True)
+    ]
+    one.graph.wait_for_node("/b", PATIENCE)
+    two.graph.wait_for_node("/a", PATIENCE)
+    assert other.graph.view().nodes() == ["/c"]
+    one.close()
+    assert [node.is_shutdown for node in nodes] == [True, False, False]
+    two.graph.wait_for(lambda view: view.nodes() == ["/b"], PATIENCE, "the end of a")
+
+
+def test_stop_and_go(network: Network) -> None:
+    """Contexts that open and close at the same time, from many threads."""
+    network.context()
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            for _ in range(3):
+                with Context(network.environment()) as context:
+                    Node("n", context=context, anonymous=True)
+        except BaseException as error:  # noqa: BLE001  # whatever it is, it is wrong
+            errors.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(PATIENCE * 2)
+    assert not errors
+    assert not any(thread.is_alive() for thread in threads)
