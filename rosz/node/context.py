@@ -174,6 +174,11 @@ class Context:
         """Whether the end has begun."""
         return self._stopping.is_set()
 
+    @property
+    def closed(self) -> bool:
+        """Whether the end has come: hooks have run, and the session is closed."""
+        return self._stopped.is_set()
+
     def on_shutdown(self, hook: Callable[[str], None]) -> Callable[[], None]:
         """Have a function called with the reason when the context shuts down.
 

@@ -17,6 +17,7 @@ import os
 import signal
 import socket
 import threading
+import time
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,8 @@ __all__ = ("install", "release")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_FD = -1
 _SOON = 0.05
+_ONE_STROKE = 0.1
+"""Seconds in which a second signal is an echo of the first: timeout(1) signals the group, too."""
 _REMINDERS = 20
 
 
@@ -68,6 +71,7 @@ class _Handler:
         self._numbers = numbers
         self._contexts: list[Context] = []
         self._asked = False
+        self._asked_at = 0.0
         self._ran = threading.Event()
         self._echoes = 0
         self._reader, self._writer = socket.socketpair()
@@ -137,11 +141,14 @@ class _Handler:
 
     def _hear(self, number: int) -> None:
         if self._asked:
+            ending = not all(context.closed for context in self._contexts)
+            if ending and time.monotonic() - self._asked_at < _ONE_STROKE:
+                return
             # End the process at once, telling where every thread stood.
             faulthandler.dump_traceback()
             os._exit(128 + number)
         live = [context for context in self._contexts if not context.is_shutdown]
-        self._asked = bool(live)
+        self._asked, self._asked_at = bool(live), time.monotonic()
         reason = signal.Signals(number).name
         for context in live:
             # On another thread: this one may hold a lock that is needed, or has to hear of more.
