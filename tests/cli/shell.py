@@ -1,0 +1,99 @@
+"""A shell of a test: runs commands in this process, on the test's own network."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from typing import Any
+
+import pytest
+from network import Network, Program
+
+from rosz.cli.main import run
+from rosz.node import Node
+
+__all__ = ("Result", "Shell", "latch")
+
+_MAIN = "from rosz.cli.main import main; main()"
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class Result:
+    """What a command ended with."""
+
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code = code
+        self.out = out
+        self.err = err
+
+    @property
+    def lines(self) -> list[str]:
+        """The lines of its output, of a command that succeeded."""
+        assert self.code == 0, self.err
+        return self.out.splitlines()
+
+    @property
+    def json(self) -> Any:
+        """Its output, read as JSON, of a command that succeeded."""
+        assert self.code == 0, self.err
+        return json.loads(self.out)
+
+    def __repr__(self) -> str:
+        return f"exit code {self.code}\n{self.out}\n{self.err}"
+
+
+class Shell:
+    """Runs ``rosz`` commands.
+
+    Args:
+        network: Where.
+        monkeypatch: Sets the environment.
+        capsys: Takes what they write.
+    """
+
+    def __init__(
+        self,
+        network: Network,
+        monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str],
+    ) -> None:
+        self.network = network
+        self._monkeypatch = monkeypatch
+        self._capsys = capsys
+        for name in ("ROS_NAMESPACE", "ROSZ_CONNECT", "ROSZ_LISTEN", "ROSZ_MODE", "NO_COLOR"):
+            monkeypatch.delenv(name, raising=False)
+        for name in ("ROS_PACKAGE_PATH", "ROSZ_PACKAGE_PATH", "ROS_HOME", "ROS_LOG_DIR"):
+            monkeypatch.delenv(name, raising=False)
+        for name in ("HOME", "ROS_DOMAIN_ID", "ROSZ_RENDEZVOUS"):
+            monkeypatch.setenv(name, network.variables()[name])
+        monkeypatch.chdir(network.folder)
+
+    def __call__(self, *words: str, stdin: str = "", terminal: bool = False) -> Result:
+        """Run a command to its end.
+
+        Args:
+            words: The command line.
+            stdin: What it reads.
+            terminal: Whether a person types that.
+        """
+        self._monkeypatch.setattr(
+            sys, "stdin", _Terminal(stdin) if terminal else io.StringIO(stdin)
+        )
+        self._capsys.readouterr()
+        code = run(words)
+        out, err = self._capsys.readouterr()
+        return Result(code, out, err)
+
+    def start(self, *words: str, **variables: str) -> Program:
+        """Start a command as a process of its own."""
+        return self.network.program(_MAIN, *words, **variables)
+
+
+def latch(node: Node, topic: str, message: Any) -> None:
+    """Publish a message that stays."""
+    node.publisher(topic, type(message), latch=True).publish(message)
