@@ -176,8 +176,9 @@ def theirs(folder: Path, *options: str) -> list[str]:
 def plain(text: str, folder: Path) -> list[str]:
     """Return what was said without what differs from run to run, sorted."""
     text = re.sub(r"\x1b\[\d*m|\x1b\]2;.*?\x07", "", text.partition("\nDIED\n")[0])
-    # roslaunch's threads print into each other's lines.
+    # roslaunch's threads and its nodes print into each other's lines.
     text = re.sub(r"(?=\[[\w/]+-\d+\] (?:killing|escalating|process has))", "\n", text)
+    text = re.sub(r"(process\[.*?\]: started with pid \[\d+\])", r"\n\1\n", text)
     text = re.sub(rf"{folder}/log/[0-9a-f-]+", "LOGS", text)
     text = re.sub(r"pid \[?\d+\]?", "pid PID", text)
     text = re.sub(r"(\w)-\d+(?=[\]*.])", r"\1-N", text)

@@ -171,9 +171,11 @@ def test_grandchildren_end_with_their_node(tmp_path: Path) -> None:
     assert not any(map(alive, pids))
 
 
-def test_what_a_dead_node_leaves_behind_is_ended(tmp_path: Path) -> None:
+@pytest.mark.parametrize("start", ["", "setsid "], ids=["in its group", "in a session of its own"])
+def test_what_a_dead_node_leaves_behind_is_ended(tmp_path: Path, start: str) -> None:
     noted = tmp_path / "pid"
-    script = f"sleep 600 & echo $! > {noted}; exit 1"
+    inner = f"echo $$ > {noted}.new; mv {noted}.new {noted}; exec sleep 600"
+    script = f"{start}sh -c '{inner}' & until test -e {noted}; do :; done; exit 1"
     with launch(tmp_path, shell("parent", script), shell("other", "exec sleep 600")) as run:
         run.err.wait_for("[parent-1] process has died")
         pid = int(noted.read_text())
