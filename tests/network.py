@@ -88,11 +88,17 @@ class Program:
         with self._changed:
             return "\n".join(self.lines)
 
-    def wait_for(self, text: str, timeout: float = PATIENCE) -> str:
-        """Wait for a line with a text in it, and return the first such line."""
+    def wait_for(self, text: str, timeout: float = PATIENCE, *, after: int = 0) -> str:
+        """Wait for a line with a text in it, and return the first such line.
+
+        Args:
+            text: What to look for.
+            timeout: Seconds.
+            after: Lines to leave out at the beginning.
+        """
 
         def found() -> list[str]:
-            return [line for line in self.lines if text in line]
+            return [line for line in self.lines[after:] if text in line]
 
         with self._changed:
             self._changed.wait_for(lambda: found() or self._ended, timeout)
@@ -209,8 +215,11 @@ class Network:
             argv: Its arguments.
             variables: Environment variables, beside those of the network.
         """
-        command = [sys.executable, "-c", dedent(script), *argv]
-        return self._keep(Program(command, self.variables(**variables)))
+        return self.run("-c", dedent(script), *argv, **variables)
+
+    def run(self, *argv: str, **variables: str) -> Program:
+        """Start Python with a command line."""
+        return self._keep(Program([sys.executable, *argv], self.variables(**variables)))
 
     def thread(self, function: Callable[[], object]) -> threading.Thread:
         """Run a function on a thread that the test waits for in the end."""

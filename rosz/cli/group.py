@@ -151,7 +151,7 @@ def print_json(value: Any) -> None:
     """Print a value as JSON for people and programs alike."""
     import msgspec
 
-    sys.stdout.write(msgspec.json.format(msgspec.json.encode(value)).decode() + "\n")
+    sys.stdout.write(msgspec.json.format(msgspec.json.encode(value, enc_hook=str)).decode() + "\n")
 
 
 def warn(text: str) -> None:

@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 
 __all__ = ("Core",)
 
-_REFUSED = re.compile(r"bound to (\S+?): \[.*address already in use", re.IGNORECASE)
+_REFUSED = re.compile(
+    r"bound to (\S+?): \[.*address already in use|listener on (\S+) - unable to acquire lock",
+    re.IGNORECASE,
+)
+"""What Zenoh says of a TCP endpoint, and of a unix socket, that somebody else holds."""
 
 
 class Core:
@@ -78,7 +82,7 @@ class Core:
         except TransportError as error:
             if keep is not None:
                 keep.close()
-            raise _explained(error) from error
+            raise _explained(error, self.endpoints) from error
         try:
             self.params: Replica = Replica(self.session, self.domain, keep=keep)
         except BaseException:
@@ -102,11 +106,13 @@ class Core:
         self.close()
 
 
-def _explained(error: TransportError) -> TransportError:
+def _explained(error: TransportError, endpoints: Sequence[str]) -> TransportError:
     match = _REFUSED.search(str(error))
     if match is None:
         return error
+    place = match[1] or match[2]
+    endpoint = next((one for one in endpoints if one.endswith(place)), place)
     return TransportError(
-        f"'{match[1]}' is occupied: another core, or a node that the others meet at, holds it; all"
+        f"'{endpoint}' is occupied: another core, or a node that the others meet at, holds it; all"
         " goes on as it is, or end that one and start the core then"
     )

@@ -89,7 +89,7 @@ def describe(survey: Survey, node: Token) -> str:
         lines += _section(title, [f"{name} [{type_name}]" for name, type_name in sorted(found)])
     served = {t.name for t in _endpoints(survey, node, Kind.SERVICE)}
     lines += _section("Services", sorted(served))
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines)
 
 
 def _endpoints(survey: Survey, node: Token, *kinds: Kind) -> list[Token]:

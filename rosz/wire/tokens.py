@@ -133,7 +133,7 @@ def parse_token(key: str) -> Token:
     name, type_text, type_hash, qos = chunks[_NODE_CHUNKS:_ENDPOINT_CHUNKS]
     return msgspec.structs.replace(
         node_token,
-        name=_demangle(name),
+        name="/" + _demangle(name).removeprefix("/"),  # some participants leave the slash out
         type_name=ros_type(type_text),
         type_hash=type_hash,
         qos=qos_text.parse_qos(qos),

@@ -1,0 +1,114 @@
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from network import Network
+
+from rosz.cli import env
+from rosz.introspect.shells import COMMANDS, program
+
+from .shell import Shell
+
+BIN = Path(env.__file__).parent / "bin"
+ENV = f"{sys.executable} -m rosz env"
+
+
+def evaluate(network: Network, shell: str, *lines: str) -> subprocess.CompletedProcess[str]:
+    """Run lines in a shell that has evaluated what rosz prints for it."""
+    if shutil.which(shell) is None:
+        pytest.skip(f"{shell} is not installed: apt install {shell}")
+    first = f"{ENV} fish | source" if shell == "fish" else f'eval "$({ENV} {shell})"'
+    return subprocess.run(
+        [shell, "-c", "\n".join([first, *lines])],
+        env=network.variables(),
+        cwd=network.folder,
+        capture_output=True,
+        text=True,
+        timeout=40,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_programs_are_those_of_the_table(command: str) -> None:
+    assert (BIN / command).read_text() == program(command)
+
+
+def test_all_programs_may_be_executed() -> None:
+    found = {path.name for path in BIN.iterdir()}
+    assert found == {*COMMANDS, "rospack", "rosls", "rosed"}
+    assert all(path.stat().st_mode & 0o111 == 0o111 for path in BIN.iterdir())
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_ros_1_names_mean_rosz(network: Network, shell: str) -> None:
+    network.node("talker")
+    done = evaluate(
+        network,
+        shell,
+        "rosnode list",
+        "timeout 30 rostopic list",
+        "rosmsg show std_msgs/Bool",
+        "roscd std_msgs/msg && pwd",
+        "rosls std_msgs/msg | grep -x Bool.msg",
+        "rospack find std_msgs",
+    )
+    assert done.stderr == ""
+    *lines, here, file, found = done.stdout.splitlines()
+    assert lines == ["/talker", "/rosout", "bool data", ""]
+    assert here == f"{found}/msg"
+    assert file == "Bool.msg"
+
+
+def test_evaluating_twice_changes_nothing(network: Network) -> None:
+    again = f'eval "$({ENV} bash)"'
+    done = evaluate(network, "bash", again, 'echo "$PATH" | tr ":" "\\n" | grep -c cli/bin')
+    assert done.stdout == "1\n"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "roscd",
+        "roscd nope",
+        "rosls",
+        "rosls nope",
+        "rospack",
+        "rospack find nope",
+        "rosed std_msgs",
+    ],
+)
+def test_what_goes_wrong_is_told(network: Network, line: str) -> None:
+    done = evaluate(network, "bash", line)
+    assert done.returncode in {1, 2}
+    assert not done.stdout
+    assert "usage: " in done.stderr or "package 'nope' not found" in done.stderr
+
+
+def test_rosed_opens_the_file(network: Network) -> None:
+    done = evaluate(network, "bash", "EDITOR=cat rosed std_msgs Bool.msg")
+    assert "bool data" in done.stdout
+    assert evaluate(network, "bash", "rosed std_msgs Nope.msg").returncode == 1
+
+
+def test_the_shell_is_guessed(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHELL", "/usr/bin/fish")
+    assert shell("env").out == shell("env", "fish").out
+    monkeypatch.setenv("SHELL", "/bin/dash")
+    assert shell("env").out == shell("env", "bash").out == shell("env", "zsh").out
+
+
+def test_an_unknown_shell(shell: Shell) -> None:
+    result = shell("env", "fsh")
+    assert result.code == 2
+    assert "'fsh' is no shell that is known; expected bash, zsh, fish; did you mean 'fish'?" in (
+        result.err
+    )
+
+
+def test_the_settings(shell: Shell) -> None:
+    assert shell("env", "--json").json["domain"] == 42
