@@ -28,6 +28,11 @@ PATIENCE = 15.0
 
 T = TypeVar("T", bound="Any")
 _ROOT = Path(__file__).parent.parent
+_WHOLE_LINES = (
+    "print = lambda *words, end='\\n', flush=False, write=print: "
+    "write(' '.join(map(str, words)) + end, end='', flush=flush)\n"
+)
+"""What keeps the lines of several threads of a program apart."""
 
 
 def repeats(usual: int, full: int) -> int:
@@ -215,7 +220,7 @@ class Network:
             argv: Its arguments.
             variables: Environment variables, beside those of the network.
         """
-        return self.run("-c", dedent(script), *argv, **variables)
+        return self.run("-c", _WHOLE_LINES + dedent(script), *argv, **variables)
 
     def run(self, *argv: str, **variables: str) -> Program:
         """Start Python with a command line."""

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from network import PATIENCE, Network, eventually
 
@@ -18,19 +20,19 @@ class Changed(String):
 
 
 @pytest.fixture
-def log(capfd: pytest.CaptureFixture[str]) -> Log:
-    return Log(capfd)
+def log(network: Network) -> Log:
+    return Log(network.folder / "log")
 
 
 class Log:
-    def __init__(self, capture: pytest.CaptureFixture[str]) -> None:
-        self._capture = capture
-        self._text = ""
+    """The log files of all nodes of a test."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
 
     @property
     def text(self) -> str:
-        self._text += self._capture.readouterr().err
-        return self._text
+        return "".join(file.read_text() for file in self._folder.rglob("*.log"))
 
     def wait_for(self, text: str) -> None:
         eventually(lambda: text in self.text, f"'{text}' in the log")
