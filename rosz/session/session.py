@@ -30,6 +30,7 @@ from rosz.session.declared import (
     mapped,
 )
 from rosz.session.ending import ClosedSession
+from rosz.session.memory import keep_freed_memory
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.segments import sweep
 from rosz.session.stamp import HybridClock, Stamp
@@ -96,6 +97,7 @@ class Session:
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
         sweep()
+        keep_freed_memory()
         where = ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
         try:
             with mapped(f"open a session ({where})"), _one_receiver():
