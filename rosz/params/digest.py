@@ -16,9 +16,10 @@ from rosz.errors import DecodeError
 from rosz.params.paths import Path
 from rosz.params.writes import Write
 
-__all__ = ("BUCKETS", "Digest", "bucket_of", "mark_of")
+__all__ = ("BUCKETS", "Digest", "bucket_of")
 
 BUCKETS: Final = 64
+_MOST_NOTED: Final = 1000
 _LAYOUT: Final = struct.Struct(f"<{BUCKETS}Q")
 
 
@@ -27,26 +28,28 @@ def bucket_of(path: Path) -> int:
     return zlib.crc32("/".join(path).encode()) % BUCKETS
 
 
-def mark_of(write: Write) -> int:
-    """Return what a write adds to its bucket: 64 bits of its path and stamp."""
-    text = f"{write.time} {write.clock} {'/'.join(write.path)}"
-    return int.from_bytes(blake2b(text.encode(), digest_size=8).digest(), "little")
-
-
 class Digest:
-    """The fingerprint of a set of writes."""
+    """The fingerprint of a set of writes.
 
-    __slots__ = ("_marks",)
+    Writes come and go far more often than anybody asks, so they are only noted, and folded in when
+    somebody does or many are noted.
+    """
+
+    __slots__ = ("_marks", "_noted")
 
     def __init__(self) -> None:
         self._marks = [0] * BUCKETS
+        self._noted: list[tuple[Path, int, str]] = []
 
-    def toggle(self, path: Path, mark: int) -> None:
+    def toggle(self, write: Write) -> None:
         """Add a write, or remove it if it is in."""
-        self._marks[bucket_of(path)] ^= mark
+        self._noted.append((write.path, write.time, write.clock))
+        if len(self._noted) >= _MOST_NOTED:
+            self._fold()
 
     def to_bytes(self) -> bytes:
         """Return it in the form that others compare."""
+        self._fold()
         return _LAYOUT.pack(*self._marks)
 
     def differing(self, other: bytes) -> list[int]:
@@ -57,5 +60,13 @@ class Digest:
         """
         if len(other) != _LAYOUT.size:
             raise DecodeError("digest", 0, f"{len(other)} bytes, expected {_LAYOUT.size}")
+        self._fold()
         theirs = _LAYOUT.unpack(other)
         return [index for index, mark in enumerate(self._marks) if mark != theirs[index]]
+
+    def _fold(self) -> None:
+        noted, self._noted = self._noted, []
+        for path, time, clock in noted:
+            text = "/".join(path)
+            mark = blake2b(f"{time} {clock} {text}".encode(), digest_size=8).digest()
+            self._marks[zlib.crc32(text.encode()) % BUCKETS] ^= int.from_bytes(mark, "little")

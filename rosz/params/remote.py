@@ -148,7 +148,7 @@ class ParamClient:
         seen = self._ask(Question("stamp")).value
         self._session.clock.observe(Stamp(int(seen), ""))
         stamp = self._session.stamp()
-        message = Batch.of(("", 0), (stamp.time, stamp.id), self._origin, batch)
+        message = Batch.of((stamp.time, stamp.id), self._origin, batch)
         patience = min(ACKNOWLEDGED_BY, self._timeout)
         answer = self._ask(Question("write", batch=message, timeout=patience))
         return Outcome(stamp.time, tuple(answer.slow))

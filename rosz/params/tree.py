@@ -13,7 +13,16 @@ from typing import Final, Literal
 from rosz.params.paths import Path
 from rosz.params.values import Value
 
-__all__ = ("MISSING", "Draft", "Missing", "Tree", "leaves", "lookup")
+__all__ = (
+    "MISSING",
+    "Draft",
+    "Missing",
+    "Tree",
+    "leaves",
+    "lookup",
+    "with_delete",
+    "with_put",
+)
 
 Tree = dict[str, Value]
 
@@ -50,8 +59,34 @@ def leaves(value: Value, path: Path = ()) -> Iterator[tuple[Path, Value]]:
         yield from leaves(item, (*path, key))
 
 
+def with_put(root: Tree, path: Path, value: Value) -> Tree:
+    """Return a tree with a value set: what is there goes, and all above becomes dicts."""
+    if not path:
+        return dict(value)
+    changed, parent = _opened(root, path)
+    parent[path[-1]] = value
+    return changed
+
+
+def with_delete(root: Tree, path: Path) -> Tree:
+    """Return a tree without what is at a path; all above becomes dicts, and stays when empty."""
+    changed, parent = _opened(root, path)
+    parent.pop(path[-1], None)
+    return changed
+
+
+def _opened(root: Tree, path: Path) -> tuple[Tree, Tree]:
+    """Return a copy of a tree that may be changed at a path, and the dict to change there."""
+    changed = node = root.copy()
+    for part in path[:-1]:
+        below = node.get(part)
+        node[part] = below = below.copy() if type(below) is dict else {}
+        node = below
+    return changed, node
+
+
 class Draft:
-    """A change of a tree in the making.
+    """Many changes of a tree in the making, which copy each dict but once.
 
     Args:
         root: The tree to start from; it stays as it is.

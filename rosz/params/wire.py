@@ -7,6 +7,7 @@ rules as values that a program sets.
 from __future__ import annotations
 
 import datetime as dt
+import struct
 from collections.abc import Iterable
 from typing import Any, Final, TypeVar
 
@@ -33,7 +34,9 @@ __all__ = (
     "encode_value",
     "join_path",
     "packed",
+    "seal",
     "split_path",
+    "unseal",
 )
 
 _LATEST: Final = 1 << 62
@@ -43,6 +46,8 @@ _MOMENT: Final = 1
 _DATE: Final = 2
 _PLAIN: Final = frozenset({bool, int, float, str, bytes})
 
+_HEAD: Final = struct.Struct("<QB")
+
 _Message = TypeVar("_Message", bound=msgspec.Struct)
 
 
@@ -50,8 +55,6 @@ class Batch(msgspec.Struct, array_like=True):
     """Writes under one stamp.
 
     Attributes:
-        sender: The replica that tells of them, and hears who has applied them.
-        number: Which of its messages, for the acknowledgement.
         time: Nanoseconds.
         clock: The clock that the time is of.
         origin: Who made them, for people.
@@ -59,8 +62,6 @@ class Batch(msgspec.Struct, array_like=True):
         deletions: Path of each deletion.
     """
 
-    sender: str
-    number: int
     time: int
     clock: str
     origin: str
@@ -68,22 +69,9 @@ class Batch(msgspec.Struct, array_like=True):
     deletions: list[str] = []
 
     @classmethod
-    def of(
-        cls,
-        message: tuple[str, int],
-        stamp: tuple[int, str],
-        origin: str,
-        changes: Iterable[Change],
-    ) -> Batch:
-        """Return the message for changes under one stamp.
-
-        Args:
-            message: Its sender and number.
-            stamp: Time and clock.
-            origin: Who made the changes.
-            changes: What they are.
-        """
-        batch = cls(*message, *stamp, origin)
+    def of(cls, stamp: tuple[int, str], origin: str, changes: Iterable[Change]) -> Batch:
+        """Return the message for changes under one stamp."""
+        batch = cls(*stamp, origin)
         for path, value in changes:
             if value is DELETED:
                 batch.deletions.append(join_path(path))
@@ -98,12 +86,13 @@ class Batch(msgspec.Struct, array_like=True):
             DecodeError: A value or path in it is none.
         """
         stamp = _stamp(self.time, self.clock)
+        origin = self.origin
         try:
             found = [
-                put(split_path(path), stamp, normalise(value), self.origin)
-                for path, value in self.puts
+                put(split_path(path), stamp, normalise(value), origin) for path, value in self.puts
             ]
-            found += [delete(split_path(path), stamp, self.origin) for path in self.deletions]
+            if self.deletions:
+                found += [delete(split_path(path), stamp, origin) for path in self.deletions]
         except ParamError as error:
             raise DecodeError("parameter batch", -1, str(error)) from error
         return found
@@ -219,7 +208,7 @@ def encode(message: msgspec.Struct) -> bytes:
     return _ENCODER.encode(message)
 
 
-def decode(data: bytes, kind: type[_Message]) -> _Message:
+def decode(data: bytes | memoryview, kind: type[_Message]) -> _Message:
     """Return the message that bytes hold.
 
     Raises:
@@ -230,6 +219,33 @@ def decode(data: bytes, kind: type[_Message]) -> _Message:
     except (msgspec.MsgspecError, RecursionError, ValueError) as error:
         raise DecodeError(f"{kind.__name__.lower()} of parameters", -1, str(error)) from error
     return message
+
+
+def seal(sender: str, number: int, message: bytes) -> bytes:
+    """Put in front of a message who is to hear that it has arrived.
+
+    Args:
+        sender: The session that sends it.
+        number: Which of its messages it is.
+        message: It.
+    """
+    return _HEAD.pack(number, len(sender)) + sender.encode() + message
+
+
+def unseal(data: bytes) -> tuple[str, int, int]:
+    """Return sender and number of a message, and where it begins.
+
+    Raises:
+        DecodeError: The bytes are none.
+    """
+    if len(data) < _HEAD.size or len(data) < _HEAD.size + data[_HEAD.size - 1]:
+        raise DecodeError("message about parameters", 0, f"{len(data)} bytes, expected more")
+    number, length = _HEAD.unpack_from(data)
+    start = _HEAD.size + length
+    sender = data[_HEAD.size : start]
+    if not sender.isalnum():
+        raise DecodeError("message about parameters", _HEAD.size, f"{sender!r}, expected a session")
+    return sender.decode(), number, start
 
 
 def encode_value(value: Value) -> bytes:

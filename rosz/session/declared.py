@@ -133,7 +133,7 @@ class RawPublisher(Declared):
         self.key = key
         self._put = entity.put
 
-    def put(self, payload: bytes, attachment: bytes) -> None:
+    def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample.
 
         Raises:

@@ -30,6 +30,7 @@ class Process:
         connect: Iterable[str] = (),
         skew: float = 0.0,
         file: str = "",
+        more: int = 0,
     ) -> None:
         settings = {
             "endpoint": endpoint,
@@ -37,6 +38,7 @@ class Process:
             "connect": list(connect),
             "skew": skew,
             "file": file,
+            "more": more,
         }
         self._process = subprocess.Popen(
             [
@@ -101,7 +103,8 @@ class Fleet:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.rendezvous = f"unixsock-stream/{folder / 'z'}"
+        # Not a socket file: of several that start at once, each may take it for left over.
+        self.rendezvous = f"tcp/127.0.0.1:{free_port()}"
         self._all: list[Process] = []
 
     def start(self, *, endpoint: str = "", wait: bool = True, **settings: Any) -> Process:
@@ -130,11 +133,12 @@ def states(processes: Iterable[Process]) -> list[dict[str, Any]]:
     return [process.answer() for process in every]
 
 
-def until_known(processes: list[Process]) -> None:
-    """Wait until all know all."""
+def until_known(processes: list[Process], others: int = 0) -> None:
+    """Wait until all know all, or so many others."""
+    others = others or len(processes) - 1
     deadline = time.monotonic() + PATIENCE
     pause = threading.Event()
-    while any(state["members"] < len(processes) - 1 for state in states(processes)):
+    while any(state["members"] < others for state in states(processes)):
         assert time.monotonic() < deadline, "they do not find each other"
         pause.wait(0.01)
 

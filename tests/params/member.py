@@ -1,6 +1,7 @@
 """One replica as a process of its own, told what to do line by line on stdin.
 
-Run as: python member.py '{"endpoint": …, "mode": …, "connect": […], "skew": …, "file": …}'
+Run as: python member.py '{"endpoint": …, "mode": …, "connect": […], "skew": …, "file": …,
+"more": …}'
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ import os
 import sys
 import threading
 import time
+import timeit
 from pathlib import Path
 from typing import Any
 
-from rosz.params.replica import Replica
+from rosz.params.api import Params
+from rosz.params.replica import Changed, Replica
 from rosz.params.store import Store
-from rosz.session import HybridClock, Session, SessionConfig, Stamp
+from rosz.session import HybridClock, Sample, Session, SessionConfig, Stamp
 from rosz.session.settle import Settling, serve_links
 
 
@@ -42,8 +45,16 @@ class Member:
     """The replica, and the verbs that its stdin may use."""
 
     def __init__(
-        self, endpoint: str, mode: Any, connect: list[str], skew: float, file: str
+        self,
+        *,
+        endpoint: str,
+        mode: Any,
+        connect: list[str],
+        skew: float,
+        file: str,
+        more: int,
     ) -> None:
+        begun = time.perf_counter()
         self._session = Session.open(
             SessionConfig(rendezvous=endpoint, mode=mode, connect=tuple(connect))
         )
@@ -54,11 +65,16 @@ class Member:
             serve_links(self._session)
             settled = Settling(self._session, 0.5, threading.Event()).settled
         keep = Store(Path(file)) if file else None
-        begun = time.perf_counter()
         self.replica = Replica(
             self._session, label=f"member {os.getpid()}", settled=settled, keep=keep
         )
         self.joined = time.perf_counter() - begun
+        self._crowd = [
+            Replica(Session.open(SessionConfig(rendezvous=endpoint, mode=mode)))
+            for _ in range(more)
+        ]
+        self._delays: list[float] = []
+        self._bare: list[Any] = []
 
     def do(self, verb: str, **arguments: Any) -> Any:
         return getattr(self, f"do_{verb}")(**arguments)
@@ -100,8 +116,74 @@ class Member:
     def do_root(self) -> Any:
         return self.replica.root
 
+    def do_everywhere(self, name: str) -> Any:
+        """Return the values on all replicas of this process."""
+        return [replica.get(name) for replica in (self.replica, *self._crowd)]
+
+    def do_digests(self) -> Any:
+        """Return the different digests of all replicas of this process."""
+        return sorted({replica.digest().hex() for replica in (self.replica, *self._crowd)})
+
     def do_joined(self) -> Any:
+        """Tell how many seconds it took from nothing to a replica that has everything."""
         return self.joined
+
+    def do_writes(self, name: str, count: int) -> Any:
+        """Return the seconds that each of so many sets took; the values are when they began."""
+        taken = []
+        for _ in range(count):
+            begun = time.monotonic_ns()
+            self.replica.set(name, begun)
+            taken.append((time.monotonic_ns() - begun) / 1e9)
+        return taken
+
+    def do_reads(self, count: int) -> Any:
+        """Return the seconds that one read takes."""
+        params = Params(self.replica, "/bench/node")
+        params["~gain"] = 1.5
+        return min(timeit.repeat(lambda: params["~gain"], number=count, repeat=3)) / count
+
+    def do_watch(self, name: str) -> Any:
+        """Note how old each value is when the callback gets it."""
+        self.replica.watch(name, self._note_delay)
+
+    def _note_delay(self, change: Changed) -> None:
+        if isinstance(change.new, int):
+            self._delays.append((time.monotonic_ns() - change.new) / 1e9)
+
+    def do_echo(self, key: str) -> Any:
+        """Answer puts as a replica does, and do nothing else."""
+        back = self._session.publisher(f"{key}/back")
+        self._bare += [back, self._session.subscriber(key, lambda _sample: back.put(b"0"))]
+
+    def do_bare(self, key: str, count: int, echoes: int) -> Any:
+        """Return the seconds that each of so many puts took to be answered by all."""
+        heard: list[int] = []
+        done = threading.Semaphore(0)
+
+        def hear(_sample: Sample) -> None:
+            heard.append(1)
+            if len(heard) % echoes == 0:
+                done.release()
+
+        ear = self._session.subscriber(f"{key}/back", hear)
+        there = self._session.publisher(key, block=True)
+        while not there.matched:
+            time.sleep(0.01)
+        taken = []
+        for _ in range(count):
+            begun = time.perf_counter()
+            there.put(b"some ninety bytes, as a write of a parameter has" * 2)
+            done.acquire()
+            taken.append(time.perf_counter() - begun)
+        ear.close()
+        there.close()
+        return taken
+
+    def do_delays(self) -> Any:
+        """Return what was noted since the last time."""
+        found, self._delays = self._delays, []
+        return found
 
 
 def main() -> None:

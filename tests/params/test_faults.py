@@ -20,6 +20,7 @@ WRITES = 10_000 if FULL else 1_500
 SECONDS = 20.0 if FULL else 1.5
 STOPPED = 10.0 if FULL else 3.5
 LOADED = 5_000
+MANY = 200 if FULL else 40
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -204,3 +205,25 @@ def test_a_kept_store_survives_the_kill_of_everybody(fleet: Fleet) -> None:
     root = again.do("root")["ns"]
     assert all(root[name.rpartition("/")[2]] == value for name, value in sure.items())
     print(f"{len(sure)} writes acknowledged before kill -9 of all are back from the file")
+
+
+def test_many_replicas_in_one_domain(fleet: Fleet) -> None:
+    port = free_port()
+    router = fleet.start(endpoint=f"tcp/127.0.0.1:{port}", mode="router")
+    crowds = [
+        fleet.start(endpoint=f"tcp/127.0.0.1:{port}", mode="client", more=MANY // 2 - 1, wait=False)
+        for _ in range(2)
+    ]
+    for crowd in crowds:
+        assert crowd.answer(250) == "up"
+    until_known([router, *crowds], MANY)
+    loaded = router.do("load", namespace="/", values={f"p{n}": n for n in range(1000)})
+    assert loaded["slow"] == []
+    taken = [crowds[number % 2].do("set", name="/x", value=number) for number in range(10)]
+    assert all(answer["slow"] == [] for answer in taken)
+    for crowd in crowds:
+        assert set(crowd.do("everywhere", name="/x")) == {9}
+        assert len(crowd.do("digests")) == 1
+    seconds = sorted(answer["seconds"] for answer in taken)[5]
+    print(f"set acknowledged by {MANY} replicas in three processes: {seconds * 1000:.1f} ms")
+    until_same([router, *crowds], f"{MANY + 1} replicas in one domain")

@@ -116,7 +116,7 @@ def test_doing_a_write_again_much_later_changes_nothing(network: Network) -> Non
     replica = network.replica()
     session = network.session()
     stamp = replica._session.stamp()
-    batch = Batch.of(("", 0), (stamp.time, session.zid), "x", [(("a",), "old")])
+    batch = Batch.of((stamp.time, session.zid), "x", [(("a",), "old")])
     question = encode(Question("write", batch=batch, timeout=1))
     key = Keys(0).ask(replica.zid)
     assert session.get(key, payload=question, timeout=5)[0].ok

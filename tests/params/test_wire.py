@@ -22,6 +22,8 @@ from rosz.params.wire import (
     decode_value,
     encode,
     encode_value,
+    seal,
+    unseal,
 )
 from rosz.params.writes import DELETED, Write
 
@@ -46,12 +48,11 @@ def test_records_survive_the_way(batch: list[Write]) -> None:
 
 @given(st.dictionaries(PATHS.filter(bool), st.one_of(st.just(DELETED), VALUES), max_size=5))
 def test_batches_survive_the_way(changes: dict[Any, Any]) -> None:
-    batch = Batch.of(("f0", 3), (5, "ab"), "me", changes.items())
+    batch = Batch.of((5, "ab"), "me", changes.items())
     again = decode(encode(batch), Batch)
     found = {write.path: write for write in again.writes()}
     assert {path: write.value for path, write in found.items()} == changes
     assert all((w.time, w.clock, w.origin) == (5, "ab", "me") for w in found.values())
-    assert (again.sender, again.number) == ("f0", 3)
 
 
 @given(st.sampled_from(KINDS), st.binary(max_size=60))
@@ -93,17 +94,34 @@ def test_any_msgpack_is_a_message_or_the_named_error(kind: type[Any], value: Any
 @pytest.mark.parametrize(
     ("message", "reason"),
     [
-        (Batch("ab", 1, 0, "a", ""), "the time 0, expected one before"),
-        (Batch("ab", 1, 1 << 62, "a", ""), "expected one before"),
-        (Batch("ab", 1, 5, "a", "", [("a//b", 1)]), "'a//b', expected 'a//b'|expected"),
-        (Batch("ab", 1, 5, "a", "", [("", 1)]), "the root of all parameters is a dict"),
-        (Batch("ab", 1, 5, "a", "", [("a", None)]), "null is no parameter value"),
-        (Batch("ab", 1, 5, "a", "", [("/".join("a" * 101), 1)]), "has 101 parts"),
+        (Batch(0, "a", ""), "the time 0, expected one before"),
+        (Batch(1 << 62, "a", ""), "expected one before"),
+        (Batch(5, "a", "", [("a//b", 1)]), "'a//b', expected 'a//b'|expected"),
+        (Batch(5, "a", "", [("", 1)]), "the root of all parameters is a dict"),
+        (Batch(5, "a", "", [("a", None)]), "null is no parameter value"),
+        (Batch(5, "a", "", [("/".join("a" * 101), 1)]), "has 101 parts"),
     ],
 )
 def test_writes_that_mean_nothing_are_refused(message: Batch, reason: str) -> None:
     with pytest.raises(DecodeError, match=reason):
         decode(encode(message), Batch).writes()
+
+
+@given(st.integers(0, (1 << 64) - 1), st.from_regex(r"[0-9a-f]{1,32}", fullmatch=True))
+def test_seals_survive_the_way(number: int, sender: str) -> None:
+    data = seal(sender, number, b"rest")
+    found, again, start = unseal(data)
+    assert (found, again, data[start:]) == (sender, number, b"rest")
+
+
+@given(st.binary(max_size=30))
+def test_any_bytes_are_sealed_or_the_named_error(data: bytes) -> None:
+    try:
+        sender, _, start = unseal(data)
+    except DecodeError:
+        return
+    assert sender.isalnum()
+    assert start <= len(data)
 
 
 def test_values_nested_without_end_are_refused() -> None:

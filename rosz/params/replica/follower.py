@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import logging
 from types import TracebackType
 from typing import Final, Self
 
-from rosz.errors import DecodeError, NoReplica
+from rosz.errors import NoReplica
 from rosz.params.keys import Keys
 from rosz.params.replica.members import Members
 from rosz.params.replica.reading import Reading
 from rosz.params.replica.state import State
 from rosz.params.replica.sync import Synchroniser
 from rosz.params.replica.worker import Worker
-from rosz.params.wire import Batch, decode
 from rosz.session import Sample, Session
 
 __all__ = ("Follower",)
-
-_log = logging.getLogger("rosz.params")
 
 _COMPARE_EVERY: Final = 5.0
 
@@ -76,13 +72,7 @@ class Follower(Reading):
 
     def _on_change(self, sample: Sample) -> None:
         payload = sample.payload
-        self._worker.submit(lambda: self._apply(payload))
-
-    def _apply(self, payload: bytes) -> None:
-        try:
-            self._state.apply(decode(payload, Batch).writes())
-        except DecodeError as error:
-            _log.warning("a replica wrote what is no parameter: %s", error)
+        self._worker.submit(lambda: self._state.take(payload))
 
     def _compare(self) -> None:
         self._sync.compare_with_one()

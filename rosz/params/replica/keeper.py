@@ -55,6 +55,7 @@ class Keeper:
         late = now - self._last - _TICK
         self._last = now
         self._sync.members.drop_ghosts()
+        self._sync.state.read()
         if late > _STOPPED or now >= self._compare_at:
             self._compare_at = now + random.uniform(*_COMPARE_EVERY)  # noqa: S311  # nothing secret
             self._sync.compare_with_one()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import struct
 import time
 from collections.abc import Callable
 from functools import partial
@@ -16,8 +17,8 @@ from rosz.params.replica.acks import Acks, Pending
 from rosz.params.replica.members import Members
 from rosz.params.replica.state import State
 from rosz.params.replica.worker import Worker
-from rosz.params.wire import Batch, decode, encode
-from rosz.session import Closable, Query, Reply, Sample, Session, Stamp
+from rosz.params.wire import Batch, encode, seal, unseal
+from rosz.session import Closable, Query, RawPublisher, Reply, Sample, Session, Stamp
 
 __all__ = ("Line",)
 
@@ -26,6 +27,8 @@ _log = logging.getLogger("rosz.params")
 _LARGE: Final = 16_384
 """Bytes of a message above which it is not read on Zenoh's thread."""
 
+_ACK: Final = struct.Struct("<Q")
+_MOST_VOICES: Final = 1000
 _PATIENCE: Final = 0.25
 """Seconds after which those that have not acknowledged a write are told it once more."""
 
@@ -38,7 +41,7 @@ class Line:
         keys: Where.
         state: What takes in the writes of others.
         worker: Where large ones are read.
-        kept: Calls a function once all that the state has taken in is safe.
+        kept: Calls a function once all that the state has taken in is on disk; none if it never is.
     """
 
     def __init__(
@@ -47,7 +50,7 @@ class Line:
         keys: Keys,
         state: State,
         worker: Worker,
-        kept: Callable[[Callable[[], None]], None],
+        kept: Callable[[Callable[[], None]], None] | None,
     ) -> None:
         self.acks = Acks()
         self._session = session
@@ -56,6 +59,8 @@ class Line:
         self._worker = worker
         self._kept = kept
         self._own = session.zid.encode()
+        self._voices: dict[str, RawPublisher] = {}
+        self._change = session.publisher(keys.change, block=True)
         self._declared: list[Closable] = [
             session.subscriber(keys.change, self._on_change, remote_only=True),
             session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
@@ -84,10 +89,9 @@ class Line:
         deadline = time.monotonic() + timeout
         pending = self.acks.open(members.zids if timeout > 0 else ())
         try:
-            message = (self._session.zid, pending.number)
-            batch = Batch.of(message, (stamp.time, stamp.id), origin, changes)
-            data = encode(batch)
-            self._session.put(self._keys.change, data)
+            batch = Batch.of((stamp.time, stamp.id), origin, changes)
+            data = seal(self._session.zid, pending.number, encode(batch))
+            self._change.put(data)
             if not pending.wait(min(_PATIENCE, timeout)):
                 self._tell_again(pending, data, deadline - time.monotonic())
                 pending.wait(deadline - time.monotonic())
@@ -97,11 +101,19 @@ class Line:
             _warn(changes, late, timeout)
         return tuple(late)
 
+    def gone(self, zid: str) -> None:
+        """Wait for a replica no longer, and answer it no more."""
+        self.acks.gone(zid)
+        self._worker.submit(lambda: self._hush(zid))
+
     def close(self) -> None:
         """Undeclare all, and wait for nobody any more."""
         for declared in self._declared:
             declared.close()
         self.acks.give_up()
+        for zid in tuple(self._voices):
+            self._hush(zid)
+        self._change.close()
 
     def _tell_again(self, pending: Pending, data: bytes, timeout: float) -> None:
         if timeout <= 0:
@@ -121,47 +133,65 @@ class Line:
 
     def _on_change(self, sample: Sample) -> None:
         payload = sample.payload
-        if len(payload) > _LARGE or self._state.busy():
-            self._worker.submit(lambda: self._take(payload))
-        else:
-            self._take(payload)
-
-    def _take(self, payload: bytes) -> None:
-        batch = self._apply(payload)
-        if batch is not None:
-            self._kept(lambda: self._acknowledge(batch.sender, batch.number))
-
-    def _apply(self, payload: bytes) -> Batch | None:
         try:
-            batch = decode(payload, Batch)
-            self._state.apply(batch.writes())
+            sender, number, _ = unseal(payload)
         except DecodeError as error:
             _log.warning("a replica wrote what is no parameter: %s", error)
-            return None
-        return batch
+            return
+        then = partial(self._acknowledge, sender, number)
+        if len(payload) > _LARGE:
+            self._worker.submit(lambda: self._apply(payload, then))
+        elif self._state.note(payload):
+            then()
+        elif self._state.take_soon(payload):
+            self._settle(then)
+        else:
+            self._worker.submit(lambda: self._apply(payload, then))
+
+    def _apply(self, payload: bytes, then: Callable[[], None]) -> None:
+        self._state.take(payload)
+        self._settle(then)
+
+    def _settle(self, then: Callable[[], None]) -> None:
+        """Do something as soon as what was applied is safe."""
+        if self._kept is None:
+            then()
+        else:
+            self._kept(then)
 
     def _acknowledge(self, sender: str, number: int) -> None:
+        ack = _ACK.pack(number) + self._own
+        voice = self._voices.get(sender)
         try:
             # Called on Zenoh's thread: an acknowledgement lost on a full link is asked for again,
             # but one that waits for the link would hold up all that comes in.
-            self._session.put(self._keys.ack(sender), b"%d %s" % (number, self._own), block=False)
+            if voice is not None:
+                voice.put(ack)
+            else:
+                self._session.put(self._keys.ack(sender), ack, block=False)
+                self._worker.submit(lambda: self._find_voice(sender))
         except RoszError as error:
             _log.debug("a write is not acknowledged: %s", error)
 
+    def _find_voice(self, sender: str) -> None:
+        """Declare the way back to a writer: a put on a declared key needs no search for its way."""
+        if sender not in self._voices and len(self._voices) < _MOST_VOICES:
+            self._voices[sender] = self._session.publisher(self._keys.ack(sender))
+
+    def _hush(self, zid: str) -> None:
+        voice = self._voices.pop(zid, None)
+        if voice is not None:
+            voice.close()
+
     def _on_ack(self, sample: Sample) -> None:
-        number, _, zid = sample.payload.partition(b" ")
-        if number.isdigit() and zid.isalnum():
-            self.acks.heard(zid.decode(), int(number))
+        payload = sample.payload
+        zid = payload[_ACK.size :]
+        if zid.isalnum():
+            self.acks.heard(zid.decode(), _ACK.unpack_from(payload)[0])
 
     def _on_retry(self, query: Query) -> None:
         payload = query.payload or b""
-        self._worker.submit(lambda: self._take_again(query, payload))
-
-    def _take_again(self, query: Query, payload: bytes) -> None:
-        if self._apply(payload) is None:
-            query.close()
-        else:
-            self._kept(lambda: self._confirm(query))
+        self._worker.submit(lambda: self._apply(payload, lambda: self._confirm(query)))
 
     def _confirm(self, query: Query) -> None:
         with query:

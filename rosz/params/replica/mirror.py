@@ -80,14 +80,14 @@ class Mirror:
                 path = self._keys.path(reply.key)
                 value = decode_value(reply.payload)
             except DecodeError:
-                self._session.delete(reply.key, stamp=self._session.stamp())
+                self._session.delete(reply.key, stamp=self._state.stamp())
                 continue
             if path not in tree:
-                self._session.delete(reply.key, stamp=self._session.stamp())
+                self._session.delete(reply.key, stamp=self._state.stamp())
             elif encode_value(tree[path]) == encode_value(value):
                 del tree[path]
         for path, value in tree.items():
-            self._put(path, value, self._session.stamp())
+            self._put(path, value, self._state.stamp())
 
     def close(self) -> None:
         """Undeclare all; again is no error."""

@@ -106,4 +106,4 @@ class Reading:
         Raises:
             InvalidName: It is no global name.
         """
-        return self._state.watchers.add(split(name), callback)
+        return self._state.watch(split(name), callback)

@@ -12,7 +12,7 @@ import os
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import PurePath
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -106,12 +106,12 @@ class Replica(Reading):
         self._saver = self._load(keep)
         self._worker = Worker("rosz-params")
         keys = Keys(domain)
-        kept = self._saver.when_safe if self._saver is not None else _at_once
+        kept = self._saver.when_safe if self._saver is not None else None
         self._line = Line(session, keys, self._state, self._worker, kept)
         self._mirror = Mirror(session, keys, self._state, self._worker)
         self._members = Members(session, keys)
         self._sync = Synchroniser(session, keys, self._state, self._members, self._worker)
-        server = Server(self, session.clock, self._worker, lambda: self._sync.ready)
+        server = Server(self, self._state.stamp, self._worker, lambda: self._sync.ready)
         self._declared: list[Closable] = [
             session.queryable(keys.sync(session.zid), self._sync.serve, complete=True),
             session.queryable(keys.ask(session.zid), server.serve, complete=True),
@@ -289,7 +289,7 @@ class Replica(Reading):
 
     def _on_member(self, member: Member, alive: bool) -> None:
         if not alive:
-            self._line.acks.gone(member.zid)
+            self._line.gone(member.zid)
         elif self._sync.ready and member < self._own:
             self._sync.meet(member)
 
@@ -298,7 +298,3 @@ class Replica(Reading):
             safe = threading.Event()
             self._saver.when_safe(safe.set)
             safe.wait(timeout)
-
-
-def _at_once(then: Callable[[], None]) -> None:
-    then()

@@ -13,7 +13,7 @@ from rosz.params.paths import split
 from rosz.params.replica.reading import names_beside
 from rosz.params.replica.worker import Worker
 from rosz.params.wire import Answer, Question, decode, encode, packed
-from rosz.session import HybridClock, Query, Stamp
+from rosz.session import Query, Stamp
 
 if TYPE_CHECKING:
     from rosz.params.replica.replica import Replica
@@ -34,7 +34,7 @@ class Server:
 
     Args:
         replica: Whom to read and write.
-        clock: What gives stamps to those who are to write.
+        stamp: Gives stamps to those who are to write.
         worker: Where the reading is done.
         ready: Tells whether the replica has joined.
     """
@@ -42,12 +42,12 @@ class Server:
     def __init__(
         self,
         replica: Replica,
-        clock: HybridClock,
+        stamp: Callable[[], Stamp],
         worker: Worker,
         ready: Callable[[], bool],
     ) -> None:
         self._replica = replica
-        self._clock = clock
+        self._stamp_now = stamp
         self._worker = worker
         self._ready = ready
         self._places = threading.BoundedSemaphore(_AT_ONCE)
@@ -118,7 +118,7 @@ class Server:
         return Answer("missing" if found is None else "ok", value=found)
 
     def _stamp(self, _: Question) -> Answer:
-        return Answer(value=self._clock.now().time)
+        return Answer(value=self._stamp_now().time)
 
     def _write(self, question: Question) -> Answer:
         batch = question.batch

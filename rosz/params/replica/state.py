@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import Final
 
+from rosz.errors import DecodeError
 from rosz.params.history import History
 from rosz.params.merge import Change
 from rosz.params.paths import Path
 from rosz.params.replica.watch import Callback, Watch, Watchers
 from rosz.params.tree import Tree
+from rosz.params.wire import Batch, decode, unseal
 from rosz.params.writes import DELETED, Write, delete, put
 from rosz.session import HybridClock, Stamp
 
@@ -18,34 +24,70 @@ __all__ = ("State", "Step")
 Step = tuple[Tree, Tree, list[Write]]
 """A change of the tree: before, after, and the writes that made it."""
 
-_PATIENCE = 0.002
+_log = logging.getLogger("rosz.params")
+
+_PATIENCE: Final = 0.002
+_MOST_UNREAD: Final = 64
+"""Messages that may wait to be read: what a read has to do at most before it returns."""
 
 
 class State:
     """A history behind a lock; its tree is read without.
 
+    Messages of others are only noted as they arrive, and read when somebody looks at the tree: a
+    process that nobody asks costs the writers next to nothing, and who asks gets what is newest.
+
     Args:
-        clock: The session's, which is kept ahead of every write seen.
+        clock: The session's, which is kept ahead of all writes seen whenever it is asked.
 
     Attributes:
-        root: The tree now; never changed in place.
         watchers: Who is told of changes.
     """
 
     def __init__(self, clock: HybridClock) -> None:
-        self.root: Tree = {}
         self.watchers = Watchers()
+        self._root: Tree = {}
         self._clock = clock
         self._history = History()
         self._lock = threading.Lock()
+        self._current = _Current(self)
         self._sinks: tuple[Callable[[list[Write]], None], ...] = ()
+        self._unread: deque[bytes] = deque()
+        self._reading = False
 
     def __len__(self) -> int:
-        return len(self._history)
+        with self._current:
+            return len(self._history)
+
+    @property
+    def root(self) -> Tree:
+        """The tree now; never changed in place."""
+        # Set before the last message is taken from the queue, so that one of the two always tells.
+        if self._unread or self._reading:
+            self.read()
+        return self._root
+
+    def read(self) -> None:
+        """Apply what was noted."""
+        with self._current:
+            pass
+
+    def note(self, message: bytes) -> bool:
+        """Take in a message of another replica, sealed, in next to no time.
+
+        Returns:
+            Whether that is all; if not, somebody waits for it and it has to be applied at once.
+        """
+        if self._is_followed() or len(self._unread) >= _MOST_UNREAD:
+            return False
+        self._unread.append(message)
+        # Whoever began to follow meanwhile may have read what was there before this.
+        return not self._is_followed()
 
     def feed(self, sink: Callable[[list[Write]], None]) -> None:
         """Have a function given all that is news, in order; it must be quick."""
-        self._sinks = (*self._sinks, sink)
+        with self._current:
+            self._sinks = (*self._sinks, sink)
 
     def write(
         self, changes: Iterable[Change], origin: str, stamp: Stamp | None = None
@@ -55,8 +97,8 @@ class State:
         Raises:
             ParamError: A change has no meaning in the tree; nothing has changed then.
         """
-        with self._lock:
-            stamp = stamp or self._clock.now()
+        with self._current:
+            stamp = stamp or self._now()
             at = (stamp.time, stamp.id)
             writes = [
                 delete(path, at, origin) if value is DELETED else put(path, at, value, origin)
@@ -70,44 +112,61 @@ class State:
         Raises:
             ParamError: A write has no meaning in the tree; nothing has changed then.
         """
-        with self._lock:
+        with self._current:
             return self._apply(writes)
 
-    def busy(self) -> bool:
-        """Tell whether another thread is changing the tree and will be for a while."""
-        if self._lock.acquire(timeout=_PATIENCE):
-            self._lock.release()
+    def take(self, message: bytes) -> None:
+        """Apply a message of another replica, sealed."""
+        with self._current:
+            self._take(message)
+
+    def take_soon(self, message: bytes) -> bool:
+        """Apply a message of another replica, unless somebody is at work on the history just now.
+
+        Returns:
+            Whether it is done; if not, use `take` where waiting does no harm.
+        """
+        if not self.enter(_PATIENCE):
             return False
+        try:
+            self._take(message)
+        finally:
+            self.leave()
         return True
+
+    def stamp(self) -> Stamp:
+        """Return a stamp that is later than all that was seen."""
+        with self._current:
+            return self._now()
 
     def writes(self) -> list[Write]:
         """Return all writes that are kept."""
-        with self._lock:
+        with self._current:
             return list(self._history.writes())
 
     def bucket(self, indices: Iterable[int]) -> list[Write]:
         """Return the writes in some buckets of the digest."""
-        with self._lock:
+        with self._current:
             return [write for index in indices for write in self._history.bucket(index)]
 
     def find(self, path: Path) -> Write | None:
         """Return the write at a path itself."""
-        with self._lock:
+        with self._current:
             return self._history.find(path)
 
     def hides(self, write: Write) -> bool:
         """Tell whether a write is known, or has a newer one at its path or above."""
-        with self._lock:
+        with self._current:
             return self._history.hides(write)
 
     def source(self, path: Path) -> Write | None:
         """Return the write that a parameter has its value from."""
-        with self._lock:
+        with self._current:
             return self._history.source(path)
 
     def digest(self) -> bytes:
         """Return the fingerprint of the history."""
-        with self._lock:
+        with self._current:
             return self._history.digest()
 
     def differing(self, digest: bytes) -> list[int]:
@@ -116,26 +175,81 @@ class State:
         Raises:
             DecodeError: The bytes are no digest.
         """
-        with self._lock:
+        with self._current:
             return self._history.differing(digest)
 
     def forget(self, age: int, keep: int) -> int:
         """Drop deletions older than an age in nanoseconds, or above a number, if not needed."""
-        with self._lock:
-            return self._history.forget(self._clock.now().time - age, keep)
+        with self._current:
+            return self._history.forget(self._now().time - age, keep)
 
-    def watch(self, path: Path, callback: Callback) -> tuple[Watch, Tree]:
-        """Start a watch; return it with the tree that its first change will be a change of."""
-        with self._lock:
-            return self.watchers.add(path, callback), self.root
+    def watch(self, path: Path, callback: Callback) -> Watch:
+        """Start a watch, which hears of all that comes from now on."""
+        with self._current:
+            return self.watchers.add(path, callback)
+
+    def enter(self, timeout: float = -1) -> bool:
+        """Begin to work on the history; nobody else does until `leave`.
+
+        Args:
+            timeout: Seconds to wait for others to leave; for ever if negative.
+
+        Returns:
+            Whether it is so; false when the time was over.
+        """
+        if not self._lock.acquire(timeout=timeout):
+            return False
+        if self._unread:
+            self._reading = True
+            while self._unread:
+                self._take(self._unread.popleft())
+            self._reading = False
+        return True
+
+    def leave(self) -> None:
+        """End what `enter` began."""
+        self._lock.release()
+
+    def _is_followed(self) -> bool:
+        return bool(self._sinks) or self.watchers.active
+
+    def _take(self, message: bytes) -> None:
+        try:
+            start = unseal(message)[2]
+            self._apply(decode(memoryview(message)[start:], Batch).writes())
+        except DecodeError as error:
+            _log.warning("a replica wrote what is no parameter: %s", error)
+
+    def _now(self) -> Stamp:
+        self._clock.observe(Stamp(self._history.latest, ""))
+        return self._clock.now()
 
     def _apply(self, writes: Iterable[Write]) -> Step:
-        old = self.root
+        old = self._root
         news = self._history.apply(writes)
-        self._clock.observe(Stamp(self._history.latest, ""))
-        new = self.root = self._history.root
+        new = self._root = self._history.root
         if news:
             self.watchers.tell(old, new, news)
             for sink in self._sinks:
                 sink(news)
         return old, new, news
+
+
+class _Current:
+    """The history of a state with all that was noted applied, and nobody else at work on it."""
+
+    __slots__ = ("_state",)
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+
+    def __enter__(self) -> None:
+        self._state.enter()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._state.leave()

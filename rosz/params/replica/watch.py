@@ -98,6 +98,11 @@ class Watchers:
         self._worker: Worker | None = None
         self._closed = False
 
+    @property
+    def active(self) -> bool:
+        """Whether there are any."""
+        return bool(self._watches)
+
     def add(self, path: Path, callback: Callback) -> Watch:
         """Call a function back on changes at a path, above it and below it."""
         watch = Watch(self, path, callback)

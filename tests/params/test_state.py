@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from rosz.params.replica.state import State
+from rosz.params.wire import Batch, encode, seal
+from rosz.params.writes import Write
+from rosz.session import HybridClock, Stamp
+
+
+@pytest.fixture
+def hasty() -> Iterator[None]:
+    """Let threads take turns as often as they can."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def state() -> State:
+    return State(HybridClock("aa"))
+
+
+def message(path: str, value: Any, time: int) -> bytes:
+    batch = Batch.of((time, "bb"), "other", [(tuple(path.split("/")), value)])
+    return seal("bb", time, encode(batch))
+
+
+@pytest.mark.usefixtures("hasty")
+def test_what_was_noted_is_in_every_tree_read_afterwards() -> None:
+    shared = state()
+    wrong: list[tuple[str, int, Any]] = []
+    stop = threading.Event()
+
+    def note(name: str) -> None:
+        for number in range(1, 1500):
+            data = message(name, number, number)
+            if not shared.note(data):
+                shared.take(data)
+            seen = shared.root.get(name)
+            if seen != number:
+                wrong.append((name, number, seen))
+
+    def look() -> None:
+        while not stop.is_set():
+            shared.root  # noqa: B018  # reading is what is tried
+            shared.digest()
+
+    lookers = [threading.Thread(target=look) for _ in range(2)]
+    noters = [threading.Thread(target=note, args=(name,)) for name in ("a", "b")]
+    for thread in (*lookers, *noters):
+        thread.start()
+    for thread in noters:
+        thread.join()
+    stop.set()
+    for thread in lookers:
+        thread.join()
+    assert wrong == []
+    assert shared.root == {"a": 1499, "b": 1499}
+
+
+def test_a_read_waits_for_the_one_that_is_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    shared = state()
+    entered, release = threading.Event(), threading.Event()
+    apply = shared._history.apply
+
+    def slowly(writes: list[Write]) -> list[Write]:
+        entered.set()
+        assert release.wait(10)
+        return apply(writes)
+
+    monkeypatch.setattr(shared._history, "apply", slowly)
+    shared.note(message("a", 1, 1))
+    first = threading.Thread(target=shared.read)
+    first.start()
+    assert entered.wait(10)
+    seen: list[dict[str, Any]] = []
+    second = threading.Thread(target=lambda: seen.append(shared.root))
+    second.start()
+    second.join(0.1)
+    release.set()
+    first.join()
+    second.join()
+    assert seen == [{"a": 1}]
+
+
+def test_noting_has_an_end() -> None:
+    shared = state()
+    taken = [shared.note(message(f"n{number}", number, number + 1)) for number in range(100)]
+    assert taken == [True] * 64 + [False] * 36
+    assert len(shared.root) == 64
+
+
+def test_who_follows_is_served_at_once() -> None:
+    shared = state()
+    assert shared.note(message("a", 1, 1))
+    heard: list[object] = []
+    watch = shared.watch(("a",), heard.append)
+    assert not shared.note(message("a", 2, 2))
+    watch.close()
+    assert shared.note(message("a", 3, 3))
+    shared.feed(heard.append)
+    assert not shared.note(message("a", 4, 4))
+    assert shared.root == {"a": 3}
+
+
+def test_taking_does_not_wait_for_others() -> None:
+    shared = state()
+    shared.enter()
+    assert not shared.take_soon(message("a", 1, 1))
+    shared.leave()
+    assert shared.take_soon(message("a", 1, 1))
+    assert shared.root == {"a": 1}
+
+
+def test_own_stamps_are_later_than_all_that_was_noted() -> None:
+    shared = state()
+    far = 1 << 61
+    shared.note(message("a", 1, far))
+    stamp, (_, new, _) = shared.write([(("a",), 2)], "me")
+    assert stamp > Stamp(far, "bb")
+    assert new == {"a": 2}
+    assert shared.stamp() > stamp
+
+
+def test_damaged_messages_change_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    shared = state()
+    with caplog.at_level(logging.WARNING, "rosz.params"):
+        for data in (b"", seal("bb", 1, b""), seal("bb", 1, b"\xc1"), message("a//b", 1, 1)):
+            shared.note(data)
+        assert shared.root == {}
+    assert caplog.text.count("wrote what is no parameter") == 4
