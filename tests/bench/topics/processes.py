@@ -42,12 +42,14 @@ class Peer:
         )
 
     def read(self) -> Any:
-        """Return what it says next."""
+        """Return what it says next, past what its system logs on the same stream."""
         assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            raise SystemExit(f"{' '.join(self._command)} ended too early")
-        return json.loads(line)
+        for line in self._process.stdout:
+            try:
+                return json.loads(line)
+            except json.JSONDecodeError:
+                sys.stderr.write(line)
+        raise SystemExit(f"{' '.join(self._command)} ended too early")
 
     def ask(self) -> Any:
         """Return what it answers to a line."""
