@@ -9,12 +9,17 @@ from __future__ import annotations
 
 import struct
 import zlib
-from _blake2 import blake2b  # hashlib's, without OpenSSL, which every node would load
 from typing import Final
 
 from rosz.errors import DecodeError
 from rosz.params.paths import Path
 from rosz.params.writes import Write
+
+try:
+    # hashlib's own, without OpenSSL, which every node would load for it.
+    from _blake2 import blake2b
+except ImportError:
+    from hashlib import blake2b
 
 __all__ = ("BUCKETS", "Digest", "bucket_of")
 
