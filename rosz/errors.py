@@ -15,8 +15,9 @@ One root, so that ``except RoszError`` catches all that rosz reports and nothing
     │   ├── ExecutableNotFound
     │   ├── TypeNotFound            no such message or service type
     │   └── ParamNotFound           (also KeyError)
-    ├── EncodeError                 a value of ours does not fit its type (also ValueError)
-    ├── DecodeError                 bytes of theirs are damaged (also ValueError)
+    ├── MessageError                a message is not as its type wants it (also ValueError)
+    │   ├── EncodeError             a value of ours does not fit its type
+    │   └── DecodeError             bytes of theirs are damaged
     ├── TransportError              the session cannot do what was asked (also ConnectionError)
     │   └── NoReplica               nobody holds the parameter store
     ├── ClosedError                 the thing used has been closed or shut down
@@ -45,6 +46,7 @@ __all__ = (
     "InvalidName",
     "LaunchError",
     "LaunchFileError",
+    "MessageError",
     "NoReplica",
     "NotFoundError",
     "PackageError",
@@ -213,7 +215,11 @@ class ParamNotFound(NotFoundError, KeyError):
         return self._text
 
 
-class EncodeError(RoszError, ValueError):
+class MessageError(RoszError, ValueError):
+    """A message that is not as its type wants it."""
+
+
+class EncodeError(MessageError):
     """A value that does not fit the type of its field.
 
     Attributes:
@@ -229,7 +235,7 @@ class EncodeError(RoszError, ValueError):
         super().__init__(f"{type_name}{'.' + field if field else ''}: {reason}")
 
 
-class DecodeError(RoszError, ValueError):
+class DecodeError(MessageError):
     """Bytes that are no valid message of the type.
 
     Attributes:

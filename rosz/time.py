@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import msgspec
 
-__all__ = ("ClassicConstructor", "DurationValue", "TimeValue", "normal")
+__all__ = ("ClassicConstructor", "DurationValue", "StampValue", "TimeValue", "normal")
 
 _NS = 1_000_000_000
 
@@ -55,7 +55,7 @@ class ClassicConstructor(msgspec.StructMeta):
         return super().__call__(sec, nanosec)
 
 
-class _Value:
+class StampValue:
     """What times and durations share."""
 
     if not TYPE_CHECKING:  # the fields are those of the message classes below
@@ -165,7 +165,7 @@ class _Value:
         return NotImplemented if theirs is None else self.to_nsec() >= theirs
 
 
-class TimeValue(_Value):
+class TimeValue(StampValue):
     """A point in time: seconds and nanoseconds since the epoch."""
 
     if not TYPE_CHECKING:
@@ -199,7 +199,7 @@ class TimeValue(_Value):
         return NotImplemented
 
 
-class DurationValue(_Value):
+class DurationValue(StampValue):
     """A span of time, perhaps a negative one."""
 
     if not TYPE_CHECKING:
@@ -207,7 +207,7 @@ class DurationValue(_Value):
 
     def __init_subclass__(cls, **options: object) -> None:
         super().__init_subclass__(**options)
-        shared = _Value
+        shared = StampValue
         if shared._duration_class is None:  # noqa: SLF001  # of this module
             # The message class comes first: it is what a difference of times is.
             shared._duration_class = cls  # noqa: SLF001

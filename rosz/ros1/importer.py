@@ -27,7 +27,7 @@ from rosz.errors import PackageError, RoszError
 from rosz.packages import PackageIndex
 from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
 
-__all__ = ("MODULES", "install", "type_store", "uninstall")
+__all__ = ("MODULES", "install", "package_path", "type_store", "uninstall")
 
 MODULES = (
     "actionlib",
@@ -36,6 +36,7 @@ MODULES = (
     "genmsg",
     "genpy",
     "message_filters",
+    "rclpy",
     "rosgraph",
     "roslaunch",
     "roslib",
@@ -80,6 +81,12 @@ def type_store() -> TypeStore:
     """Return the store that imports take their classes from."""
     install()
     return next(one.types.store for one in sys.meta_path if isinstance(one, _First))
+
+
+def package_path() -> PackageIndex:
+    """Return the packages that imports look in."""
+    install()
+    return next(one.types.packages for one in sys.meta_path if isinstance(one, _First))
 
 
 class _Types:
