@@ -1,8 +1,9 @@
-"""The parameter store beside ROS 1's: ``python tests/bench/params [ROUNDS] [MOST_REPLICAS]``.
+"""The parameter store beside ROS 1's: ``python -m tests.bench.params [ROUNDS] [MOST]``.
 
 Starts a roscore on a port of its own, and replicas as processes that meet at a port of their own.
 Every figure is measured for both in turn, round by round; the medians are printed with their ratio
-and with what is asked for. Where ROS 1 is not installed, only rosz is measured.
+and with what is asked for. Where ROS 1 is not installed, only rosz is measured. ``MOST`` replicas
+are started at most.
 """
 
 from __future__ import annotations
@@ -16,16 +17,18 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT))
+from ..figures import OWN, Figure, busy, percentile, table  # noqa: TID252  # tests is no package
+from .ros1 import Roscore, available
 
-from tests.bench.params.figures import Figure, percentile, table  # noqa: E402  # of this tree
-from tests.bench.params.ros1 import Roscore, available  # noqa: E402
-from tests.params.fleet import Fleet, Process, until_known  # noqa: E402
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from params.fleet import Fleet, Process, until_known  # noqa: E402  # found by the line above
 
 WRITES = 300
 READS = 20_000
 PARAMS = 5_000
+ROS1 = "ROS 1"
 ROSZ = (sys.executable, "-P", "-m", "rosz", "param")
 
 
@@ -49,11 +52,11 @@ class Bench:
     def alone(self) -> list[Figure]:
         """Measure what needs one other replica."""
         figures = [
-            Figure("read in a node", "us", "1 us, and 1/200 of ROS 1"),
-            Figure("set returned, then seen by a watcher elsewhere: p95", "ms", "1 ms"),
-            Figure(f"command: load {PARAMS} parameters", "s", "1/5 of ROS 1"),
-            Figure("command: get one parameter", "s"),
-            Figure(f"from nothing to a replica of {PARAMS} parameters", "ms", "100 ms"),
+            Figure("read in a node", "µs", {ROS1: "1 µs, and 1/200 of ROS 1"}),
+            Figure("set returned, then seen by a watcher elsewhere: p95", "ms", {"": "1 ms"}),
+            Figure(f"command: load {PARAMS} parameters", "s", {ROS1: "1/5 of ROS 1"}),
+            Figure("command: get one parameter", "s", {ROS1: ""}),
+            Figure(f"from nothing to a replica of {PARAMS} parameters", "ms", {"": "100 ms"}),
         ]
         with tempfile.TemporaryDirectory(prefix="rosz") as folder:
             fleet = Fleet(Path(folder))
@@ -66,8 +69,8 @@ class Bench:
 
     def sets(self, count: int, limit: float) -> list[Figure]:
         """Measure sets that so many other replicas acknowledge, and bare Zenoh doing as much."""
-        figure = Figure(f"set, acknowledged by {count} other", "ms", f"{limit:g} x ROS 1")
-        bare = Figure(f"a put of bare Zenoh, answered by {count} other", "ms")
+        figure = Figure(f"set, acknowledged by {count} other", "ms", {ROS1: f"{limit:g} x ROS 1"})
+        bare = Figure(f"a put of bare Zenoh, answered by {count} other", "ms", {ROS1: ""})
         with tempfile.TemporaryDirectory(prefix="rosz") as folder:
             fleet = Fleet(Path(folder))
             writer, *others = fleet.start_many(count + 1)
@@ -76,13 +79,13 @@ class Bench:
             writer.do("writes", name="/bench/value", count=20)
             for _ in range(self._rounds):
                 taken = writer.do("writes", name="/bench/value", count=WRITES)
-                figure.rosz.append(statistics.median(taken))
+                figure.add(OWN, statistics.median(taken))
                 taken = writer.do("bare", key="bench/bare", count=WRITES, echoes=count)
-                bare.rosz.append(statistics.median(taken))
+                bare.add(OWN, statistics.median(taken))
                 if self._roscore is not None:
                     theirs = statistics.median(self._roscore.times("set", WRITES))
-                    figure.ros1.append(theirs)
-                    bare.ros1.append(theirs)
+                    figure.add(ROS1, theirs)
+                    bare.add(ROS1, theirs)
             fleet.close()
         return [figure, bare]
 
@@ -91,20 +94,20 @@ class Bench:
     ) -> None:
         read, seen, load, get, join = figures
         mine = {**os.environ, "ROSZ_RENDEZVOUS": fleet.rendezvous, "PYTHONPATH": str(ROOT)}
-        read.rosz.append(writer.do("reads", count=READS))
+        read.add(OWN, writer.do("reads", count=READS))
         writer.do("writes", name="/bench/watched", count=WRITES)
-        seen.rosz.append(percentile(watcher.do("delays"), 95))
-        load.rosz.append(run([*ROSZ, "load", str(self._file), "/many"], mine))
-        get.rosz.append(run([*ROSZ, "get", "/bench/watched"], mine))
+        seen.add(OWN, percentile(watcher.do("delays"), 95))
+        load.add(OWN, run([*ROSZ, "load", str(self._file), "/many"], mine))
+        get.add(OWN, run([*ROSZ, "get", "/bench/watched"], mine))
         late = fleet.start()
         until_known([writer, watcher, late])
-        join.rosz.append(late.do("joined"))
+        join.add(OWN, late.do("joined"))
         late.kill()
         if self._roscore is not None:
             theirs = self._roscore.env
-            read.ros1.append(statistics.median(self._roscore.times("get", WRITES)))
-            load.ros1.append(run(["rosparam", "load", str(self._file), "/many"], theirs))
-            get.ros1.append(run(["rosparam", "get", "/bench/value"], theirs))
+            read.add(ROS1, statistics.median(self._roscore.times("get", WRITES)))
+            load.add(ROS1, run(["rosparam", "load", str(self._file), "/many"], theirs))
+            get.add(ROS1, run(["rosparam", "get", "/bench/value"], theirs))
 
 
 def run(words: Sequence[str], env: Mapping[str, str]) -> float:
@@ -129,7 +132,7 @@ def main() -> None:
         finally:
             if roscore is not None:
                 roscore.close()
-    sys.stdout.write(table(figures) + "\n")
+    sys.stdout.write(f"{table(figures)}\n\n{busy()}\n")
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ def echo(system: System) -> None:
 
 
 def ping(system: System, count: str) -> None:
-    """Tell the median microseconds from publishing to the callback with what came back."""
+    """Tell the median seconds from publishing to the callback with what came back."""
     rounds = int(count) + _WARM_UP
     publish, message = system.publisher("ping", "Twist"), system.message("Twist")
     times: list[float] = []
@@ -66,7 +66,7 @@ def ping(system: System, count: str) -> None:
         done.wait(0.5)
     if not done.wait(30):
         raise SystemExit(f"only {len(times)} of {rounds} came back")
-    say(statistics.median(times[_WARM_UP:]) * 1e6)
+    say(statistics.median(times[_WARM_UP:]))
 
 
 def hear(system: System, kind: str, seconds: str) -> None:
@@ -108,7 +108,7 @@ def serve(system: System) -> None:
 
 
 def call(system: System, count: str) -> None:
-    """Tell the median microseconds of a call."""
+    """Tell the median seconds of a call."""
     once = system.client("switch")
     say("ready")
     time.sleep(_CALM)
@@ -117,7 +117,7 @@ def call(system: System, count: str) -> None:
         began = time.perf_counter()
         once()
         times.append(time.perf_counter() - began)
-    say(statistics.median(times[int(count) // 10 :]) * 1e6)
+    say(statistics.median(times[int(count) // 10 :]))
 
 
 def listen(system: System) -> None:
