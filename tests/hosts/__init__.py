@@ -1,0 +1,1 @@
+"""Several machines on one: hosts from namespaces, links to cut, what users do with them."""
