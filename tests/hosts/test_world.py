@@ -46,7 +46,7 @@ def test_hosts_have_names_homes_and_processes_of_their_own(world: World) -> None
     _, home, of_account = program.output.split()
     assert home == of_account == str(one.home) != str(other.home)
     one.execute("sleep", "60")
-    assert one.processes() == ["sleep 60"]
+    eventually(lambda: one.processes() == ["sleep 60"], "the process there")
     assert not other.processes()
     assert reaches(one, "other")
     assert not one.listening()
