@@ -38,6 +38,7 @@ FLOORS = {
     "rosz.params.remote": 4,
     "rosz.params.api": 5,
     "rosz.node": 5,
+    "rosz.doctor": 6,
     "rosz.introspect": 6,
     "rosz.launch.run": 6,
     "rosz.reconfigure": 6,
