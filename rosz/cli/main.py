@@ -27,6 +27,7 @@ COMMANDS = {
     "gen": "write Python modules for the messages of a package",
     "pkg": "list, find and create packages",
     "log": "follow the log of all nodes, set levels",
+    "doctor": "name what is wrong, what shows it and what to do",
     "env": "print what to eval in a shell",
 }
 _INTERRUPTED = 130

@@ -34,6 +34,8 @@ class NodeInfo(msgspec.Struct, frozen=True):
         argv: Command line.
         started: Nanoseconds since the Unix epoch.
         age: Seconds since then, by no clock that anybody sets.
+        now: What its system clock says at this moment, in nanoseconds since the Unix epoch.
+        sees: The sessions of which it knows nodes, its own among them.
     """
 
     name: str
@@ -42,6 +44,8 @@ class NodeInfo(msgspec.Struct, frozen=True):
     argv: list[str]
     started: int
     age: float = 0.0
+    now: int = 0
+    sees: list[str] = []
 
 
 class Request(msgspec.Struct, frozen=True):
@@ -128,13 +132,25 @@ def _serve(node: Node, key: str, query: Query, began: float) -> None:
         node.shutdown(shut_down)
 
 
+def _info(node: Node, age: float) -> NodeInfo:
+    process = node.process
+    return NodeInfo(
+        node.name,
+        process.pid,
+        process.host,
+        [sys.executable, *sys.argv],
+        process.started,
+        age,
+        time.time_ns(),
+        sorted({token.zid for token in node.context.graph.view().tokens}),
+    )
+
+
 def _answer(node: Node, request: Request, age: float) -> tuple[Any, str]:
     """Return what to answer, and the reason of a shutdown to carry out after that."""
     match request.action:
         case "info":
-            command = [sys.executable, *sys.argv]
-            process = node.process
-            return NodeInfo(node.name, process.pid, process.host, command, process.started, age), ""
+            return _info(node, age), ""
         case "shutdown":
             return True, request.reason or "requested"
         case "levels":

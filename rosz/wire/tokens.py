@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from typing import Literal
 
 import msgspec
 
@@ -69,7 +70,7 @@ class Token(msgspec.Struct, frozen=True):
         return f"{self.namespace.rstrip('/')}/{self.node}"
 
 
-def tokens_key(domain: int, zid: str = "*") -> str:
+def tokens_key(domain: int | Literal["*"], zid: str = "*") -> str:
     """Return the key expression that matches all tokens of a domain, or of one session in it."""
     return f"{SPACE}/{domain}/{zid}/**"
 
