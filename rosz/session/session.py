@@ -30,6 +30,7 @@ from rosz.session.declared import (
     mapped,
 )
 from rosz.session.ending import ClosedSession
+from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.segments import sweep
@@ -101,6 +102,8 @@ class Session:
         where = ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
         try:
             with mapped(f"open a session ({where})"), _one_receiver():
+                if config.mode == "peer" and config.hold_rendezvous:
+                    return cls(open_at(settings, config.rendezvous))
                 return cls(zenoh.open(settings))
         except TransportError as error:
             if _NOBODY not in str(error):

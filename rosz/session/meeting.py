@@ -1,0 +1,44 @@
+"""Opening a session that is to be the meeting point where nobody else is.
+
+Of two processes that begin to listen at one port at the same moment, Linux may refuse both: each
+finds the other one about to. Zenoh does not try again, and they would never meet.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Any
+
+import zenoh
+
+from rosz.session.probe import is_answered
+
+__all__ = ("open_at",)
+
+_ATTEMPTS = 8
+_PAUSE = 0.02
+_LOCAL = ("tcp/127.", "tcp/localhost:", "tcp/[::1]:", "unixsock-stream/")
+
+
+def open_at(settings: zenoh.Config, rendezvous: str) -> Any:
+    """Open a session, and see to it that somebody then listens at the meeting point.
+
+    Args:
+        settings: The configuration.
+        rendezvous: Endpoint of the meeting point. One of another machine is left to itself, and
+            so is one that the configuration does not listen at.
+
+    Raises:
+        zenoh.ZError: The session cannot be opened.
+    """
+    raw: Any = zenoh.open(settings)
+    if rendezvous.startswith(_LOCAL) and rendezvous in settings.get_json("listen/endpoints"):
+        for _ in range(_ATTEMPTS):
+            if is_answered(rendezvous):
+                break
+            raw.close()
+            # Who was refused together must not come back together.
+            time.sleep(_PAUSE * os.urandom(1)[0] / 256)
+            raw = zenoh.open(settings)
+    return raw

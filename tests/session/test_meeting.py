@@ -1,0 +1,79 @@
+"""Who is first holds the meeting point, also of two that come at the same moment."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+import zenoh
+from network import Network, repeats
+
+from rosz.session import Session, SessionConfig
+from rosz.session.probe import is_answered
+
+PEER = """
+    import sys
+    from rosz.environment import Environment
+    from rosz.session import Session, SessionConfig
+
+    config = SessionConfig.node(Environment.read())
+    print("ready", flush=True)
+    sys.stdin.readline()
+    with Session.open(config) as session:
+        print("open", flush=True)
+        while not session.peers():
+            pass
+        print("met", flush=True)
+        sys.stdin.readline()
+"""
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.mark.timeout(600)
+def test_two_at_the_same_moment(network: Network) -> None:
+    for _ in range(repeats(15, 300)):
+        network.rendezvous = f"tcp/127.0.0.1:{free_port()}"
+        pair = [network.program(PEER) for _ in range(2)]
+        for program in pair:
+            program.wait_for("ready")
+        for program in pair:
+            program.say("go")
+        for program in pair:
+            program.wait_for("met")
+        for program in pair:
+            program.say("enough")
+            assert program.exit_code() == 0
+            program.close()
+
+
+def test_refused_at_first(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What Linux does to two that begin to listen together, without a second one."""
+    port = free_port()
+    network.rendezvous = f"tcp/127.0.0.1:{port}"
+    opened = []
+    open_session = zenoh.open
+
+    def refused_once(settings: zenoh.Config) -> zenoh.Session:
+        opened.append(settings)
+        if len(opened) > 1:
+            return open_session(settings)
+        with socket.create_server(("127.0.0.1", port)) as other:
+            session = open_session(settings)
+            other.close()
+        return session
+
+    monkeypatch.setattr(zenoh, "open", refused_once)
+    with Session.open(SessionConfig.node(network.environment())):
+        assert len(opened) == 2
+        assert is_answered(network.rendezvous)
+
+
+def test_who_is_told_not_to_listen_there(network: Network) -> None:
+    environment = network.environment(zenoh_override='listen/endpoints=["tcp/127.0.0.1:0"]')
+    with Session.open(SessionConfig.node(environment)):
+        assert not is_answered(network.rendezvous)
