@@ -131,7 +131,7 @@ class Program:
         try:
             code = self.process.wait(timeout)
         except subprocess.TimeoutExpired:
-            self.process.send_signal(signal.SIGABRT)  # faulthandler tells where it stands
+            self.send(signal.SIGABRT)  # faulthandler tells where it stands
             self._reader.join(5)
             pytest.fail(f"the program did not end within {timeout:g} s:\n{self.output}")
         self._reader.join(timeout)

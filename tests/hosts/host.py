@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -59,6 +60,8 @@ class HostProgram(Program):
             with suppress(ProcessLookupError):
                 os.killpg(self.inner, signal.SIGKILL)
             self.process.send_signal(signal.SIGCONT)
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(PATIENCE)
         super().close()
 
 
