@@ -19,12 +19,13 @@ __all__ = ("check_connect", "check_rendezvous", "check_socket_files", "why_refus
 _CONNECT_SECONDS = 1.0
 _GREETING_SECONDS = 1.0
 _TCP = frozenset({"tcp", "tls", "ws"})
+_PLAIN = frozenset({"tcp", "unixsock-stream"})
 
 
 def check_rendezvous(environment: Environment) -> Iterator[Finding]:
     """Find out whether what holds the meeting point is no Zenoh."""
     endpoint = environment.rendezvous
-    if not why_refused(endpoint) and not _greets(endpoint):
+    if not why_refused(endpoint) and not _greets(endpoint, environment):
         yield error(
             "rendezvous-held",
             f"something that is not Zenoh, or hangs, holds the rendezvous {endpoint}",
@@ -38,7 +39,7 @@ def check_connect(environment: Environment) -> Iterator[Finding]:
     """Find out whether nobody listens where ``ROSZ_CONNECT`` points."""
     for endpoint in environment.connect:
         reason = why_refused(endpoint)
-        if not reason and not _greets(endpoint):
+        if not reason and not _greets(endpoint, environment):
             reason = f"what listens there says nothing within {_GREETING_SECONDS:g} s: it hangs, or"
             reason += " it is not Zenoh"
         if reason:
@@ -64,7 +65,10 @@ def check_socket_files(environment: Environment) -> Iterator[Finding]:
         yield make(
             "stale-lock",
             f"the process that listened at {path} died and left its socket",
-            [f"{path}: {why_refused(endpoint)}", f"{lock}: {'not locked' if ours else 'not ours'}"],
+            [
+                f"{path}: {why_refused(endpoint)}",
+                f"{lock}: {'not locked' if ours else 'held by another process or user'}",
+            ],
             f"rm {path} {lock}" + ("; the next process to start does it" if ours else ""),
         )
 
@@ -99,10 +103,16 @@ def _try(family: int, address: object) -> str:
     return ""
 
 
-def _greets(endpoint: str) -> bool:
-    """Tell whether a Zenoh session opens at an endpoint."""
+def _greets(endpoint: str, environment: Environment) -> bool:
+    """Tell whether a Zenoh session opens at an endpoint; yes where it would need certificates."""
+    if _parts(endpoint)[0] not in _PLAIN:
+        return True
     config = SessionConfig(
-        mode="client", rendezvous=endpoint, must_connect=True, open_timeout=_GREETING_SECONDS
+        mode="client",
+        rendezvous=endpoint,
+        must_connect=True,
+        open_timeout=_GREETING_SECONDS,
+        override=environment.zenoh_override,
     )
     try:
         Session.open(config).close()

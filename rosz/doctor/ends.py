@@ -199,6 +199,9 @@ def check_packages(
                     "other-definition",
                     f"{ros1_type(type_name)} has another definition here: commands and nodes of"
                     " this machine do not reach those",
-                    [f"{end} {type_hash[:_HASH_SHOWN]}…, here {known[:_HASH_SHOWN]}…" for end in ends],
+                    [
+                        f"{end} {type_hash[:_HASH_SHOWN]}…, here {known[:_HASH_SHOWN]}…"
+                        for end in ends
+                    ],
                     f"bring the package '{package}' to the version that they have",
                 )

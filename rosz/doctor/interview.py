@@ -83,7 +83,10 @@ def check_sight(
     if not _blind(survey, answers):
         return
     time.sleep(_AGAIN)
-    survey, answers = take(session, survey.domain, processes=True), interview(session, survey.domain)
+    survey, answers = (
+        take(session, survey.domain, processes=True),
+        interview(session, survey.domain),
+    )
     blind = _blind(survey, answers)
     if not blind:
         return
