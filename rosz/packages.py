@@ -50,13 +50,17 @@ class Package(msgspec.Struct, frozen=True):
         """Return the names of all files of the package that may be executed, sorted."""
         return sorted({file.name for file in self._files() if _is_executable(file)})
 
+    def files(self, name: str) -> list[Path]:
+        """Return all files of a name anywhere in the package."""
+        return [file for file in self._files() if file.name == name]
+
     def executable(self, name: str) -> Path:
         """Find an executable file by its name anywhere in the package, as rosrun does.
 
         Raises:
             ExecutableNotFound: There is none, or it lacks the executable bit.
         """
-        found = [file for file in self._files() if file.name == name]
+        found = self.files(name)
         for file in found:
             if _is_executable(file):
                 return file
@@ -103,7 +107,8 @@ class PackageIndex:
     def _known(self) -> dict[str, Package]:
         known: dict[str, Package] = {}
         for root in self.roots:
-            for folder in _crawl(root):
+            # Of two packages of a name the one nearer to the root wins.
+            for folder in sorted(_crawl(root), key=lambda folder: len(folder.parts)):
                 package = Package(_name_in(folder / MANIFEST), folder)
                 known.setdefault(package.name, package)
         return known

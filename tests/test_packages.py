@@ -36,6 +36,15 @@ def test_finds_packages_at_any_depth_and_first_root_wins(tmp_path: Path) -> None
         index.find("hidden")
 
 
+def test_the_nearer_of_two_of_a_name_wins(tmp_path: Path) -> None:
+    make(tmp_path / "definitions" / "alpha", "alpha")
+    near = make(tmp_path / "sources", "alpha")
+    make(tmp_path / "others" / "alpha", "beta")
+    index = PackageIndex([tmp_path])
+    assert index.names() == ["alpha", "beta"]
+    assert index.find("alpha").path == near
+
+
 def test_a_root_may_be_a_package(tmp_path: Path) -> None:
     make(tmp_path / "p", "solo")
     assert PackageIndex([tmp_path / "p"]).find("solo").path == tmp_path / "p"

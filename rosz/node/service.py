@@ -27,7 +27,8 @@ class Service(Endpoint):
     """A server of a service; see `rosz.Node.service`.
 
     Every call gets a thread of a bounded pool. What the handler raises is logged here and arrives
-    at the caller as `ServiceError`.
+    at the caller as `ServiceError`; a handler that raises `ServiceError` itself refuses a request
+    on purpose, and nothing is logged.
     """
 
     def __init__(
@@ -81,6 +82,8 @@ class Service(Endpoint):
         message = types.Request._decode(request)
         try:
             result = self._handler(message)
+        except ServiceError as error:  # a refusal, which is no fault of the handler
+            raise ServiceError(f"service cannot process request: {error}") from error
         except (Exception, SystemExit) as error:
             self.node.log.exception("handler of service '%s' failed", self.name)
             raise ServiceError(f"error processing request: {error}") from error

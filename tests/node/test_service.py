@@ -9,7 +9,7 @@ from network import PATIENCE, Network, eventually
 
 from rosz.errors import EncodeError, ServiceError
 from rosz.msgs.example_interfaces.srv import AddTwoInts, AddTwoIntsRequest, AddTwoIntsResponse
-from rosz.msgs.std_srvs.srv import Empty, SetBool, SetBoolResponse
+from rosz.msgs.std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolResponse
 from rosz.node import Node
 from rosz.node.service import to_response
 
@@ -97,6 +97,19 @@ def test_exception_arrives_and_is_logged(
     written = capfd.readouterr().err
     assert written.count("handler of service '/fail' failed") == 2
     assert type(error).__name__ in written
+
+
+def test_a_refusal_arrives_and_is_not_logged(
+    server: Node, caller: Node, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(_: object) -> None:
+        raise ServiceError("not now")
+
+    server.service("work", Empty, refuse)
+    with pytest.raises(ServiceError, match=r"with an error: .*request: not now$"):
+        caller.client("work", Empty).call(EmptyRequest())
+    server.close()
+    assert "not now" not in capfd.readouterr().err
 
 
 def test_invalid_response_arrives_and_is_logged(server: Node, caller: Node) -> None:
