@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Self, Unpack
 
+import msgspec
 import zenoh
 
 from rosz.errors import TransportError
@@ -32,6 +33,7 @@ from rosz.session.declared import (
 from rosz.session.ending import ClosedSession
 from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
+from rosz.session.probe import first_answered
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.segments import sweep
 from rosz.session.stamp import HybridClock, Stamp
@@ -68,6 +70,32 @@ def _one_receiver() -> Iterator[None]:
             os.environ.pop(_RUNTIME, None)
 
 
+def _within_reach(config: SessionConfig) -> SessionConfig:
+    """Have a client of several places go to the first that answers: Zenoh stays at the very first.
+
+    A command asks where it was told to ask rather than at home; a node is a client of its own hub.
+
+    Raises:
+        TransportError: Nobody answers at any of them.
+    """
+    if config.mode != "client" or not config.connect or config.config_file:
+        return config
+    home = (config.rendezvous,)
+    wanted = (*config.connect, *home) if config.must_connect else (*home, *config.connect)
+    place = first_answered(wanted, config.open_timeout)
+    if not place:
+        raise _nobody(config)
+    return msgspec.structs.replace(config, rendezvous=place, connect=())
+
+
+def _nobody(config: SessionConfig) -> TransportError:
+    where = ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
+    return TransportError(
+        f"nobody answers at {where} within {config.open_timeout:g} s: start 'rosz core', a launch"
+        " or a node there first, or name another place in ROSZ_RENDEZVOUS"
+    )
+
+
 class Session:
     """One connection to the network.
 
@@ -90,6 +118,7 @@ class Session:
                 a configuration value is refused.
             UsageError: The override text is malformed.
         """
+        config = _within_reach(config)
         with mapped("read the Zenoh configuration"):
             if config.config_file:
                 settings = zenoh.Config.from_file(config.config_file)
