@@ -1,0 +1,188 @@
+"""genpy.message: classes by name, checks of fields, and messages from and to text."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable
+from typing import Any
+
+from rosz.errors import DecodeError as DeserializationError
+from rosz.errors import DefinitionError, TypeNotFound
+from rosz.errors import EncodeError as SerializationError
+from rosz.errors import MessageError as MessageException
+from rosz.message import Message
+from rosz.message.fill import fill_message_args
+from rosz.message.text import strify_message
+from rosz.ros1.genpy.rostime import Duration, Time
+from rosz.ros1.importer import type_store
+from rosz.time import DurationValue, StampValue, TimeValue
+
+__all__ = (
+    "DeserializationError",
+    "Duration",
+    "Message",
+    "MessageException",
+    "SerializationError",
+    "Time",
+    "check_type",
+    "fill_message_args",
+    "get_message_class",
+    "get_printable_message_args",
+    "get_service_class",
+    "is_simple",
+    "strify_message",
+)
+
+_SIGNED = {"byte": 8, "int8": 8, "int16": 16, "int32": 32, "int64": 64}
+_UNSIGNED = {"char": 8, "uint8": 8, "uint16": 16, "uint32": 32, "uint64": 64}
+_FLOATS = frozenset({"float32", "float64"})
+_HEADERS = frozenset({"Header", "std_msgs/Header", "roslib/Header"})
+
+
+class _FieldError(SerializationError):
+    """A value that is not of the type of its field, in genpy's words."""
+
+    def __init__(self, field: str, reason: str) -> None:
+        super().__init__("", field, reason)
+
+    def __str__(self) -> str:
+        return f"field {self.field} {self.reason}"
+
+
+def is_simple(type_: str) -> bool:
+    """Tell whether a type is a number or a bool."""
+    return type_ in _SIGNED or type_ in _UNSIGNED or type_ in _FLOATS or type_ == "bool"
+
+
+def get_message_class(message_type: str, reload_on_error: bool = False) -> type[Any] | None:  # noqa: ARG001  # genpy's
+    """Return a message class by its name.
+
+    Args:
+        message_type: ``std_msgs/String``.
+        reload_on_error: Not needed here: definitions are read when they are asked for.
+
+    Returns:
+        The class; None if there is none of that name.
+
+    Raises:
+        ValueError: The name has no package.
+    """
+    return _find(message_type, type_store().message)
+
+
+def get_service_class(service_type: str, reload_on_error: bool = False) -> type[Any] | None:  # noqa: ARG001  # genpy's
+    """Return a service class by its name; see `get_message_class`."""
+    return _find(service_type, type_store().service)
+
+
+def _find(name: str, look: Any) -> type[Any] | None:
+    if "/" not in name:
+        if name != "Header":
+            raise ValueError(f"message type is missing package name: {name}")
+        name = "std_msgs/Header"
+    try:
+        found: type[Any] = look(name)
+    except (DefinitionError, TypeNotFound):
+        return None
+    return found
+
+
+def get_printable_message_args(msg: Any, buff: Any = None, prefix: str = "") -> str:
+    """Return the names of the values that a message is made of, separated by spaces.
+
+    Args:
+        msg: The message.
+        buff: A text stream to write them to instead; nothing but its content is returned then.
+        prefix: What each name begins with.
+    """
+    text = " ".join(_leaves(msg, prefix))
+    if buff is None:
+        return text
+    buff.write(f"{text} " if text else "")
+    written: str = buff.getvalue().rstrip()
+    return written
+
+
+def _leaves(msg: Any, prefix: str) -> list[str]:
+    found: list[str] = []
+    for name in msg.__slots__:
+        value = getattr(msg, name)
+        if isinstance(value, Message) and not isinstance(value, StampValue):
+            found += _leaves(value, f"{prefix}{name}.")
+        else:
+            found.append(prefix + name)
+    return found
+
+
+def check_type(field_name: str, field_type: str, field_val: Any) -> None:
+    """Check a value against the type of a field, as ROS 1 spells it.
+
+    Args:
+        field_name: For the error.
+        field_type: ``uint8``, ``string[]``, ``geometry_msgs/Point``, …
+        field_val: The value.
+
+    Raises:
+        SerializationError: It does not fit.
+    """
+    if field_type.endswith("]"):
+        _check_array(field_name, field_type.partition("[")[0], field_val)
+    elif field_type in _SIGNED or field_type in _UNSIGNED:
+        _check_integer(field_name, field_type, field_val)
+    elif field_type in _SINGLE:
+        fits, reason = _SINGLE[field_type]
+        if not fits(field_val):
+            raise _FieldError(field_name, reason)
+    else:
+        _check_message(field_name, field_type, field_val)
+
+
+def _is_float(value: Any) -> bool:
+    return type(value) in (int, float) or (
+        hasattr(value, "dtype") and getattr(value, "shape", None) == ()
+    )
+
+
+_SINGLE: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "float32": (_is_float, "must be float type"),
+    "float64": (_is_float, "must be float type"),
+    "bool": (lambda value: value in (True, False, 0, 1), "is not a bool"),
+    "string": (
+        lambda value: isinstance(value, str | bytes),
+        "must be of type bytes or an ascii string",
+    ),
+    "time": (lambda value: isinstance(value, TimeValue), "must be of type Time"),
+    "duration": (lambda value: isinstance(value, DurationValue), "must be of type Duration"),
+}
+
+
+def _check_integer(name: str, kind: str, value: Any) -> None:
+    signed = kind in _SIGNED
+    if type(value) is not int or (not signed and value < 0):
+        raise _FieldError(name, f"must be {'an integer' if signed else 'unsigned integer'} type")
+    limit = 1 << (_SIGNED[kind] - 1 if signed else _UNSIGNED[kind])
+    if value >= limit or value < -limit:
+        raise _FieldError(name, f"exceeds specified width [{kind}]")
+
+
+def _check_array(name: str, base: str, values: Any) -> None:
+    if isinstance(values, bytes | str):
+        if base not in {"char", "uint8", "byte"}:
+            raise _FieldError(name, "must be a list or tuple type. Only uint8[] can be a string")
+        return
+    if not isinstance(values, list | tuple | array) and not hasattr(values, "tolist"):
+        raise _FieldError(name, "must be a list or tuple type")
+    for value in values.tolist() if hasattr(values, "tolist") else values:
+        check_type(f"{name}[]", base, value)
+
+
+def _check_message(name: str, kind: str, value: Any) -> None:
+    if not isinstance(value, Message):
+        raise _FieldError(name, f"must be of type [{kind}]")
+    if value._type in _HEADERS:
+        if kind not in _HEADERS:
+            raise _FieldError(name, f"must be a Header instead of a {value._type}")
+    elif value._type != kind:
+        raise _FieldError(name, f"must be of type {kind} instead of {value._type}")
+    for slot, inner in zip(value.__slots__, value._slot_types, strict=True):
+        check_type(f"{name}.{slot}", inner, getattr(value, slot))

@@ -1,0 +1,186 @@
+"""rosgraph.names: graph resource names (ROS wiki, Names)."""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+import sys
+import time
+from collections.abc import Mapping, Sequence
+
+from rosz import names
+from rosz.ros1.rosgraph.rosenv import ROS_NAMESPACE
+
+__all__ = (
+    "ANYTYPE",
+    "GLOBALNS",
+    "MSG_EXT",
+    "PRIV_NAME",
+    "REMAP",
+    "ROS_NAMESPACE",
+    "SEP",
+    "SRV_EXT",
+    "anonymous_name",
+    "canonicalize_name",
+    "get_ros_namespace",
+    "is_global",
+    "is_legal_base_name",
+    "is_legal_name",
+    "is_legal_remap",
+    "is_private",
+    "load_mappings",
+    "make_caller_id",
+    "make_global_ns",
+    "namespace",
+    "ns_join",
+    "resolve_name",
+    "script_resolve_name",
+)
+
+MSG_EXT = ".msg"
+SRV_EXT = ".srv"
+SEP = "/"
+GLOBALNS = "/"
+PRIV_NAME = "~"
+REMAP = ":="
+ANYTYPE = "*"
+
+_REMAPPING = re.compile(r"[~/A-Za-z_][\w/]*:=.*")
+_BASE = re.compile(r"[A-Za-z]\w*")
+_NAME = re.compile(r"[~/A-Za-z][\w/]*")
+
+
+def get_ros_namespace(
+    env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
+) -> str:
+    """Return the namespace that ``__ns:=`` or ``ROS_NAMESPACE`` gives, with slashes at both ends.
+
+    Args:
+        env: Variables; those of the process when not given.
+        argv: Command line; that of the process when not given.
+    """
+    for word in sys.argv if argv is None else argv:
+        if word.startswith("__ns:="):
+            return make_global_ns(word.partition(REMAP)[2])
+    variables = os.environ if env is None else env
+    return make_global_ns(variables.get(ROS_NAMESPACE, GLOBALNS))
+
+
+def make_caller_id(name: str) -> str:
+    """Return a name in the process's namespace, with slashes at both ends."""
+    return make_global_ns(ns_join(get_ros_namespace(), name))
+
+
+def make_global_ns(name: str) -> str:
+    """Return a name with slashes at both ends.
+
+    Raises:
+        ValueError: It is private.
+    """
+    if is_private(name):
+        raise ValueError(f"cannot turn [{name}] into a global name")
+    name = name if is_global(name) else SEP + name
+    return name if name.endswith(SEP) else name + SEP
+
+
+def is_global(name: str) -> bool:
+    """Tell whether a name starts at the root."""
+    return bool(name) and names.is_global(name)
+
+
+def is_private(name: str) -> bool:
+    """Tell whether a name is private to its node."""
+    return bool(name) and names.is_private(name)
+
+
+def namespace(name: str) -> str:
+    """Return the namespace that a name lies in, with its slash at the end.
+
+    Raises:
+        ValueError: It is None.
+        TypeError: It is no text.
+    """
+    if name is None:
+        raise ValueError("name")
+    if not isinstance(name, str):
+        raise TypeError("name")
+    return name.removesuffix(SEP).rpartition(SEP)[0] + SEP if SEP in name else SEP
+
+
+def ns_join(ns: str, name: str) -> str:
+    """Put a name into a namespace; a global or private one stays as it is."""
+    if is_private(name) or is_global(name) or not ns:
+        return name
+    return ns + name if ns == PRIV_NAME or ns.endswith(SEP) else f"{ns}{SEP}{name}"
+
+
+def load_mappings(argv: Sequence[str]) -> dict[str, str]:
+    """Return the remappings of a command line, ``__name`` and its like among them."""
+    found: dict[str, str] = {}
+    for word in filter(is_legal_remap, argv):
+        left, _, right = (part.strip() for part in word.partition(REMAP))
+        if left and right and REMAP not in right and not re.match(r"_[^_]", left):
+            found[left] = right
+    return found
+
+
+def is_legal_name(name: str | None) -> bool:
+    """Tell whether a text is a legal name of any sort; the empty one is."""
+    if name is None:
+        return False
+    return not name or (_NAME.fullmatch(name) is not None and "//" not in name)
+
+
+def is_legal_base_name(name: str | None) -> bool:
+    """Tell whether a text is a legal name without a namespace."""
+    return name is not None and _BASE.fullmatch(name) is not None
+
+
+def is_legal_remap(arg: str | None) -> bool:
+    """Tell whether a word of a command line is a remapping or sets a private parameter."""
+    return arg is not None and _REMAPPING.fullmatch(arg) is not None
+
+
+def canonicalize_name(name: str) -> str:
+    """Take away what slashes there are too many."""
+    return names.canonical(name)
+
+
+def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
+    """Return the global name that a name means to a node.
+
+    Args:
+        name: Any name; the empty one means the node's namespace.
+        namespace_: Full name of the node.
+        remappings: Resolved name to resolved name.
+    """
+    if not name:
+        return namespace(namespace_)
+    name = canonicalize_name(name)
+    if is_private(name):
+        name = canonicalize_name(namespace_ + SEP + name[1:])
+    elif not is_global(name):
+        name = namespace(namespace_) + name
+    return remappings.get(name, name) if remappings else name
+
+
+def script_resolve_name(script_name: str, name: str) -> str:
+    """Return the global name that a name means to a program that is no node.
+
+    Args:
+        script_name: Name that stands for the program's.
+        name: Any name.
+    """
+    if not name:
+        return get_ros_namespace()
+    if is_global(name):
+        return name
+    if is_private(name):
+        return ns_join(make_caller_id(script_name), name[1:])
+    return get_ros_namespace() + name
+
+
+def anonymous_name(id: str) -> str:  # noqa: A002  # ROS 1's name
+    """Return a name made unique to this machine, process and moment."""
+    return names.anonymous(id, socket.gethostname(), os.getpid(), time.time_ns() // 1_000_000)

@@ -1,0 +1,85 @@
+"""One snippet run twice: on Debian's real modules, and on rosz's of the same names."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import subprocess
+from functools import cache
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import pytest
+
+from rosz.ros1.importer import install, uninstall
+
+PYTHON = "/usr/bin/python3"
+
+_TRIES = """
+import json, sys
+def tried(function, *arguments):
+    try:
+        return plain(function(*arguments))
+    except Exception as error:
+        return ["raises", type(error).__name__.replace("EncodeError", "SerializationError")]
+def plain(value):
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (tuple, list)):
+        return [plain(one) for one in value]
+    if isinstance(value, float):
+        return round(value, 9)
+    if isinstance(value, dict):
+        return {str(key): plain(one) for key, one in value.items()}
+    return value if isinstance(value, (str, int, bool, type(None))) else str(value)
+"""
+
+
+@cache
+def _has(module: str) -> bool:
+    if not Path(PYTHON).exists():
+        return False
+    done = subprocess.run([PYTHON, "-c", f"import {module}"], check=False, capture_output=True)
+    return done.returncode == 0
+
+
+def real(snippet: str, module: str, package: str) -> Any:
+    """Return what ``result`` is when a snippet has run on the real modules.
+
+    Args:
+        snippet: Sets ``result``; has ``tried(function, *arguments)``.
+        module: A module that it needs.
+        package: What to install where that is missing.
+    """
+    if not _has(module):
+        pytest.skip(f"needs ROS 1's {module} (Debian: {package})")
+    code = _TRIES + dedent(snippet) + "\nprint(json.dumps(plain(result)))\n"
+    done = subprocess.run(
+        [PYTHON, "-c", code],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        env={"PATH": "/usr/bin:/bin", "HOME": "/nonexistent"},
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def ours(snippet: str) -> Any:
+    """Return what ``result`` is when a snippet has run on rosz's modules."""
+    space: dict[str, Any] = {}
+    install()
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            exec(_TRIES + dedent(snippet) + "\nresult = plain(result)\n", space)
+    finally:
+        uninstall()
+    return json.loads(json.dumps(space["result"]))
+
+
+def same(snippet: str, module: str, package: str) -> None:
+    """Check that a snippet comes to the same on both."""
+    assert ours(snippet) == real(snippet, module, package)
