@@ -36,6 +36,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         mode: ``ROSZ_MODE``: ``peer`` (mesh) or ``client`` (of a router at the rendezvous).
         multicast: ``ROSZ_MULTICAST=1`` looks for others on the local network.
         shared_memory: ``ROSZ_SHM``: samples of so many bytes and more go by shared memory; 0: off.
+        keys: ``ROSZ_KEYS``, folder of the keys that links beyond this machine need.
         namespace: ``ROS_NAMESPACE``.
         distro: ``ROS_DISTRO``; ``humble`` selects that release's wire format.
         zenoh_config: ``ZENOH_SESSION_CONFIG_URI``, a Zenoh configuration file.
@@ -54,6 +55,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
     mode: Literal["peer", "client"] = "peer"
     multicast: bool = False
     shared_memory: int = 0
+    keys: Path | None = None
     namespace: str = ""
     distro: str = ""
     zenoh_config: str = ""
@@ -85,6 +87,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
             mode=_mode(env.get("ROSZ_MODE", "")),
             multicast=env.get("ROSZ_MULTICAST", "") not in {"", "0"},
             shared_memory=_bytes("ROSZ_SHM", env.get("ROSZ_SHM", "")),
+            keys=Path(env["ROSZ_KEYS"]).expanduser().absolute() if env.get("ROSZ_KEYS") else None,
             namespace=env.get("ROS_NAMESPACE", ""),
             distro=env.get("ROS_DISTRO", ""),
             zenoh_config=env.get("ZENOH_SESSION_CONFIG_URI", ""),

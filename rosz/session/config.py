@@ -8,15 +8,19 @@ multicast is off unless asked for.
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import UsageError
 
-__all__ = ("SessionConfig", "zenoh_settings")
+if TYPE_CHECKING:
+    from rosz.security import KeyFolder
+
+__all__ = ("SessionConfig", "keys_of", "secured", "zenoh_settings")
 
 _RETRY_MS = 200
 _LEASE_MS = 60_000
@@ -38,6 +42,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
         must_connect: Whether opening fails, after ``open_timeout``, when nobody answers.
         open_timeout: Seconds that a client, or who must connect, waits for somebody to be there.
         multicast: Whether to look for others on the local network.
+        keys: What links beyond the machine need; anybody may link to it when not given.
         shared_memory: Payloads of at least so many bytes go by shared memory; 0 is off.
         config_file: Zenoh configuration file to start from.
         override: ``path/to/key=json;…`` applied last.
@@ -52,6 +57,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
     open_timeout: float = 2.0
     multicast: bool = False
     shared_memory: int = 0
+    keys: KeyFolder | None = None
     config_file: str = ""
     override: str = ""
 
@@ -71,6 +77,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
             listen=() if client else env.listen,
             multicast=env.multicast,
             shared_memory=env.shared_memory,
+            keys=keys_of(env),
             open_timeout=_ROUTER_BY,
             config_file=env.zenoh_config,
             override=env.zenoh_override,
@@ -91,9 +98,24 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
             must_connect=True,
             open_timeout=timeout,
             multicast=env.multicast,
+            keys=keys_of(env),
             config_file=env.zenoh_config,
             override=env.zenoh_override,
         )
+
+
+def keys_of(env: Environment) -> KeyFolder | None:
+    """Return the keys of this machine, if it is to use any.
+
+    Raises:
+        UsageError: There are none where they should be, or others may read them.
+        YamlError: The rules beside them are no rules.
+    """
+    if env.keys is None:
+        return None
+    from rosz.security import KeyFolder
+
+    return KeyFolder.find(env.keys, socket.gethostname())
 
 
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
@@ -106,6 +128,9 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     elif config.mode == "peer":
         held = [config.rendezvous] if config.hold_rendezvous else []
         listen = [*held, _EPHEMERAL, *listen]
+    if config.keys is not None:
+        connect = [secured(endpoint) for endpoint in connect]
+        listen = [secured(endpoint) for endpoint in listen]
     must_listen = config.mode == "router"
     must_connect = config.must_connect or config.mode == "client"
     return {
@@ -139,6 +164,37 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     }
 
 
+def key_settings(config: SessionConfig) -> dict[str, Any]:
+    """Return what keys add to a Zenoh configuration, by path in it."""
+    if config.keys is None:
+        return {}
+    from rosz.security import access_control
+
+    loopback = [name for _, name in socket.if_nameindex() if name.startswith("lo")]
+    return {
+        "transport/link/tls": _tls(config.keys),
+        "access_control": access_control(config.keys.rules, loopback),
+    }
+
+
+def secured(endpoint: str) -> str:
+    """Return what an endpoint is called where links beyond the machine need keys.
+
+    Raises:
+        UsageError: Its protocol knows none.
+    """
+    protocol, _, place = endpoint.partition("/")
+    host = place.partition("?")[0].partition("#")[0].rpartition(":")[0].strip("[]")
+    local = host in {"localhost", "::1"} or host.startswith("127.")
+    if protocol in {"tls", "unixsock-stream"} or (protocol == "tcp" and local):
+        return endpoint
+    if protocol == "tcp":
+        return f"tls/{place}"
+    raise UsageError(
+        f"'{endpoint}': with ROSZ_KEYS, links beyond this machine are tls; expected 'tls/{place}'"
+    )
+
+
 def overrides(text: str) -> Mapping[str, str]:
     """Read ``ZENOH_CONFIG_OVERRIDE``: key path to JSON text.
 
@@ -152,6 +208,17 @@ def overrides(text: str) -> Mapping[str, str]:
             raise UsageError(f"ZENOH_CONFIG_OVERRIDE has '{part}'; expected 'path/to/key=json'")
         found[key.strip()] = value.strip()
     return found
+
+
+def _tls(keys: KeyFolder) -> dict[str, Any]:
+    return {
+        "enable_mtls": True,
+        "verify_name_on_connect": True,
+        "close_link_on_expiration": True,
+        "root_ca_certificate": str(keys.authority),
+        **{f"{end}_certificate": str(keys.certificate) for end in ("listen", "connect")},
+        **{f"{end}_private_key": str(keys.key) for end in ("listen", "connect")},
+    }
 
 
 def _shared_memory(threshold: int) -> dict[str, Any]:

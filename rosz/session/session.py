@@ -19,7 +19,7 @@ import zenoh
 from rosz.errors import TransportError
 from rosz.session.advanced import advanced_publisher, advanced_subscriber
 from rosz.session.answers import Answers, AskOptions, Target
-from rosz.session.config import SessionConfig, overrides, zenoh_settings
+from rosz.session.config import SessionConfig, key_settings, overrides, zenoh_settings
 from rosz.session.declared import (
     Closable,
     Declared,
@@ -34,6 +34,7 @@ from rosz.session.ending import ClosedSession
 from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
 from rosz.session.probe import first_answered
+from rosz.session.refusals import refusals, tell_refusals
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
 from rosz.session.segments import sweep
 from rosz.session.stamp import HybridClock, Stamp
@@ -124,10 +125,13 @@ class Session:
                 settings = zenoh.Config.from_file(config.config_file)
             else:
                 settings = zenoh.Config.from_json5(json.dumps(zenoh_settings(config)))
+            for path, part in key_settings(config).items():
+                settings.insert_json5(path, json.dumps(part))
             for path, text in overrides(config.override).items():
                 settings.insert_json5(path, text)
         sweep()
         keep_freed_memory()
+        tell_refusals(config)
         where = ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
         try:
             with mapped(f"open a session ({where})"), _one_receiver():
@@ -137,9 +141,10 @@ class Session:
         except TransportError as error:
             if _NOBODY not in str(error):
                 raise
+            reasons = "".join(f"; no link to {reason}" for reason in refusals(config))
             raise TransportError(
-                f"nobody answers at {where} within {config.open_timeout:g} s: start 'rosz core', a"
-                " launch or a node there first, or name another place in ROSZ_RENDEZVOUS"
+                f"nobody answers at {where} within {config.open_timeout:g} s{reasons}: start 'rosz"
+                " core', a launch or a node there first, or name another place in ROSZ_RENDEZVOUS"
             ) from error
 
     def stamp(self) -> Stamp:

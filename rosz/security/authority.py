@@ -1,0 +1,226 @@
+"""A small certificate authority: one key that signs those of machines and people.
+
+Certificates are X.509 version 3 (RFC 5280) on the curve P-256. A holder's certificate serves both
+ends of a link, and bears the holder's name and, for machines, the addresses it is reached at.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import ipaddress
+import os
+import re
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosz.errors import UsageError
+from rosz.security.folder import AUTHORITY, CERTIFICATE, KEY, check_private
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
+    from cryptography.x509 import Certificate, GeneralName, Name
+
+__all__ = ("Authority", "read_certificate")
+
+_HOME = "authority"
+_NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?")
+_AUTHORITY_DAYS = 3650
+_CLOCKS_DIFFER = dt.timedelta(hours=1)
+
+
+class Authority:
+    """The authority of a folder of keys.
+
+    Args:
+        folder: What `create` made.
+
+    Raises:
+        UsageError: There is no authority, or others may read its key.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        key, certificate = folder / _HOME / KEY, folder / _HOME / CERTIFICATE
+        if not key.is_file() or not certificate.is_file():
+            raise UsageError(f"no authority in '{folder}': 'rosz keys init {folder}' makes one")
+        check_private(key)
+        self.certificate = read_certificate(certificate)
+        self._key = _read_key(key)
+
+    @classmethod
+    def create(cls, folder: Path, name: str = "rosz", days: int = _AUTHORITY_DAYS) -> Authority:
+        """Make a new authority.
+
+        Args:
+            folder: Where; is made if need be.
+            name: What its certificate calls it.
+            days: How long it is good for.
+
+        Raises:
+            UsageError: There is one already, which is not touched.
+        """
+        home = folder / _HOME
+        if (home / KEY).exists():
+            raise UsageError(
+                f"'{folder}' has an authority already; keys that it signed would be worth nothing"
+                " under a new one. To start anew, move the folder away first"
+            )
+        key = _new_key()
+        subject = _subject(f"{name} authority")
+        certificate = _Draft(subject, key.public_key(), days).sign(subject, key, authority=True)
+        _write(home, key, certificate)
+        return cls(folder)
+
+    def add(self, name: str, addresses: Sequence[str] = (), days: int = 825) -> Path:
+        """Make keys for a machine or a person.
+
+        Args:
+            name: What others call it: host name, or user name. Rules are by this name.
+            addresses: IP addresses and further host names that others reach the machine at.
+            days: How long they are good for.
+
+        Returns:
+            The folder to bring to the machine.
+
+        Raises:
+            UsageError: The name is none, or has keys already, which are not touched.
+        """
+        if not _NAME.fullmatch(name) or name == _HOME:
+            raise UsageError(
+                f"'{name}' is no name for a holder of keys; expected letters, digits, '.', '_', '-'"
+            )
+        folder = self.folder / name
+        if folder.exists():
+            raise UsageError(
+                f"'{name}' has keys already: '{folder}'. To replace them, delete that folder first"
+            )
+        key = _new_key()
+        draft = _Draft(_subject(name), key.public_key(), days, [name, *addresses])
+        certificate = draft.sign(self.certificate.subject, self._key, authority=False)
+        _write(folder, key, certificate)
+        shutil.copyfile(self.folder / _HOME / CERTIFICATE, folder / AUTHORITY)
+        return folder
+
+    def holders(self) -> list[Path]:
+        """Return the folders of all for whom there are keys, sorted."""
+        found = (file.parent for file in self.folder.glob(f"*/{CERTIFICATE}"))
+        return sorted(folder for folder in found if folder.name != _HOME)
+
+
+class _Draft:
+    """A certificate that nobody has signed yet."""
+
+    def __init__(self, subject: Name, public: Any, days: int, places: Sequence[str] = ()) -> None:
+        self._subject = subject
+        self._public = public
+        self._days = days
+        self._places = [_place(text) for text in places]
+
+    def sign(self, issuer: Name, key: EllipticCurvePrivateKey, *, authority: bool) -> Certificate:
+        from cryptography import x509
+        from cryptography.hazmat.primitives import hashes
+
+        now = dt.datetime.now(dt.UTC)
+        usage = x509.KeyUsage(
+            digital_signature=not authority,
+            content_commitment=False,
+            key_encipherment=False,
+            data_encipherment=False,
+            key_agreement=False,
+            key_cert_sign=authority,
+            crl_sign=authority,
+            encipher_only=False,
+            decipher_only=False,
+        )
+        builder = (
+            x509.CertificateBuilder(issuer, self._subject, self._public)
+            .serial_number(x509.random_serial_number())
+            .not_valid_before(now - _CLOCKS_DIFFER)
+            .not_valid_after(now + dt.timedelta(days=self._days))
+            .add_extension(x509.BasicConstraints(authority, 0 if authority else None), True)
+            .add_extension(usage, True)
+        )
+        if not authority:
+            both = [
+                x509.oid.ExtendedKeyUsageOID.SERVER_AUTH,
+                x509.oid.ExtendedKeyUsageOID.CLIENT_AUTH,
+            ]
+            builder = builder.add_extension(x509.ExtendedKeyUsage(both), False)
+            builder = builder.add_extension(x509.SubjectAlternativeName(self._places), False)
+        return builder.sign(key, hashes.SHA256())
+
+
+def read_certificate(file: Path) -> Certificate:
+    """Read a certificate.
+
+    Raises:
+        UsageError: It is none.
+    """
+    x509 = _cryptography().x509
+    try:
+        certificate: Certificate = x509.load_pem_x509_certificate(file.read_bytes())
+    except ValueError as error:
+        raise UsageError(f"'{file}' is no certificate: {error}") from error
+    return certificate
+
+
+def _read_key(file: Path) -> EllipticCurvePrivateKey:
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    try:
+        key = load_pem_private_key(file.read_bytes(), None)
+    except (ValueError, TypeError) as error:
+        raise UsageError(f"'{file}' is no private key: {error}") from error
+    if not isinstance(key, EllipticCurvePrivateKey):
+        raise UsageError(f"'{file}' is another kind of key than rosz makes; expected one on P-256")
+    return key
+
+
+def _new_key() -> EllipticCurvePrivateKey:
+    _cryptography()
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    return ec.generate_private_key(ec.SECP256R1())
+
+
+def _subject(name: str) -> Name:
+    from cryptography import x509
+
+    return x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
+
+
+def _place(text: str) -> GeneralName:
+    from cryptography import x509
+
+    try:
+        return x509.IPAddress(ipaddress.ip_address(text))
+    except ValueError:
+        if not _NAME.fullmatch(text):
+            raise UsageError(f"'{text}' is no IP address and no host name") from None
+        return x509.DNSName(text)
+
+
+def _write(folder: Path, key: EllipticCurvePrivateKey, certificate: Certificate) -> None:
+    from cryptography.hazmat.primitives import serialization as form
+
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    secret = key.private_bytes(form.Encoding.PEM, form.PrivateFormat.PKCS8, form.NoEncryption())
+    # Nobody may read it at any moment, and none that is there is overwritten.
+    handle = os.open(folder / KEY, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "wb") as file:
+        file.write(secret)
+    (folder / CERTIFICATE).write_bytes(certificate.public_bytes(form.Encoding.PEM))
+
+
+def _cryptography() -> Any:
+    try:
+        import cryptography.x509
+    except ImportError as error:
+        raise UsageError(
+            "making and reading certificates needs the 'cryptography' package:"
+            " pip install 'rosz[keys]'"
+        ) from error
+    return cryptography

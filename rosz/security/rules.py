@@ -1,0 +1,168 @@
+"""Access rules as people write them: for each holder of a key, the names it may use.
+
+::
+
+    laptop:
+      publish: [/cmd_vel, "/joy/**"]
+      subscribe: ["/**"]
+      call: [/reset]
+      set: ["/gains/**"]
+      get: true
+    operator: all
+    "*":                      # everybody who has a key
+      subscribe: [/map]
+
+``*`` stands for any part of one chunk of a name, ``**`` for any number of chunks. What is not
+allowed is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import msgspec
+import yaml
+
+from rosz.errors import YamlError, near_miss
+
+__all__ = ("ANYBODY", "EVERYTHING", "NAME_VERBS", "Permit", "Rules", "read_rules")
+
+ANYBODY: Final = "*"
+EVERYTHING: Final = "/**"
+NAME_VERBS: Final = ("publish", "subscribe", "call", "serve", "set")
+_FLAGS: Final = ("get", "control")
+_PATTERN: Final = re.compile(r"(/(\*\*|[A-Za-z0-9_*]+))+")
+
+
+class Permit(msgspec.Struct, frozen=True, kw_only=True):
+    """What one holder of a key may do.
+
+    Attributes:
+        publish: Topics it may publish, as patterns of global names.
+        subscribe: Topics it may subscribe to.
+        call: Services it may call.
+        serve: Services it may serve.
+        set: Parameters it may set and delete.
+        get: Whether it may read parameters, which are one store: all of them or none.
+        control: Whether it may ping and end nodes, set log levels, and ask about launches.
+    """
+
+    publish: tuple[str, ...] = ()
+    subscribe: tuple[str, ...] = ()
+    call: tuple[str, ...] = ()
+    serve: tuple[str, ...] = ()
+    set: tuple[str, ...] = ()
+    get: bool = False
+    control: bool = False
+
+    @classmethod
+    def all(cls) -> Permit:
+        """Return leave to do everything."""
+        names = dict.fromkeys(NAME_VERBS, (EVERYTHING,))
+        return cls(**names, get=True, control=True)
+
+    @property
+    def is_all(self) -> bool:
+        """Whether it is leave to do everything."""
+        return self == Permit.all()
+
+
+class Rules(msgspec.Struct, frozen=True):
+    """Who may do what.
+
+    Attributes:
+        permits: By the name in a key's certificate; under `ANYBODY`, what all may do.
+    """
+
+    permits: dict[str, Permit]
+
+
+def read_rules(text: str, file: str) -> Rules:
+    """Read the rules of a file.
+
+    Args:
+        text: What the file holds.
+        file: What errors call it.
+
+    Raises:
+        YamlError: It is no YAML, or says something that means nothing.
+    """
+    try:
+        top = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        raise YamlError(error.problem or "no YAML", file, line, column) from error
+    except yaml.YAMLError as error:
+        raise YamlError(str(error), file, 1, 1) from error
+    if top is None:
+        return Rules({})
+    reader = _Reader(file)
+    holders = reader.items(top, "key holders")
+    return Rules({str(name.value): reader.permit(value) for name, value in holders})
+
+
+class _Reader:
+    """Reads nodes of a document, and says of what is wrong where it stands."""
+
+    def __init__(self, file: str) -> None:
+        self._file = file
+
+    def items(self, node: yaml.Node, of: str) -> Iterator[tuple[yaml.Node, yaml.Node]]:
+        if not isinstance(node, yaml.MappingNode):
+            raise self._error(node, f"expected a mapping of {of}")
+        seen: set[str] = set()
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode) or not key.value:
+                raise self._error(key, "expected a name")
+            if key.value in seen:
+                raise self._error(key, f"'{key.value}' stands here twice")
+            seen.add(key.value)
+            yield key, value
+
+    def permit(self, node: yaml.Node) -> Permit:
+        if isinstance(node, yaml.ScalarNode):
+            if node.value == "all":
+                return Permit.all()
+            raise self._error(node, f"'{node.value}'; expected 'all', or a mapping of permissions")
+        given: dict[str, tuple[str, ...] | bool] = {}
+        for key, value in self.items(node, "permissions"):
+            verb = str(key.value)
+            if verb in NAME_VERBS:
+                given[verb] = self._patterns(value)
+            elif verb in _FLAGS:
+                given[verb] = self._flag(value)
+            else:
+                known = (*NAME_VERBS, *_FLAGS)
+                raise self._error(
+                    key,
+                    f"'{verb}' is no permission{near_miss(verb, known)}; expected one of"
+                    f" {', '.join(known)}",
+                )
+        return msgspec.convert(given, Permit)
+
+    def _patterns(self, node: yaml.Node) -> tuple[str, ...]:
+        parts: Sequence[yaml.Node] = node.value if isinstance(node, yaml.SequenceNode) else [node]
+        return tuple(self._pattern(part) for part in parts)
+
+    def _pattern(self, node: yaml.Node) -> str:
+        if not isinstance(node, yaml.ScalarNode):
+            raise self._error(node, "expected a name or a list of names")
+        text: str = node.value
+        if not _PATTERN.fullmatch(text) or "***" in text:
+            raise self._error(
+                node,
+                f"'{text}' is no pattern of global names; expected such as /cmd_vel, /arm/* or /**",
+            )
+        return text
+
+    def _flag(self, node: yaml.Node) -> bool:
+        if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:bool":
+            return bool(node.value.lower() in {"true", "yes", "on"})
+        raise self._error(node, "expected true or false")
+
+    def _error(self, node: yaml.Node, what: str) -> YamlError:
+        mark = node.start_mark
+        return YamlError(what, self._file, mark.line + 1, mark.column + 1)
