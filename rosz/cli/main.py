@@ -28,6 +28,7 @@ COMMANDS = {
     "pkg": "list, find and create packages",
     "log": "follow the log of all nodes, set levels",
     "doctor": "name what is wrong, what shows it and what to do",
+    "turtlesim": "take pictures of turtlesims",
     "env": "print what to eval in a shell",
 }
 _INTERRUPTED = 130
