@@ -15,7 +15,7 @@ import msgspec
 
 from rosz.errors import ExecutableNotFound, NotFoundError, PackageError, PackageNotFound, near_miss
 
-__all__ = ("Package", "PackageIndex")
+__all__ = ("MANIFEST", "Package", "PackageIndex", "crawl")
 
 MANIFEST = "package.xml"
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"})
@@ -108,7 +108,7 @@ class PackageIndex:
         known: dict[str, Package] = {}
         for root in self.roots:
             # Of two packages of a name the one nearer to the root wins.
-            for folder in sorted(_crawl(root), key=lambda folder: len(folder.parts)):
+            for folder in sorted(crawl(root), key=lambda folder: len(folder.parts)):
                 package = Package(_name_in(folder / MANIFEST), folder)
                 known.setdefault(package.name, package)
         return known
@@ -151,7 +151,7 @@ def _is_executable(file: Path) -> bool:
     return file.is_file() and os.access(file, os.X_OK)
 
 
-def _crawl(root: Path) -> Iterator[Path]:
+def crawl(root: Path) -> Iterator[Path]:
     """Walk to the folders that hold a package.xml; a package holds no further ones."""
     for folder, names, files in os.walk(root, followlinks=True):
         if MANIFEST in files:
