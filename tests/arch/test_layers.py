@@ -48,6 +48,7 @@ FLOORS = {
     "rosz.turtlebot3_sim": 6,
     "rosz.turtlesim": 6,
     "rosz.ros1": 7,
+    "rosz.workspace": 7,
     "rosz.cli": 8,
 }
 MAY_IMPORT_ZENOH = "rosz.session"
