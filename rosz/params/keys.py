@@ -3,12 +3,16 @@
 Under ``@rosz/<domain>/``::
 
     param/<path>                 one key per written path: msgpack of the value, or deleted
-    change                       writes, as replicas tell them to each other
+    change[/<path>]              writes, as replicas tell them to each other
     ack/<zid>                    to the writer of that session: I have applied it
-    store/<zid>/write            a write, told to one replica that seems to have missed it
+    store/<zid>/write[/<path>]   a write, told to one replica that seems to have missed it
     store/<zid>/sync             asked of one replica: what differs between us
-    store/<zid>/ask              asked of one replica: read, or write, for somebody who is none
+    store/<zid>/ask              asked of one replica: to read for somebody who is none
+    store/<zid>/set[/<path>]     asked of one replica: to write for somebody who is none
     replica/<zid>/<start>/<who>  liveliness token of a replica
+
+Where links need keys, the key of a write names a path that all of it lies at or below, so that
+rules can tell who may write what; no replica takes in a write that reaches further than its key.
 
 Replicas talk on ``change``, where a batch is one message. What they write also goes to the keys
 under ``param`` as soon as anybody subscribes to those: a Zenoh storage, a tool in another language.
@@ -17,14 +21,15 @@ under ``param`` as soon as anybody subscribes to those: a Zenoh storage, a tool 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 import msgspec
 
 from rosz.errors import DecodeError
-from rosz.params.paths import Path, from_key, joined, to_key
+from rosz.params.paths import Path, common, from_key, joined, to_key
 from rosz.wire import own_key
 
-__all__ = ("Keys", "Member", "matches")
+__all__ = ("Keys", "Member", "check_reach", "matches")
 
 
 class Member(msgspec.Struct, frozen=True, order=True):
@@ -46,9 +51,11 @@ class Keys:
 
     Args:
         domain: The ROS domain.
+        scoped: Whether the key of a write names how far it reaches.
     """
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, *, scoped: bool = False) -> None:
+        self.scoped = scoped
         self.params = own_key(domain, "param")
         self.change = own_key(domain, "change")
         self.tokens = own_key(domain, "replica", "**")
@@ -81,6 +88,29 @@ class Keys:
         """Return the key on which a replica is told a write once more."""
         return own_key(self._domain, "store", zid, "write")
 
+    def set(self, zid: str) -> str:
+        """Return the key on which a replica writes for those who are none."""
+        return own_key(self._domain, "store", zid, "set")
+
+    def reaching(self, key: str, paths: Iterable[Path]) -> str:
+        """Return the key for a write of some paths, where they are named in it."""
+        if not self.scoped:
+            return key
+        reach = to_key(common(paths))
+        return f"{key}/{reach}" if reach else key
+
+    def reach(self, key: str, base: str) -> Path:
+        """Return the path that a key for a write names.
+
+        Args:
+            key: What the write came on.
+            base: What such a key begins with.
+
+        Raises:
+            DecodeError: It is no such key.
+        """
+        return from_key(key[len(base) + 1 :])
+
     def sync(self, zid: str) -> str:
         """Return the key on which a replica compares itself with others."""
         return own_key(self._domain, "store", zid, "sync")
@@ -107,6 +137,21 @@ class Keys:
                 "replica token", 0, f"'{token}', expected '{head}<zid>/<start>/<who>'"
             )
         return Member(int(chunks[1]), chunks[0], joined(from_key(chunks[2]))[1:])
+
+
+def check_reach(paths: Iterable[Path], reach: Path) -> None:
+    """Refuse a write that reaches further than its key says.
+
+    Raises:
+        DecodeError: It does.
+    """
+    if not reach:
+        return
+    for path in paths:
+        if path[: len(reach)] != reach:
+            raise DecodeError(
+                "parameter batch", -1, f"'{joined(path)}' on the key for '{joined(reach)}'"
+            )
 
 
 def matches(expression: str, key: str) -> bool:

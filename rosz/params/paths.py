@@ -9,14 +9,25 @@ its graph names. Zenoh's keys are not, so there a part's forbidden characters ar
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
 from rosz import names
 from rosz.errors import DecodeError, InvalidName, ParamError
 from rosz.params.values import unsound_text
 
-__all__ = ("ROOT", "Path", "climb", "from_key", "joined", "parent", "resolve", "split", "to_key")
+__all__ = (
+    "ROOT",
+    "Path",
+    "climb",
+    "common",
+    "from_key",
+    "joined",
+    "parent",
+    "resolve",
+    "split",
+    "to_key",
+)
 
 Path = tuple[str, ...]
 ROOT: Final[Path] = ()
@@ -47,6 +58,18 @@ def joined(path: Path) -> str:
 def parent(path: Path) -> Path:
     """Return the path one level up; the root's is the root."""
     return path[:-1]
+
+
+def common(paths: Iterable[Path]) -> Path:
+    """Return the longest path that all of some lie at or below; the root's, if there are none."""
+    found = list(paths)
+    if not found:
+        return ROOT
+    first, last = min(found), max(found)
+    length = 0
+    while length < min(len(first), len(last)) and first[length] == last[length]:
+        length += 1
+    return first[:length]
 
 
 def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> str:

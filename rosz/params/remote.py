@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
@@ -41,7 +41,7 @@ class ParamClient:
     ) -> None:
         self._session = session
         self._domain = domain
-        self._keys = Keys(domain)
+        self._keys = Keys(domain, scoped=session.secured)
         self._origin = origin or process_label()
         self._timeout = timeout
         self._members: list[Member] = []
@@ -150,7 +150,7 @@ class ParamClient:
         stamp = self._session.stamp()
         message = Batch.of((stamp.time, stamp.id), self._origin, batch)
         patience = min(ACKNOWLEDGED_BY, self._timeout)
-        answer = self._ask(Question("write", batch=message, timeout=patience))
+        answer = self._ask(Question("write", batch=message, timeout=patience), batch)
         return Outcome(stamp.time, tuple(answer.slow))
 
     def follow(self) -> Follower:
@@ -173,23 +173,36 @@ class ParamClient:
             raise NoReplica(NOBODY)
         return self._members
 
-    def _ask(self, question: Question) -> Answer:
-        """Ask the replicas one after the other, those last that were asked in vain before."""
+    def _ask(self, question: Question, batch: Sequence[Change] = ()) -> Answer:
+        """Ask the replicas one after the other, those last that were asked in vain before.
+
+        Args:
+            question: What to ask.
+            batch: What it writes, if it does.
+        """
         deadline = time.monotonic() + self._timeout
         data = encode(question)
+        patience = question.timeout + _PATIENCE
         while True:
             for member in sorted(self._members or self._look(), key=self._was_silent):
-                answer = self._ask_one(member, data, question.timeout + _PATIENCE)
+                answer = self._ask_one(self._key(member, batch), member, data, patience)
                 if answer is not None and answer.status != "joining":
                     return _checked(question, answer)
                 if time.monotonic() >= deadline:
                     who = ", ".join(self.silent) or "those there are have not joined yet"
+                    if self._session.secured:
+                        who += "; or the rules beside their keys do not allow it"
                     raise WaitTimeout("answer about parameters", self._timeout, f"asked: {who}")
             self._members = []
             time.sleep(_JOINING_POLL)
 
-    def _ask_one(self, member: Member, data: bytes, patience: float) -> Answer | None:
-        replies = self._session.get(self._keys.ask(member.zid), payload=data, timeout=patience)
+    def _key(self, member: Member, batch: Sequence[Change]) -> str:
+        if not batch:
+            return self._keys.ask(member.zid)
+        return self._keys.reaching(self._keys.set(member.zid), (path for path, _ in batch))
+
+    def _ask_one(self, key: str, member: Member, data: bytes, patience: float) -> Answer | None:
+        replies = self._session.get(key, payload=data, timeout=patience)
         for reply in replies:
             if reply.ok:
                 return decode(reply.payload, Answer)

@@ -102,9 +102,11 @@ class Session:
 
     Args:
         raw: The open Zenoh session.
+        secured: Whether links beyond the machine need keys.
     """
 
-    def __init__(self, raw: zenoh.Session) -> None:
+    def __init__(self, raw: zenoh.Session, *, secured: bool = False) -> None:
+        self.secured = secured
         self._raw: Any = raw
         self._closing = threading.Lock()
         self.zid = str(raw.zid())
@@ -131,13 +133,14 @@ class Session:
                 settings.insert_json5(path, text)
         sweep()
         keep_freed_memory()
+        secured = config.keys is not None
         tell_refusals(config)
         where = ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
         try:
             with mapped(f"open a session ({where})"), _one_receiver():
                 if config.mode == "peer" and config.hold_rendezvous:
-                    return cls(open_at(settings, config.rendezvous))
-                return cls(zenoh.open(settings))
+                    return cls(open_at(settings, config.rendezvous), secured=secured)
+                return cls(zenoh.open(settings), secured=secured)
         except TransportError as error:
             if _NOBODY not in str(error):
                 raise

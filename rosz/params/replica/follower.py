@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from types import TracebackType
 from typing import Final, Self
 
-from rosz.errors import NoReplica
+from rosz.errors import DecodeError, NoReplica
 from rosz.params.keys import Keys
 from rosz.params.replica.members import Members
 from rosz.params.replica.reading import Reading
@@ -15,6 +16,8 @@ from rosz.params.replica.worker import Worker
 from rosz.session import Sample, Session
 
 __all__ = ("Follower",)
+
+_log = logging.getLogger("rosz.params")
 
 _COMPARE_EVERY: Final = 5.0
 
@@ -38,7 +41,8 @@ class Follower(Reading):
         self._worker = Worker("rosz-params")
         self._members = Members(session, keys)
         self._sync = Synchroniser(session, keys, self._state, self._members, self._worker)
-        self._subscriber = session.subscriber(keys.change, self._on_change)
+        self._keys = keys
+        self._subscriber = session.subscriber(f"{keys.change}/**", self._on_change)
         try:
             self._members.follow(lambda _member, _alive: None, timeout)
             self._join()
@@ -71,8 +75,14 @@ class Follower(Reading):
         self._sync.join()
 
     def _on_change(self, sample: Sample) -> None:
-        payload = sample.payload
-        self._worker.submit(lambda: self._state.take(payload))
+        payload, key = sample.payload, sample.key
+        self._worker.submit(lambda: self._take(payload, key))
+
+    def _take(self, payload: bytes, key: str) -> None:
+        try:
+            self._state.take(payload, self._keys.reach(key, self._keys.change))
+        except DecodeError as error:
+            _log.warning("a replica wrote what is no parameter: %s", error)
 
     def _compare(self) -> None:
         self._sync.compare_with_one()

@@ -12,7 +12,7 @@ from typing import Final
 from rosz.errors import DecodeError, RoszError
 from rosz.params.keys import Keys
 from rosz.params.merge import Change
-from rosz.params.paths import joined
+from rosz.params.paths import ROOT, Path, joined
 from rosz.params.replica.acks import Acks, Pending
 from rosz.params.replica.members import Members
 from rosz.params.replica.state import State
@@ -63,8 +63,9 @@ class Line:
         self._change = session.publisher(keys.change, block=True)
         self._declared: list[Closable] = [
             session.subscriber(keys.change, self._on_change, remote_only=True),
+            session.subscriber(f"{keys.change}/*/**", self._on_scoped, remote_only=True),
             session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
-            session.queryable(keys.write(session.zid), self._on_retry, complete=True),
+            session.queryable(f"{keys.write(session.zid)}/**", self._on_retry, complete=True),
         ]
 
     def tell(
@@ -91,9 +92,9 @@ class Line:
         try:
             batch = Batch.of((stamp.time, stamp.id), origin, changes)
             data = seal(self._session.zid, pending.number, encode(batch))
-            self._change.put(data)
+            self._tell(changes, data)
             if not pending.wait(min(_PATIENCE, timeout)):
-                self._tell_again(pending, data, deadline - time.monotonic())
+                self._tell_again(pending, changes, data, deadline - time.monotonic())
                 pending.wait(deadline - time.monotonic())
         finally:
             late = sorted(members.label(zid) for zid in self.acks.close(pending))
@@ -115,12 +116,21 @@ class Line:
             self._hush(zid)
         self._change.close()
 
-    def _tell_again(self, pending: Pending, data: bytes, timeout: float) -> None:
+    def _tell(self, changes: list[Change], data: bytes) -> None:
+        if self._keys.scoped:
+            key = self._keys.reaching(self._keys.change, (path for path, _ in changes))
+            self._session.put(key, data)
+        else:
+            self._change.put(data)
+
+    def _tell_again(
+        self, pending: Pending, changes: list[Change], data: bytes, timeout: float
+    ) -> None:
         if timeout <= 0:
             return
         for zid in sorted(pending.waiting.copy()):
             self._session.get_async(
-                self._keys.write(zid),
+                self._keys.reaching(self._keys.write(zid), (path for path, _ in changes)),
                 partial(self._on_confirmed, zid, pending.number),
                 lambda: None,
                 payload=data,
@@ -132,7 +142,17 @@ class Line:
             self.acks.heard(zid, number)
 
     def _on_change(self, sample: Sample) -> None:
-        payload = sample.payload
+        self._take(sample.payload, ROOT)
+
+    def _on_scoped(self, sample: Sample) -> None:
+        try:
+            reach = self._keys.reach(sample.key, self._keys.change)
+        except DecodeError as error:
+            _log.warning("a replica wrote what is no parameter: %s", error)
+            return
+        self._take(sample.payload, reach)
+
+    def _take(self, payload: bytes, reach: Path) -> None:
         try:
             sender, number, _ = unseal(payload)
         except DecodeError as error:
@@ -140,16 +160,16 @@ class Line:
             return
         then = partial(self._acknowledge, sender, number)
         if len(payload) > _LARGE:
-            self._worker.submit(lambda: self._apply(payload, then))
-        elif self._state.note(payload):
+            self._worker.submit(lambda: self._apply(payload, reach, then))
+        elif self._state.note(payload, reach):
             then()
-        elif self._state.take_soon(payload):
+        elif self._state.take_soon(payload, reach):
             self._settle(then)
         else:
-            self._worker.submit(lambda: self._apply(payload, then))
+            self._worker.submit(lambda: self._apply(payload, reach, then))
 
-    def _apply(self, payload: bytes, then: Callable[[], None]) -> None:
-        self._state.take(payload)
+    def _apply(self, payload: bytes, reach: Path, then: Callable[[], None]) -> None:
+        self._state.take(payload, reach)
         self._settle(then)
 
     def _settle(self, then: Callable[[], None]) -> None:
@@ -191,7 +211,13 @@ class Line:
 
     def _on_retry(self, query: Query) -> None:
         payload = query.payload or b""
-        self._worker.submit(lambda: self._apply(payload, lambda: self._confirm(query)))
+        try:
+            reach = self._keys.reach(query.key, self._keys.write(self._session.zid))
+        except DecodeError as error:
+            with query:
+                query.reply_error(str(error))
+            return
+        self._worker.submit(lambda: self._apply(payload, reach, lambda: self._confirm(query)))
 
     def _confirm(self, query: Query) -> None:
         with query:

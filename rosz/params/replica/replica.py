@@ -105,16 +105,17 @@ class Replica(Reading):
         self._closed = False
         self._saver = self._load(keep)
         self._worker = Worker("rosz-params")
-        keys = Keys(domain)
+        keys = Keys(domain, scoped=session.secured)
         kept = self._saver.when_safe if self._saver is not None else None
         self._line = Line(session, keys, self._state, self._worker, kept)
         self._mirror = Mirror(session, keys, self._state, self._worker)
         self._members = Members(session, keys)
         self._sync = Synchroniser(session, keys, self._state, self._members, self._worker)
-        server = Server(self, self._state.stamp, self._worker, lambda: self._sync.ready)
+        server = Server(self, keys, self._state.stamp, self._worker, lambda: self._sync.ready)
         self._declared: list[Closable] = [
             session.queryable(keys.sync(session.zid), self._sync.serve, complete=True),
             session.queryable(keys.ask(session.zid), server.serve, complete=True),
+            session.queryable(f"{keys.set(session.zid)}/**", server.serve_writes, complete=True),
         ]
         if settled is not None:
             settled.wait(_SETTLED_BY)

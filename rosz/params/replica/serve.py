@@ -8,8 +8,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from rosz.errors import DecodeError, ParamNotFound, RoszError
+from rosz.params.keys import Keys, check_reach
 from rosz.params.merge import Change
-from rosz.params.paths import split
+from rosz.params.paths import Path, split
 from rosz.params.replica.reading import names_beside
 from rosz.params.replica.worker import Worker
 from rosz.params.wire import Answer, Question, decode, encode, packed
@@ -34,6 +35,7 @@ class Server:
 
     Args:
         replica: Whom to read and write.
+        keys: Where it is asked.
         stamp: Gives stamps to those who are to write.
         worker: Where the reading is done.
         ready: Tells whether the replica has joined.
@@ -42,11 +44,13 @@ class Server:
     def __init__(
         self,
         replica: Replica,
+        keys: Keys,
         stamp: Callable[[], Stamp],
         worker: Worker,
         ready: Callable[[], bool],
     ) -> None:
         self._replica = replica
+        self._keys = keys
         self._stamp_now = stamp
         self._worker = worker
         self._ready = ready
@@ -55,16 +59,20 @@ class Server:
             "get": self._get,
             "names": self._names,
             "search": self._search,
-            "write": self._write,
             "stamp": self._stamp,
         }
 
     def serve(self, query: Query) -> None:
         """Take in a question."""
         payload = query.payload or b""
-        self._worker.submit(lambda: self._sort(query, payload))
+        self._worker.submit(lambda: self._read(query, payload))
 
-    def _sort(self, query: Query, payload: bytes) -> None:
+    def serve_writes(self, query: Query) -> None:
+        """Take in a write."""
+        payload = query.payload or b""
+        self._worker.submit(lambda: self._begin_write(query, payload))
+
+    def _read(self, query: Query, payload: bytes) -> None:
         try:
             question = decode(payload, Question)
         except DecodeError as error:
@@ -73,26 +81,34 @@ class Server:
         verb = self._verbs.get(question.verb)
         if verb is None:
             self._reply(query, Answer("refused", text=f"'{question.verb}' is nothing to ask for"))
-        elif not self._ready():
-            self._reply(query, Answer("joining"))
-        elif question.verb != "write":
-            self._reply(query, self._outcome(verb, question))
-        elif self._places.acquire(blocking=False):
-            threading.Thread(
-                target=self._wait, args=(query, verb, question), name="rosz-params-ask", daemon=True
-            ).start()
+        elif self._ready():
+            self._reply(query, self._outcome(lambda: verb(question), question))
         else:
             self._reply(query, Answer("joining"))
 
-    def _wait(self, query: Query, verb: Callable[[Question], Answer], question: Question) -> None:
+    def _begin_write(self, query: Query, payload: bytes) -> None:
         try:
-            self._reply(query, self._outcome(verb, question))
+            order = decode(payload, Question)
+            reach = self._keys.reach(query.key, self._keys.set(self._replica.zid))
+        except DecodeError as error:
+            self._reply(query, Answer("refused", text=str(error)))
+            return
+        if not self._ready() or not self._places.acquire(blocking=False):
+            self._reply(query, Answer("joining"))
+            return
+        threading.Thread(
+            target=self._end_write, args=(query, order, reach), name="rosz-params-ask", daemon=True
+        ).start()
+
+    def _end_write(self, query: Query, order: Question, reach: Path) -> None:
+        try:
+            self._reply(query, self._outcome(lambda: self._write(order, reach), order))
         finally:
             self._places.release()
 
-    def _outcome(self, verb: Callable[[Question], Answer], question: Question) -> Answer:
+    def _outcome(self, act: Callable[[], Answer], question: Question) -> Answer:
         try:
-            return verb(question)
+            return act()
         except ParamNotFound as error:
             beside = names_beside(self._replica.root, split(question.name))
             return Answer("missing", text=str(error), value=beside)
@@ -120,13 +136,14 @@ class Server:
     def _stamp(self, _: Question) -> Answer:
         return Answer(value=self._stamp_now().time)
 
-    def _write(self, question: Question) -> Answer:
-        batch = question.batch
+    def _write(self, order: Question, reach: Path) -> Answer:
+        batch = order.batch
         if batch is None:
             return Answer("refused", text="a write that writes nothing")
         changes: list[Change] = [(write.path, write.value) for write in batch.writes()]
+        check_reach((path for path, _ in changes), reach)
         stamp = Stamp(batch.time, batch.clock)
         outcome = self._replica.write(
-            changes, origin=batch.origin, stamp=stamp, timeout=min(question.timeout, _LONGEST)
+            changes, origin=batch.origin, stamp=stamp, timeout=min(order.timeout, _LONGEST)
         )
         return Answer(slow=list(outcome.slow))

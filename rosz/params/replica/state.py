@@ -11,8 +11,9 @@ from typing import Final
 
 from rosz.errors import DecodeError
 from rosz.params.history import History
+from rosz.params.keys import check_reach
 from rosz.params.merge import Change
-from rosz.params.paths import Path
+from rosz.params.paths import ROOT, Path
 from rosz.params.replica.watch import Callback, Watch, Watchers
 from rosz.params.tree import Tree
 from rosz.params.wire import Batch, decode, unseal
@@ -52,7 +53,7 @@ class State:
         self._lock = threading.Lock()
         self._current = _Current(self)
         self._sinks: tuple[Callable[[list[Write]], None], ...] = ()
-        self._unread: deque[bytes] = deque()
+        self._unread: deque[tuple[bytes, Path]] = deque()
         self._reading = False
 
     def __len__(self) -> int:
@@ -72,15 +73,19 @@ class State:
         with self._current:
             pass
 
-    def note(self, message: bytes) -> bool:
+    def note(self, message: bytes, reach: Path = ROOT) -> bool:
         """Take in a message of another replica, sealed, in next to no time.
+
+        Args:
+            message: It.
+            reach: The path that all that it writes has to lie at or below.
 
         Returns:
             Whether that is all; if not, somebody waits for it and it has to be applied at once.
         """
         if self._is_followed() or len(self._unread) >= _MOST_UNREAD:
             return False
-        self._unread.append(message)
+        self._unread.append((message, reach))
         # Whoever began to follow meanwhile may have read what was there before this.
         return not self._is_followed()
 
@@ -115,12 +120,12 @@ class State:
         with self._current:
             return self._apply(writes)
 
-    def take(self, message: bytes) -> None:
-        """Apply a message of another replica, sealed."""
+    def take(self, message: bytes, reach: Path = ROOT) -> None:
+        """Apply a message of another replica, sealed; the arguments are those of `note`."""
         with self._current:
-            self._take(message)
+            self._take(message, reach)
 
-    def take_soon(self, message: bytes) -> bool:
+    def take_soon(self, message: bytes, reach: Path = ROOT) -> bool:
         """Apply a message of another replica, unless somebody is at work on the history just now.
 
         Returns:
@@ -129,7 +134,7 @@ class State:
         if not self.enter(_PATIENCE):
             return False
         try:
-            self._take(message)
+            self._take(message, reach)
         finally:
             self.leave()
         return True
@@ -202,7 +207,7 @@ class State:
         if self._unread:
             self._reading = True
             while self._unread:
-                self._take(self._unread.popleft())
+                self._take(*self._unread.popleft())
             self._reading = False
         return True
 
@@ -213,10 +218,12 @@ class State:
     def _is_followed(self) -> bool:
         return bool(self._sinks) or self.watchers.active
 
-    def _take(self, message: bytes) -> None:
+    def _take(self, message: bytes, reach: Path) -> None:
         try:
             start = unseal(message)[2]
-            self._apply(decode(memoryview(message)[start:], Batch).writes())
+            writes = decode(memoryview(message)[start:], Batch).writes()
+            check_reach((write.path for write in writes), reach)
+            self._apply(writes)
         except DecodeError as error:
             _log.warning("a replica wrote what is no parameter: %s", error)
 
