@@ -89,10 +89,10 @@ class Output:
         if all(self._terminals) and self._same:
             terminal = self._terminal(owner, 1, prefix)
             if terminal is not None:
-                return Streams(_nothing(), terminal, os.dup(terminal), terminal=True)
+                return Streams(_input(), terminal, os.dup(terminal), terminal=True)
         out = self._pipe(owner, 1, prefix)
         err = os.dup(out) if self._same else self._pipe(owner, 2, prefix)
-        return Streams(_nothing(), out, err, terminal=False)
+        return Streams(_input(), out, err, terminal=False)
 
     def log(self, owner: int, prefix: str, file: Path | None, mode: Literal["w", "a"]) -> Streams:
         """Return streams whose standard output ends up in a file, and only errors on the screen.
@@ -111,7 +111,7 @@ class Output:
         err = self._terminal(owner, 2, prefix) if self._terminals[1] else None
         if err is None:
             err = self._pipe(owner, 2, prefix)
-        return Streams(_nothing(), out, err, terminal=False)
+        return Streams(_input(), out, err, terminal=False)
 
     @staticmethod
     def direct() -> Streams:
@@ -186,8 +186,12 @@ class Output:
             self._process.wait()
 
 
-def _nothing() -> int:
-    return os.open(os.devnull, os.O_RDONLY)
+def _input() -> int | None:
+    """Return what nodes read: the terminal of the launch, as in ROS 1, or nothing.
+
+    A pipe is none of theirs: over ssh it carries what the launch tells the agent.
+    """
+    return None if os.isatty(0) else os.open(os.devnull, os.O_RDONLY)
 
 
 def _same_file(first: int, second: int) -> bool:
