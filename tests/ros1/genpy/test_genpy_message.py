@@ -71,7 +71,6 @@ def test_printable_arguments() -> None:
         from geometry_msgs.msg import PoseStamped, Twist
         from std_msgs.msg import Empty, String
         import io
-from typing import Any
         result = [get_printable_message_args(cls()) for cls in (PoseStamped, Twist, Empty, String)]
         result.append(get_printable_message_args(Twist(), io.StringIO(), "cmd."))
         """,
