@@ -25,7 +25,7 @@ COMMANDS = {
     "msg": "show message types",
     "srv": "show service types",
     "gen": "write Python modules for the messages of a package",
-    "pkg": "list, find and create packages",
+    "pkg": "list, find, create and check packages",
     "log": "follow the log of all nodes, set levels",
     "doctor": "name what is wrong, what shows it and what to do",
     "turtlesim": "take pictures of turtlesims",

@@ -1,4 +1,4 @@
-"""``rosz pkg``: list, find and create packages."""
+"""``rosz pkg``: list, find, create and check packages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ("app",)
 
 app = typer.Typer(
-    add_completion=False, no_args_is_help=True, help="List, find and create packages."
+    add_completion=False, no_args_is_help=True, help="List, find, create and check packages."
 )
 
 
@@ -69,6 +69,32 @@ def create_package(
     sys.stdout.write(
         f"created {folder}\nrun it with: rosz launch {folder / 'launch' / 'talker.launch'}\n"
     )
+
+
+@app.command("check", context_settings={"ignore_unknown_options": True})
+def check_command(
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[FOLDER|PACKAGE]...", help="The workspace around the present folder, if none."
+        ),
+    ] = None,
+    *,
+    setup: Annotated[
+        bool, typer.Option("--setup", help="Write devel/setup.bash and its kin, as catkin_make.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+) -> int:
+    """Check packages: manifest, definitions, launch files, .cfg files and scripts.
+
+    Exit code 1 if there is an error. Options and targets of catkin_make are passed over.
+    """
+    from rosz.cli.pkg_check import check_packages, set_up
+
+    code = check_packages(words or (), as_json=json)
+    if setup:
+        set_up()
+    return code
 
 
 # What ROS 1 packages list as dependencies and rosz brings, though not as packages.

@@ -16,7 +16,7 @@ SHELLS: tuple[Shell, ...] = ("bash", "zsh", "fish")
 
 COMMANDS = {
     "catkin_create_pkg": "pkg create",
-    "catkin_make": "pkg check",
+    "catkin_make": "pkg check --setup",
     "roscore": "core",
     "roslaunch": "launch",
     "rosmsg": "msg",

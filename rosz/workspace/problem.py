@@ -1,0 +1,52 @@
+"""Something wrong in a package, and where."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from rosz.errors import SourceError
+
+__all__ = ("Problem", "error", "from_error", "warning")
+
+
+class Problem(msgspec.Struct, frozen=True, order=True):
+    """Something wrong in a package, or likely to be.
+
+    Attributes:
+        path: The file or folder.
+        line: 1-based line, 0 for the whole file.
+        column: 1-based column, 0 where unknown.
+        level: ``error``, or ``warning`` for what still works with rosz.
+        text: What is wrong and what to do.
+    """
+
+    path: str
+    line: int
+    column: int
+    level: Literal["error", "warning"]
+    text: str
+
+    @property
+    def place(self) -> str:
+        """``path:line:column``, as far as known."""
+        return ":".join(str(part) for part in (self.path, self.line, self.column) if part)
+
+
+def error(path: Path, text: str, line: int = 0, column: int = 0) -> Problem:
+    """Return a problem that keeps something from working."""
+    return Problem(str(path), line, column, "error", text)
+
+
+def warning(path: Path, text: str, line: int = 0, column: int = 0) -> Problem:
+    """Return a problem that something else than rosz may have with the file."""
+    return Problem(str(path), line, column, "warning", text)
+
+
+def from_error(fault: Exception, path: Path) -> Problem:
+    """Return what an exception says as a problem of a file; its own place counts if it has one."""
+    if isinstance(fault, SourceError):
+        return Problem(fault.path, fault.line, fault.column, "error", fault.reason)
+    return error(path, str(fault))

@@ -1,0 +1,71 @@
+"""``rosz pkg check``, and the lines of course documents around ``catkin_make``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from network import Network
+
+from .command import rosz
+from .test_env import evaluate
+
+
+def test_a_workspace_that_is_well(tmp_path: Path) -> None:
+    (tmp_path / "src").mkdir()
+    rosz(tmp_path / "src", "pkg", "create", "demo")
+    done = rosz(tmp_path, "pkg", "check")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "checked 1 package: 0 errors, 0 warnings; nothing needs building\n"
+
+
+def test_what_is_wrong_is_said_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / "src").mkdir()
+    rosz(tmp_path / "src", "pkg", "create", "demo")
+    (tmp_path / "src/demo/msg/Odd.msg").write_text("int3 x\n")
+    done = rosz(tmp_path, "pkg", "check", "demo", variables={"ROSZ_PACKAGE_PATH": "src"})
+    assert (done.returncode, done.stderr) == (1, "")
+    line, summary = done.stdout.splitlines()
+    assert line.startswith("src/demo/msg/Odd.msg:1:1: error: type 'int3' of field 'x'")
+    assert summary == "checked 1 package: 1 error, 0 warnings"
+    as_json = rosz(tmp_path, "pkg", "check", "--json")
+    assert as_json.returncode == 1
+    (package,) = json.loads(as_json.stdout)
+    assert package["problems"][0]["line"] == 1
+
+
+def test_no_workspace(tmp_path: Path) -> None:
+    done = rosz(tmp_path, "pkg", "check")
+    assert done.returncode == 1
+    assert "no package in the workspace around" in done.stderr
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_course_of_a_course(network: Network, shell: str) -> None:
+    done = evaluate(
+        network,
+        shell,
+        "mkdir -p catkin_ws/src",
+        "cd catkin_ws/src",
+        "catkin_create_pkg beginner_tutorials std_msgs rospy roscpp",
+        "cd ..",
+        "catkin_make -j4 -DCMAKE_BUILD_TYPE=Release",
+        f"source devel/setup.{shell}",
+        "cd /",
+        "roscd beginner_tutorials/scripts && pwd",
+        "rosls beginner_tutorials",
+        "rosmsg show beginner_tutorials/Number",
+        "timeout 30 rosrun beginner_tutorials talker.py _rate:=100 &",
+        "sh -c 'until rostopic list 2>/dev/null | grep -q /numbers; do :; done'",
+        "rostopic echo -n 1 /numbers",
+        "rosnode kill /talker",
+    )
+    assert "WARNING: dependency" not in done.stderr
+    out = done.stdout
+    assert "checked 1 package: 0 errors, 0 warnings; nothing needs building\n" in out
+    assert f"{network.folder}/catkin_ws/src/beginner_tutorials/scripts\n" in out
+    assert "launch\nmsg\npackage.xml\nscripts\n" in out
+    assert "int64 data\nstring name\n" in out
+    assert 'name: "tick"\n---\n' in out
+    assert "killed" in out
