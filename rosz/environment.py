@@ -33,7 +33,10 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         rendezvous: ``ROSZ_RENDEZVOUS``, the endpoint where local sessions meet.
         connect: ``ROSZ_CONNECT``, endpoints of other machines, separated by commas.
         listen: ``ROSZ_LISTEN``, endpoints to accept other machines on, separated by commas.
-        mode: ``ROSZ_MODE``: ``peer`` (mesh) or ``client`` (of a router at the rendezvous).
+        mode: ``ROSZ_MODE``: ``peer`` (mesh) or ``client`` (of the core at the rendezvous, or of
+            one of ``connect``); when unset, ``client`` where ``connect`` is given and ``listen``
+            is not: nothing can dial a peer that listens on loopback alone, so a mesh would end at
+            the machine.
         multicast: ``ROSZ_MULTICAST=1`` looks for others on the local network.
         shared_memory: ``ROSZ_SHM``: samples of so many bytes and more go by shared memory; 0: off.
         keys: ``ROSZ_KEYS``, folder of the keys that links beyond this machine need.
@@ -79,12 +82,14 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         """
         env = os.environ if environ is None else environ
         home = Path(env.get("ROS_HOME") or Path(env.get("HOME") or "/") / ".ros")
+        connect = _endpoints(env.get("ROSZ_CONNECT", ""))
+        listen = _endpoints(env.get("ROSZ_LISTEN", ""))
         return cls(
             domain=_domain(env.get("ROS_DOMAIN_ID", "")),
             rendezvous=env.get("ROSZ_RENDEZVOUS") or DEFAULT_RENDEZVOUS,
-            connect=_endpoints(env.get("ROSZ_CONNECT", "")),
-            listen=_endpoints(env.get("ROSZ_LISTEN", "")),
-            mode=_mode(env.get("ROSZ_MODE", "")),
+            connect=connect,
+            listen=listen,
+            mode=_mode(env.get("ROSZ_MODE", ""), dials=bool(connect and not listen)),
             multicast=env.get("ROSZ_MULTICAST", "") not in {"", "0"},
             shared_memory=_bytes("ROSZ_SHM", env.get("ROSZ_SHM", "")),
             keys=Path(env["ROSZ_KEYS"]).expanduser().absolute() if env.get("ROSZ_KEYS") else None,
@@ -173,11 +178,11 @@ def _domain(text: str) -> int:
     return int(text)
 
 
-def _mode(text: str) -> Literal["peer", "client"]:
+def _mode(text: str, *, dials: bool) -> Literal["peer", "client"]:
+    if text == "client" or (dials and not text):
+        return "client"
     if text in {"", "peer"}:
         return "peer"
-    if text == "client":
-        return "client"
     raise UsageError(f"ROSZ_MODE is '{text}'; expected 'peer' or 'client'")
 
 

@@ -8,13 +8,14 @@ that outlive all nodes, on disk also itself.
 from __future__ import annotations
 
 import re
+import socket
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.session import Session, SessionConfig
+from rosz.session import Session, SessionConfig, keys_of, secured
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -59,16 +60,21 @@ class Core:
     ) -> None:
         from rosz.params.replica import Replica
 
-        self.endpoints = (environment.rendezvous, *environment.listen, *listen)
+        self.endpoints = _listening(environment.rendezvous, (*environment.listen, *listen))
         self.connect = (*environment.connect, *connect)
         self.domain = environment.domain
         self.store = store
+        keys = keys_of(environment)
+        if keys is not None:
+            self.endpoints = tuple(secured(endpoint) for endpoint in self.endpoints)
+            self.connect = tuple(secured(endpoint) for endpoint in self.connect)
         config = SessionConfig(
             mode="router",
-            rendezvous=environment.rendezvous,
+            rendezvous=self.endpoints[0],
             listen=self.endpoints[1:],
             connect=self.connect,
             multicast=environment.multicast,
+            keys=keys,
             config_file=environment.zenoh_config,
             override=environment.zenoh_override,
         )
@@ -104,6 +110,28 @@ class Core:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _listening(rendezvous: str, listen: Sequence[str]) -> tuple[str, ...]:
+    """Return where to listen so that the rendezvous is held at all addresses of its name.
+
+    ``tcp/0.0.0.0:7447`` holds ``127.0.0.1:7447`` already, and nobody can listen there twice; but
+    where ``localhost`` is ``::1`` as well, that has to be held too, or the next node would.
+    """
+    protocol, _, place = rendezvous.partition("/")
+    host, _, port = place.rpartition(":")
+    every = {f"tcp/0.0.0.0:{port}": "127.", f"tcp/[::]:{port}": ""}
+    held = [start for endpoint, start in every.items() if endpoint in listen]
+    if protocol != "tcp" or not held:
+        return tuple(dict.fromkeys((rendezvous, *listen)))
+    try:
+        found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
+    except (OSError, ValueError):  # Zenoh says better what is wrong with it
+        return (rendezvous, *listen)
+    addresses = dict.fromkeys(str(entry[4][0]) for entry in found)
+    rest = [address for address in addresses if not address.startswith(tuple(held))]
+    extra = [f"tcp/[{one}]:{port}" if ":" in one else f"tcp/{one}:{port}" for one in rest]
+    return tuple(dict.fromkeys((*listen, *extra)))
 
 
 def _explained(error: TransportError, endpoints: Sequence[str]) -> TransportError:

@@ -12,7 +12,7 @@ __all__ = ("first_answered", "is_answered")
 _TIMEOUT = 0.5
 _AGAIN_SECONDS = 0.1
 _GRACE_SECONDS = 0.3
-"""How long an endpoint that is less wanted waits for one that is wanted more."""
+"""How long an endpoint that is less wanted waits for word of one that is wanted more."""
 
 
 def first_answered(endpoints: Sequence[str], timeout: float) -> str:
@@ -25,31 +25,37 @@ def first_answered(endpoints: Sequence[str], timeout: float) -> str:
         timeout: Seconds to go on trying.
     """
     began = time.monotonic()
-    answered: set[str] = set()
+    answers: dict[str, bool] = {}
     changed = threading.Condition()
     over = threading.Event()
 
     def look(endpoint: str) -> None:
         while not over.is_set():
-            if is_answered(endpoint, timeout):
-                with changed:
-                    answered.add(endpoint)
-                    changed.notify()
+            answer = is_answered(endpoint, timeout)
+            with changed:
+                answers[endpoint] = answer
+                changed.notify()
+            if answer:
                 return
             over.wait(_AGAIN_SECONDS)
 
-    def found() -> bool:
-        late = time.monotonic() - began > min(_GRACE_SECONDS, timeout)
-        return endpoints[0] in answered or bool(late and answered)
+    def first() -> str:
+        late = time.monotonic() - began > _GRACE_SECONDS
+        for endpoint in endpoints:
+            if answers.get(endpoint):
+                return endpoint
+            if endpoint not in answers and not late:
+                return ""
+        return ""
 
     for endpoint in endpoints:
         name = f"rosz looks at {endpoint}"
         threading.Thread(target=look, args=(endpoint,), name=name, daemon=True).start()
     with changed:
-        changed.wait_for(found, min(_GRACE_SECONDS, timeout))
-        changed.wait_for(found, max(0.0, timeout - _GRACE_SECONDS))
+        changed.wait_for(first, min(_GRACE_SECONDS, timeout))
+        changed.wait_for(first, max(0.0, timeout - _GRACE_SECONDS))
         over.set()
-        return next((endpoint for endpoint in endpoints if endpoint in answered), "")
+        return next((endpoint for endpoint in endpoints if answers.get(endpoint)), "")
 
 
 def is_answered(endpoint: str, timeout: float = _TIMEOUT) -> bool:
