@@ -1,0 +1,11 @@
+#!/usr/bin/env python
+"""Ctrl-C in a loop of pure Python, which asks whether it may go on."""
+
+import rospy
+
+rospy.init_node("busy")
+print("ready")
+count = 0
+while not rospy.is_shutdown():
+    count += 1
+print("counted", count > 0)

@@ -1,0 +1,15 @@
+#!/usr/bin/env python
+"""A timer whose callback fails."""
+
+import rospy
+
+rospy.init_node("broken_clock")
+
+
+def tick(event):
+    raise RuntimeError("the spring broke")
+
+
+timer = rospy.Timer(rospy.Duration(0.02), tick)
+rospy.sleep(0.3)
+print(timer.is_alive())
