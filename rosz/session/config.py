@@ -28,6 +28,8 @@ _ROUTER_BY = 10.0
 """Seconds that a node waits for its router, which may have been started just before it."""
 
 _EPHEMERAL = "tcp/127.0.0.1:0"
+_EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
+"""Who looks for others by multicast has to be reached by those it finds."""
 
 
 class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
@@ -127,7 +129,8 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
         listen = [config.rendezvous, *listen]
     elif config.mode == "peer":
         held = [config.rendezvous] if config.hold_rendezvous else []
-        listen = [*held, _EPHEMERAL, *listen]
+        own = _EPHEMERAL_EVERYWHERE if config.multicast else _EPHEMERAL
+        listen = [*held, own, *listen]
     if config.keys is not None:
         connect = [secured(endpoint) for endpoint in connect]
         listen = [secured(endpoint) for endpoint in listen]
