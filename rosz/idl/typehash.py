@@ -14,7 +14,7 @@ from typing import Any
 from rosz.idl.catalog import Catalog
 from rosz.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
 
-__all__ = ("describe", "message_hash", "service_event", "service_hash")
+__all__ = ("describe", "message_hash", "service_event", "service_hash", "service_parts")
 
 _IDS = {
     "int8": 2,
@@ -46,7 +46,18 @@ def message_hash(spec: MessageSpec, catalog: Catalog) -> str:
 
 
 def service_hash(spec: ServiceSpec, catalog: Catalog) -> str:
-    """Return the hash of a service: of a type that holds request, response and event."""
+    """Return the hash of a service."""
+    whole, below = service_parts(spec, catalog)
+    return _hash(whole, below.values())
+
+
+def service_parts(
+    spec: ServiceSpec, catalog: Catalog
+) -> tuple[MessageSpec, dict[str, MessageSpec]]:
+    """Return a service as the type that it is hashed as, and all types in that by name.
+
+    It holds request, response and event.
+    """
     event = service_event(spec)
     info = catalog.message(_EVENT_INFO)
     below = {spec.request.name: spec.request, spec.response.name: spec.response, event.name: event}
@@ -61,7 +72,7 @@ def service_hash(spec: ServiceSpec, catalog: Catalog) -> str:
             Field("event_message", FieldType(event.name)),
         ),
     )
-    return _hash(whole, below.values())
+    return whole, below
 
 
 def service_event(spec: ServiceSpec) -> MessageSpec:

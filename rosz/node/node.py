@@ -22,6 +22,7 @@ from rosz.node.generic import GenericSubscription
 from rosz.node.log import NodeLog
 from rosz.node.publisher import Publisher
 from rosz.node.rate import Rate
+from rosz.node.ros2_services import Lookout
 from rosz.node.service import Service
 from rosz.node.subscription import Subscription
 from rosz.node.timer import Timer, TimerEvent
@@ -123,6 +124,7 @@ class Node:
             standard.announce(self)
             if not context.passing:
                 standard.follow_clock(self)
+                self.keep(Lookout(self))
         except BaseException:
             self._end("")
             raise

@@ -45,18 +45,25 @@ class Service(Endpoint):
         )
         self.service_type = service_type
         self._handler = handler
-        self._pool = Pool(threads, f"rosz-srv{name}", self._serve)
-        self._declared.append(
-            node.context.session.questions(self.key, self._pool.put, complete=True)
-        )
+        self._pool: Pool[Any] | None = None
+        self._open(threads)
         self.announce()
+
+    def _open(self, threads: int) -> None:
+        """Take questions in from now on."""
+        self._pool = pool = Pool(threads, f"rosz-srv{self.name}", self.serve)
+        self._declared.append(
+            self.node.context.session.questions(self.key, pool.put, complete=True)
+        )
 
     def close(self) -> None:
         """Undeclare it, its token first; from any thread, again is no error."""
         super().close()
-        self._pool.close()
+        if self._pool is not None:
+            self._pool.close()
 
-    def _serve(self, raw: Any) -> None:
+    def serve(self, raw: Any) -> None:
+        """Answer a question as Zenoh has it."""
         with Query(raw) as query:
             if self.closed:
                 return

@@ -57,6 +57,16 @@ def call(name: str, a: int, b: int) -> None:
     client.close()
 
 
+def types_of(node: str, names: list[str]) -> None:
+    """Ask for the types of parameters: of those services the only one that the SDK can decode."""
+    kind = "rcl_interfaces/srv/GetParameterTypes"
+    service = f"{node}/get_parameter_types"
+    client = sdk.ROS2ServiceClient(service, kind, node_name="sdk_client", timeout=10.0, **PLACE)
+    answer: Any = client.call(names=names)
+    say(types=None if answer is None else list(map(int, answer.types)))
+    client.close()
+
+
 def see() -> None:
     """Tell what its discovery shows."""
     say(
@@ -79,6 +89,7 @@ def main() -> None:
         "echo": echo,
         "serve": serve,
         "call": call,
+        "types": types_of,
         "see": see,
         "inspect": inspect,
     }

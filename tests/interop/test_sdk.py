@@ -27,7 +27,7 @@ from rosz.msgs.geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quatern
 from rosz.msgs.nav_msgs.msg import Odometry
 from rosz.msgs.sensor_msgs.msg import Image, JointState
 from rosz.msgs.std_msgs.msg import Header, String
-from rosz.node import MessageInfo, Node
+from rosz.node import MessageInfo, Node, Publisher
 from rosz.session import Session, SessionConfig
 
 INTERFACES = Path(__file__).parents[2] / "interfaces"
@@ -99,14 +99,20 @@ def node(city: Network) -> Node:
     return city.node("rosz_side")
 
 
+def wait_for_echo(there: Publisher[Any]) -> None:
+    """Wait until the SDK hears us, and we it: it announces both before they work."""
+    there.wait_for_subscribers(timeout=PATIENCE)
+    eventually(lambda: there._raw.matched, "a route to the SDK's subscriber")
+    there.node.context.graph.wait_for_topic("/back", PATIENCE)
+
+
 @pytest.mark.parametrize("kind", dict.fromkeys(type(message) for message in MESSAGES))
 def test_topics_both_ways(sdk: Partner, node: Node, kind: type[Message]) -> None:
     """There, decoded, encoded, and back again: nothing has changed."""
     back = node.subscription("back", kind)
     there = node.publisher("there", kind)
     sdk("echo", "/there", "/back", kind._type_name)
-    there.wait_for_subscribers(timeout=PATIENCE)
-    node.context.graph.wait_for_topic("/back", PATIENCE)
+    wait_for_echo(there)
     for message in MESSAGES:
         if type(message) is kind:
             there.publish(message)
@@ -120,8 +126,7 @@ def test_generic_and_info(sdk: Partner, node: Node) -> None:
     node.subscription("back", String, lambda _, info: got.put(info), with_info=True)
     there = node.publisher("there", String)
     sdk("echo", "/there", "/back", "std_msgs/msg/String")
-    there.wait_for_subscribers(timeout=PATIENCE)
-    node.context.graph.wait_for_topic("/back", PATIENCE)
+    wait_for_echo(there)
     for number in range(3):
         there.publish(str(number))
         assert generic.get(PATIENCE).data == str(number)
@@ -179,3 +184,15 @@ def test_our_view_of_it(sdk: Partner, node: Node) -> None:
     assert publisher.type_hash == String._type_hash
     assert [token.node_name for token in view.subscriptions("/there")] == ["/sdk_echo"]
     assert view.services()["/add"] == ["example_interfaces/srv/AddTwoInts"]
+
+
+def test_parameters(sdk: Partner, node: Node) -> None:
+    """The parameter services are there as soon as a node is that is not of rosz."""
+    node.params["~gains"] = {"p": 0.5, "names": ["a"]}
+    assert "/rosz_side/get_parameter_types" not in sdk("see")["services"]
+    sdk("serve", "/add")
+    eventually(
+        lambda: "/rosz_side/set_parameters_atomically" in sdk("see")["services"], "the services"
+    )
+    names = ["gains.p", "gains.names", "use_sim_time", "none"]
+    assert sdk("types", "/rosz_side", names) == {"types": [3, 9, 1, 0]}

@@ -1,0 +1,301 @@
+"""The services that every ROS 2 node has, over rosz's parameters; as rclcpp's do."""
+
+from __future__ import annotations
+
+import datetime as dt
+import threading
+from array import array
+from typing import Any
+
+import pytest
+from network import PATIENCE, Network, eventually
+
+from rosz.errors import ParamError
+from rosz.msgs.geometry_msgs.msg import Twist
+from rosz.msgs.rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rosz.msgs.rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rosz.msgs.std_srvs.srv import SetBool
+from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
+from rosz.node import Client, Node
+from rosz.node.ros2_parameters import from_ros2, to_ros2
+from rosz.wire import Kind, Token, format_token
+
+STORED = {
+    "rate": 10.0,
+    "gains": {"p": 1, "inner": {"deep": True}, "names": ["x", "y"]},
+    "odd": [1, "a"],
+    "day": dt.date(2025, 5, 31),
+    "nothing": {},
+}
+NAMES = ["day", "gains.inner.deep", "gains.names", "gains.p", "odd", "rate", "use_sim_time"]
+
+
+@pytest.fixture
+def talker(network: Network) -> Node:
+    node = network.node("talker", namespace="robot")
+    node.params["~"] = STORED
+    return node
+
+
+@pytest.fixture
+def asker(network: Network, talker: Node) -> Node:  # noqa: ARG001  # there before it
+    return network.node("asker")
+
+
+def client(asker: Node, name: str, kind: type[Any]) -> Client:
+    made = asker.client(f"/robot/talker/{name}", kind, timeout=PATIENCE)
+    made.wait_for_service(PATIENCE)
+    return made
+
+
+def number(name: str, value: int) -> Parameter:
+    return Parameter(name, ParameterValue(ParameterType.PARAMETER_INTEGER, integer_value=value))
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "field"),
+    [
+        (True, 1, "bool_value"),
+        (-(1 << 63), 2, "integer_value"),
+        (0.25, 3, "double_value"),
+        ("é\n", 4, "string_value"),
+        (b"\x00\xff", 5, "byte_array_value"),
+        ([True, False], 6, "bool_array_value"),
+        ([1, -2], 7, "integer_array_value"),
+        ([1.5, 2.5], 8, "double_array_value"),
+        (["a", ""], 9, "string_array_value"),
+    ],
+)
+def test_values_both_ways(value: object, kind: int, field: str) -> None:
+    sent = to_ros2(value)
+    assert (sent.type, getattr(sent, field)) == (kind, value)
+    decoded = ParameterValue._decode(ParameterValue._encode(sent))
+    back = from_ros2(decoded)
+    assert back == value
+    assert type(back) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "field", "shown"),
+    [
+        ([1, 2.5], 8, "double_array_value", [1, 2.5]),
+        ([], 5, "byte_array_value", b""),
+        ([1, "a"], 4, "string_value", "[1, a]"),
+        ([True, 1], 4, "string_value", "[true, 1]"),
+        ([[1], [2]], 4, "string_value", "[[1], [2]]"),
+        (dt.date(2025, 5, 31), 4, "string_value", "2025-05-31"),
+    ],
+)
+def test_values_that_only_the_store_has(
+    value: object, kind: int, field: str, shown: object
+) -> None:
+    sent = to_ros2(value)
+    assert (sent.type, getattr(sent, field)) == (kind, shown)
+
+
+def test_value_of_no_type() -> None:
+    with pytest.raises(ParamError, match="'10' is no type of parameter; expected 0 to 9"):
+        from_ros2(ParameterValue(10))
+
+
+@pytest.mark.parametrize(
+    ("prefixes", "depth", "names", "above"),
+    [
+        ([], 0, NAMES, ["gains", "gains.inner"]),
+        ([], 1, ["day", "odd", "rate", "use_sim_time"], []),
+        ([], 2, [n for n in NAMES if n != "gains.inner.deep"], ["gains"]),
+        (["gains"], 0, NAMES[1:4], ["gains", "gains.inner"]),
+        (["gains"], 1, NAMES[2:4], ["gains"]),
+        (["gains.p", "rate"], 1, ["gains.p", "rate"], ["gains"]),
+        (["gain"], 0, [], []),
+        (["gains."], 0, [], []),
+    ],
+)
+def test_list(
+    asker: Node, prefixes: list[str], depth: int, names: list[str], above: list[str]
+) -> None:
+    result = client(asker, "list_parameters", ListParameters)(prefixes, depth).result
+    assert (result.names, result.prefixes) == (names, above)
+
+
+def test_get(asker: Node) -> None:
+    values = client(asker, "get_parameters", GetParameters)(["rate", "none", "gains.p"]).values
+    assert [value.type for value in values] == [3, 0, 2]
+    assert (values[0].double_value, values[2].integer_value) == (10.0, 1)
+    types = client(asker, "get_parameter_types", GetParameterTypes)
+    assert types([*NAMES, "none", "gains"]).types == bytes([4, 1, 9, 2, 4, 3, 1, 0, 0])
+
+
+def test_describe(asker: Node) -> None:
+    ask = client(asker, "describe_parameters", DescribeParameters)
+    rate, odd, sim, none = ask(["rate", "odd", "use_sim_time", "none"]).descriptors
+    assert (rate.name, rate.type, rate.read_only, rate.dynamic_typing) == ("rate", 3, False, True)
+    assert (odd.type, odd.read_only) == (4, True)
+    assert odd.additional_constraints == "YAML of a list, which ROS 2 has no type for"
+    assert (sim.type, sim.read_only) == (1, True)
+    assert (none.name, none.type) == ("none", 0)
+
+
+def test_set(asker: Node, talker: Node) -> None:
+    """One by one: those that cannot be set do not hold the others up."""
+    seen: list[Any] = []
+    talker.params.watch("~rate", seen.append)
+    set_parameters = client(asker, "set_parameters", SetParameters)
+    results = set_parameters(
+        [
+            number("rate", 5),
+            number("new.x", 1),
+            number("gains", 1),
+            number("odd", 1),
+            number("use_sim_time", 1),
+            number("", 1),
+            Parameter("gains.p"),
+            Parameter("none"),
+            Parameter("rate", ParameterValue(77)),
+        ]
+    ).results
+    assert [result.successful for result in results] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+        False,
+        True,
+        False,
+        False,
+    ]
+    assert [result.reason for result in results if not result.successful] == [
+        "'gains' is no parameter: there are parameters below it",
+        "'odd' is a list that ROS 2 has no type for: set '/robot/talker/odd' with 'rosz param set'",
+        "'use_sim_time' is the same for all nodes: set '/use_sim_time' with 'rosz param set' before"
+        " they start",
+        "'' is no name of a parameter",
+        "'none' is not set",
+        "'77' is no type of parameter; expected 0 to 9",
+    ]
+    assert talker.params["~rate"] == 5
+    assert talker.params["~new/x"] == 1
+    assert "~gains/p" not in talker.params
+    assert "for ROS 2" in talker.params.origin("~rate")
+    eventually(lambda: [change.new for change in seen] == [5], "the watch is told")
+
+
+def test_set_atomically(asker: Node, talker: Node) -> None:
+    """All or nothing, and as one change."""
+    put = client(asker, "set_parameters_atomically", SetParametersAtomically)
+    refused = put([number("rate", 6), Parameter("none")]).result
+    assert (refused.successful, refused.reason) == (False, "'none' is not set")
+    assert talker.params["~rate"] == 10.0
+    assert put([number("rate", 6), Parameter("gains.p"), number("a", 1)]).result.successful
+    assert talker.params["~rate"] == 6
+    assert talker.params["~a"] == 1
+    assert "~gains/p" not in talker.params
+
+
+def test_arrays_arrive_as_lists(asker: Node, talker: Node) -> None:
+    value = ParameterValue(ParameterType.PARAMETER_DOUBLE_ARRAY, double_array_value=[1, 2])
+    assert isinstance(
+        ParameterValue._decode(ParameterValue._encode(value)).double_array_value, array
+    )
+    put = client(asker, "set_parameters", SetParameters)
+    assert put([Parameter("list", value)]).results[0].successful
+    assert talker.params["~list"] == [1.0, 2.0]
+    assert type(talker.params["~list"]) is list
+
+
+def test_a_node_without_parameters(network: Network) -> None:
+    bare, asker = network.node("bare"), network.node("asker")
+    ask = asker.client("/bare/list_parameters", ListParameters)
+    ask.wait_for_service(PATIENCE)
+    assert ask().result.names == ["use_sim_time"]
+    bare.params["/bare"] = 3  # a leaf where a namespace is usual
+    assert ask().result.names == ["use_sim_time"]
+
+
+def test_type_description(asker: Node) -> None:
+    ask = client(asker, "get_type_description", GetTypeDescription)
+    found = ask("geometry_msgs/msg/Twist", Twist._type_hash)
+    assert found.successful
+    top = found.type_description.type_description
+    assert [(f.name, f.type.type_id, f.type.nested_type_name) for f in top.fields] == [
+        ("linear", 1, "geometry_msgs/msg/Vector3"),
+        ("angular", 1, "geometry_msgs/msg/Vector3"),
+    ]
+    (vector,) = found.type_description.referenced_type_descriptions
+    assert [(f.name, f.type.type_id) for f in vector.fields] == [("x", 11), ("y", 11), ("z", 11)]
+    assert [s.encoding for s in found.type_sources] == ["msg", "msg"]
+    assert "float64 x" in found.type_sources[1].raw_file_contents
+
+
+def test_type_description_of_a_service(asker: Node) -> None:
+    ask = client(asker, "get_type_description", GetTypeDescription)
+    found = ask("std_srvs/srv/SetBool", SetBool._type_hash)
+    assert found.successful
+    names = [f.name for f in found.type_description.type_description.fields]
+    assert names == ["request_message", "response_message", "event_message"]
+    sources = {s.type_name: s.encoding for s in found.type_sources}
+    assert sources["std_srvs/srv/SetBool"] == "srv"
+    assert sources["std_srvs/srv/SetBool_Event"] == "implicit"
+
+
+@pytest.mark.parametrize(
+    ("name", "type_hash", "reason"),
+    [
+        ("nothing/msg/X", "", "there is no package 'nothing'"),
+        ("x", "", "'x' is no type; expected the form 'pkg/msg/Name' or 'pkg/srv/Name'"),
+        ("std_msgs/String", "", "'std_msgs/String' is no type"),
+        ("std_msgs/msg/String", "RIHS01_0", "the version of 'std_msgs/msg/String' here has the"),
+    ],
+)
+def test_type_that_is_not_known(asker: Node, name: str, type_hash: str, reason: str) -> None:
+    answer = client(asker, "get_type_description", GetTypeDescription)(name, type_hash, False)
+    assert not answer.successful
+    assert reason in answer.failure_reason
+    assert answer.type_sources == []
+
+
+def test_nobody_asks_no_services(network: Network, talker: Node) -> None:
+    """Among nodes of rosz alone nothing is declared, as long as no client wants it."""
+    other = network.node("other")
+    other.context.graph.wait_for_node("/robot/talker", PATIENCE)
+    other.client("/other/something/else", SetBool)
+    graph = talker.context.graph
+    graph.wait_for(lambda view: bool(view.clients("/other/something/else")), PATIENCE, "a client")
+    eventually(
+        lambda: "rosz-ros2/robot/talker" not in {t.name for t in threading.enumerate()},
+        "the talker has had a look",
+    )
+    assert graph.view().services() == {}
+
+
+def test_a_foreign_node_brings_them(network: Network, talker: Node) -> None:
+    """Who looks at the list of services before calling, as ``ros2 param`` does, finds them."""
+    token = Token(network.domain, "abc", 0, 0, Kind.NODE, "/", "_ros2cli_1")
+    kept = network.session().token(format_token(token))
+    view = talker.context.graph.wait_for_service("/robot/talker/set_parameters", PATIENCE)
+    talker.context.graph.wait_for_service("/robot/talker/get_type_description", PATIENCE)
+    (server,) = view.servers("/robot/talker/set_parameters")
+    assert server.qos is not None
+    assert server.qos.depth == 1000
+    kept.close()
+
+
+def test_humble_has_no_type_descriptions(network: Network) -> None:
+    context = network.context(distro="humble")
+    node = network.node("old", context=context)
+    node.client("old/list_parameters", ListParameters).wait_for_service(PATIENCE)
+    assert "/old/get_type_description" not in node.context.graph.view().services()
+
+
+def test_they_end_with_the_node(talker: Node, asker: Node) -> None:
+    client(asker, "get_parameters", GetParameters)
+    talker.close()
+    asker.context.graph.wait_for(lambda view: not view.services(), PATIENCE, "no more services")
