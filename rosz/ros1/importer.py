@@ -1,9 +1,9 @@
 """Makes ROS 1's names importable: message packages, and the Python modules that rosz has for them.
 
 Two finders on ``sys.meta_path``. The first one stands in front and knows a name at a glance: what
-rosz ships (``std_msgs``, ``rospy``, …) and ``<package>.msg`` / ``<package>.srv`` of any package on
-the package path. The second one stands at the end, for packages that nothing else provides; only it
-searches the package path for a plain name.
+rosz ships (``std_msgs``, ``rospy``, …), and ``<package>.msg``, ``<package>.srv`` and
+``<package>.cfg`` of any package on the package path. The second one stands at the end, for packages
+that nothing else provides; only it searches the package path for a plain name.
 
 A name imported this way is the very module that rosz has, under one more name: ``std_msgs.msg`` is
 ``rosz.msgs.std_msgs.msg``.
@@ -55,6 +55,7 @@ MODULES = (
 """ROS 1's Python modules; those that lie beside this one are importable under their own names."""
 
 _KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
+_CFG = "cfg"
 _HERE = Path(__file__).parent
 
 
@@ -131,10 +132,19 @@ class _Types:
         module.__dict__.setdefault("__getattr__", more)
         return module
 
-    def folder(self, package: str) -> Path | None:
-        """Return the folder of a package that has types of its own."""
+    def cfg_files(self, package: str) -> list[Path]:
+        """Return the files of a package that describe parameters of dynamic_reconfigure."""
+        from rosz.ros1.dynamic_reconfigure.files import find_files
+
         try:
-            if self.has(package, "msg") or self.has(package, "srv"):
+            return find_files(self.packages.find(package).path)
+        except RoszError:  # as below
+            return []
+
+    def folder(self, package: str) -> Path | None:
+        """Return the folder of a package that has types, or descriptions of parameters."""
+        try:
+            if self.has(package, "msg") or self.has(package, "srv") or self.cfg_files(package):
                 return self.packages.find(package).path
         except RoszError:  # an import of something else must not fail over a broken package
             return None
@@ -186,6 +196,8 @@ class _First(MetaPathFinder):
         first, _, inner = rest.partition(".")
         if first in _KINDS:
             return self._of_package(fullname, root, _KINDS[first], inner, path)
+        if first == _CFG:
+            return self._of_cfg(fullname, root, inner, path)
         if root in self._modules:
             return self._known(fullname, f"rosz.ros1.{fullname}")
         if root in self._shipped and not rest:
@@ -232,6 +244,22 @@ class _First(MetaPathFinder):
             return None
         return _same(name, lambda: _single(name, module, inner[1:]))
 
+    def _of_cfg(
+        self, name: str, package: str, inner: str, path: Sequence[str] | None
+    ) -> ModuleSpec | None:
+        """Find ``<package>.cfg``, or ``<package>.cfg.<Name>Config`` as catkin generates it."""
+        files = self.types.cfg_files(package)
+        if not files:
+            return None
+        if inner:
+            return _same(name, lambda: _config(name, files)) if inner.endswith("Config") else None
+        generated = PathFinder.find_spec(name, path)
+        spec = ModuleSpec(name, None, is_package=True)
+        spec.submodule_search_locations = [
+            *((generated and generated.submodule_search_locations) or ())
+        ]
+        return spec
+
 
 class _Last(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
@@ -258,6 +286,12 @@ class _Last(MetaPathFinder):
         spec = ModuleSpec(fullname, None, is_package=True)
         spec.submodule_search_locations = [str(code)] if code.is_dir() else []
         return spec
+
+
+def _config(name: str, files: Sequence[Path]) -> ModuleType:
+    from rosz.ros1.dynamic_reconfigure.cfgfile import load
+
+    return load(name, files)
 
 
 def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:

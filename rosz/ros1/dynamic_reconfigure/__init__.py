@@ -1,0 +1,21 @@
+"""dynamic_reconfigure: ROS 1's names for what `rosz.reconfigure` does.
+
+``.cfg`` files run as they are, and what catkin generated from them is importable without a build:
+``from my_pkg.cfg import TutorialsConfig`` (ROS wiki, dynamic_reconfigure). May import what rospy is
+built on, and rospy's own modules.
+"""
+
+from rosz.ros1.dynamic_reconfigure.exceptions import (
+    DynamicReconfigureCallbackException,
+    DynamicReconfigureException,
+    DynamicReconfigureParameterException,
+)
+from rosz.ros1.dynamic_reconfigure.search import find_reconfigure_services, get_parameter_names
+
+__all__ = (
+    "DynamicReconfigureCallbackException",
+    "DynamicReconfigureException",
+    "DynamicReconfigureParameterException",
+    "find_reconfigure_services",
+    "get_parameter_names",
+)

@@ -1,0 +1,266 @@
+"""``dynamic_reconfigure.client``: reads and changes parameters of another node (ROS wiki)."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from rosz import reconfigure
+from rosz.errors import ClosedError, ParamError, ServiceError, WaitTimeout
+from rosz.reconfigure import Description
+from rosz.reconfigure.messages import pack_config, pack_description
+from rosz.ros1.dynamic_reconfigure.encoding import (
+    Config,
+    decode_config,
+    decode_description,
+    extract_params,
+)
+from rosz.ros1.dynamic_reconfigure.exceptions import (
+    DynamicReconfigureCallbackException,
+    DynamicReconfigureParameterException,
+)
+from rosz.ros1.rospy import state
+from rosz.ros1.rospy.exceptions import ROSException, ROSInterruptException
+
+__all__ = ("Client",)
+
+T = TypeVar("T")
+_SILENT_FOR = 1.0
+"""Seconds after which a wait without a timeout says what it waits for, as in ROS 1."""
+
+_ANSWER_BY = 10.0
+"""Seconds that a server which is there gets to answer, where nobody says how many."""
+
+_NOW = 0.0
+_TYPES: dict[str, type] = {"bool": bool, "int": int, "str": str, "double": float}
+
+
+class Client:
+    """Reads and changes parameters of another node; see `rosz.reconfigure.Client`.
+
+    Args:
+        name: Name of the server, mostly that of its node.
+        timeout: Seconds to wait for the server; until it is there when not given.
+        config_callback: Gets the configuration that holds, and each one that holds from then on.
+        description_callback: Gets the descriptions of the parameters, as
+            `get_parameter_descriptions` returns them.
+
+    Attributes:
+        name: Name of the server.
+
+    Raises:
+        ROSInitException: ``init_node`` has not been called.
+        ROSException: The server did not come in time.
+        ROSInterruptException: The node was shut down meanwhile.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        timeout: float | None = None,
+        config_callback: Callable[[Config], object] | None = None,
+        description_callback: Callable[[list[dict[str, Any]]], object] | None = None,
+    ) -> None:
+        self.name = name
+        self._config_callback = config_callback
+        self._description_callback = description_callback
+        self._decoded: tuple[Description, Config] | None = None
+        self._client = reconfigure.Client(
+            state.node(),
+            name,
+            timeout=_ANSWER_BY,
+            config_callback=self._on_config,
+            description_callback=self._on_description,
+        )
+        self._service = f"{self._client.name}/set_parameters"
+        try:
+            self._wait(timeout)
+        except BaseException:
+            self._client.close()
+            raise
+
+    @property
+    def config(self) -> Config | None:
+        """The configuration that holds, or ``None`` before it is known."""
+        return self._configuration(_NOW)
+
+    @property
+    def param_description(self) -> list[dict[str, Any]] | None:
+        """What there is to set, or ``None`` before it is known."""
+        return self._parameters(_NOW)
+
+    @property
+    def group_description(self) -> Config | None:
+        """The root group, or ``None`` before it is known."""
+        return self._groups(_NOW)
+
+    def get_configuration(self, timeout: float | None = None) -> Config | None:
+        """Return the configuration that holds.
+
+        Args:
+            timeout: Seconds to wait for the server to tell; 10 when not given.
+
+        Returns:
+            Name to value, and the groups; ``None`` when the server did not tell.
+        """
+        return self._patiently(self._configuration, timeout, "configuration")
+
+    def get_parameter_descriptions(
+        self, timeout: float | None = None
+    ) -> list[dict[str, Any]] | None:
+        """Return what there is to set; timeout and ``None`` as for `get_configuration`."""
+        return self._patiently(self._parameters, timeout, "descriptions")
+
+    def get_group_descriptions(self, timeout: float | None = None) -> Config | None:
+        """Return the root group; timeout and ``None`` as for `get_configuration`."""
+        return self._patiently(self._groups, timeout, "descriptions")
+
+    def update_configuration(self, changes: Mapping[str, Any]) -> Config:
+        """Change parameters.
+
+        Args:
+            changes: Name to value; ``groups`` holds states of groups by name.
+
+        Returns:
+            The configuration that holds then.
+
+        Raises:
+            DynamicReconfigureParameterException: There is no such parameter, or a value cannot be
+                one of it.
+            DynamicReconfigureCallbackException: The server refused, is gone, or did not answer
+                within 10 seconds.
+            ROSInterruptException: The node was shut down meanwhile.
+        """
+        try:
+            _check(self._client.description(), changes)
+            found = self._client.update(changes)
+        except ParamError as error:
+            raise DynamicReconfigureParameterException(str(error)) from error
+        except (ServiceError, WaitTimeout) as error:
+            raise DynamicReconfigureCallbackException(f"service call failed: {error}") from error
+        except ClosedError as error:
+            raise ROSInterruptException("rospy shutdown") from error
+        return self._classic(self._client.description(), found)
+
+    def update_groups(self, changes: Mapping[str, bool]) -> Config | None:
+        """Change which groups are shown, by name, and return the root group."""
+        self.update_configuration({"groups": changes})
+        return self.get_group_descriptions()
+
+    def close(self) -> None:
+        """Stop listening to the server."""
+        self._client.close()
+
+    def get_config_callback(self) -> Callable[[Config], object] | None:
+        """Return what is called with configurations."""
+        return self._config_callback
+
+    def set_config_callback(self, value: Callable[[Config], object] | None) -> None:
+        """Have a function called with configurations, with the one that holds right away."""
+        self._config_callback = value
+        known = self.config
+        if value is not None and known is not None:
+            value(known)
+
+    config_callback = property(get_config_callback, set_config_callback)
+
+    def get_description_callback(self) -> Callable[[list[dict[str, Any]]], object] | None:
+        """Return what is called with descriptions."""
+        return self._description_callback
+
+    def set_description_callback(
+        self, value: Callable[[list[dict[str, Any]]], object] | None
+    ) -> None:
+        """Have a function called with descriptions, with those that are known right away."""
+        self._description_callback = value
+        known = self.param_description
+        if value is not None and known is not None:
+            value(known)
+
+    description_callback = property(get_description_callback, set_description_callback)
+
+    def _wait(self, timeout: float | None) -> None:
+        """Wait for the server; without a timeout until it comes, as launch files count on."""
+        try:
+            try:
+                self._client.wait(timeout or _SILENT_FOR)
+            except WaitTimeout:
+                if timeout:
+                    raise
+                sys.stderr.write(f"Waiting for service {self._service}...\n")
+                self._client.wait(threading.TIMEOUT_MAX / 2)
+        except WaitTimeout as error:
+            raise ROSException(
+                f"timeout exceeded while waiting for service {self._service}: {error}"
+            ) from error
+        except ClosedError as error:
+            raise ROSInterruptException("rospy shutdown") from error
+
+    def _patiently(
+        self, ask: Callable[[float], T | None], timeout: float | None, what: str
+    ) -> T | None:
+        """Ask, and where there is no timeout say soon that it takes long."""
+        found = ask(timeout or _SILENT_FOR)
+        if found is None and not timeout and not state.node().is_shutdown:
+            sys.stderr.write(f"Waiting for {what}...\n")
+            found = ask(_ANSWER_BY)
+        return found
+
+    def _configuration(self, timeout: float) -> Config | None:
+        try:
+            config = self._client.config(timeout)
+            return self._classic(self._client.description(_NOW), config)
+        except (WaitTimeout, ClosedError):
+            return None
+
+    def _groups(self, timeout: float) -> Config | None:
+        try:
+            return self._decode(self._client.description(timeout))
+        except (WaitTimeout, ClosedError):
+            return None
+
+    def _parameters(self, timeout: float) -> list[dict[str, Any]] | None:
+        groups = self._groups(timeout)
+        return None if groups is None else extract_params(groups)
+
+    def _decode(self, description: Description) -> Config:
+        """Return the root group of a description."""
+        if self._decoded is None or self._decoded[0] is not description:
+            self._decoded = (description, decode_description(pack_description(description)))
+        return self._decoded[1]
+
+    def _classic(self, description: Description, config: Config) -> Config:
+        """Return a configuration in the form that ROS 1's client has: with values in the groups."""
+        values = {name: one for name, one in config.items() if name != "groups"}
+        message = pack_config(description, values, description.read_states(config["groups"]))
+        return decode_config(message, self._decode(description))
+
+    def _on_config(self, config: Config) -> None:
+        if self._config_callback is not None:
+            self._config_callback(self._classic(self._client.description(), config))
+
+    def _on_description(self, description: Description) -> None:
+        if self._description_callback is not None:
+            self._description_callback(extract_params(self._decode(description)))
+
+
+def _check(description: Description, changes: Mapping[str, Any]) -> None:
+    """Refuse changes in ROS 1's words.
+
+    Raises:
+        DynamicReconfigureParameterException: One cannot be made.
+    """
+    for name, value in changes.items():
+        if name == "groups":
+            continue
+        setting = description.settings.get(name)
+        if setting is None:
+            raise DynamicReconfigureParameterException(f"don't know parameter: {name}")
+        try:
+            setting.convert(value)
+        except ParamError as error:
+            kind = _TYPES[setting.kind or "str"]
+            text = f"can't set parameter '{name}' of {kind}: {error}"
+            raise DynamicReconfigureParameterException(text) from error

@@ -1,0 +1,31 @@
+"""What ``.cfg`` files of before catkin describe parameters with; the same as with catkin."""
+
+from __future__ import annotations
+
+import rosz.ros1.roslib as roslib  # noqa: PLR0402  # ROS 1's module offers it under this name
+from rosz.ros1.dynamic_reconfigure.parameter_generator_catkin import (
+    ParameterGenerator,
+    Template,
+    bool_t,
+    double_t,
+    inspect,
+    int_t,
+    os,
+    re,
+    str_t,
+    sys,
+)
+
+__all__ = (
+    "ParameterGenerator",
+    "Template",
+    "bool_t",
+    "double_t",
+    "inspect",
+    "int_t",
+    "os",
+    "re",
+    "roslib",
+    "str_t",
+    "sys",
+)
