@@ -103,29 +103,47 @@ class PackageIndex:
     def __init__(self, roots: Sequence[Path]) -> None:
         self.roots = tuple(roots)
 
-    @cached_property
+    @property
     def _known(self) -> dict[str, Package]:
+        return self._crawled[0]
+
+    @property
+    def broken(self) -> list[PackageError]:
+        """What is wrong with each package.xml that cannot be read."""
+        return self._crawled[1]
+
+    @cached_property
+    def _crawled(self) -> tuple[dict[str, Package], list[PackageError]]:
         known: dict[str, Package] = {}
+        broken: list[PackageError] = []
         for root in self.roots:
             # Of two packages of a name the one nearer to the root wins.
             for folder in sorted(crawl(root), key=lambda folder: len(folder.parts)):
-                package = Package(_name_in(folder / MANIFEST), folder)
-                known.setdefault(package.name, package)
-        return known
+                try:
+                    package = Package(_name_in(folder / MANIFEST), folder)
+                except PackageError as error:
+                    # One that cannot be read keeps nobody from using the others, as in rospack.
+                    broken.append(error)
+                else:
+                    known.setdefault(package.name, package)
+        return known, broken
 
     def find(self, name: str) -> Package:
         """Return the package of that name.
 
         Raises:
             PackageNotFound: It is in none of the folders.
-            PackageError: A package.xml on the way cannot be read.
+            PackageError: A folder of that name has a package.xml that cannot be read.
         """
-        if "_known" not in self.__dict__:
+        if "_crawled" not in self.__dict__:
             quick = self._beside(name)
             if quick is not None:
                 return quick
         if name in self._known:
             return self._known[name]
+        for error in self.broken:
+            if Path(error.path).parent.name == name:
+                raise error
         raise PackageNotFound(name, self._known, [str(root) for root in self.roots])
 
     def _beside(self, name: str) -> Package | None:

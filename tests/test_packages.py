@@ -63,9 +63,14 @@ def test_ignored_folders(tmp_path: Path) -> None:
     [("<package><name>a</package>", r"package\.xml:1:"), ("<robot/>", "expected <package>")],
 )
 def test_a_bad_manifest_is_named(tmp_path: Path, text: str, reason: str) -> None:
-    (tmp_path / "package.xml").write_text(text)
+    (tmp_path / "odd").mkdir()
+    (tmp_path / "odd" / "package.xml").write_text(text)
+    make(tmp_path / "good", "good")
+    index = PackageIndex([tmp_path])
+    assert index.names() == ["good"]
     with pytest.raises(PackageError, match=reason):
-        PackageIndex([tmp_path]).names()
+        index.find("odd")
+    assert [error.path for error in index.broken] == [str(tmp_path / "odd" / "package.xml")]
 
 
 def test_executables(tmp_path: Path) -> None:

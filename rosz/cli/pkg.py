@@ -25,7 +25,10 @@ def list_packages(
     json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
 ) -> None:
     """List all packages with their folders."""
-    packages = _index().packages()
+    index = _index()
+    packages = index.packages()
+    for fault in index.broken:
+        sys.stderr.write(f"WARNING: {fault}\n")
     if json:
         import msgspec
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import msgspec
 
 from rosz.environment import Environment, package_index
-from rosz.errors import PackageError
 from rosz.idl import Catalog
 from rosz.packages import MANIFEST, Package, PackageIndex
 from rosz.typestore import TypeStore
@@ -49,7 +48,7 @@ def check(
     """
     packages = {folder: _package(folder) for folder in folders}
     good = [package.path for package in packages.values() if package is not None]
-    index = PackageIndex([*good, *_sound(package_index(environment).roots, folders)])
+    index = PackageIndex([*good, *package_index(environment).roots])
     catalog = Catalog(TypeStore(index, environment.home / "rosz").definition)
     variables = {**environ, "ROSZ_PACKAGE_PATH": ":".join(str(root) for root in index.roots)}
     twice = _same_names([package for package in packages.values() if package is not None])
@@ -67,28 +66,9 @@ def check(
 
 
 def _package(folder: Path) -> Package | None:
-    try:
-        (package,) = PackageIndex([folder]).packages()
-    except (PackageError, ValueError):  # told of by the check of its package.xml
-        return None
-    return package
-
-
-def _sound(roots: Sequence[Path], checked: Sequence[Path]) -> Iterator[Path]:
-    """Yield the roots that can be read, leaving out packages that are checked themselves."""
-    for root in roots:
-        try:
-            PackageIndex([root]).names()
-        except PackageError:
-            yield from (folder for folder in _readable(root) if folder not in checked)
-        else:
-            yield root
-
-
-def _readable(root: Path) -> Iterator[Path]:
-    for manifest in sorted(root.rglob(MANIFEST)):
-        if _package(manifest.parent) is not None:
-            yield manifest.parent
+    """Return the package in a folder; none if its package.xml cannot be read, which is told."""
+    found = PackageIndex([folder]).packages()
+    return found[0] if found else None
 
 
 def _same_names(packages: Sequence[Package]) -> dict[Path, list[Problem]]:
