@@ -21,14 +21,14 @@ from rosz.environment import Environment
 from rosz.node import Context, Node
 from rosz.session import Session, SessionConfig
 
-__all__ = ("PATIENCE", "Network", "Program", "eventually", "repeats")
+__all__ = ("PATIENCE", "WHOLE_LINES", "Network", "Program", "eventually", "repeats")
 
 PATIENCE = 15.0
 """Seconds after which something that should happen at once counts as never happening."""
 
 T = TypeVar("T", bound="Any")
 _ROOT = Path(__file__).parent.parent
-_WHOLE_LINES = (
+WHOLE_LINES = (
     "print = lambda *words, end='\\n', flush=False, write=print: "
     "write(' '.join(map(str, words)) + end, end='', flush=flush)\n"
 )
@@ -220,7 +220,7 @@ class Network:
             argv: Its arguments.
             variables: Environment variables, beside those of the network.
         """
-        return self.run("-c", _WHOLE_LINES + dedent(script), *argv, **variables)
+        return self.run("-c", WHOLE_LINES + dedent(script), *argv, **variables)
 
     def run(self, *argv: str, **variables: str) -> Program:
         """Start Python with a command line."""

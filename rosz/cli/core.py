@@ -31,6 +31,9 @@ def core_command(
             metavar="ENDPOINT", help="Connect to another machine, tcp/robot1:7447; repeatable."
         ),
     ] = None,
+    keys: Annotated[
+        str, typer.Option(metavar="DIR", help="Keys that links beyond this machine need.")
+    ] = "",
     store: Annotated[str, typer.Option(metavar="FILE", help="Keep the parameters in a file.")] = "",
     port: Annotated[str, typer.Option("-p", "--port", hidden=True)] = "",
 ) -> None:
@@ -43,10 +46,14 @@ def core_command(
             "there is no master, and so no port of it: ROSZ_RENDEZVOUS moves the meeting point,"
             " ROS_DOMAIN_ID keeps groups of nodes apart"
         )
+    import msgspec
+
     from rosz.environment import Environment
     from rosz.introspect.core import Core
 
     environment = Environment.read()
+    if keys:
+        environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     file = Path(store).absolute() if store else None
     with until_stopped(), Core(environment, listen or (), connect or (), file) as core:
         lines = [f"listening on {endpoint}" for endpoint in core.endpoints]

@@ -19,6 +19,7 @@ COMMANDS = {
     "run": "run an executable of a package",
     "core": "hold the meeting point and a replica of the parameters, until stopped",
     "param": "get and set parameters",
+    "reconfigure": "read and change settings of nodes while they run",
     "topic": "list, show, measure and publish topics",
     "service": "list and call services",
     "node": "list, inspect, ping and end nodes",
@@ -27,6 +28,7 @@ COMMANDS = {
     "gen": "write Python modules for the messages of a package",
     "pkg": "list, find, create and check packages",
     "log": "follow the log of all nodes, set levels",
+    "keys": "make and check the keys that links between machines need",
     "doctor": "name what is wrong, what shows it and what to do",
     "turtlesim": "take pictures of turtlesims",
     "env": "print what to eval in a shell",
@@ -79,6 +81,10 @@ def _dispatch(argv: list[str]) -> int:
         sys.stdout.write(f"rosz {version('rosz')}\n")
         return 0
     name = argv[0]
+    if name == "complete":
+        from rosz.cli.complete import complete
+
+        return complete(argv[1:])
     if name not in COMMANDS:
         hint = near_miss(name, COMMANDS) or "; 'rosz --help' lists them"
         raise UsageError(f"'{name}' is no command{hint}")

@@ -134,7 +134,7 @@ def _topics(names: Sequence[str], out: Flow, back: Flow) -> Iterator[_Grant]:
     yield back, _LISTEN, samples
     # What a transient-local publisher keeps is asked for, and answered, beside the samples.
     yield back, _ASK, kept
-    yield out, _ANSWER, kept
+    yield out, _ANSWER, kept + samples
     yield out, _TOKEN, kept + _tokens(Kind.PUBLISHER, names)
     yield back, _TOKEN, kept + _tokens(Kind.SUBSCRIPTION, names)
 

@@ -123,6 +123,7 @@ class _Draft:
         from cryptography.hazmat.primitives import hashes
 
         now = dt.datetime.now(dt.UTC)
+        end = now + dt.timedelta(days=self._days)
         usage = x509.KeyUsage(
             digital_signature=not authority,
             content_commitment=False,
@@ -137,8 +138,8 @@ class _Draft:
         builder = (
             x509.CertificateBuilder(issuer, self._subject, self._public)
             .serial_number(x509.random_serial_number())
-            .not_valid_before(now - _CLOCKS_DIFFER)
-            .not_valid_after(now + dt.timedelta(days=self._days))
+            .not_valid_before(min(now, end) - _CLOCKS_DIFFER)
+            .not_valid_after(end)
             .add_extension(x509.BasicConstraints(authority, 0 if authority else None), True)
             .add_extension(usage, True)
         )

@@ -33,7 +33,7 @@ ANYBODY: Final = "*"
 EVERYTHING: Final = "/**"
 NAME_VERBS: Final = ("publish", "subscribe", "call", "serve", "set")
 _FLAGS: Final = ("get", "control")
-_PATTERN: Final = re.compile(r"(/(\*\*|[A-Za-z0-9_*]+))+")
+_PATTERN: Final = re.compile(r"(/(\*\*|\*|\*?[A-Za-z0-9_]+(\*[A-Za-z0-9_]+)*\*?))+")
 
 
 class Permit(msgspec.Struct, frozen=True, kw_only=True):
@@ -151,7 +151,7 @@ class _Reader:
         if not isinstance(node, yaml.ScalarNode):
             raise self._error(node, "expected a name or a list of names")
         text: str = node.value
-        if not _PATTERN.fullmatch(text) or "***" in text:
+        if not _PATTERN.fullmatch(text):
             raise self._error(
                 node,
                 f"'{text}' is no pattern of global names; expected such as /cmd_vel, /arm/* or /**",

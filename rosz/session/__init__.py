@@ -2,7 +2,7 @@
 
 from rosz.session import calls as calls  # waits at the exit
 from rosz.session.answers import Answers, Target
-from rosz.session.config import SessionConfig
+from rosz.session.config import SessionConfig, keys_of, secured
 from rosz.session.declared import Closable, RawPublisher, Ring
 from rosz.session.samples import Query, Reply, Sample
 from rosz.session.session import Session
@@ -21,4 +21,6 @@ __all__ = (
     "SessionConfig",
     "Stamp",
     "Target",
+    "keys_of",
+    "secured",
 )

@@ -28,7 +28,7 @@ def refusals(config: SessionConfig) -> list[str]:
     from rosz.security.handshake import refusal
 
     found = []
-    for endpoint in map(secured, config.connect):
+    for endpoint in map(secured, dict.fromkeys((config.rendezvous, *config.connect))):
         reason = refusal(endpoint, config.keys) if endpoint.startswith("tls/") else ""
         if reason:
             found.append(f"'{endpoint}': {reason}")
@@ -44,7 +44,7 @@ def tell_refusals(config: SessionConfig) -> None:
         return
     if config.listen:
         zenoh.init_log_from_env_or("zenoh_link_tls=warn")
-    if config.connect:
+    if config.connect and not config.must_connect and config.mode != "client":
         threading.Thread(target=_tell, args=(config,), name="rosz-refusals", daemon=True).start()
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from textwrap import dedent
 from typing import TYPE_CHECKING
 
-from network import PATIENCE, Program, eventually
+from network import PATIENCE, WHOLE_LINES, Program, eventually
 
 from hosts.namespace import Namespace, children
 
@@ -126,7 +126,7 @@ class Host:
 
     def program(self, script: str, *argv: str, **variables: str) -> HostProgram:
         """Start a Python program, given as its text."""
-        return self.execute(sys.executable, "-c", dedent(script), *argv, **variables)
+        return self.execute(sys.executable, "-c", WHOLE_LINES + dedent(script), *argv, **variables)
 
     def rosz(self, *argv: str, **variables: str) -> HostProgram:
         """Start a ``rosz`` command."""

@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+
+import pytest
+
+from rosz.errors import UsageError, YamlError
+from rosz.security import KeyFolder
+from rosz.security.authority import Authority
+from rosz.security.review import review
+from rosz.session import secured
+
+
+def test_files_are_for_their_owner_alone(authority: Authority) -> None:
+    home = authority.add("robot")
+    assert (home / "key.pem").stat().st_mode & 0o777 == 0o600
+    assert home.stat().st_mode & 0o777 == 0o700
+    assert (authority.folder / "authority" / "key.pem").stat().st_mode & 0o777 == 0o600
+
+
+def test_found_by_host_name_or_directly(authority: Authority) -> None:
+    home = authority.add("robot")
+    assert KeyFolder.find(authority.folder, "robot") == KeyFolder.find(home, "other")
+
+
+def test_a_key_that_others_can_read_is_refused(authority: Authority) -> None:
+    home = authority.add("robot")
+    (home / "key.pem").chmod(0o640)
+    with pytest.raises(UsageError, match=r"others may read '.*key.pem' \(mode 0640, expected 0600"):
+        KeyFolder.find(home, "robot")
+    (authority.folder / "authority" / "key.pem").chmod(0o644)
+    with pytest.raises(UsageError, match="others may read"):
+        Authority(authority.folder)
+
+
+def test_no_key(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no key in '.*' \(ROSZ_KEYS\): expected 'key.pem' there"):
+        KeyFolder.find(tmp_path, "robot")
+
+
+def test_half_a_copy(authority: Authority) -> None:
+    home = authority.add("robot")
+    (home / "authority.pem").unlink()
+    with pytest.raises(
+        UsageError, match=r"has a key but no 'authority.pem'; copy the whole folder"
+    ):
+        KeyFolder.find(home, "robot")
+
+
+def test_rules_that_are_none_let_nobody_start(authority: Authority) -> None:
+    home = authority.add("robot")
+    (home / "rules.yaml").write_text("a: {drive: true}\n")
+    with pytest.raises(YamlError, match=r"rules.yaml:1:5: 'drive' is no permission"):
+        KeyFolder.find(home, "robot")
+
+
+def test_nothing_is_overwritten(authority: Authority) -> None:
+    key = (authority.add("robot") / "key.pem").read_bytes()
+    with pytest.raises(UsageError, match="'robot' has keys already"):
+        authority.add("robot")
+    with pytest.raises(UsageError, match="has an authority already"):
+        Authority.create(authority.folder)
+    assert (authority.folder / "robot" / "key.pem").read_bytes() == key
+
+
+@pytest.mark.parametrize("name", ["../up", "", "authority", "a b", "-x"])
+def test_names_of_holders(authority: Authority, name: str) -> None:
+    with pytest.raises(UsageError, match="is no name for a holder of keys"):
+        authority.add(name)
+
+
+def test_review_of_what_is_right(authority: Authority) -> None:
+    authority.add("robot", ["10.0.0.5"])
+    (authority.folder / "rules.yaml").write_text("robot: {publish: [/a], set: [/b]}\n")
+    found = review(authority.folder)
+    assert [(holder.name, holder.places) for holder in found.holders] == [("robot", ("10.0.0.5",))]
+    assert found.rules[0].allowed == {"robot": ["publish /a", "set /b", "get all parameters"]}
+    assert found.wrong == []
+
+
+def test_review_of_what_is_wrong(authority: Authority, tmp_path: Path) -> None:
+    authority.add("late", days=10)
+    authority.add("gone", days=-1)
+    (authority.add("open") / "key.pem").chmod(0o644)
+    strange = Authority.create(tmp_path / "other").add("strange")
+    strange.rename(authority.folder / "strange")
+    own = (authority.folder / "authority" / "certificate.pem").read_bytes()
+    (authority.folder / "strange" / "authority.pem").write_bytes(own)
+    (authority.folder / "rules.yaml").write_text("nobody: all\n")
+    wrong = "\n".join(review(authority.folder).wrong)
+    for part in (
+        "'late' ends on",
+        "'gone' ended on",
+        "others may read",
+        "is not signed by",
+        "allows 'nobody' something, who has no keys",
+    ):
+        assert part in wrong
+
+
+def test_review_takes_its_date_from_the_caller(authority: Authority) -> None:
+    authority.add("robot", days=100)
+    then = dt.datetime.now(dt.UTC) + dt.timedelta(days=101)
+    assert any("'robot' ended on" in line for line in review(authority.folder, then).wrong)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("tcp/robot:7447", "tls/robot:7447"),
+        ("tcp/[2001:db8::1]:7447", "tls/[2001:db8::1]:7447"),
+        ("tcp/localhost:7447", "tcp/localhost:7447"),
+        ("tcp/127.0.0.1:0", "tcp/127.0.0.1:0"),
+        ("tcp/[::1]:7447", "tcp/[::1]:7447"),
+        ("unixsock-stream//run/z.sock", "unixsock-stream//run/z.sock"),
+        ("tls/robot:7447", "tls/robot:7447"),
+    ],
+)
+def test_endpoints(given: str, expected: str) -> None:
+    assert secured(given) == expected
+
+
+@pytest.mark.parametrize("endpoint", ["udp/robot:7447", "ws/robot:80", "quic/robot:7447"])
+def test_no_way_around(endpoint: str) -> None:
+    with pytest.raises(UsageError, match="links beyond this machine are tls"):
+        secured(endpoint)

@@ -1,0 +1,224 @@
+"""Keys and rules between hosts: who gets in, and what each may do there."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from hosts.host import HostProgram
+from hosts.world import World
+from network import eventually
+
+from rosz.security.authority import Authority
+
+ROBOT = """
+    import rosz
+    from rosz.msgs.std_msgs.msg import String
+    from rosz.msgs.std_srvs.srv import Trigger, TriggerResponse
+
+    def answer(name):
+        def serve(request):
+            print("served", name, flush=True)
+            return TriggerResponse(success=True, message=name)
+        return serve
+
+    with rosz.Node("robot") as node:
+        node.params.set("/gains/p", 1)
+        node.params.set("/secrets/pin", 1234)
+        out = {name: node.publisher(name, String) for name in ("camera", "odom")}
+        for name in ("map", "plan"):
+            node.publisher(name, String, latch=True).publish(name)
+        for name in ("cmd_vel", "lift"):
+            node.subscription(name, String, lambda m, n=name: print("got", n, m.data, flush=True))
+        for name in ("reset", "format"):
+            node.service(name, Trigger, answer(name))
+        node.params.watch("/", lambda c: print("param", c.name, c.new, flush=True))
+        print("up", flush=True)
+        for tick in node.rate(20):
+            for name, publisher in out.items():
+                publisher.publish(f"{name} {tick}")
+"""
+
+LAPTOP = """
+    import sys, time
+    import rosz
+    from rosz.msgs.std_msgs.msg import String
+    from rosz.msgs.std_srvs.srv import Trigger
+
+    with rosz.Node("laptop") as node:
+        for name in ("odom", "camera", "map", "plan"):
+            kept = "transient_local" if name in ("map", "plan") else "volatile"
+            qos = rosz.QoS(depth=1, durability=kept)
+            seen = set()
+            def hear(message, name=name, seen=seen):
+                if name not in seen:
+                    seen.add(name)
+                    print("heard", name, flush=True)
+            node.subscription(name, String, hear, qos=qos)
+        out = [node.publisher(name, String) for name in ("lift", "cmd_vel")]
+        print("up", flush=True)
+        for order in sys.stdin:
+            verb, *rest = order.split()
+            try:
+                if verb == "publish":
+                    for publisher in out:
+                        publisher.publish("go")
+                elif verb == "call":
+                    client = node.client(rest[0], Trigger)
+                    client.wait_for_service(2)
+                    print("answer", client(timeout=2).message, flush=True)
+                elif verb == "set":
+                    node.params.set(rest[0], rest[1])
+                    print("set", rest[0], flush=True)
+                elif verb == "names":
+                    tokens = node.context.graph.view().endpoints()
+                    names = {token.name for token in tokens if token.node_name == "/robot"}
+                    print("robot has", *sorted(names), flush=True)
+                elif verb == "get":
+                    print("value", node.params.get(rest[0], None), flush=True)
+            except rosz.RoszError as error:
+                print("error", verb, *rest, type(error).__name__, flush=True)
+            print("done", *order.split(), flush=True)
+"""
+
+
+class Pair:
+    """A robot with a core, and a laptop that connects to it."""
+
+    def __init__(self, world: World, authority: Authority) -> None:
+        self.robot, self.laptop = world.host("robot"), world.host("laptop")
+        self.authority = authority
+        for host in (self.robot, self.laptop):
+            authority.add(host.name, [host.address])
+            host.variables["ROSZ_KEYS"] = str(authority.folder)
+        self.laptop.variables["ROSZ_CONNECT"] = "tcp/robot:7447"
+
+    def rules(self, text: str) -> None:
+        (self.authority.folder / "robot" / "rules.yaml").write_text(text)
+
+    def start(self) -> tuple[HostProgram, HostProgram]:
+        core = self.robot.rosz("core", "--listen", f"tcp/{self.robot.address}:7447")
+        core.wait_for("started core")
+        robot = self.robot.program(ROBOT)
+        robot.wait_for("up")
+        return core, robot
+
+
+@pytest.fixture
+def pair(world: World, authority: Authority) -> Pair:
+    return Pair(world, authority)
+
+
+def test_with_keys_all_works(pair: Pair) -> None:
+    _, robot = pair.start()
+    laptop = pair.laptop.program(LAPTOP)
+    for name in ("odom", "camera", "map", "plan"):
+        laptop.wait_for(f"heard {name}")
+    laptop.say("publish")
+    robot.wait_for("got cmd_vel go")
+    robot.wait_for("got lift go")
+    laptop.say("call reset")
+    laptop.wait_for("answer reset")
+    laptop.say("set /gains/p 7")
+    robot.wait_for("param /gains/p 7")
+
+
+RULES = """
+laptop:
+  subscribe: [/odom, /map]
+  publish: [/cmd_vel]
+  call: [/reset]
+  set: ["/gains/**"]
+  get: true
+"""
+
+
+def test_rules_allow_what_they_say_and_nothing_else(pair: Pair) -> None:
+    pair.rules(RULES)
+    _, robot = pair.start()
+    laptop = pair.laptop.program(LAPTOP)
+    laptop.wait_for("heard odom")
+    laptop.wait_for("heard map")
+    for _ in range(3):
+        laptop.say("publish")
+    eventually(lambda: robot.output.count("got cmd_vel go") == 3, "three orders")
+    laptop.say("call reset")
+    laptop.wait_for("answer reset")
+    laptop.say("call format")
+    laptop.wait_for("error call format")
+    laptop.say("get /secrets/pin")
+    laptop.wait_for("value 1234")
+    laptop.say("set /gains/p 7")
+    robot.wait_for("param /gains/p 7")
+    laptop.say("set /secrets/pin 0")
+    laptop.wait_for("done set /secrets/pin", 30)
+    assert pair.robot.ask("param", "get", "/secrets/pin") == "1234"
+    laptop.say("names")
+    assert laptop.wait_for("robot has") == "robot has /cmd_vel /map /odom /reset"
+    for unheard in ("lift", "secrets"):
+        assert unheard not in robot.output
+    assert "heard camera" not in laptop.output
+    assert "heard plan" not in laptop.output
+    assert "served format" not in robot.output
+
+
+def test_who_may_do_all(pair: Pair) -> None:
+    pair.rules("laptop: all\n'*': {}\n")
+    _, robot = pair.start()
+    laptop = pair.laptop.program(LAPTOP)
+    laptop.wait_for("heard plan")
+    laptop.say("set /secrets/pin 0")
+    robot.wait_for("param /secrets/pin 0")
+
+
+def test_who_is_not_named(pair: Pair) -> None:
+    pair.rules("somebody: all\n")
+    _, robot = pair.start()
+    laptop = pair.laptop.program(LAPTOP)
+    laptop.wait_for("up")
+    for order in ("publish", "call reset", "names"):
+        laptop.say(order)
+    assert laptop.wait_for("robot has").strip() == "robot has"
+    assert robot.output == "up"
+    assert "heard" not in laptop.output
+
+
+def test_without_a_key(pair: Pair) -> None:
+    core, robot = pair.start()
+    del pair.laptop.variables["ROSZ_KEYS"]
+    listing = pair.laptop.rosz("topic", "list")
+    assert listing.exit_code() == 1
+    assert "/odom" not in listing.output
+    core.wait_for("InvalidContentType")
+    assert robot.output == "up"
+
+
+def test_with_a_key_of_another_authority(pair: Pair, tmp_path: Path) -> None:
+    core, _ = pair.start()
+    other = Authority.create(tmp_path / "other")
+    other.add("laptop", [pair.laptop.address])
+    listing = pair.laptop.rosz("topic", "list", ROSZ_KEYS=str(other.folder))
+    assert listing.exit_code() == 1
+    assert "its certificate is refused here" in listing.output
+    core.wait_for("zenoh_link_tls")
+
+
+def test_with_an_expired_key(pair: Pair) -> None:
+    core, _ = pair.start()
+    shutil.rmtree(pair.authority.folder / "laptop")
+    pair.authority.add("laptop", days=-1)
+    listing = pair.laptop.rosz("topic", "list")
+    assert listing.exit_code() == 1
+    assert "it refuses: sslv3 alert certificate expired" in listing.output
+    core.wait_for("certificate expired")
+
+
+def test_a_key_for_another_name(pair: Pair) -> None:
+    """Who has a key cannot stand in for another machine."""
+    shutil.rmtree(pair.authority.folder / "robot")
+    (pair.authority.add("other")).rename(pair.authority.folder / "robot")
+    pair.start()
+    listing = pair.laptop.rosz("topic", "list")
+    assert listing.exit_code() == 1
+    assert "Hostname mismatch" in listing.output

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import pytest
+
+from rosz.errors import YamlError
+from rosz.security import Permit, access_control, read_rules
+
+
+def test_all_forms() -> None:
+    rules = read_rules(
+        """
+laptop:
+  publish: /cmd_vel
+  subscribe: [/odom, "/arm*/*", "/**"]
+  get: true
+operator: all
+"*": {}
+""",
+        "rules.yaml",
+    )
+    laptop = Permit(publish=("/cmd_vel",), subscribe=("/odom", "/arm*/*", "/**"), get=True)
+    assert rules.permits == {"laptop": laptop, "operator": Permit.all(), "*": Permit()}
+
+
+def test_nothing_written_is_nothing_allowed() -> None:
+    assert read_rules("# later\n", "rules.yaml").permits == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[]", "r:1:1: expected a mapping of key holders"),
+        (
+            "a: {publsh: [/b]}",
+            "r:1:5: 'publsh' is no permission; did you mean 'publish'?; expected",
+        ),
+        ("a: {publish: [b]}", "r:1:15: 'b' is no pattern of global names"),
+        ("a: {publish: [/a***]}", "r:1:15: '/a***' is no pattern"),
+        ("a: {publish: [/a**]}", "r:1:15: '/a**' is no pattern"),
+        ("a: {publish: [{}]}", "r:1:15: expected a name or a list of names"),
+        ("a: {get: maybe}", "r:1:10: expected true or false"),
+        ("a: some", "r:1:4: 'some'; expected 'all', or a mapping of permissions"),
+        ("a: {}\na: all", "r:2:1: 'a' stands here twice"),
+        ("a: [", "r:1:5: "),
+        ("? [a]\n: all", "r:1:3: expected a name"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:
+    with pytest.raises(YamlError) as caught:
+        read_rules(text, "r")
+    assert str(caught.value).startswith(message)
+
+
+def allowed(rules: str, flow: str, message: str) -> set[str]:
+    """Return the keys on which somebody called ``a`` may send or get a kind of message."""
+    control = access_control(read_rules(rules, "r"), ["lo"])
+    mine = [p["rules"] for p in control["policies"] if "holder a" in p["subjects"]]
+    names = {name for part in mine for name in part}
+    found = [
+        rule["key_exprs"]
+        for rule in control["rules"]
+        if rule["id"] in names and flow in rule["flows"] and message in rule["messages"]
+    ]
+    return {key for keys in found for key in keys}
+
+
+def test_what_rules_become() -> None:
+    one = "a: {publish: [/arm/x], subscribe: ['/arm*/**'], call: [/go], set: ['/gains/**']}"
+    assert "*/arm/x/*/*" in allowed(one, "ingress", "put")
+    assert "*/arm/x/*/*" not in allowed(one, "egress", "put")
+    assert "*/arm$*/**/*/*" in allowed(one, "egress", "put")
+    assert "*/go/*/*" in allowed(one, "ingress", "query")
+    assert "@rosz/*/change/gains/**" in allowed(one, "ingress", "put")
+    assert "@rosz/*/change/**" not in allowed(one, "ingress", "put")
+    assert "@ros2_lv/*/*/*/*/MP/*/*/*/%arm$*/**" in allowed(one, "egress", "liveliness_token")
+    assert "@ros2_lv/*/*/*/*/MP/*/*/*/%arm%x/**" in allowed(one, "ingress", "liveliness_token")
+
+
+def test_who_may_set_but_a_part_cannot_tell_others_what_they_missed() -> None:
+    sync = "@rosz/*/store/*/sync"
+    assert sync not in allowed("a: {set: ['/gains/**']}", "ingress", "reply")
+    assert sync in allowed("a: {set: ['/**']}", "ingress", "reply")
+
+
+def test_default_is_no() -> None:
+    control = access_control(read_rules("", "r"), ["lo"])
+    assert control["default_permission"] == "deny"
+    assert [policy["subjects"] for policy in control["policies"]] == [
+        ["interfaces of this machine", "sockets of this machine"]
+    ]
