@@ -106,6 +106,7 @@ class Context:
             0 if alone or self.passing else self.SETTLED_BY,
             self._flushed,
             mesh=config.mode == "peer",
+            everywhere=config.multicast,
         )
         self.settled = settling.settled
         self.when_settled = settling.when_settled

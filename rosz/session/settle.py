@@ -2,15 +2,19 @@
 
 A peer hears of the other peers from the one it meets first, and connects to them in the background.
 What it publishes before that is done misses those it is not linked to yet. So it asks whom it
-meets for *their* links, and is settled once it has all of them itself.
+meets for *their* links, and is settled once it has all of them itself. Those of other machines, to
+whom routers carry what it says, listen where it cannot reach them, and are left out.
 """
 
 from __future__ import annotations
 
 import logging
+import socket
 import threading
 import time
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
     from rosz.session.declared import Closable
     from rosz.session.session import Session
 
-__all__ = ("Settling", "serve_links")
+__all__ = ("Settling", "place", "serve_links")
 
 _SPACE = "@rosz/links"
 _POLL = 0.002
@@ -39,19 +43,27 @@ class Settling:
         timeout: Seconds after which it counts as settled, come what may; 0 if it is already.
         stop: Ends the waiting when set.
         mesh: Whether it links to all its neighbours, rather than to one as a client does.
+        everywhere: Whether peers of other machines can be reached as well, as by multicast.
 
     Attributes:
         settled: Set in the end.
     """
 
     def __init__(
-        self, session: Session, timeout: float, stop: threading.Event, *, mesh: bool = True
+        self,
+        session: Session,
+        timeout: float,
+        stop: threading.Event,
+        *,
+        mesh: bool = True,
+        everywhere: bool = False,
     ) -> None:
         self.settled = threading.Event()
         self._session = session
         self._timeout = timeout
         self._stop = stop
         self._mesh = mesh
+        self._asked = f"{_SPACE}/{'*' if everywhere else place()}/*"
         self._lock = threading.Lock()
         self._waiting: list[Callable[[], None]] = []
         if timeout:
@@ -93,7 +105,7 @@ class Settling:
     def _neighbours(self, timeout: float) -> set[str]:
         """Return everybody that those who are linked to this session are linked to."""
         found: set[str] = set()
-        for reply in self._session.get(f"{_SPACE}/*", timeout=min(timeout, _ASK_TIMEOUT)):
+        for reply in self._session.get(self._asked, timeout=min(timeout, _ASK_TIMEOUT)):
             if reply.ok:
                 try:
                     found.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
@@ -116,12 +128,26 @@ def serve_links(session: Session) -> Closable:
         # Zenoh forbids calls into the session on its own threads.
         threading.Thread(target=_answer, args=(session, query), daemon=True).start()
 
-    return session.queryable(f"{_SPACE}/{session.zid}", answer)
+    return session.queryable(_own_key(session), answer)
 
 
 def _answer(session: Session, query: Query) -> None:
     with query:
         try:
-            query.reply(f"{_SPACE}/{session.zid}", msgspec.msgpack.encode(session.peers()))
+            query.reply(_own_key(session), msgspec.msgpack.encode(session.peers()))
         except RoszError:
             return  # the session closed meanwhile; whoever asked sees that it is gone
+
+
+def _own_key(session: Session) -> str:
+    return f"{_SPACE}/{place()}/{session.zid}"
+
+
+@cache
+def place() -> str:
+    """Return what all have in common who can reach each other by loopback."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        return f"{boot}-{Path('/proc/self/ns/net').stat().st_ino}"
+    except OSError:  # another system than Linux: no namespaces either
+        return socket.gethostname().lower() or "localhost"

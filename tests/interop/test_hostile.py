@@ -16,6 +16,7 @@ from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.sensor_msgs.msg import PointCloud2
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import MessageInfo, Node
+from rosz.session.settle import place
 
 STRING = f"std_msgs::msg::dds_::String_/{String._type_hash}"
 ADD = f"example_interfaces::srv::dds_::AddTwoInts_/{AddTwoInts._type_hash}"
@@ -213,7 +214,7 @@ def test_control(node: Node, plain: Plain) -> None:
 
 def test_answers_about_links(network: Network, plain: Plain) -> None:
     """Somebody who lies about links delays nobody for ever."""
-    lies = plain.queries("@rosz/links/liar")
+    lies = plain.queries(f"@rosz/links/{place()}/liar")
 
     def lie() -> None:
         while True:
@@ -221,7 +222,7 @@ def test_answers_about_links(network: Network, plain: Plain) -> None:
             if query is None:
                 return
             with query:
-                query.reply("@rosz/links/liar", b"\xc1junk")
+                query.reply(f"@rosz/links/{place()}/liar", b"\xc1junk")
 
     network.thread(lie)
     newcomer = network.node("newcomer")
