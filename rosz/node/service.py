@@ -18,9 +18,13 @@ if TYPE_CHECKING:
     from rosz.message import Service as ServiceType
     from rosz.node.node import Node
 
-__all__ = ("Service", "to_response")
+__all__ = ("Refusal", "Service", "to_response")
 
 _NO_GID = bytes(16)
+
+
+class Refusal(ServiceError):
+    """What a handler raises to answer with an error that it has told the log about itself."""
 
 
 class Service(Endpoint):
@@ -83,7 +87,8 @@ class Service(Endpoint):
 
         Raises:
             DecodeError: The request is damaged.
-            ServiceError: The handler raised, or returned what is no response.
+            Refusal: The handler raised it.
+            ServiceError: The handler raised something else, or returned what is no response.
         """
         types = self.service_type
         message = types.Request._decode(request)

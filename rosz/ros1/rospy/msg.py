@@ -1,0 +1,88 @@
+"""Messages as rospy passes them around: of any type, and made of what a caller gave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+from rosz.message.base import Writable
+from rosz.ros1.rospy.absent import attribute
+
+__all__ = ("AnyMsg", "args_kwds_to_message")
+
+
+class AnyMsg:
+    """A message of whatever type a topic has, not decoded.
+
+    Attributes:
+        _buff: Its bytes: CDR, with the header of four bytes.
+        _connection_header: ``type``, ``md5sum``, ``message_definition``, ``topic``, ``callerid``.
+    """
+
+    _md5sum: ClassVar[str] = "*"
+    _type: ClassVar[str] = "*"
+    _has_header: ClassVar[bool] = False
+    _full_text: ClassVar[str] = ""
+    __slots__ = ("_buff", "_connection_header")
+
+    def __init__(self, *args: object) -> None:
+        if args:
+            raise TypeError(f"AnyMsg takes no values, got {len(args)}")
+        self._buff = b""
+        self._connection_header: dict[str, str] = {}
+
+    def serialize(self, buff: Writable) -> None:
+        """Write the bytes into a file-like object."""
+        buff.write(self._buff)
+
+    def deserialize(self, data: bytes) -> Self:
+        """Take bytes as they are."""
+        self._buff = bytes(data)
+        return self
+
+
+def args_kwds_to_message(
+    data_class: type[Any], args: Sequence[Any], kwds: Mapping[str, Any]
+) -> Any:
+    """Return the message that the arguments of a ``publish`` mean.
+
+    Args:
+        data_class: Class of the topic's messages.
+        args: A message, or the values of all its fields.
+        kwds: Values of some of its fields by name.
+
+    Raises:
+        TypeError: They are neither, or of another type.
+        AttributeError: There is no such field.
+    """
+    if args and kwds:
+        raise TypeError("publish() can be called with arguments or keywords, but not both.")
+    if kwds:
+        return _by_name(data_class, kwds)
+    if len(args) == 1 and hasattr(args[0], "_md5sum"):
+        given = args[0]
+        if given._md5sum in {data_class._md5sum, AnyMsg._md5sum} or data_class is AnyMsg:
+            return given
+        single = data_class._slot_types
+        if len(single) == 1 and single[0] == given._type:
+            return data_class(given)
+        expected = single[0] if len(single) == 1 else data_class._type
+        raise TypeError(f"expected [{expected}] but got [{given._type}]")
+    slots = list(data_class.__slots__)
+    if not args:
+        return data_class()
+    if len(args) != len(slots):
+        raise TypeError(
+            f"Invalid number of arguments, args should be {slots} args are{tuple(args)}"
+        )
+    return _by_name(data_class, dict(zip(slots, args, strict=True)))
+
+
+def _by_name(data_class: type[Any], fields: Mapping[str, Any]) -> Any:
+    for name in fields:
+        if name not in data_class.__slots__:
+            raise AttributeError(f"{name} is not an attribute of {data_class.__name__}")
+    return data_class(**fields)
+
+
+__getattr__ = attribute(__name__)

@@ -1,0 +1,169 @@
+"""Services by rospy's names (ROS wiki, rospy/Overview/Services)."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from rosz.node import Node
+from rosz.node import Service as NodeService
+from rosz.node.service import Refusal
+from rosz.qos import SERVICES
+from rosz.ros1.rospy.absent import attribute
+from rosz.ros1.rospy.msg import args_kwds_to_message
+from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
+from rosz.ros1.rospy.state import has_node, state, when_ready
+
+__all__ = ("Service", "ServiceException")
+
+_THREADS = 1000
+_BUFF_SIZE = 65536
+
+ErrorHandler = Callable[[BaseException, Any, Any, Any], object]
+
+
+class ServiceException(Exception):
+    """A service call that failed."""
+
+
+class ServiceEnd:
+    """What services and their callers have in common.
+
+    Args:
+        name: Name of the service.
+        service_class: Its class.
+
+    Attributes:
+        resolved_name: The global name.
+        request_class: Class of its requests.
+        response_class: Class of its responses.
+
+    Raises:
+        ValueError: The name is none, or the class is none of a service.
+    """
+
+    def __init__(self, name: str, service_class: type[Any]) -> None:
+        if not name or not isinstance(name, str):
+            raise ValueError("service name is not a non-empty string")
+        if service_class is None:
+            raise ValueError("service_class must be the class of a service, got None")
+        resolve = resolve_name if has_node() else resolve_name_without_node_name
+        self.name = name
+        self.resolved_name = resolve(name)
+        self.service_class = service_class
+        self.request_class: type[Any] = service_class._request_class
+        self.response_class: type[Any] = service_class._response_class
+        self.type: str = service_class._type
+
+
+class Service(ServiceEnd):
+    """A service of this node.
+
+    Args:
+        name: Name of the service.
+        service_class: Its class.
+        handler: Gets a request, and returns a response, or what makes one: a list, tuple or
+            dictionary of its fields, or the value of its only one.
+        buff_size: Accepted; no buffer has to be large enough for a request here.
+        error_handler: Told instead of the log of what the handler raises: exception, class, value
+            and traceback.
+
+    Raises:
+        ValueError: The name is none, or the class is none of a service.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[Any],
+        handler: Callable[[Any], Any],
+        buff_size: int = _BUFF_SIZE,
+        error_handler: ErrorHandler | None = None,
+    ) -> None:
+        super().__init__(name, service_class)
+        self.handler = handler
+        self.buff_size = buff_size
+        self.error_handler = error_handler
+        self._over = threading.Event()
+        self._service: NodeService | None = None
+        when_ready(self._open)
+
+    def _open(self, node: Node) -> None:
+        if not self._over.is_set():
+            self._service = node.keep(
+                NodeService(
+                    node,
+                    self.resolved_name,
+                    self.service_class,
+                    self._handle,
+                    SERVICES,
+                    _THREADS,
+                )
+            )
+
+    def _handle(self, request: Any) -> Any:
+        """Return the response to a request.
+
+        Raises:
+            Refusal: There is none; the text is for the caller.
+        """
+        try:
+            response = self._response(self.handler(request))
+            response._encode(response)
+        except ServiceException as error:
+            raise Refusal(f"service cannot process request: {error}") from error
+        except Exception as error:
+            self._tell(error)
+            raise Refusal(f"error processing request: {error}") from error
+        return response
+
+    def _response(self, value: Any) -> Any:
+        kind = self.response_class
+        if isinstance(value, kind):
+            return value
+        if value is None and kind.__slots__:
+            raise ServiceException("service handler returned None")
+        if isinstance(value, dict):
+            args, fields = [], value
+        elif isinstance(value, list | tuple):
+            args, fields = list(value), {}
+        else:
+            args, fields = ([] if value is None else [value]), {}
+        try:
+            return args_kwds_to_message(kind, args, fields)
+        except AttributeError as error:
+            raise ServiceException(f"handler returned invalid value: {error}") from error
+        except TypeError as error:
+            raise ServiceException(
+                f"handler returned wrong number of values: {error}"
+            ) from error
+
+    def _tell(self, error: Exception) -> None:
+        if self.error_handler is not None:
+            self.error_handler(error, type(error), error, error.__traceback__)
+        elif state.node is not None:
+            trace = traceback.format_exception(error)
+            state.node.log.error("Error processing request: %s\n%s", error, trace)
+
+    def shutdown(self, reason: str = "") -> None:
+        """End the service; again is no error.
+
+        Args:
+            reason: Why, for the log.
+        """
+        del reason
+        self._over.set()
+        if self._service is not None:
+            self._service.close()
+
+    def spin(self) -> None:
+        """Wait until the service or the node ends."""
+        from rosz.ros1.rospy.core import is_shutdown
+
+        while not is_shutdown() and not self._over.wait(0.5):
+            pass
+
+
+__getattr__ = attribute(__name__)

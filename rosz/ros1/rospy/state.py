@@ -1,0 +1,159 @@
+"""The process-wide state of rospy, whose functions all mean "this process's one node".
+
+Nothing else in rosz keeps any. Whatever is made before ``init_node`` waits here for the node.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rosz import remap
+from rosz.ros1.rospy.exceptions import ROSInitException
+
+if TYPE_CHECKING:
+    from rosz.node import Context, Node
+    from rosz.params.api import Params
+
+__all__ = (
+    "UNNAMED",
+    "State",
+    "arguments",
+    "context",
+    "has_node",
+    "helper",
+    "node",
+    "params",
+    "set_arguments",
+    "state",
+    "when_ready",
+)
+
+UNNAMED = "/unnamed"
+"""Name of the node before there is one."""
+
+
+class State:
+    """All that rospy remembers.
+
+    Attributes:
+        lock: Held while any of this is changed.
+        context: What the process shares with the network, once something needed it.
+        node: The node, once there is one.
+        helper: What stands in for it before, where a service is called so early.
+        arguments: The command line that ``init_node`` was given, else that of the process.
+        params: Parameters as seen before there is a node.
+        init_call: The arguments of ``init_node``, which a second call must repeat.
+        waiting: What to do as soon as there is a node, in order.
+        sources: Topics that this process publishes on, by name.
+        sinks: Topics that it subscribes to, by name.
+        hooks: What to call when the node shuts down, by the stage it belongs to, in order.
+        shutdown: Set when the end has begun.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.context: Context | None = None
+        self.node: Node | None = None
+        self.helper: Node | None = None
+        self.arguments: remap.Arguments | None = None
+        self.params: Params | None = None
+        self.init_call: tuple[Any, ...] | None = None
+        self.waiting: list[Callable[[Node], object]] = []
+        self.sources: dict[str, Any] = {}
+        self.sinks: dict[str, Any] = {}
+        self.hooks: dict[str, list[Callable[..., object]]] = {
+            "client": [],
+            "preshutdown": [],
+            "shutdown": [],
+        }
+        self.shutdown = threading.Event()
+
+
+state = State()
+"""The one there is."""
+
+
+def arguments() -> remap.Arguments:
+    """Return the command line, sorted by meaning."""
+    if state.arguments is None:
+        state.arguments = remap.parse(sys.argv[1:])
+    return state.arguments
+
+
+def set_arguments(argv: Sequence[str]) -> None:
+    """Take another command line than that of the process, without a program's name."""
+    with state.lock:
+        state.arguments = remap.parse(argv)
+        if state.context is not None:
+            state.context.arguments = state.arguments
+
+
+def context() -> Context:
+    """Return what the process shares with the network; opened at first use, closed at exit.
+
+    Raises:
+        TransportError: The session cannot be opened.
+        UsageError: The environment has a value that means nothing.
+    """
+    with state.lock:
+        if state.context is None:
+            from rosz.node import Context
+
+            opened = Context()
+            opened.arguments = arguments()
+            state.context = opened
+        return state.context
+
+
+def has_node() -> bool:
+    """Tell whether ``init_node`` has been called."""
+    return state.node is not None
+
+
+def node() -> Node:
+    """Return the node of this process.
+
+    Raises:
+        ROSInitException: ``init_node`` has not been called.
+    """
+    if state.node is None:
+        raise ROSInitException("client code must call rospy.init_node() first")
+    return state.node
+
+
+def params() -> Params:
+    """Return the parameters as the node sees them, or as one called ``/unnamed`` does."""
+    if state.node is not None:
+        return state.node.params
+    with state.lock:
+        if state.params is None:
+            from rosz.params.api import Params
+
+            state.params = Params(
+                context().params, UNNAMED, arguments().resolved_remaps(UNNAMED)
+            )
+        return state.params
+
+
+def when_ready(act: Callable[[Node], object]) -> None:
+    """Have something done with the node: now, or when there is one."""
+    with state.lock:
+        if state.node is None:
+            state.waiting.append(act)
+            return
+    act(state.node)
+
+
+def helper() -> Node:
+    """Return the node, or, before there is one, a nameless one that can call services."""
+    if state.node is not None:
+        return state.node
+    with state.lock:
+        if state.helper is None:
+            from rosz.node import Node
+
+            state.helper = Node(UNNAMED.strip("/"), context=context())
+        return state.helper
