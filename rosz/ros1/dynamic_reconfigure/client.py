@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 from rosz import reconfigure
 from rosz.errors import ClosedError, ParamError, ServiceError, WaitTimeout
 from rosz.reconfigure import Description
-from rosz.reconfigure.messages import pack_config, pack_description
+from rosz.reconfigure.messages import pack_description
 from rosz.ros1.dynamic_reconfigure.encoding import (
     Config,
-    decode_config,
     decode_description,
     extract_params,
+    in_groups,
 )
 from rosz.ros1.dynamic_reconfigure.exceptions import (
     DynamicReconfigureCallbackException,
@@ -142,7 +142,7 @@ class Client:
             raise DynamicReconfigureCallbackException(f"service call failed: {error}") from error
         except ClosedError as error:
             raise ROSInterruptException("rospy shutdown") from error
-        return self._classic(self._client.description(), found)
+        return in_groups(found, self._decode(self._client.description()))
 
     def update_groups(self, changes: Mapping[str, bool]) -> Config | None:
         """Change which groups are shown, by name, and return the root group."""
@@ -211,7 +211,7 @@ class Client:
     def _configuration(self, timeout: float) -> Config | None:
         try:
             config = self._client.config(timeout)
-            return self._classic(self._client.description(_NOW), config)
+            return in_groups(config, self._decode(self._client.description(_NOW)))
         except (WaitTimeout, ClosedError):
             return None
 
@@ -231,15 +231,9 @@ class Client:
             self._decoded = (description, decode_description(pack_description(description)))
         return self._decoded[1]
 
-    def _classic(self, description: Description, config: Config) -> Config:
-        """Return a configuration in the form that ROS 1's client has: with values in the groups."""
-        values = {name: one for name, one in config.items() if name != "groups"}
-        message = pack_config(description, values, description.read_states(config["groups"]))
-        return decode_config(message, self._decode(description))
-
     def _on_config(self, config: Config) -> None:
         if self._config_callback is not None:
-            self._config_callback(self._classic(self._client.description(), config))
+            self._config_callback(in_groups(config, self._decode(self._client.description())))
 
     def _on_description(self, description: Description) -> None:
         if self._description_callback is not None:

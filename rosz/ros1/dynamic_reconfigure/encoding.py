@@ -23,6 +23,7 @@ __all__ = (
     "extract_params",
     "get_tree",
     "group_dict",
+    "in_groups",
     "initial_config",
 )
 
@@ -203,3 +204,13 @@ def decode_config(msg: ConfigMsg, description: Mapping[str, Any] | None = None) 
             if one["name"] in config:
                 group[one["name"]] = config[one["name"]]
     return config
+
+
+def in_groups(config: Config, description: Mapping[str, Any]) -> Config:
+    """Return a configuration of `rosz.reconfigure` in the form that ROS 1's clients give it.
+
+    Args:
+        config: The configuration.
+        description: What `decode_description` returned.
+    """
+    return decode_config(encode_config(config), description)
