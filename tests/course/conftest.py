@@ -1,0 +1,17 @@
+"""What the course's tests share: see `terminal.Desk`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from network import Network
+from terminal import Desk
+
+
+@pytest.fixture
+def desk(network: Network) -> Iterator[Desk]:
+    """A student's desk, on a network of its own."""
+    made = Desk(network)
+    yield made
+    made.close()
