@@ -1,7 +1,8 @@
 """What makes ROS 1's command names mean rosz in a shell, and in all that is started from it.
 
 A folder of small programs goes on the PATH, so that ``timeout 5 rostopic …``, ``nohup roscore`` and
-scripts find them as well. Only roscd, which changes the shell's own folder, is a function.
+scripts find them as well. Only roscd, which changes the shell's own folder, is a function. Where a
+person types, the TAB key asks ``rosz complete``.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ COMMANDS = {
 }
 """ROS 1's commands, and what they are here."""
 
+_HELPERS = ("roscd", "rosed", "rosls", "rospack")
+
 _POSIX = """\
 export ROSZ_PYTHON={python}
 case ":$PATH:" in *:{folder}:*) ;; *) export PATH={folder}:"$PATH" ;; esac
@@ -41,6 +44,34 @@ roscd() {{
 }}
 """
 
+_BASH = """\
+if [[ $- = *i* ]]; then
+_rosz_complete() {{
+  local line="${{COMP_LINE:0:COMP_POINT}}"
+  mapfile -t COMPREPLY < <("$ROSZ_PYTHON" -P -m rosz complete bash "$line" 2>/dev/null)
+  [[ ${{#COMPREPLY[@]}} = 1 && $COMPREPLY = *[/=] ]] && compopt -o nospace
+  return 0
+}}
+complete -F _rosz_complete {names}
+fi
+"""
+
+_ZSH = """\
+if [[ -o interactive ]]; then
+(( $+functions[compdef] )) || {{ autoload -Uz compinit && compinit -u -D; }}
+_rosz_complete() {{
+  local line="${{(j: :)words[1,CURRENT-1]}} $PREFIX"
+  local -a found ended
+  found=(${{(f)"$("$ROSZ_PYTHON" -P -m rosz complete zsh "$line" 2>/dev/null)"}})
+  ended=(${{found:#*[/=]}})
+  found=(${{(M)found:#*[/=]}})
+  (( $#ended )) && compadd -Q -a ended
+  (( $#found )) && compadd -Q -S '' -a found
+}}
+compdef _rosz_complete {names}
+fi
+"""
+
 _FISH = """\
 set -gx ROSZ_PYTHON {python}
 contains {folder} $PATH; or set -gx PATH {folder} $PATH
@@ -48,6 +79,12 @@ function roscd
     test -n "$argv[1]"; or begin; echo "usage: roscd PACKAGE[/FOLDER]" >&2; return 2; end
     set -l parts (string split -m 1 / $argv[1])
     set -l folder (rospack find $parts[1]); and cd $folder/$parts[2]
+end
+function __rosz_complete
+    $ROSZ_PYTHON -P -m rosz complete fish (commandline -cp | string collect) 2>/dev/null
+end
+for command in {names}
+    complete -c $command -f -a "(__rosz_complete)"
 end
 """
 
@@ -60,10 +97,11 @@ def script(shell: Shell, folder: str, python: str) -> str:
         folder: Where the programs are.
         python: The interpreter that has rosz.
     """
-    text = _FISH if shell == "fish" else _POSIX
-    return text.format(folder=shlex.quote(folder), python=shlex.quote(python))
+    text = {"bash": _POSIX + _BASH, "zsh": _POSIX + _ZSH, "fish": _FISH}[shell]
+    names = " ".join(("rosz", *COMMANDS, *_HELPERS))
+    return text.format(folder=shlex.quote(folder), python=shlex.quote(python), names=names)
 
 
 def program(command: str) -> str:
     """Return the text of the program that stands for one of ROS 1's commands."""
-    return f'#!/bin/sh\nexec "${{ROSZ_PYTHON:-python3}}" -m rosz {COMMANDS[command]} "$@"\n'
+    return f'#!/bin/sh\nexec "${{ROSZ_PYTHON:-python3}}" -P -m rosz {COMMANDS[command]} "$@"\n'

@@ -1,0 +1,301 @@
+"""The TAB key, in real shells and by what it asks."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from network import PATIENCE, Network
+
+from rosz.cli.complete import complete, expand, split_line
+from rosz.cli.grammar import _HELPERS, _WORDS, _commands
+from rosz.cli.main import COMMANDS
+from rosz.introspect.shells import COMMANDS as ALIASES
+from rosz.launch.run.template import create
+from rosz.msgs.geometry_msgs.msg import Twist
+from rosz.msgs.std_srvs.srv import SetBool
+
+from .shell import Shell
+
+Ask = Callable[..., list[str]]
+
+
+@pytest.fixture
+def system(network: Network) -> Network:
+    """A node with a topic, a service and a parameter, and a package."""
+    node = network.node("turtle")
+    node.publisher("/turtle1/cmd_vel", Twist)
+    node.service("/turtle1/pen", SetBool, lambda _: SetBool.Response())
+    node.params["/turtle1/speed"] = 3
+    (network.folder / "src").mkdir()
+    create(network.folder / "src", "turtle_pkg")
+    return network
+
+
+@pytest.fixture
+def ask(shell: Shell, capsys: pytest.CaptureFixture[str]) -> Ask:
+    """What the TAB key asks, and gets."""
+    del shell  # has set the environment
+
+    def run(line: str, name: str = "fish") -> list[str]:
+        capsys.readouterr()
+        assert complete([name, line]) == 0
+        out, err = capsys.readouterr()
+        assert not err
+        return out.splitlines()
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("rostopic ec", ["echo"]),
+        ("rosz topic ec", ["echo"]),
+        ("rosz doc", ["doctor"]),
+        ("rostopic echo /tur", ["/turtle1/cmd_vel"]),
+        ("rostopic echo -n 1 /tur", ["/turtle1/cmd_vel"]),
+        ("rostopic echo -p /tur", ["/turtle1/cmd_vel"]),
+        ("rostopic echo /turtle1/cmd_vel/lin", ["/turtle1/cmd_vel/linear"]),
+        ("rostopic echo /turtle1/cmd_vel/linear/x", ["/turtle1/cmd_vel/linear/x"]),
+        ("rostopic echo /turtle1/cmd_vel/none/x", []),
+        ("rostopic echo /turtle1/cmd_vel ", []),
+        ("rostopic hz /turtle1/cmd_vel /tu", ["/turtle1/cmd_vel"]),
+        ("rostopic find geom", ["geometry_msgs/Twist"]),
+        ("rostopic pub /turtle1/cmd_vel ", ["geometry_msgs/Twist"]),
+        ("rostopic pub /new std_msgs/Stri", ["std_msgs/String"]),
+        ("rostopic pub /new std_msgs/String ", ["{data: ''}"]),
+        ("rostopic pub --ra", ["--rate"]),
+        ("rostopic pub -r 1", []),
+        ("rosservice call /tur", ["/turtle1/pen"]),
+        ("rosservice call /turtle1/pen ", ["{data: false}"]),
+        ("rosservice call /nowhere ", []),
+        ("rosservice find ", ["std_srvs/SetBool"]),
+        ("rosnode info /", ["/turtle"]),
+        ("rosparam get /turtle1/", ["/turtle1/speed"]),
+        ("rosmsg show geometry_msgs/TwistS", ["geometry_msgs/TwistStamped"]),
+        ("rossrv show std_srvs/Set", ["std_srvs/SetBool"]),
+        ("rosrun turtle_", ["turtle_pkg"]),
+        ("rosrun turtle_pkg ", ["talker.py"]),
+        ("rosrun nowhere ", []),
+        ("roslaunch turtle_", ["turtle_pkg"]),
+        ("roslaunch turtle_pkg ", ["talker.launch"]),
+        ("roslaunch turtle_pkg talker.launch ", ["rate:="]),
+        ("roslaunch turtle_pkg talker.launch rate:=", ["rate:=1.0"]),
+        ("roslaunch turtle_pkg talker.launch rate:=2 ", []),
+        ("roslaunch src/turtle_pkg/launch/", ["src/turtle_pkg/launch/talker.launch"]),
+        ("roslaunch src/turtle_pkg/launch/talker.launch r", ["rate:="]),
+        ("rosparam load src/", ["src/turtle_pkg/"]),
+        ("rosparam load src/turtle_pkg/package.xml /tur", ["/turtle1/speed"]),
+        ("roscd turtle_pkg/m", ["turtle_pkg/msg/"]),
+        ("rosls turtle_", ["turtle_pkg"]),
+        ("rosed turtle_pkg tal", ["talker.launch", "talker.py"]),
+        ("rospack find turtle_", ["turtle_pkg"]),
+        ("rosz pkg check turtle_", ["turtle_pkg"]),
+        ("rosz log --level w", ["warn"]),
+        ("ROS_DOMAIN_ID=42 rosnode info /t", ["/turtle"]),
+        ("cd / && rosnode info /t", ["/turtle"]),
+        ("rosz nothing ", []),
+        ("rosz topic nothing ", []),
+        ("ls ", []),
+        ("", []),
+    ],
+)
+def test_candidates(system: Network, ask: Ask, line: str, expected: list[str]) -> None:
+    del system
+    assert ask(line) == expected
+
+
+@pytest.mark.parametrize(
+    ("shell_name", "line", "expected"),
+    [
+        ("bash", "roslaunch turtle_pkg talker.launch rate:=", ["1.0"]),
+        ("zsh", "roslaunch turtle_pkg talker.launch rate:=", ["rate:=1.0"]),
+        ("bash", "rostopic pub /new std_msgs/String ", ["'{data: '\"'\"''\"'\"'}'"]),
+        ("fish", "rostopic pub /new std_msgs/String ", ["{data: ''}"]),
+    ],
+)
+def test_candidates_as_a_shell_takes_them(
+    system: Network, ask: Ask, shell_name: str, line: str, expected: list[str]
+) -> None:
+    del system
+    assert ask(line, shell_name) == expected
+
+
+@pytest.mark.parametrize(
+    "line", ["rostopic echo /", "rosnode info ", "rosparam get ", "rosservice call "]
+)
+def test_an_empty_network_gives_nothing_at_once(ask: Ask, line: str) -> None:
+    began = time.monotonic()
+    assert ask(line) == []
+    assert time.monotonic() - began < 1
+
+
+def test_a_network_that_hangs_gives_nothing_soon(network: Network) -> None:
+    import socket
+
+    with socket.socket(socket.AF_UNIX) as mute:
+        mute.bind(str(network.folder / "z.sock"))
+        mute.listen()
+        program = network.run("-m", "rosz", "complete", "bash", "rostopic echo /")
+        assert program.exit_code() == 0
+        assert program.output == ""
+
+
+def test_a_person_does_not_wait(system: Network) -> None:
+    line = "rostopic echo /"
+    best = min(_seconds(system, line) for _ in range(5))
+    assert best < 0.8  # 0.1 s on an idle machine
+
+
+def _seconds(network: Network, line: str) -> float:
+    began = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-m", "rosz", "complete", "bash", line],
+        env=network.variables(),
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=True,
+    )
+    assert done.stdout == "/rosout\n/turtle1/cmd_vel\n"
+    return time.monotonic() - began
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("rostopic ec", ["rostopic", "ec"]),
+        ("rostopic echo ", ["rostopic", "echo", ""]),
+        ("a | b;c 'x y' ", ["c", "x y", ""]),
+        ("x $(rostopic ec", ["rostopic", "ec"]),
+        ('a "b c', ["a", "b c"]),
+        ("a 'b c", ["a", "b c"]),
+        ("a 'b\" ", ["a", 'b" ']),
+        ("a |", None),
+    ],
+)
+def test_the_words_of_a_line(line: str, words: list[str] | None) -> None:
+    assert split_line(line) == words
+
+
+def test_what_a_line_stands_for() -> None:
+    assert expand(["/opt/bin/rostopic", "echo"]) == ["rosz", "topic", "echo"]
+    assert expand(["catkin_create_pkg"]) == ["rosz", "pkg", "create"]
+    assert expand(["A=1", "B=2", "rosz", "topic"]) == ["rosz", "topic"]
+    assert expand(["roscd", "x"]) == ["roscd", "x"]
+    assert expand(["A=1"]) == expand(["ls"]) == []
+
+
+def test_every_command_that_takes_names_has_its_table() -> None:
+    from importlib import import_module
+
+    for path in _WORDS:
+        if path[0] == "reconfigure" and path[0] not in COMMANDS:
+            continue
+        commands = _commands(import_module(f"rosz.cli.{path[0]}").app)
+        assert len(path) == 1 or path[1] in commands, path
+    assert {*_HELPERS} == {"roscd", "rosed", "rosls", "rospack"}
+
+
+@pytest.mark.parametrize("alias", ALIASES)
+def test_every_alias_completes(ask: Ask, alias: str) -> None:
+    line = f"{alias} -"
+    assert any(candidate.startswith("-") for candidate in [*ask(line), *ask(f"{alias} list -")])
+
+
+class Terminal:
+    """A shell that a person types into.
+
+    Args:
+        command: The shell.
+        network: Where.
+    """
+
+    def __init__(self, command: list[str], network: Network) -> None:
+        self._said = b""
+        self.pid, self._file = pty.fork()
+        if self.pid == 0:
+            os.chdir(network.folder)
+            os.execvpe(command[0], command, {**network.variables(TERM="dumb"), "PS1": "> "})
+
+    def type(self, text: str) -> None:
+        os.write(self._file, text.encode())
+
+    def wait_for(self, text: str, timeout: float = PATIENCE) -> str:
+        """Read until a text is there, and return all that came."""
+        deadline = time.monotonic() + timeout
+        while text.encode() not in self._said:
+            ready, _, _ = select.select([self._file], [], [], max(0, deadline - time.monotonic()))
+            if not ready:
+                pytest.fail(f"no {text!r}, but {self._said.decode(errors='replace')!r}")
+            self._said += os.read(self._file, 4096)
+        said, self._said = self._said.decode(errors="replace"), b""
+        return said
+
+    def close(self) -> None:
+        os.kill(self.pid, 9)
+        os.waitpid(self.pid, 0)
+        os.close(self._file)
+
+
+SHELLS = {"bash": ["bash", "--norc", "--noprofile", "-i"], "zsh": ["zsh", "-f", "-i"]}
+
+
+@pytest.fixture(params=SHELLS)
+def terminal(system: Network, request: pytest.FixtureRequest) -> Iterator[Terminal]:
+    """An interactive shell with ROS 1's names."""
+    name = request.param
+    if shutil.which(name) is None:
+        pytest.skip(f"{name} is not installed: apt install {name}")
+    made = Terminal(SHELLS[name], system)
+    made.type(f'eval "$({sys.executable} -m rosz env {name})"; echo rea""dy\n')
+    made.wait_for("ready\r\n")
+    yield made
+    made.close()
+
+
+def test_a_person_presses_tab(terminal: Terminal) -> None:
+    # What is completed is what the command then gets.
+    terminal.type("rostopic type /tur\t\n")
+    terminal.wait_for("geometry_msgs/Twist\r\n")
+    terminal.type("rosparam get /turtle1/s\t\n")
+    terminal.wait_for("\n3\r\n")
+    terminal.type("rosservice call /turtle1/pen \t\n")
+    terminal.wait_for("success: ")
+    terminal.type("roslaunch turtle_pkg tal\tra\t2 --nodes\n")
+    terminal.wait_for("\n/talker\r\n")
+    terminal.type("roscd turtle_pkg/la\t; pwd\n")
+    terminal.wait_for("src/turtle_pkg/launch\r\n")
+
+
+def test_fish_completes(system: Network) -> None:
+    if shutil.which("fish") is None:
+        pytest.skip("fish is not installed: apt install fish")
+    env = f"{sys.executable} -m rosz env fish | source"
+    asked = ["rostopic type /tur", "roslaunch turtle_pkg talker.launch ra", "rosz topic ec"]
+    done = subprocess.run(
+        ["fish", "--no-config", "-c", "; ".join([env, *(f"complete -C '{a}'" for a in asked)])],
+        env=system.variables(),
+        cwd=system.folder,
+        capture_output=True,
+        text=True,
+        timeout=40,
+        check=True,
+    )
+    assert done.stdout == "/turtle1/cmd_vel\nrate:=\necho\n"
+    assert not done.stderr
+
+
+def test_a_folder_begun_with_a_tilde(ask: Ask, network: Network) -> None:
+    (network.folder / "values.yaml").touch()
+    assert ask("rosparam load ~/val") == ["~/values.yaml"]
+    assert Path("~").expanduser() == network.folder
