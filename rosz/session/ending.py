@@ -6,7 +6,7 @@ from typing import Any
 
 from rosz.errors import ClosedError
 
-__all__ = ("ClosedSession",)
+__all__ = ("ClosedSession", "still_open")
 
 
 class ClosedSession:
@@ -21,3 +21,14 @@ class ClosedSession:
 
     def __getattr__(self, name: str) -> Any:
         raise ClosedError(f"no {name.replace('_', ' ')} any more: {self._why}")
+
+
+def still_open(raw: Any) -> Any:
+    """Return Zenoh's session, to be handed to a function of Zenoh's that takes one.
+
+    Raises:
+        ClosedError: It is closed.
+    """
+    if isinstance(raw, ClosedSession):
+        raw.declare()
+    return raw

@@ -30,7 +30,7 @@ from rosz.session.declared import (
     direct,
     mapped,
 )
-from rosz.session.ending import ClosedSession
+from rosz.session.ending import ClosedSession, still_open
 from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
 from rosz.session.probe import first_answered
@@ -226,7 +226,7 @@ class Session:
                 )
                 return RawPublisher(key, plain)
             keeping = advanced_publisher(
-                self._raw,
+                still_open(self._raw),
                 key,
                 cache,
                 congestion_control=congestion,
@@ -299,7 +299,7 @@ class Session:
             if not history:
                 return self._raw.declare_subscriber(key, handler, allowed_origin=origin)
             return advanced_subscriber(
-                self._raw, key, handler, history, recover=recover, allowed_origin=origin
+                still_open(self._raw), key, handler, history, recover=recover, allowed_origin=origin
             )
 
     def queryable(
