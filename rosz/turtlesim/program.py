@@ -15,6 +15,7 @@ def main() -> None:
     The private parameter ``headless`` does without the window.
     """
     with Node("turtlesim") as node:
+        node.context.cooperative = True
         simulator = Simulator(node)
         window = _window(node, simulator)
         if window is None:

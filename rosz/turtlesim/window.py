@@ -47,7 +47,7 @@ class Window:
             raise WindowError(str(error)) from error
         self._root.title(_TITLE)
         self._root.resizable(width=False, height=False)
-        self._root.protocol("WM_DELETE_WINDOW", lambda: node.shutdown("window closed"))
+        self._root.protocol("WM_DELETE_WINDOW", self.close)
         self._canvas = tk.Canvas(
             self._root, width=FIELD_PIXELS, height=FIELD_PIXELS, highlightthickness=0
         )
@@ -60,6 +60,10 @@ class Window:
         """Show what happens; returns when the node has ended."""
         self._refresh()
         self._root.mainloop()
+
+    def close(self) -> None:
+        """End the node, and the window with it."""
+        self._node.shutdown("window closed")
 
     def _refresh(self) -> None:
         if self._node.is_shutdown:

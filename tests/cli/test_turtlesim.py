@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from network import Network
+
+from rosz.turtlesim.simulator import Simulator
+
+from .shell import Shell
+
+
+@pytest.fixture
+def sim(network: Network) -> Simulator:
+    """A running simulation."""
+    return Simulator(network.node("turtlesim"))
+
+
+def test_snapshot_writes_a_picture(shell: Shell, sim: Simulator) -> None:
+    assert shell("turtlesim", "snapshot", "field.png").lines == []
+    assert (shell.network.folder / "field.png").read_bytes() == sim.picture().png
+    assert shell("turtlesim", "snapshot", "--node", "turtlesim", "by_name.PNG").code == 0
+
+
+def test_snapshot_to_stdout(network: Network, sim: Simulator) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "rosz", "turtlesim", "snapshot", "-"],
+        env=network.variables(),
+        capture_output=True,
+        timeout=40,
+        check=True,
+    )
+    assert done.stdout == sim.picture().png
+
+
+@pytest.mark.usefixtures("sim")
+def test_what_cannot_be(shell: Shell) -> None:
+    wrong = shell("turtlesim", "snapshot", "field.jpg")
+    assert (wrong.code, wrong.out) == (2, "")
+    assert "'field.jpg' does not end in .png" in wrong.err
+    unknown = shell("turtlesim", "snapshot", "field.png", "--node", "/turtlesin")
+    assert unknown.code == 1
+    assert "did you mean '/turtlesim'?" in unknown.err
+    lost = shell("turtlesim", "snapshot", "nowhere/field.png")
+    assert lost.code == 1
+    assert lost.err == "rosz: nowhere/field.png: No such file or directory\n"
+
+
+def test_nobody_to_take_a_picture_of(shell: Shell, network: Network) -> None:
+    network.node("somebody")
+    result = shell("turtlesim", "snapshot", "field.png")
+    assert result.code == 1
+    assert "no turtlesim is running: start 'rosz run turtlesim turtlesim_node'" in result.err
