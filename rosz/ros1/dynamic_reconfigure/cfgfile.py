@@ -175,13 +175,13 @@ def _compile(path: Path) -> CodeType:
 
 @contextmanager
 def _folder_first(path: Path) -> Iterator[None]:
-    """Let a file import what lies beside it, as a program can."""
-    folder = str(path.resolve().parent)
-    sys.path.insert(0, folder)
+    """Let a file import what lies beside it, as a program can; what it adds itself goes with it."""
+    before = list(sys.path)
+    sys.path.insert(0, str(path.resolve().parent))
     try:
         yield
     finally:
-        sys.path.remove(folder)
+        sys.path[:] = before
 
 
 def _line(trace: TracebackType | None, path: Path) -> int:

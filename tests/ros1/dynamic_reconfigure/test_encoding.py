@@ -1,0 +1,183 @@
+"""What files describe, and its messages, are what Debian's dynamic_reconfigure makes of them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import msgspec
+import pytest
+from cfg_samples import BESIDE, SAMPLES
+
+from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
+from rosz.msgs.dynamic_reconfigure.msg import GroupState
+from rosz.reconfigure.messages import pack_config, pack_description
+from rosz.ros1.dynamic_reconfigure import encoding, get_parameter_names
+from rosz.ros1.dynamic_reconfigure.cfgfile import describe, load
+from rosz.ros1.importer import install, uninstall
+
+PYTHON = Path("/usr/bin/python3")
+CHANGES = {"a": 1, "b": True, "c": "x", "d": 0.5}
+NAMES = [*SAMPLES, "Test"]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("sample") / "cfg"
+    folder.mkdir()
+    (folder / "beside_it.py").write_text(BESIDE)
+    for name, text in SAMPLES.items():
+        (folder / f"{name}.cfg").write_text(text)
+    return sorted(folder.glob("*.cfg"))
+
+
+@pytest.fixture(scope="module")
+def theirs(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    folder = tmp_path_factory.mktemp("generated")
+    if not PYTHON.exists():
+        pytest.skip(f"no Python at {PYTHON}, so no dynamic_reconfigure to compare with")
+    probe = subprocess.run(
+        [PYTHON, "-c", "import dynamic_reconfigure"], check=False, capture_output=True
+    )
+    if probe.returncode:
+        pytest.skip("nothing to compare with (Debian: python3-dynamic-reconfigure)")
+    done = subprocess.run(
+        [PYTHON, "-W", "ignore", str(Path(__file__).with_name("reconfigure_worker.py"))],
+        input=json.dumps(
+            {"files": [str(file) for file in files], "folder": str(folder), "changes": CHANGES}
+        ),
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(folder)},
+    )
+    assert done.returncode == 0, done.stderr
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+@pytest.fixture(scope="module")
+def ours(files: list[Path], theirs: dict[str, Any]) -> dict[str, Any]:
+    install()
+    try:
+        found: dict[str, Any] = {name: load(f"sample.cfg.{name}Config", files) for name in SAMPLES}
+    finally:
+        uninstall()
+    found["Test"] = SimpleNamespace(**theirs["Test"]["module"])
+    return found
+
+
+def _without_places(value: Any) -> Any:
+    """Leave out lines: ROS 1 gives that of its own code for what is not in a group."""
+    if isinstance(value, dict):
+        kept = {k: one for k, one in value.items() if k not in {"srcline", "srcfile"}}
+        return {name: _without_places(one) for name, one in kept.items()}
+    if isinstance(value, list):
+        return [_without_places(one) for one in value]
+    return value
+
+
+def _without_types(config: dict[str, Any]) -> dict[str, Any]:
+    """Leave out how groups are shown, which ROS 1 forgets."""
+
+    def bare(group: dict[str, Any]) -> dict[str, Any]:
+        inner = {name: bare(one) for name, one in group["groups"].items()}
+        return group | {"type": "", "groups": inner}
+
+    return config | {"groups": bare(config["groups"])}
+
+
+def _plain(value: Any) -> Any:
+    """Take messages for what they hold."""
+    return json.loads(json.dumps(msgspec.to_builtins(value)))
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_modules(ours: dict[str, Any], theirs: dict[str, Any], name: str) -> None:
+    module = ours[name]
+    held = {k: v for k, v in vars(module).items() if not k.startswith(("__", "extract_params"))}
+    assert _without_places(_plain(held)) == _without_places(theirs[name]["module"])
+    assert list(held["config_description"]) == list(theirs[name]["module"]["config_description"])
+    assert get_parameter_names(module) == list(theirs[name]["module"]["defaults"])
+
+
+def test_places_are_those_in_the_file(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
+    described = ours["Tutorials"].config_description["parameters"]
+    assert [one["srcline"] for one in described] == [8, 9, 10, 11, 17]
+    assert {one["srcfile"] for one in described} == {"Tutorials.cfg"}
+    enum = described[4]["edit_method"]
+    assert (
+        enum == theirs["Tutorials"]["module"]["config_description"]["parameters"][4]["edit_method"]
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_encoding(ours: dict[str, Any], theirs: dict[str, Any], name: str) -> None:
+    module, expected = ours[name], theirs[name]
+    description = encoding.encode_description(module)
+    assert _plain(description) == expected["encode_description"]
+    decoded = encoding.decode_description(description)
+    assert _plain(decoded) == expected["decode_description"]
+    assert _plain(encoding.extract_params(decoded)) == expected["extract_decoded"]
+    assert _plain(encoding.get_tree(description)) == expected["get_tree"]
+    config = encoding.Config(module.defaults)
+    config["groups"] = encoding.get_tree(description)
+    first = encoding.initial_config(encoding.encode_config(config), module.config_description)
+    assert _plain(first) == expected["initial_config"]
+    assert list(first) == expected["order"]
+    message = encoding.encode_config(first)
+    assert _plain(message) == expected["encode_config"]
+    assert _plain(encoding.decode_config(message, decoded)) == expected["decode_config"]
+    assert repr(encoding.decode_config(message, decoded)) == expected["printed"]
+    assert _plain(encoding.decode_config(message)) == expected["decode_flat"]
+    assert _plain(encoding.encode_config(CHANGES)) == expected["changes"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_the_library_below_sends(
+    ours: dict[str, Any], theirs: dict[str, Any], name: str
+) -> None:
+    module, expected = ours[name], theirs[name]
+    description = describe(module.config_description)
+    assert _plain(pack_description(description)) == expected["encode_description"]
+    config = description.config(description.defaults(), description.states())
+    assert _without_types(_plain(config)) == _without_types(expected["initial_config"])
+    values = {key: value for key, value in config.items() if key != "groups"}
+    states = description.states()
+    assert _plain(pack_config(description, values, states)) == expected["encode_config"]
+
+
+def test_the_state_of_any_group_is_found() -> None:
+    """ROS 1 finds that of the first one among its siblings only."""
+
+    def group(name: str, number: int, state: bool, *inner: dict[str, Any]) -> dict[str, Any]:
+        given = {"name": name, "id": number, "state": state, "groups": list(inner)}
+        return given | {"type": "", "parent": 0, "parameters": []}
+
+    root = group("Default", 0, True, group("A", 1, True), group("B", 2, False))
+    shown = ConfigMessage(groups=[GroupState(name, True, n, 0) for n, name in enumerate("DAB")])
+    first = encoding.initial_config(shown, root)
+    assert [one.state for one in first.groups.groups.values()] == [True, False]
+    assert [state.state for state in pack_config(describe(root), {}, {}).groups] == [
+        True, True, False,
+    ]  # fmt: skip
+
+
+def test_groups_as_a_list() -> None:
+    groups = [{"name": "G", "state": False, "id": 1, "parent": 0}]
+    message = encoding.encode_config({"a": 1, "groups": groups}, flat=False)
+    assert _plain(message.groups) == [{"name": "G", "state": False, "id": 1, "parent": 0}]
+
+
+def test_a_module_has_what_catkin_gives_it(ours: dict[str, Any]) -> None:
+    module = ours["Enums"]
+    assert isinstance(module, ModuleType)
+    assert module.__name__ == "sample.cfg.EnumsConfig"
+    assert (module.__file__ or "").endswith("Enums.cfg")
+    assert (module.Enums_Fast, module.Enums_Full, module.Enums_Alone) == ("fast", 1.0, True)
+    assert module.inf == float("inf")
+    assert module.extract_params(module.config_description)[0]["name"] == "mode"
