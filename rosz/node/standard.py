@@ -14,7 +14,14 @@ from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 if TYPE_CHECKING:
     from rosz.node.node import Node
 
-__all__ = ("announce", "follow_clock", "open_rosout", "process_of", "set_initial_params")
+__all__ = (
+    "announce",
+    "follow_clock",
+    "open_rosout",
+    "process_of",
+    "set_initial_params",
+    "simulate",
+)
 
 _SECOND = 1_000_000_000
 
@@ -66,8 +73,12 @@ def follow_clock(node: Node) -> None:
 
     Reading it makes the process a replica of the parameters, as every node is.
     """
-    if node.params.get("/use_sim_time", False) is not True:
-        return
+    if node.params.get("/use_sim_time", False) is True:
+        simulate(node)
+
+
+def simulate(node: Node) -> None:
+    """Live in simulated time from now on, and take it from ``/clock``."""
     from rosz.msgs.rosgraph_msgs.msg import Clock
 
     clock = node.context.clock
