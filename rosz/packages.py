@@ -75,13 +75,26 @@ class Package(msgspec.Struct, frozen=True):
             f"{near_miss(name, known) or listing}"
         )
 
+    def within(self, name: str) -> Path:
+        """Return the path of something in the package, by its path from the package's folder.
+
+        Raises:
+            NotFoundError: The path leads out of the package.
+        """
+        path = Path(os.path.normpath(self.path / name))
+        if not path.is_relative_to(os.path.normpath(self.path)):
+            raise NotFoundError(
+                f"'{name}' leads out of package '{self.name}' ({self.path}); expected a file in it"
+            )
+        return path
+
     def file(self, name: str) -> Path:
         """Find a file by its name anywhere in the package, as ``roslaunch PKG FILE`` does.
 
         Raises:
-            NotFoundError: There is none.
+            NotFoundError: There is none, or the name leads out of the package.
         """
-        direct = self.path / name
+        direct = self.within(name)
         if direct.is_file():
             return direct
         for file in self._files():

@@ -196,6 +196,7 @@ def dump_command(
     elif file in {"", "-"}:
         sys.stdout.write(dump(value))
     else:
+        _check_target(file)
         Path(file).write_text(dump(value), encoding="utf-8")
     return 0
 
@@ -320,11 +321,20 @@ def _read_text(file: str) -> tuple[str, str]:
     return _text(_bytes(file, NotFoundError), file), file
 
 
+def _check_target(file: str) -> None:
+    """Refuse to write through a link, by which somebody else could have a file overwritten."""
+    from pathlib import Path
+
+    if Path(file).is_symlink():
+        raise UsageError(f"'{file}' is a link to '{Path(file).readlink()}'; name the file itself")
+
+
 def _bytes(file: str, error: type[RoszError]) -> bytes:
     from pathlib import Path
 
     if not Path(file).is_file():
-        raise error(f"file '{file}' does not exist")
+        what = "is no regular file" if Path(file).exists() else "does not exist"
+        raise error(f"file '{file}' {what}")
     return Path(file).read_bytes()
 
 

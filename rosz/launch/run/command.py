@@ -166,7 +166,7 @@ def locate(package: Package, name: str) -> Path:
     """
     if "/" not in name:
         return package.executable(name)
-    path = package.path / name
+    path = package.within(name)
     if path.is_file() and os.access(path, os.X_OK):
         return path
     if path.is_file():

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 from types import TracebackType
 from typing import Final, Self
 
 from rosz.errors import DecodeError, NoReplica
 from rosz.params.keys import Keys
+from rosz.params.replica.complaints import NO_PARAMETER
 from rosz.params.replica.members import Members
 from rosz.params.replica.reading import Reading
 from rosz.params.replica.state import State
@@ -16,8 +16,6 @@ from rosz.params.replica.worker import Worker
 from rosz.session import Sample, Session
 
 __all__ = ("Follower",)
-
-_log = logging.getLogger("rosz.params")
 
 _COMPARE_EVERY: Final = 5.0
 
@@ -82,7 +80,7 @@ class Follower(Reading):
         try:
             self._state.take(payload, self._keys.reach(key, self._keys.change))
         except DecodeError as error:
-            _log.warning("a replica wrote what is no parameter: %s", error)
+            self._state.complaints.tell(NO_PARAMETER, error)
 
     def _compare(self) -> None:
         self._sync.compare_with_one()

@@ -14,6 +14,7 @@ from rosz.params.keys import Keys
 from rosz.params.merge import Change
 from rosz.params.paths import ROOT, Path, joined
 from rosz.params.replica.acks import Acks, Pending
+from rosz.params.replica.complaints import NO_PARAMETER
 from rosz.params.replica.members import Members
 from rosz.params.replica.state import State
 from rosz.params.replica.worker import Worker
@@ -148,7 +149,7 @@ class Line:
         try:
             reach = self._keys.reach(sample.key, self._keys.change)
         except DecodeError as error:
-            _log.warning("a replica wrote what is no parameter: %s", error)
+            self._state.complaints.tell(NO_PARAMETER, error)
             return
         self._take(sample.payload, reach)
 
@@ -156,7 +157,7 @@ class Line:
         try:
             sender, number, _ = unseal(payload)
         except DecodeError as error:
-            _log.warning("a replica wrote what is no parameter: %s", error)
+            self._state.complaints.tell(NO_PARAMETER, error)
             return
         then = partial(self._acknowledge, sender, number)
         if len(payload) > _LARGE:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -14,6 +13,7 @@ from rosz.params.history import History
 from rosz.params.keys import check_reach
 from rosz.params.merge import Change
 from rosz.params.paths import ROOT, Path
+from rosz.params.replica.complaints import NO_PARAMETER, Complaints
 from rosz.params.replica.watch import Callback, Watch, Watchers
 from rosz.params.tree import Tree
 from rosz.params.wire import Batch, decode, unseal
@@ -24,8 +24,6 @@ __all__ = ("State", "Step")
 
 Step = tuple[Tree, Tree, list[Write]]
 """A change of the tree: before, after, and the writes that made it."""
-
-_log = logging.getLogger("rosz.params")
 
 _PATIENCE: Final = 0.002
 _MOST_UNREAD: Final = 64
@@ -43,10 +41,12 @@ class State:
 
     Attributes:
         watchers: Who is told of changes.
+        complaints: What was said of damage.
     """
 
     def __init__(self, clock: HybridClock) -> None:
         self.watchers = Watchers()
+        self.complaints = Complaints()
         self._root: Tree = {}
         self._clock = clock
         self._history = History()
@@ -225,7 +225,7 @@ class State:
             check_reach((write.path for write in writes), reach)
             self._apply(writes)
         except DecodeError as error:
-            _log.warning("a replica wrote what is no parameter: %s", error)
+            self.complaints.tell(NO_PARAMETER, error)
 
     def _now(self) -> Stamp:
         self._clock.observe(Stamp(self._history.latest, ""))

@@ -146,7 +146,7 @@ class Synchroniser:
                 if sync.index is not None:
                     self._settle(sync.index, answer)
             except DecodeError as error:
-                _log.warning("a replica sent what is no comparison: %s", error)
+                self.state.complaints.tell("a replica sent what is no comparison", error)
                 query.reply_error(str(error))
                 return
             query.reply(query.key, encode(answer))
