@@ -94,6 +94,8 @@ class Service(Endpoint):
         message = types.Request._decode(request)
         try:
             result = self._handler(message)
+        except Refusal:
+            raise
         except ServiceError as error:  # a refusal, which is no fault of the handler
             raise ServiceError(f"service cannot process request: {error}") from error
         except (Exception, SystemExit) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from rosz import names
 from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.core import run_hooks, wait_for_shutdown
+from rosz.ros1.rospy.core import signal_shutdown, wait_for_shutdown
 from rosz.ros1.rospy.exceptions import ROSException, ROSInitException
 from rosz.ros1.rospy.logs import (
     DEBUG,
@@ -35,7 +36,7 @@ from rosz.ros1.rospy.params import (
     search_param,
     set_param,
 )
-from rosz.ros1.rospy.state import arguments, context, set_arguments, state
+from rosz.ros1.rospy.state import arguments, context, run_hooks, set_arguments, state
 
 if TYPE_CHECKING:
     from rosz.node import Node
@@ -96,7 +97,7 @@ def init_node(  # noqa: PLR0917  # rospy's signature
     """
     if not name:
         raise ValueError("name must not be empty")
-    if names.basename(name) != name or "/" in name:
+    if "/" in name:
         raise ValueError("namespaces are not allowed in node names")
     command = list(sys.argv if argv is None else argv)
     call = (name, command, anonymous, log_level, disable_rostime, disable_signals)
@@ -129,7 +130,6 @@ def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) 
     node = Node(name, context=shared, handle_signals=signals)
     if log_level is not None:
         node.log.setLevel(LEVELS[log_level])
-    shared.on_shutdown(lambda reason: run_hooks(reason or "atexit"))
     node.on_shutdown(_ended)
     state.node = node
     Bridge.install()
@@ -142,10 +142,11 @@ def _ended(reason: str) -> None:
     """End the process's part when its node was told to end, as by a newer one of its name."""
     run_hooks(reason)
     if state.context is not None and not state.context.is_shutdown:
-        state.context.reason = reason
-        import threading
-
-        threading.Thread(target=state.context.shutdown, args=(reason,), daemon=True).start()
+        # Not here: this runs while the node closes, which the context would wait for.
+        end = threading.Thread(
+            target=state.context.shutdown, args=(reason,), name="rosz-rospy-end", daemon=True
+        )
+        end.start()
 
 
 def spin() -> None:
@@ -158,8 +159,8 @@ def spin() -> None:
         raise ROSInitException("client code must call rospy.init_node() first")
     try:
         wait_for_shutdown()
-    except KeyboardInterrupt:
-        run_hooks("keyboard interrupt")
+    except KeyboardInterrupt:  # where the program has not left signals to the node
+        signal_shutdown("keyboard interrupt")
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:

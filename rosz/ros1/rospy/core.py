@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import atexit
 import os
-import sys
-import threading
 from collections.abc import Callable
 from urllib.parse import urlparse
 
@@ -29,7 +27,8 @@ from rosz.ros1.rospy.names import (
     remap_name,
     resolve_name,
 )
-from rosz.ros1.rospy.state import state
+from rosz.ros1.rospy.state import is_shutdown as ended
+from rosz.ros1.rospy.state import run_hooks, state
 
 __all__ = (
     "ROSException",
@@ -61,6 +60,9 @@ __all__ = (
 )
 
 
+atexit.register(run_hooks, "atexit")
+
+
 def is_initialized() -> bool:
     """Tell whether ``init_node`` has been called."""
     return state.node is not None
@@ -71,8 +73,7 @@ def is_shutdown() -> bool:
     if state.context is not None:
         # Who asks ends by itself, and need not be interrupted.
         state.context.cooperative = True
-        return state.shutdown.is_set() or state.context.is_shutdown
-    return state.shutdown.is_set()
+    return ended()
 
 
 def is_shutdown_requested() -> bool:
@@ -86,36 +87,9 @@ def signal_shutdown(reason: object) -> None:
     Args:
         reason: Why, for the log.
     """
-    state.shutdown.set()
+    run_hooks(str(reason))
     if state.context is not None:
         state.context.shutdown(str(reason))
-    run_hooks(str(reason))
-
-
-def run_hooks(reason: str) -> None:
-    """Call all that wants to know of the end, once, in the order of registration."""
-    state.shutdown.set()
-    with state.lock:
-        hooks = {stage: list(found) for stage, found in state.hooks.items()}
-        for found in state.hooks.values():
-            found.clear()
-    for hook in hooks["client"]:
-        _call(hook)
-    for hook in (*hooks["preshutdown"], *hooks["shutdown"]):
-        _call(hook, reason)
-
-
-atexit.register(run_hooks, "atexit")
-
-
-def _call(hook: Callable[..., object], *args: str) -> None:
-    try:
-        hook(*args)
-    except Exception as error:  # noqa: BLE001  # the callback boundary
-        if state.node is not None:
-            state.node.log.report(f"shutdown hook {hook!r} failed", error)
-        else:
-            sys.excepthook(type(error), error, error.__traceback__)
 
 
 def _add_hook(stage: str, hook: Callable[..., object], *late: str) -> None:
@@ -124,10 +98,10 @@ def _add_hook(stage: str, hook: Callable[..., object], *late: str) -> None:
             f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}"
         )
     with state.lock:
-        if not state.shutdown.is_set():
+        if not ended():
             state.hooks[stage].append(hook)
             return
-    _call(hook, *late)
+    hook(*late)
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
@@ -159,9 +133,7 @@ def add_shutdown_hook(h: Callable[[str], object]) -> None:
 
 def wait_for_shutdown() -> None:
     """Wait until the end has begun; any thread, any number of them."""
-    if state.context is not None and not state.shutdown.is_set():
-        if threading.current_thread() is threading.main_thread():
-            state.context.cooperative = True
+    if state.context is not None:
         state.context.wait_for_shutdown()
 
 

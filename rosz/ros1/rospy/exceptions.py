@@ -61,4 +61,8 @@ class TransportInitError(TransportException):
     """A connection could not be made; nothing raises it but code written for rospy."""
 
 
+for _name in __all__:
+    # Tracebacks and reprs show it as programs import it.
+    globals()[_name].__module__ = "rospy.exceptions"
+
 __getattr__ = attribute(__name__)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
+from rosz.errors import EncodeError
 from rosz.message.base import Writable
 from rosz.ros1.rospy.absent import attribute
 
-__all__ = ("AnyMsg", "args_kwds_to_message")
+__all__ = ("AnyMsg", "args_kwds_to_message", "encode", "in_words_of_genpy")
 
 
 class AnyMsg:
@@ -82,7 +83,34 @@ def _by_name(data_class: type[Any], fields: Mapping[str, Any]) -> Any:
     for name in fields:
         if name not in data_class.__slots__:
             raise AttributeError(f"{name} is not an attribute of {data_class.__name__}")
-    return data_class(**fields)
+    return data_class(**{name: value for name, value in fields.items() if value is not None})
+
+
+def encode(message: Any) -> bytes:
+    """Return a message as bytes.
+
+    Raises:
+        EncodeError: A field has a value that does not fit, said as genpy says it.
+    """
+    try:
+        payload: bytes = message._encode(message)
+    except EncodeError as error:
+        raise in_words_of_genpy(message, error) from error
+    return payload
+
+
+def in_words_of_genpy(message: Any, error: EncodeError) -> EncodeError:
+    """Return what genpy would say of a message that cannot be encoded; the same if it is silent."""
+    from rosz.ros1.genpy.message import check_type
+
+    try:
+        for name, kind in zip(message.__slots__, message._slot_types, strict=True):
+            check_type(name, kind, getattr(message, name))
+    except EncodeError as said:
+        return said
+    except AttributeError:  # a value that is no message at all, which genpy stumbles over
+        return error
+    return error
 
 
 __getattr__ = attribute(__name__)

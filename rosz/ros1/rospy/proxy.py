@@ -18,12 +18,12 @@ from rosz.qos import SERVICES
 from rosz.ros1.rospy.exceptions import (
     ROSException,
     ROSInterruptException,
-    ROSSerializationException,
 )
-from rosz.ros1.rospy.msg import args_kwds_to_message
+from rosz.ros1.rospy.msg import args_kwds_to_message, in_words_of_genpy
 from rosz.ros1.rospy.names import resolve_name
 from rosz.ros1.rospy.service import ServiceEnd, ServiceException
-from rosz.ros1.rospy.state import context, helper, state
+from rosz.ros1.rospy.state import context, helper
+from rosz.ros1.rospy.state import is_shutdown as ended
 from rosz.time import DurationValue
 
 __all__ = ("ServiceProxy", "wait_for_message", "wait_for_service")
@@ -75,15 +75,17 @@ class ServiceProxy(ServiceEnd):
 
         Raises:
             ServiceException: Nobody serves it, or the server answered with an error.
-            ROSSerializationException: A field of the request has a value that does not fit.
+            EncodeError: A field of the request has a value that does not fit.
             TypeError: The arguments are no request.
         """
         request = args_kwds_to_message(self.request_class, args, kwds)
+        if ended():
+            raise ServiceException(f"service [{self.resolved_name}] unavailable")
         name = self.resolved_name
         try:
             return self._connected().call(request)
         except EncodeError as error:
-            raise ROSSerializationException(str(error)) from error
+            raise in_words_of_genpy(request, error) from error
         except ServiceNotFound as error:
             raise ServiceException(f"service [{name}] unavailable") from error
         except ServiceError as error:
@@ -93,7 +95,7 @@ class ServiceProxy(ServiceEnd):
                 text = f"service [{name}] {_REFUSED}{text.encode()!r}"
             raise ServiceException(text or str(error)) from error
         except ClosedError as error:
-            raise ServiceException(f"service [{name}]: the call was ended by shutdown") from error
+            raise ServiceException(f"service [{name}] returned no response") from error
 
     def _connected(self) -> Client:
         with self._lock:
@@ -125,8 +127,11 @@ def wait_for_service(service: str, timeout: float | DurationValue | None = None)
 
     Raises:
         ROSException: Nobody did in time.
+        ValueError: The time is 0.
         ROSInterruptException: The node was shut down meanwhile.
     """
+    if timeout == 0:
+        raise ValueError("timeout must be non-zero")
     name = resolve_name(service)
     _check_running()
     deadline = _deadline(timeout)
@@ -190,5 +195,5 @@ def _deadline(timeout: float | DurationValue | None) -> float:
 def _check_running() -> None:
     from rosz.ros1.rospy.core import is_shutdown
 
-    if is_shutdown() or (state.context is not None and state.context.closed):
+    if is_shutdown():
         raise ROSInterruptException(_ENDED)

@@ -12,7 +12,7 @@ from rosz.node import Service as NodeService
 from rosz.node.service import Refusal
 from rosz.qos import SERVICES
 from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.msg import args_kwds_to_message
+from rosz.ros1.rospy.msg import args_kwds_to_message, encode
 from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
 from rosz.ros1.rospy.state import has_node, state, when_ready
 
@@ -26,6 +26,8 @@ ErrorHandler = Callable[[BaseException, Any, Any, Any], object]
 
 class ServiceException(Exception):
     """A service call that failed."""
+
+    __module__ = "rospy.service"
 
 
 class ServiceEnd:
@@ -47,15 +49,16 @@ class ServiceEnd:
     def __init__(self, name: str, service_class: type[Any]) -> None:
         if not name or not isinstance(name, str):
             raise ValueError("service name is not a non-empty string")
-        if service_class is None:
-            raise ValueError("service_class must be the class of a service, got None")
+        if not hasattr(service_class, "_request_class"):
+            raise AttributeError(
+                f"service_class must be the class of a service, got {service_class!r}; it has no"
+                " attribute '_request_class'"
+            )
         resolve = resolve_name if has_node() else resolve_name_without_node_name
-        self.name = name
         self.resolved_name = resolve(name)
         self.service_class = service_class
         self.request_class: type[Any] = service_class._request_class
         self.response_class: type[Any] = service_class._response_class
-        self.type: str = service_class._type
 
 
 class Service(ServiceEnd):
@@ -111,7 +114,7 @@ class Service(ServiceEnd):
         """
         try:
             response = self._response(self.handler(request))
-            response._encode(response)
+            encode(response)
         except ServiceException as error:
             raise Refusal(f"service cannot process request: {error}") from error
         except Exception as error:
@@ -123,22 +126,18 @@ class Service(ServiceEnd):
         kind = self.response_class
         if isinstance(value, kind):
             return value
-        if value is None and kind.__slots__:
+        if value is None:
             raise ServiceException("service handler returned None")
         if isinstance(value, dict):
-            args, fields = [], value
+            args, fields, fault = [], value, "returned invalid value"
         elif isinstance(value, list | tuple):
-            args, fields = list(value), {}
+            args, fields, fault = list(value), {}, "returned wrong number of values"
         else:
-            args, fields = ([] if value is None else [value]), {}
+            args, fields, fault = [value], {}, "returned invalid value"
         try:
             return args_kwds_to_message(kind, args, fields)
-        except AttributeError as error:
-            raise ServiceException(f"handler returned invalid value: {error}") from error
-        except TypeError as error:
-            raise ServiceException(
-                f"handler returned wrong number of values: {error}"
-            ) from error
+        except (AttributeError, TypeError) as error:
+            raise ServiceException(f"handler {fault}: {error}") from error
 
     def _tell(self, error: Exception) -> None:
         if self.error_handler is not None:

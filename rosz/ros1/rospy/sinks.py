@@ -9,7 +9,7 @@ from typing import Any
 from rosz.node import GenericSubscription, MessageInfo, Node, Subscription
 from rosz.qos import QoS
 from rosz.ros1.rospy.msg import AnyMsg
-from rosz.ros1.rospy.state import state, when_ready
+from rosz.ros1.rospy.state import is_shutdown, state, when_ready
 
 __all__ = ("Sink", "acquire_sink")
 
@@ -79,7 +79,7 @@ class Sink:
     def get_num_connections(self) -> int:
         """Return how many publishers there are."""
         subscription = self._subscription
-        if subscription is None or subscription.node.is_shutdown:
+        if subscription is None or subscription.closed:
             return 0
         return len(subscription.publishers())
 
@@ -106,7 +106,7 @@ class Sink:
             else:
                 callback(message, extra)
         except Exception as error:  # noqa: BLE001  # the callback boundary
-            if state.node is not None and not state.shutdown.is_set():
+            if state.node is not None and not is_shutdown():
                 state.node.log.report(f"bad callback: {callback}", error)
 
 

@@ -10,7 +10,8 @@ from rosz.node import Node, SubscriberLink
 from rosz.node import Publisher as NodePublisher
 from rosz.qos import QoS
 from rosz.ros1.rospy.exceptions import ROSException, ROSSerializationException
-from rosz.ros1.rospy.state import state, when_ready
+from rosz.ros1.rospy.msg import in_words_of_genpy
+from rosz.ros1.rospy.state import is_shutdown, state, when_ready
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,8 +68,9 @@ class Source:
         self.latch: Any = None
         self.is_latch = False
         self.closed = False
+        self._told = False
         self._has_header = bool(data_class._has_header)
-        self._queue_size = queue_size or 0
+        self._queue_size = queue_size if isinstance(queue_size, int) else 0
         self._lock = threading.RLock()
         self._members: list[object] = []
         self._listeners: list[SubscribeListener] = []
@@ -137,7 +139,7 @@ class Source:
         """
         publisher = self._publisher
         if publisher is None:
-            if state.shutdown.is_set():
+            if is_shutdown():
                 return
             raise ROSException(
                 "ROS node has not been initialized yet. Please call init_node() first"
@@ -151,16 +153,29 @@ class Source:
                 self.latch = message
             publisher.publish(message)
         except EncodeError as error:
-            raise ROSSerializationException(str(error)) from error
+            self._refuse(publisher, in_words_of_genpy(message, error))
         except ClosedError as error:
             # A program that asks whether it is shut down, and then publishes, may be too late.
-            if not (state.shutdown.is_set() or publisher.node.is_shutdown):
+            if not is_shutdown():
                 raise ROSException("publish() to a closed topic") from error
+
+    def _refuse(self, publisher: NodePublisher[Any], error: EncodeError) -> None:
+        """Raise over a message that cannot be sent; only tell, as in rospy, if nobody listens."""
+        if publisher.subscribers():
+            raise ROSSerializationException(str(error)) from error
+        if not self._told:
+            self._told = True
+            publisher.node.log.warning(
+                "a message on '%s' cannot be sent (told once; with a subscriber it is an"
+                " exception): %s",
+                self.name,
+                error,
+            )
 
     def get_num_connections(self) -> int:
         """Return how many subscribers there are."""
         publisher = self._publisher
-        if publisher is None or publisher.node.is_shutdown:
+        if publisher is None or publisher.closed:
             return 0
         return len(publisher.subscribers())
 

@@ -5,17 +5,16 @@ Nothing else in rosz keeps any. Whatever is made before ``init_node`` waits here
 
 from __future__ import annotations
 
+import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz import remap
+from rosz.node import Context, Node
+from rosz.params.api import Params
 from rosz.ros1.rospy.exceptions import ROSInitException
-
-if TYPE_CHECKING:
-    from rosz.node import Context, Node
-    from rosz.params.api import Params
 
 __all__ = (
     "UNNAMED",
@@ -24,12 +23,17 @@ __all__ = (
     "context",
     "has_node",
     "helper",
+    "is_shutdown",
     "node",
     "params",
+    "run_hooks",
     "set_arguments",
     "state",
     "when_ready",
 )
+
+_ENDED_BY = 10.0
+"""Seconds that whoever ends the node a second time waits for the first, and its hooks."""
 
 UNNAMED = "/unnamed"
 """Name of the node before there is one."""
@@ -50,7 +54,9 @@ class State:
         sources: Topics that this process publishes on, by name.
         sinks: Topics that it subscribes to, by name.
         hooks: What to call when the node shuts down, by the stage it belongs to, in order.
-        shutdown: Set when the end has begun.
+        shutdown: Set when the end has begun, and the program's own hooks have been called.
+        ended: Set when all hooks have been called.
+        ender: The thread that calls them.
     """
 
     def __init__(self) -> None:
@@ -70,10 +76,61 @@ class State:
             "shutdown": [],
         }
         self.shutdown = threading.Event()
+        self.ended = threading.Event()
+        self.ender: threading.Thread | None = None
 
 
 state = State()
 """The one there is."""
+
+
+class _Context(Context):
+    """A context whose end begins with rospy's hooks, while everything still works."""
+
+    def shutdown(self, reason: str = "") -> None:
+        """End everything: rospy's hooks first; again is no error."""
+        run_hooks(reason or self.reason or "atexit")
+        super().shutdown(reason)
+
+
+def run_hooks(reason: str) -> None:
+    """Call all that wants to know of the end, once, in the order of registration.
+
+    As in rospy, while a program's own hooks run the node is not yet said to be shut down, so that
+    they may publish, call services and sleep. Who comes second waits for the first.
+
+    Args:
+        reason: Why, as a text or as the name of a signal.
+    """
+    if reason in signal.Signals.__members__:
+        reason = f"signal-{signal.Signals[reason].value}"
+    with state.lock:
+        first = state.ender is None
+        if first:
+            state.ender = threading.current_thread()
+    if not first:
+        if threading.current_thread() is not state.ender:
+            state.ended.wait(_ENDED_BY)
+        return
+    try:
+        for hook in state.hooks["client"]:
+            _call(hook)
+        state.shutdown.set()
+        for hook in (*state.hooks["preshutdown"], *state.hooks["shutdown"]):
+            _call(hook, reason)
+    finally:
+        state.shutdown.set()
+        state.ended.set()
+
+
+def _call(hook: Callable[..., object], *args: str) -> None:
+    try:
+        hook(*args)
+    except Exception as error:  # noqa: BLE001  # the callback boundary
+        if state.node is not None:
+            state.node.log.report(f"shutdown hook {hook!r} failed", error)
+        else:
+            sys.excepthook(type(error), error, error.__traceback__)
 
 
 def arguments() -> remap.Arguments:
@@ -100,9 +157,7 @@ def context() -> Context:
     """
     with state.lock:
         if state.context is None:
-            from rosz.node import Context
-
-            opened = Context()
+            opened = _Context()
             opened.arguments = arguments()
             state.context = opened
         return state.context
@@ -130,16 +185,21 @@ def params() -> Params:
         return state.node.params
     with state.lock:
         if state.params is None:
-            from rosz.params.api import Params
-
             state.params = Params(
                 context().params, UNNAMED, arguments().resolved_remaps(UNNAMED)
             )
         return state.params
 
 
+def is_shutdown() -> bool:
+    """Tell whether the end has begun."""
+    return state.shutdown.is_set() or (state.context is not None and state.context.is_shutdown)
+
+
 def when_ready(act: Callable[[Node], object]) -> None:
-    """Have something done with the node: now, or when there is one."""
+    """Have something done with the node: now, or when there is one; never after its end."""
+    if is_shutdown():
+        return
     with state.lock:
         if state.node is None:
             state.waiting.append(act)
@@ -153,7 +213,5 @@ def helper() -> Node:
         return state.node
     with state.lock:
         if state.helper is None:
-            from rosz.node import Node
-
             state.helper = Node(UNNAMED.strip("/"), context=context())
         return state.helper

@@ -22,6 +22,7 @@ from rosz.ros1.rospy.rostime import (
     is_wallclock,
     wallsleep,
 )
+from rosz.ros1.rospy.state import is_shutdown as ended
 from rosz.ros1.rospy.state import state
 from rosz.time import DurationValue, TimeValue
 
@@ -32,6 +33,12 @@ __all__ = ("Rate", "Timer", "TimerEvent", "sleep")
 
 _SECOND = 1_000_000_000
 _ENDED = "ROS shutdown request"
+_SLEPT_OUT = 2.0
+"""Seconds of a sleep that a shutdown leaves to be slept out.
+
+Under Python 3, rospy sleeps every sleep in wall time to its end, and programs rely on it: what
+follows their loop stops the robot. A longer rest is ended by the exception that rospy documents.
+"""
 
 
 def sleep(duration: float | AnyDuration) -> None:
@@ -41,7 +48,8 @@ def sleep(duration: float | AnyDuration) -> None:
         duration: Seconds, or a ``rospy.Duration``; nothing to sleep for if not above 0.
 
     Raises:
-        ROSInterruptException: The node was shut down meanwhile.
+        ROSInterruptException: The node was shut down meanwhile, and more than two seconds were
+            left to sleep, or time is simulated.
         ROSTimeMovedBackwardsException: ROS time was set back meanwhile.
         ROSInitException: Time is simulated, and ``init_node`` has not been called.
     """
@@ -58,12 +66,17 @@ def sleep(duration: float | AnyDuration) -> None:
 def _sleep_ns(nanoseconds: int) -> None:
     if state.context is not None:
         state.context.cooperative = True
+    began = time.monotonic_ns()
     try:
         slept = clock().sleep(nanoseconds)
     except TimeMovedBackwards as error:
         raise ROSTimeMovedBackwardsException((error.after - error.before) / _SECOND) from error
-    if not slept:
+    if slept:
+        return
+    left = (nanoseconds - (time.monotonic_ns() - began)) / _SECOND
+    if not is_wallclock() or left > _SLEPT_OUT:
         raise ROSInterruptException(_ENDED)
+    wallsleep(left)
 
 
 class Rate:
@@ -181,14 +194,14 @@ class Timer(threading.Thread):
         last_expected: Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
-        while not state.shutdown.is_set() and not self._shutdown:
+        while not (ended() or self._shutdown):
             try:
                 rate.sleep()
             except ROSTimeMovedBackwardsException:
                 raise
             except ROSInterruptException:
                 return
-            if self._shutdown or state.shutdown.is_set():
+            if ended() or self._shutdown:
                 return
             real = get_rostime()
             began = time.monotonic()

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from rosz.names import is_valid
+from rosz.names import check, is_valid
 from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.exceptions import ROSException
 from rosz.ros1.rospy.msg import args_kwds_to_message
@@ -45,7 +45,7 @@ class Topic:
         md5sum: Hash of its definition, as in ROS 1.
 
     Raises:
-        ValueError: The name is none, or the class is none of a message.
+        ValueError: The name is none that anything can have, or the class is none of a message.
     """
 
     def __init__(self, name: str, data_class: type[Any], reg_type: str) -> None:
@@ -56,15 +56,15 @@ class Topic:
         if not isinstance(data_class, type):
             raise ValueError(f"data_class [{data_class}] is not a class")
         if not hasattr(data_class, "_md5sum") or not hasattr(data_class, "_type"):
-            raise ValueError(f"data_class [{data_class.__name__}] is not a message data class")
+            raise ValueError(f"data_class [{type(data_class).__name__}] is not a message data class")
         if not is_valid(name):
             warnings.warn(
                 f"'{name}' is not a legal ROS graph resource name. This may cause problems with"
                 " other ROS tools",
-                stacklevel=3,
+                stacklevel=4,
             )
         resolve = resolve_name if has_node() else resolve_name_without_node_name
-        self.name = self.resolved_name = resolve(name)
+        self.name = self.resolved_name = check(resolve(name))
         self.type: str = data_class._type
         self.data_class = data_class
         self.md5sum: str = data_class._md5sum
