@@ -1,0 +1,200 @@
+"""rclpy.logging: loggers in rclpy's words, and lines in its format."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import sys
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Any
+
+from rosz.errors import UsageError
+from rosz.node.console import ConsoleSink
+from rosz.node.log import NodeLog
+from rosz.node.logger import NodeLogger
+from rosz.node.severity import severity, severity_name
+from rosz.node.sink import Sink
+
+__all__ = ("LoggingSeverity", "RcutilsLogger", "get_logger", "write_as_rclpy")
+
+_DEFAULT_FORMAT = "[{severity}] [{time}] [{name}]: {message}"
+_TOKEN = re.compile(r"\{(\w+)\}")
+_COLORS = {10: "\033[32m", 20: "\033[0m", 30: "\033[33m", 40: "\033[31m", 50: "\033[31m"}
+_OPTIONS = frozenset({"throttle_duration_sec", "throttle_time_source_type", "skip_first", "once"})
+
+
+class LoggingSeverity(IntEnum):
+    """How much a message matters."""
+
+    UNSET = 0
+    DEBUG = 10
+    INFO = 20
+    WARN = 30
+    ERROR = 40
+    FATAL = 50
+
+
+class RcutilsLogger:
+    """A logger.
+
+    Args:
+        name: Its name, with dots between its parts.
+        logger: What logs.
+    """
+
+    def __init__(self, name: str, logger: NodeLogger) -> None:
+        self.name = name
+        self._logger = logger
+        self._seen: set[tuple[str, int]] = set()
+
+    def get_child(self, name: str) -> RcutilsLogger:
+        """Return the logger of a part of this one.
+
+        Raises:
+            UsageError: The name is empty.
+        """
+        if not name:
+            raise UsageError("the name of a child logger is empty")
+        return RcutilsLogger(f"{self.name}.{name}", self._logger.child(name))
+
+    def set_level(self, level: int) -> None:
+        """Log only what is of this severity or a higher one."""
+        self._logger.setLevel(int(level))
+
+    def get_effective_level(self) -> LoggingSeverity:
+        """Return the least severity that is logged."""
+        return LoggingSeverity(severity(self._logger.getEffectiveLevel()))
+
+    def is_enabled_for(self, severity: int) -> bool:
+        """Tell whether messages of a severity are logged."""
+        return self._logger.isEnabledFor(int(severity))
+
+    def log(self, message: Any, severity: int, **kwargs: Any) -> bool:
+        """Log a message.
+
+        Args:
+            message: The text, or anything that has one.
+            severity: How much it matters.
+            kwargs: ``once=True``; ``skip_first=True``; ``throttle_duration_sec`` seconds between
+                two messages from the same line of the program.
+
+        Returns:
+            Whether messages of that severity are logged.
+
+        Raises:
+            TypeError: An option is none of these.
+        """
+        return self._log(int(severity), message, kwargs)
+
+    def debug(self, message: Any, **kwargs: Any) -> bool:
+        """Log what only developers want to know; see `log`."""
+        return self._log(10, message, kwargs)
+
+    def info(self, message: Any, **kwargs: Any) -> bool:
+        """Log what goes as it should; see `log`."""
+        return self._log(20, message, kwargs)
+
+    def warning(self, message: Any, **kwargs: Any) -> bool:
+        """Log what was not expected; see `log`."""
+        return self._log(30, message, kwargs)
+
+    def error(self, message: Any, **kwargs: Any) -> bool:
+        """Log what failed; see `log`."""
+        return self._log(40, message, kwargs)
+
+    def fatal(self, message: Any, **kwargs: Any) -> bool:
+        """Log what the node cannot go on after; see `log`."""
+        return self._log(50, message, kwargs)
+
+    warn = warning
+
+    def _log(self, level: int, message: Any, options: dict[str, Any]) -> bool:
+        unknown = options.keys() - _OPTIONS - {"name"}
+        if unknown:
+            raise TypeError(f"a logger takes no '{min(unknown)}'")
+        if not self._logger.isEnabledFor(level):
+            return False
+        if options.get("skip_first") and self._is_first():
+            return True
+        self._logger.log(
+            level,
+            "%s",
+            message,
+            stacklevel=3,
+            once=bool(options.get("once")),
+            throttle=options.get("throttle_duration_sec"),
+        )
+        return True
+
+    def _is_first(self) -> bool:
+        """Tell whether the line of the program that logs does so for the first time."""
+        frame = sys._getframe(3)  # noqa: SLF001  # who called the method of the severity
+        place = frame.f_code.co_filename, frame.f_lineno
+        count = len(self._seen)
+        self._seen.add(place)
+        return len(self._seen) > count
+
+
+class _Console(Sink):
+    """Writes lines as rclpy does: all to stderr, in the format of the environment.
+
+    Args:
+        name: Name of the node's logger.
+        on_trouble: See `Sink`.
+        text_format: What a line looks like (``RCUTILS_CONSOLE_OUTPUT_FORMAT``).
+    """
+
+    def __init__(self, name: str, on_trouble: Callable[[str], object], text_format: str) -> None:
+        super().__init__(on_trouble)
+        self._name = name
+        self._format = text_format
+        wish = os.environ.get("RCUTILS_COLORIZED_OUTPUT", "")
+        self._color = sys.stderr is not None and sys.stderr.isatty() if not wish else wish == "1"
+
+    def _write(self, record: logging.LogRecord) -> None:
+        stream = sys.stderr
+        if stream is None:
+            return
+        nanoseconds = round(record.created * 1e9)
+        values = {
+            "severity": severity_name(record.levelno),
+            "name": self._name + record.name.removeprefix("rosout"),
+            "message": self.format(record),
+            "time": f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09d}",
+            "time_as_nanoseconds": str(nanoseconds),
+            "function_name": record.funcName or "",
+            "file_name": record.pathname,
+            "line_number": str(record.lineno),
+        }
+        text = _TOKEN.sub(lambda match: values.get(match[1], match[0]), self._format)
+        color = _COLORS[severity(record.levelno)] if self._color else ""
+        try:
+            stream.write(f"{color}{text}\033[0m\n" if color else f"{text}\n")
+            stream.flush()
+        except (OSError, ValueError) as error:
+            self._on_trouble(f"cannot log to the console: {error}")
+
+
+def write_as_rclpy(log: NodeLog, name: str) -> None:
+    """Have a node's lines written to the console in rclpy's format.
+
+    Args:
+        log: The node's log.
+        name: Name of its logger.
+    """
+    for handler in list(log.handlers):
+        if isinstance(handler, ConsoleSink):
+            log.removeHandler(handler)
+    text_format = os.environ.get("RCUTILS_CONSOLE_OUTPUT_FORMAT") or _DEFAULT_FORMAT
+    log.addHandler(_Console(name, log.manager.troubles.append, text_format))
+
+
+def get_logger(name: str) -> RcutilsLogger:
+    """Return a logger that belongs to no node, and writes to the console only."""
+    from rosz.node.clock import Clock
+
+    log = NodeLog(name, clock=Clock(), rosout=False)
+    write_as_rclpy(log, name)
+    return RcutilsLogger(name, log)

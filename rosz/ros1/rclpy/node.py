@@ -1,0 +1,483 @@
+"""rclpy.node: nodes of ROS 2's Python interface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeVar
+
+from rosz import names
+from rosz.errors import UsageError
+from rosz.node import Node as RoszNode
+from rosz.node.standard import simulate
+from rosz.ros1.rclpy import state
+from rosz.ros1.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
+from rosz.ros1.rclpy.client import Client
+from rosz.ros1.rclpy.clock import Clock, Rate, ROSClock
+from rosz.ros1.rclpy.declared import Declared
+from rosz.ros1.rclpy.exceptions import NotInitializedException, ParameterNotDeclaredException
+from rosz.ros1.rclpy.logging import RcutilsLogger, write_as_rclpy
+from rosz.ros1.rclpy.parameter import Parameter
+from rosz.ros1.rclpy.publisher import Publisher
+from rosz.ros1.rclpy.qos import QoSProfile, to_qos
+from rosz.ros1.rclpy.service import Service
+from rosz.ros1.rclpy.subscription import Subscription
+from rosz.ros1.rclpy.timer import Timer
+
+if TYPE_CHECKING:
+    from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+    from rosz.ros1.rclpy.context import Context
+    from rosz.ros1.rclpy.executors import Entity, Executor
+
+__all__ = ("Node",)
+
+P = TypeVar("P")
+_SECOND = 1_000_000_000
+
+
+class Node:
+    """A node whose callbacks run while it is spun, and only then.
+
+    Args:
+        node_name: Base name; ``__node:=`` on the command line overrides it.
+        context: What it shares with others; the default one when not given.
+        namespace: Its namespace.
+        parameter_overrides: Values of parameters, which count more than those declared.
+        options: Of rclpy's other options, ``automatically_declare_parameters_from_overrides``
+            counts; ``cli_args``, ``use_global_arguments``, ``enable_rosout``,
+            ``start_parameter_services``, ``allow_undeclared_parameters`` and
+            ``enable_logger_service`` are taken and do nothing.
+
+    Raises:
+        NotInitializedException: There was no ``rclpy.init``.
+        InvalidName: The name or namespace is not legal.
+    """
+
+    def __init__(
+        self,
+        node_name: str,
+        *,
+        context: Context | None = None,
+        namespace: str | None = None,
+        parameter_overrides: Sequence[Parameter] | None = None,
+        **options: Any,
+    ) -> None:
+        self._parts: list[Any] = []
+        self.context = context or state.default_context()
+        if not self.context.ok():
+            raise NotInitializedException("cannot create node")
+        unknown = options.keys() - _OPTIONS
+        if unknown:
+            raise UsageError(f"Node takes no '{min(unknown)}' in rosz")
+        self.executor: Executor | None = None
+        self._node = RoszNode(node_name, namespace=namespace, context=self.context.opened)
+        self._clock = ROSClock(self._node.clock)
+        self._logger_name = self._node.name.strip("/").replace("/", ".")
+        write_as_rclpy(self._node.log, self._logger_name)
+        self.default_callback_group: CallbackGroup = MutuallyExclusiveCallbackGroup()
+        given = self.context.given
+        if given.level:
+            self._node.log.set_level("", given.level)
+        overrides = self._overrides(given.params)
+        overrides |= {one.name: one.value for one in parameter_overrides or ()}
+        self._declared = Declared(self._node, overrides, self._call_soon)
+        self.declare_parameter("use_sim_time", self._node.clock.simulated)
+        if self.get_parameter("use_sim_time").value and not self._node.clock.simulated:
+            simulate(self._node)
+        if options.get("automatically_declare_parameters_from_overrides"):
+            for name, value in overrides.items():
+                if not self.has_parameter(name):
+                    self.declare_parameter(name, value)
+
+    def _overrides(self, params: dict[str, dict[str, Any]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for node in ("", self._node.base_name, self._node.name):
+            found |= params.get(node, {})
+        return found
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise AttributeError(
+            f"'{type(self).__name__}' has no '{name}': rosz's rclpy.node.Node lacks it"
+        )
+
+    # What executors ask.
+
+    def entities(self) -> Iterator[Entity]:
+        """Yield what has callbacks, timers first, as they run in rclpy."""
+        parts = list(self._parts)
+        yield from (part for part in parts if isinstance(part, Timer))
+        yield from (part for part in parts if isinstance(part, Subscription | Service))
+
+    def _wake(self) -> None:
+        executor = self.executor
+        if executor is not None:
+            executor.wake()
+
+    def _call_soon(self, job: Callable[[], object]) -> None:
+        (self.executor or state.global_executor()).call_soon(job)
+
+    # Who it is.
+
+    def get_name(self) -> str:
+        """Return its base name."""
+        return self._node.base_name
+
+    def get_namespace(self) -> str:
+        """Return its namespace."""
+        return self._node.namespace
+
+    def get_fully_qualified_name(self) -> str:
+        """Return its full name."""
+        return self._node.name
+
+    def get_clock(self) -> Clock:
+        """Return its clock, which tells ROS time."""
+        return self._clock
+
+    def get_logger(self) -> RcutilsLogger:
+        """Return its logger."""
+        return RcutilsLogger(self._logger_name, self._node.log)
+
+    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
+        """Return the global name that the name of a topic means.
+
+        Args:
+            topic: Any legal name.
+            only_expand: Whether to leave remappings out.
+        """
+        if only_expand:
+            return names.resolve(topic, self._node.name)
+        return self._node.resolve(topic)
+
+    resolve_service_name = resolve_topic_name
+
+    # What it has.
+
+    def create_publisher(
+        self,
+        msg_type: type[Any],
+        topic: str,
+        qos_profile: QoSProfile | int = 10,
+        **_options: Any,
+    ) -> Publisher:
+        """Declare that it publishes on a topic.
+
+        Args:
+            msg_type: What is published.
+            topic: Name of the topic.
+            qos_profile: A profile, or the depth of its queue.
+        """
+        raw = self._node.publisher(topic, msg_type, qos=to_qos(qos_profile))
+        return self._keep(Publisher(raw, qos_profile))
+
+    def create_subscription(
+        self,
+        msg_type: type[Any],
+        topic: str,
+        callback: Callable[[Any], Any],
+        qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        raw: bool = False,
+        **_options: Any,
+    ) -> Subscription:
+        """Declare that it listens to a topic.
+
+        Args:
+            msg_type: What is expected.
+            topic: Name of the topic.
+            callback: Gets each message, or its bytes if ``raw``.
+            qos_profile: A profile, or the depth of its queue.
+            callback_group: The group of the callback; the node's own when not given.
+            raw: Whether to pass the encoded bytes on.
+        """
+        return self._keep(
+            Subscription(
+                self._node,
+                topic,
+                msg_type,
+                callback,
+                to_qos(qos_profile),
+                raw=raw,
+                group=callback_group or self.default_callback_group,
+                wake=self._wake,
+            )
+        )
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable[[], Any] | None,
+        callback_group: CallbackGroup | None = None,
+        clock: Clock | None = None,
+        autostart: bool = True,
+    ) -> Timer:
+        """Have a function called every so often.
+
+        Args:
+            timer_period_sec: Seconds.
+            callback: What to call.
+            callback_group: The group of the callback; the node's own when not given.
+            clock: Whose time to go by; the node's when not given.
+            autostart: Whether it begins at once, or with ``reset``.
+        """
+        return self._keep(
+            Timer(
+                round(timer_period_sec * _SECOND),
+                callback,
+                self._node.clock,
+                clock=clock or self._clock,
+                group=callback_group or self.default_callback_group,
+                wake=self._wake,
+                report=self._node.log.report,
+                autostart=autostart,
+            )
+        )
+
+    def create_service(
+        self,
+        srv_type: type[Any],
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        *,
+        callback_group: CallbackGroup | None = None,
+        **_options: Any,
+    ) -> Service:
+        """Serve a service.
+
+        Args:
+            srv_type: Its type.
+            srv_name: Its name.
+            callback: Gets a request and an empty response, and returns the response.
+            callback_group: The group of the callback; the node's own when not given.
+        """
+        return self._keep(
+            Service(
+                self._node,
+                srv_name,
+                srv_type,
+                callback,
+                group=callback_group or self.default_callback_group,
+                wake=self._wake,
+            )
+        )
+
+    def create_client(self, srv_type: type[Any], srv_name: str, **_options: Any) -> Client:
+        """Make a caller of a service.
+
+        Args:
+            srv_type: Its type.
+            srv_name: Its name.
+        """
+        return self._keep(Client(self._node, srv_name, srv_type, call_soon=self._call_soon))
+
+    def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:  # noqa: ARG002
+        """Return a pace-maker for a loop.
+
+        Args:
+            frequency: Times per second.
+            clock: Not used: it goes by the node's clock.
+
+        Raises:
+            UsageError: The frequency is not above 0.
+        """
+        if frequency <= 0:
+            raise UsageError(f"a rate is '{frequency}' Hz; expected above 0")
+        return Rate(int(_SECOND / frequency), self._node.clock)
+
+    def _keep(self, part: P) -> P:
+        self._parts.append(part)
+        self._wake()
+        return part
+
+    def _destroy(self, part: Any) -> bool:
+        if part not in self._parts:
+            return False
+        self._parts.remove(part)
+        part.destroy()
+        return True
+
+    def destroy_publisher(self, publisher: Publisher) -> bool:
+        """End a publisher; tell whether it was one of the node."""
+        return self._destroy(publisher)
+
+    def destroy_subscription(self, subscription: Subscription) -> bool:
+        """End a subscription; tell whether it was one of the node."""
+        return self._destroy(subscription)
+
+    def destroy_timer(self, timer: Timer) -> bool:
+        """End a timer; tell whether it was one of the node."""
+        return self._destroy(timer)
+
+    def destroy_service(self, service: Service) -> bool:
+        """End a service; tell whether it was one of the node."""
+        return self._destroy(service)
+
+    def destroy_client(self, client: Client) -> bool:
+        """End a client; tell whether it was one of the node."""
+        return self._destroy(client)
+
+    def destroy_rate(self, rate: Rate) -> bool:
+        """End a rate."""
+        rate.destroy()
+        return True
+
+    def destroy_node(self) -> None:
+        """End the node with all it has; again is no error."""
+        if self.executor is not None:
+            self.executor.remove_node(self)
+        while self._parts:
+            self._parts.pop().destroy()
+        self._node.close()
+
+    @property
+    def publishers(self) -> Iterator[Publisher]:
+        """Its publishers."""
+        return (part for part in self._parts if isinstance(part, Publisher))
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Its subscriptions."""
+        return (part for part in self._parts if isinstance(part, Subscription))
+
+    @property
+    def timers(self) -> Iterator[Timer]:
+        """Its timers."""
+        return (part for part in self._parts if isinstance(part, Timer))
+
+    # Parameters.
+
+    def declare_parameter(
+        self,
+        name: str,
+        value: Any = None,
+        descriptor: ParameterDescriptor | None = None,
+        ignore_override: bool = False,
+    ) -> Parameter:
+        """Declare a parameter; what the command line or a launch file says counts more.
+
+        Args:
+            name: Its name.
+            value: Its default value, or a ``Parameter.Type`` for one without.
+            descriptor: What there is to say about it.
+            ignore_override: Whether the default counts, whatever else is said.
+
+        Raises:
+            ParameterAlreadyDeclaredException: It is declared already.
+            InvalidParameterTypeException: What was given is of another type.
+        """
+        return self._declared.declare(name, value, descriptor, ignore_override)
+
+    def declare_parameters(
+        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
+    ) -> list[Parameter]:
+        """Declare several parameters: tuples of what `declare_parameter` takes.
+
+        Args:
+            namespace: What their names begin with, before a dot; may be empty.
+            parameters: Name, and perhaps default value and descriptor, of each.
+            ignore_override: Whether the defaults count.
+        """
+        start = f"{namespace}." if namespace else ""
+        declared: list[Parameter] = []
+        for name, *rest in parameters:
+            value, descriptor = (*rest, None, None)[:2]
+            declared.append(
+                self._declared.declare(start + name, value, descriptor, ignore_override)
+            )
+        return declared
+
+    def undeclare_parameter(self, name: str) -> None:
+        """Forget a parameter."""
+        self._declared.undeclare(name)
+
+    def has_parameter(self, name: str) -> bool:
+        """Tell whether a parameter is declared."""
+        return self._declared.has(name)
+
+    def get_parameter(self, name: str) -> Parameter:
+        """Return a parameter.
+
+        Raises:
+            ParameterNotDeclaredException: It is not declared.
+            ParameterUninitializedException: It was declared by type alone, and is not set.
+        """
+        return self._declared.get(name)
+
+    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
+        """Return several parameters."""
+        return [self._declared.get(name) for name in names]
+
+    def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
+        """Return a parameter, or something else where it is not declared."""
+        try:
+            return self._declared.get(name)
+        except ParameterNotDeclaredException:
+            return alternative_value
+
+    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
+        """Return the parameters of a namespace, by the rest of their names."""
+        return self._declared.below(prefix)
+
+    def describe_parameter(self, name: str) -> ParameterDescriptor:
+        """Return what was said about a parameter when it was declared."""
+        return self._declared.descriptor(name)
+
+    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
+        """Set parameters; each result tells whether that one was set."""
+        return self._declared.set(parameter_list)
+
+    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
+        """Set all parameters or none."""
+        return self._declared.set_together(parameter_list)
+
+    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+        """Have a function asked before parameters are set."""
+        self._declared.add_check(callback)
+
+    def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+        """Ask a function no more."""
+        self._declared.remove_check(callback)
+
+    # Who else is there.
+
+    def get_node_names(self) -> list[str]:
+        """Return the base names of all nodes."""
+        return [names.basename(name) for name in self._view().nodes()]
+
+    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
+        """Return base name and namespace of all nodes."""
+        return [
+            (names.basename(name), names.namespace(name).rstrip("/") or "/")
+            for name in self._view().nodes()
+        ]
+
+    def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:  # noqa: ARG002
+        """Return all topics with their types."""
+        return list(self._view().topics().items())
+
+    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """Return all services with their types."""
+        return list(self._view().services().items())
+
+    def count_publishers(self, topic_name: str) -> int:
+        """Return how many publishers a topic has."""
+        return len(self._view().publishers(self.resolve_topic_name(topic_name)))
+
+    def count_subscribers(self, topic_name: str) -> int:
+        """Return how many subscriptions a topic has."""
+        return len(self._view().subscriptions(self.resolve_topic_name(topic_name)))
+
+    def _view(self) -> Any:
+        return self._node.context.graph.view()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_details: object) -> None:
+        self.destroy_node()
+
+
+_OPTIONS = frozenset({
+    "allow_undeclared_parameters", "automatically_declare_parameters_from_overrides", "cli_args",
+    "enable_logger_service", "enable_rosout", "start_parameter_services", "use_global_arguments",
+})  # fmt: skip

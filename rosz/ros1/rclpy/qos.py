@@ -1,0 +1,185 @@
+"""rclpy.qos: quality of service in rclpy's words."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+from typing import Any
+
+from rosz.errors import UsageError
+from rosz.qos import FOREVER, QoS
+from rosz.ros1.rclpy.duration import Duration, Infinite
+
+__all__ = (
+    "DurabilityPolicy",
+    "HistoryPolicy",
+    "LivelinessPolicy",
+    "QoSDurabilityPolicy",
+    "QoSHistoryPolicy",
+    "QoSLivelinessPolicy",
+    "QoSPresetProfiles",
+    "QoSProfile",
+    "QoSReliabilityPolicy",
+    "ReliabilityPolicy",
+    "qos_profile_action_status_default",
+    "qos_profile_parameter_events",
+    "qos_profile_parameters",
+    "qos_profile_sensor_data",
+    "qos_profile_services_default",
+    "qos_profile_system_default",
+    "to_qos",
+)
+
+
+class HistoryPolicy(IntEnum):
+    """How many samples are kept."""
+
+    SYSTEM_DEFAULT = 0
+    KEEP_LAST = 1
+    KEEP_ALL = 2
+    UNKNOWN = 3
+
+
+class ReliabilityPolicy(IntEnum):
+    """Whether samples may be lost."""
+
+    SYSTEM_DEFAULT = 0
+    RELIABLE = 1
+    BEST_EFFORT = 2
+    UNKNOWN = 3
+    BEST_AVAILABLE = 4
+
+
+class DurabilityPolicy(IntEnum):
+    """Whether late joiners get what was sent before."""
+
+    SYSTEM_DEFAULT = 0
+    TRANSIENT_LOCAL = 1
+    VOLATILE = 2
+    UNKNOWN = 3
+    BEST_AVAILABLE = 4
+
+
+class LivelinessPolicy(IntEnum):
+    """Who says that a publisher is alive; information only."""
+
+    SYSTEM_DEFAULT = 0
+    AUTOMATIC = 1
+    MANUAL_BY_TOPIC = 3
+    UNKNOWN = 4
+    BEST_AVAILABLE = 5
+
+
+QoSHistoryPolicy = HistoryPolicy
+QoSReliabilityPolicy = ReliabilityPolicy
+QoSDurabilityPolicy = DurabilityPolicy
+QoSLivelinessPolicy = LivelinessPolicy
+
+_POLICIES: dict[str, tuple[type[IntEnum], IntEnum]] = {
+    "history": (HistoryPolicy, HistoryPolicy.KEEP_LAST),
+    "reliability": (ReliabilityPolicy, ReliabilityPolicy.RELIABLE),
+    "durability": (DurabilityPolicy, DurabilityPolicy.VOLATILE),
+    "liveliness": (LivelinessPolicy, LivelinessPolicy.SYSTEM_DEFAULT),
+}
+_SPANS = ("lifespan", "deadline", "liveliness_lease_duration")
+
+
+class QoSProfile:
+    """What an endpoint promises or asks for; see REP 2003.
+
+    Args:
+        policies: ``history``, ``depth``, ``reliability``, ``durability``, ``lifespan``,
+            ``deadline``, ``liveliness`` and ``liveliness_lease_duration``, as far as they are not
+            the default.
+
+    Raises:
+        UsageError: A policy is none, or neither history nor depth is given.
+    """
+
+    depth: int
+
+    def __init__(self, **policies: Any) -> None:
+        if "history" not in policies and "depth" not in policies:
+            raise UsageError("a QoSProfile needs a history or a depth; give depth=10, for example")
+        policies.pop("avoid_ros_namespace_conventions", None)
+        self.depth = int(policies.pop("depth", 0))
+        for name, (kind, default) in _POLICIES.items():
+            setattr(self, name, kind(policies.pop(name, default)))
+        for name in _SPANS:
+            setattr(self, name, policies.pop(name, Infinite))
+        if policies:
+            raise UsageError(f"a QoSProfile has no '{next(iter(policies))}'")
+
+    def _values(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("depth", *_POLICIES, *_SPANS)}
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, QoSProfile) and self._values() == other._values()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        texts = (
+            f"{name}={value.name if isinstance(value, IntEnum) else value}"
+            for name, value in self._values().items()
+        )
+        return f"QoSProfile({', '.join(texts)})"
+
+
+def to_qos(profile: QoSProfile | int) -> QoS:
+    """Return a profile, or the depth of a queue, in rosz's terms.
+
+    Raises:
+        UsageError: It is neither.
+    """
+    if isinstance(profile, int):
+        if profile < 0:
+            raise UsageError(f"the depth of a queue is {profile}; expected 0 or more")
+        return QoS(depth=profile)
+    if not isinstance(profile, QoSProfile):
+        raise UsageError(f"expected a QoSProfile or a depth, got {type(profile).__name__}")
+    given: Any = profile
+    return QoS(
+        depth=given.depth,
+        reliability="best_effort"
+        if given.reliability is ReliabilityPolicy.BEST_EFFORT
+        else "reliable",
+        durability="transient_local"
+        if given.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        else "volatile",
+        history="keep_all" if given.history is HistoryPolicy.KEEP_ALL else "keep_last",
+        deadline=_span(given.deadline),
+        lifespan=_span(given.lifespan),
+        liveliness="manual_by_topic"
+        if given.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+        else "automatic",
+        lease=_span(given.liveliness_lease_duration),
+    )
+
+
+def _span(duration: Duration) -> int:
+    return duration.nanoseconds or FOREVER
+
+
+_LAST = HistoryPolicy.KEEP_LAST
+
+qos_profile_system_default = QoSProfile(history=HistoryPolicy.SYSTEM_DEFAULT, depth=10)
+qos_profile_sensor_data = QoSProfile(
+    history=_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
+)
+qos_profile_services_default = QoSProfile(history=_LAST, depth=10)
+qos_profile_parameters = QoSProfile(history=_LAST, depth=1000)
+qos_profile_parameter_events = QoSProfile(history=_LAST, depth=1000)
+qos_profile_action_status_default = QoSProfile(
+    history=_LAST, depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+
+
+class QoSPresetProfiles(Enum):
+    """The profiles that ROS 2 has names for; ``.value`` is the profile."""
+
+    SYSTEM_DEFAULT = qos_profile_system_default
+    SENSOR_DATA = qos_profile_sensor_data
+    SERVICES_DEFAULT = qos_profile_services_default
+    PARAMETERS = qos_profile_parameters
+    PARAMETER_EVENTS = qos_profile_parameter_events
+    ACTION_STATUS_DEFAULT = qos_profile_action_status_default

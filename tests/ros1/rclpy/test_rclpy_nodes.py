@@ -1,0 +1,389 @@
+"""Nodes of rclpy: their callbacks, services and parameters, in this process."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any
+
+import pytest
+from network import PATIENCE, Network, eventually
+
+from rosz.errors import ClosedError, ServiceError
+from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rosz.msgs.std_msgs.msg import Int32, String
+from rosz.msgs.std_srvs.srv import SetBool
+from rosz.ros1.rclpy import exceptions, executors
+from rosz.ros1.rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rosz.ros1.rclpy.clock import ClockType
+from rosz.ros1.rclpy.context import Context
+from rosz.ros1.rclpy.duration import Duration
+from rosz.ros1.rclpy.node import Node
+from rosz.ros1.rclpy.parameter import Parameter
+from rosz.ros1.rclpy.qos import DurabilityPolicy, QoSProfile
+from rosz.ros1.rclpy.task import Future
+
+Start = Callable[..., Context]
+
+
+@pytest.fixture
+def start(network: Network, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
+    """What begins contexts on the test's network, with a command line."""
+    for name, value in network.variables().items():
+        monkeypatch.setenv(name, value)
+    opened: list[Context] = []
+
+    def begin(*args: str) -> Context:
+        context = Context()
+        context.init(["program", *args])
+        opened.append(context)
+        return context
+
+    yield begin
+    for context in opened:
+        context.shutdown()
+
+
+class World:
+    """A node and what spins it."""
+
+    def __init__(self, start: Start, name: str = "robot", *args: str, **options: Any) -> None:
+        self.context = start(*args)
+        self.node = Node(name, context=self.context, **options)
+        self.executor = executors.SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def spin_until(self, condition: Callable[[], object], what: str) -> None:
+        def look() -> object:
+            self.executor.spin_once(timeout_sec=0.01)
+            return condition()
+
+        eventually(look, what)
+
+
+@pytest.fixture
+def world(start: Start) -> World:
+    return World(start)
+
+
+def test_messages_come_in_spin_and_on_its_thread(world: World) -> None:
+    heard: list[tuple[int, threading.Thread]] = []
+    node = world.node
+    subscription = node.create_subscription(
+        Int32, "n", lambda m: heard.append((m.data, threading.current_thread())), 10
+    )
+    publisher = node.create_publisher(Int32, "n", 10)
+    eventually(lambda: publisher.get_subscription_count() == 1, "the link")
+    for number in range(3):
+        publisher.publish(Int32(data=number))
+    eventually(lambda: len(subscription._waiting) == 3, "the messages")
+    assert heard == []
+    for count in (1, 2, 3):
+        world.executor.spin_once()
+        assert len(heard) == count
+    assert heard == [(n, threading.current_thread()) for n in range(3)]
+    assert (publisher.topic_name, subscription.topic_name) == ("/n", "/n")
+    eventually(lambda: subscription.get_publisher_count() == 1, "the publisher")
+    assert node.count_publishers("n") == node.count_subscribers("/n") == 1
+    assert ("/n", ["std_msgs/msg/Int32"]) in node.get_topic_names_and_types()
+    assert node.get_node_names_and_namespaces() == [("robot", "/")]
+
+
+def test_a_queue_keeps_the_newest(world: World) -> None:
+    heard: list[int] = []
+    subscription = world.node.create_subscription(Int32, "n", lambda m: heard.append(m.data), 2)
+    publisher = world.node.create_publisher(Int32, "n", 10)
+    eventually(lambda: publisher.get_subscription_count() == 1, "the link")
+    for number in range(5):
+        publisher.publish(Int32(number))
+    eventually(lambda: _last(subscription._waiting) == 4, "the newest message")
+    world.spin_until(lambda: len(heard) == 2, "two messages")
+    world.executor.spin_once(timeout_sec=0)
+    assert heard == [3, 4]
+
+
+def _last(messages: Any) -> Any:
+    return messages[-1].data if messages else None
+
+
+def test_transient_local_reaches_late_joiners(world: World) -> None:
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    world.node.create_publisher(String, "map", latched).publish(String(data="here"))
+    heard: list[str] = []
+    world.node.create_subscription(String, "map", lambda m: heard.append(m.data), latched)
+    world.spin_until(lambda: heard, "the message")
+    assert heard == ["here"]
+
+
+def test_timers(world: World) -> None:
+    ticks: list[int] = []
+    timer = world.node.create_timer(0.01, lambda: ticks.append(1))
+    world.spin_until(lambda: len(ticks) == 3, "three ticks")
+    timer.cancel()
+    assert timer.is_canceled()
+    assert timer.time_until_next_call() is None
+    count = len(ticks)
+    world.executor.spin_once(timeout_sec=0.05)
+    assert len(ticks) == count
+    timer.reset()
+    world.spin_until(lambda: len(ticks) > count, "a tick after the reset")
+    assert timer.timer_period_ns == 10_000_000
+    assert world.node.destroy_timer(timer)
+    assert not world.node.destroy_timer(timer)
+
+
+def test_what_a_timer_missed_is_left_out(world: World) -> None:
+    ticks: list[int] = []
+    timer = world.node.create_timer(0.005, lambda: ticks.append(1))
+    eventually(timer.is_ready, "the timer")
+    threading.Event().wait(0.03)
+    assert timer._ticking is not None
+    timer._ticking.close()
+    world.executor.spin_once(timeout_sec=0)
+    world.executor.spin_once(timeout_sec=0)
+    assert ticks == [1]
+
+
+def test_an_exception_leaves_spin(world: World) -> None:
+    world.node.create_timer(0.001, lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        world.executor.spin()
+
+
+def test_services(world: World) -> None:
+    where: list[threading.Thread] = []
+
+    def serve(request: Any, response: Any) -> Any:
+        where.append(threading.current_thread())
+        response.success, response.message = request.data, "done"
+        return response
+
+    service = world.node.create_service(SetBool, "switch", serve)
+    client = world.node.create_client(SetBool, "switch")
+    assert client.wait_for_service(timeout_sec=PATIENCE)
+    assert client.service_is_ready()
+    future = client.call_async(SetBool.Request(data=True))
+    done: list[Future] = []
+    future.add_done_callback(done.append)
+    world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+    assert future.done()
+    assert done == [future]
+    assert future.result() == SetBool.Response(success=True, message="done")
+    assert where == [threading.current_thread()]
+    assert (service.srv_name, client.srv_name) == ("/switch", "/switch")
+    assert ("/switch", ["std_srvs/srv/SetBool"]) in world.node.get_service_names_and_types()
+
+
+def test_an_async_callback_may_wait_for_a_service(world: World) -> None:
+    async def serve(request: Any, response: Any) -> Any:
+        inner = await world.node.create_client(SetBool, "inner").call_async(request)
+        response.message = f"outer {inner.message}"
+        return response
+
+    def inner(_: Any, response: Any) -> Any:
+        response.message = "inner"
+        return response
+
+    world.node.create_service(SetBool, "inner", inner)
+    world.node.create_service(SetBool, "outer", serve)
+    future = world.node.create_client(SetBool, "outer").call_async(SetBool.Request())
+    world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+    assert future.result().message == "outer inner"
+
+
+def test_a_failing_service_tells_its_caller_and_leaves_spin(world: World) -> None:
+    def serve(_request: Any, _response: Any) -> Any:
+        raise ValueError("no hand")
+
+    world.node.create_service(SetBool, "switch", serve)
+    future = world.node.create_client(SetBool, "switch").call_async(SetBool.Request())
+    with pytest.raises(ValueError, match="no hand"):
+        world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+    world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+    with pytest.raises(ServiceError, match="no hand"):
+        future.result()
+
+
+def test_a_service_that_nobody_serves(world: World) -> None:
+    client = world.node.create_client(SetBool, "nothing")
+    assert not client.service_is_ready()
+    assert not client.wait_for_service(timeout_sec=0.01)
+    future = client.call_async(SetBool.Request())
+    world.executor.spin_until_future_complete(future, timeout_sec=0.01)
+    assert not future.done()
+    client.remove_pending_request(future)
+    assert future.cancelled()
+
+
+def test_parameters_declared_and_got(world: World) -> None:
+    node = world.node
+    assert node.declare_parameter("speed", 1.5).value == 1.5
+    node.declare_parameters("pid", [("p", 1), ("name", "x", ParameterDescriptor()), ("i",)])
+    assert node.get_parameter("pid.p").get_parameter_value().integer_value == 1
+    assert node.get_parameter("pid.name").value == "x"
+    assert [one.value for one in node.get_parameters(["speed", "pid.p"])] == [1.5, 1]
+    assert sorted(node.get_parameters_by_prefix("pid")) == ["i", "name", "p"]
+    assert node.has_parameter("use_sim_time")
+    assert node.get_parameter_or("nothing", 5) == 5
+    with pytest.raises(exceptions.ParameterAlreadyDeclaredException, match="speed"):
+        node.declare_parameter("speed", 2.0)
+    with pytest.raises(exceptions.ParameterNotDeclaredException, match="nothing"):
+        node.get_parameter("nothing")
+    with pytest.raises(exceptions.ParameterUninitializedException, match=r"pid\.i"):
+        node.get_parameter("pid.i")
+    node.undeclare_parameter("speed")
+    assert not node.has_parameter("speed")
+
+
+def test_parameters_set_and_checked(world: World) -> None:
+    node = world.node
+    node.declare_parameter("speed", 1.5)
+    node.declare_parameter("fixed", 1, ParameterDescriptor(read_only=True))
+    (good,) = node.set_parameters([Parameter("speed", value=2.5)])
+    assert good.successful
+    assert node.get_parameter("speed").value == 2.5
+    (wrong,) = node.set_parameters([Parameter("speed", value="fast")])
+    assert not wrong.successful
+    assert wrong.reason == "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.STRING'"
+    assert not node.set_parameters_atomically([Parameter("fixed", value=2)]).successful
+
+    def check(parameters: list[Parameter]) -> SetParametersResult:
+        slow = all(one.value < 3.0 for one in parameters)
+        return SetParametersResult(successful=slow, reason="" if slow else "too fast")
+
+    node.add_on_set_parameters_callback(check)
+    assert node.set_parameters([Parameter("speed", value=9.0)])[0].reason == "too fast"
+    assert node.get_parameter("speed").value == 2.5
+    node.remove_on_set_parameters_callback(check)
+    assert node.set_parameters([Parameter("speed", value=9.0)])[0].successful
+
+
+def test_parameters_of_the_command_line(start: Start) -> None:
+    world = World(
+        start, "robot", "--ros-args", "-p", "speed:=3", "-p", "other:x:=1", "-r", "__node:=me",
+        "-r", "in:=/out", "-p", "wrong:=text",
+    )  # fmt: skip
+    assert world.node.declare_parameter("speed", 1.0).value == 3.0
+    assert world.node.declare_parameter("x", 5).value == 5
+    with pytest.raises(exceptions.InvalidParameterTypeException, match="wrong"):
+        world.node.declare_parameter("wrong", 1.0)
+    assert world.node.get_fully_qualified_name() == "/me"
+    assert world.node.resolve_topic_name("in") == "/out"
+    assert world.node.resolve_topic_name("in", only_expand=True) == "/in"
+
+
+def test_parameters_are_those_of_the_store(world: World, network: Network) -> None:
+    other = network.node("other")
+    other.params.set("/robot/speed", 4)
+    eventually(lambda: world.node._node.params.has("~speed"), "the parameter")
+    assert world.node.declare_parameter("speed", 1.0).value == 4.0
+    world.node.declare_parameter("pid.p", 1.0)
+    assert other.params.get("/robot/pid/p") == 1.0
+    other.params.set("/robot/speed", 5)
+    world.spin_until(lambda: world.node.get_parameter("speed").value == 5.0, "the new value")
+    other.params.set("/robot/speed", "fast")
+    world.node.set_parameters([Parameter("pid.p", value=2.0)])
+    world.executor.spin_once(timeout_sec=0.05)
+    assert world.node.get_parameter("speed").value == 5.0
+
+
+def test_names_and_clock(start: Start) -> None:
+    world = World(start, "robot", namespace="/ns")
+    node = world.node
+    assert (node.get_name(), node.get_namespace()) == ("robot", "/ns")
+    assert node.get_logger().name == "ns.robot"
+    now = node.get_clock().now()
+    assert now.clock_type is ClockType.ROS_TIME
+    assert node.get_clock().sleep_for(Duration(nanoseconds=1))
+    assert node.get_clock().now() > now
+    assert not node.get_clock().ros_time_is_active
+    rate = node.create_rate(1000.0)
+    rate.sleep()
+    world.context.shutdown()
+    with pytest.raises(exceptions.ROSInterruptException):
+        rate.sleep()
+
+
+def test_what_is_missing_is_named(world: World) -> None:
+    with pytest.raises(AttributeError, match="create_guard_condition"):
+        _ = world.node.create_guard_condition
+    assert not hasattr(world.node, "my_own")
+
+
+def test_no_node_without_init() -> None:
+    with pytest.raises(exceptions.NotInitializedException, match="cannot create node"):
+        Node("robot", context=Context())
+
+
+def test_the_end_of_a_node(world: World) -> None:
+    publisher = world.node.create_publisher(Int32, "n", 10)
+    world.node.destroy_node()
+    world.node.destroy_node()
+    assert world.executor.get_nodes() == []
+    with pytest.raises(ClosedError):
+        publisher.publish(Int32())
+    world.context.shutdown()
+    world.context.shutdown()
+    assert not world.context.ok()
+    world.executor.spin()
+
+
+def test_several_threads(start: Start) -> None:
+    context = start()
+    node = Node("robot", context=context)
+    meeting = threading.Barrier(2)
+    met = threading.Semaphore(0)
+
+    def meet() -> None:
+        with suppress(threading.BrokenBarrierError):  # the end of the test
+            meeting.wait(PATIENCE)
+            met.release()
+
+    group = ReentrantCallbackGroup()
+    for _ in range(2):
+        node.create_timer(0.01, meet, callback_group=group)
+    with executors.MultiThreadedExecutor(2, context=context) as executor:
+        executor.add_node(node)
+        threading.Thread(target=executor.spin, daemon=True).start()
+        assert met.acquire(timeout=PATIENCE)
+        meeting.abort()
+        context.shutdown()
+
+
+def test_groups_exclude(start: Start) -> None:
+    context = start()
+    node = Node("robot", context=context)
+    inside = threading.Lock()
+    both = threading.Semaphore(0)
+    clashes: list[int] = []
+    group = MutuallyExclusiveCallbackGroup()
+
+    def alone() -> None:
+        if not inside.acquire(blocking=False):
+            clashes.append(1)
+            return
+        threading.Event().wait(0.01)
+        inside.release()
+        both.release()
+
+    for _ in range(2):
+        node.create_timer(0.001, alone, callback_group=group)
+    with executors.MultiThreadedExecutor(4, context=context) as executor:
+        executor.add_node(node)
+        threading.Thread(target=executor.spin, daemon=True).start()
+        for _ in range(10):
+            assert both.acquire(timeout=PATIENCE)
+        context.shutdown()
+    assert clashes == []
+
+
+def test_tasks(world: World) -> None:
+    first = world.executor.create_task(lambda a, b: a + b, 1, b=2)
+
+    async def second() -> int:
+        return int(await first) * 10
+
+    task = world.executor.create_task(second)
+    world.executor.spin_until_future_complete(task, timeout_sec=PATIENCE)
+    assert (first.result(), task.result()) == (3, 30)

@@ -1,0 +1,153 @@
+"""rclpy's values: times, durations, profiles, parameters, command lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rosz.errors import NotFoundError, UsageError, YamlError
+from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
+from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
+from rosz.qos import QoS
+from rosz.ros1.rclpy import qos
+from rosz.ros1.rclpy.arguments import parse, remove_ros_args
+from rosz.ros1.rclpy.duration import Duration, Infinite
+from rosz.ros1.rclpy.parameter import Parameter, get_parameter_value
+from rosz.ros1.rclpy.time import ClockType, Time
+
+Type = Parameter.Type
+
+
+def test_durations() -> None:
+    assert Duration(seconds=1.5, nanoseconds=2).nanoseconds == 1_500_000_002
+    assert Duration(seconds=-1.5).to_msg() == DurationMessage(-2, 500_000_000)
+    assert Duration.from_msg(DurationMessage(-2, 500_000_000)) == Duration(seconds=-1.5)
+    assert Duration(seconds=1) < Duration(seconds=2) <= Duration(seconds=2) < Infinite
+    assert str(Duration(seconds=1)) == "1000000000 nanoseconds"
+
+
+def test_times() -> None:
+    time = Time(seconds=10, nanoseconds=5, clock_type=ClockType.ROS_TIME)
+    assert time.seconds_nanoseconds() == (10, 5)
+    assert time.to_msg() == TimeMessage(10, 5)
+    assert Time.from_msg(time.to_msg()) == time
+    assert time + Duration(seconds=1) - time == Duration(seconds=1)
+    assert (time - Duration(seconds=1)).nanoseconds == 9_000_000_005
+    assert time > time - Duration(nanoseconds=1)
+    with pytest.raises(TypeError, match="different clocks"):
+        _ = time < Time(seconds=10)
+    with pytest.raises(ValueError, match="negative"):
+        Time(seconds=-1)
+
+
+def test_profiles() -> None:
+    assert qos.to_qos(7) == QoS(depth=7)
+    assert qos.to_qos(qos.qos_profile_sensor_data) == QoS(depth=5, reliability="best_effort")
+    profile = qos.QoSProfile(
+        depth=1,
+        durability=qos.DurabilityPolicy.TRANSIENT_LOCAL,
+        deadline=Duration(seconds=1),
+        history=qos.QoSHistoryPolicy.KEEP_LAST,
+    )
+    assert qos.to_qos(profile) == QoS(1, durability="transient_local", deadline=10**9)
+    assert qos.QoSPresetProfiles.SENSOR_DATA.value == qos.qos_profile_sensor_data
+    assert profile != qos.qos_profile_sensor_data
+    with pytest.raises(UsageError, match="a history or a depth"):
+        qos.QoSProfile()
+    with pytest.raises(UsageError, match="no 'reliable'"):
+        qos.QoSProfile(depth=1, reliable=True)
+    with pytest.raises(UsageError, match="got str"):
+        qos.to_qos("reliable")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"),
+    [
+        (None, Type.NOT_SET), (True, Type.BOOL), (1, Type.INTEGER), (1.0, Type.DOUBLE),
+        ("a", Type.STRING), (b"a", Type.BYTE_ARRAY), ([True], Type.BOOL_ARRAY),
+        ([1, 2], Type.INTEGER_ARRAY), ([1.0], Type.DOUBLE_ARRAY), (["a"], Type.STRING_ARRAY),
+    ],
+)  # fmt: skip
+def test_parameters(value: object, kind: Parameter.Type) -> None:
+    parameter = Parameter("p", value=value)
+    assert parameter.type_ is kind
+    again = Parameter.from_parameter_msg(parameter.to_parameter_msg())
+    assert (again.name, again.type_, again.value) == ("p", kind, value)
+
+
+def test_what_no_parameter_can_be() -> None:
+    for value in ({"a": 1}, [1, "a"], object()):
+        with pytest.raises(UsageError, match="a parameter cannot be"):
+            Parameter("p", value=value)
+    with pytest.raises(UsageError, match="expected one of type DOUBLE"):
+        Parameter("p", Type.DOUBLE, "fast")
+    assert get_parameter_value("[1.5, 2.5]").type == Type.DOUBLE_ARRAY
+
+
+def test_command_lines() -> None:
+    found = parse(
+        [
+            "word",
+            "a:=b",
+            "--ros-args",
+            "-r",
+            "c:=d",
+            "-r",
+            "__node:=me",
+            "--remap",
+            "__ns:=/ns",
+            "-p",
+            "x:=1.5",
+            "-p",
+            "n:y:=[a]",
+            "--log-level",
+            "debug",
+            "--enable-rosout-logs",
+            "--",
+            "more",
+        ]
+    )
+    assert found.arguments.remaps == {"a": "b", "c": "d"}
+    assert found.arguments.special == {"__name": "me", "__ns": "/ns"}
+    assert found.params == {"": {"x": 1.5}, "n": {"y": ["a"]}}
+    assert (found.level, found.rest) == ("debug", ("word", "more"))
+    assert remove_ros_args(["p", "--ros-args", "-r", "a:=b", "--", "c"]) == ["p", "c"]
+
+
+def test_classic_parameters_count_too() -> None:
+    assert parse(["_speed:=2", "__name:=me"]).params == {"": {"speed": 2}}
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ("--ros-args -x a", "'-x' is no ROS argument"),
+        ("--ros-args -p a", "expected name:=value"),
+        ("--ros-args -p", "is the last word"),
+        ("--ros-args -p a:=[", "no YAML value"),
+    ],
+)
+def test_wrong_command_lines(words: str, text: str) -> None:
+    with pytest.raises(UsageError, match=text.replace("[", r"\[")):
+        parse(words.split())
+
+
+def test_parameter_files(tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {all: 1}}\n"
+        "arm:\n  ros__parameters: {pid: {p: 1.0, i: 2.0}}\n"
+        "/ns:\n  hand: {ros__parameters: {grip: true}}\n"
+    )
+    found = parse(["--ros-args", "--params-file", str(file)]).params
+    assert found == {
+        "": {"all": 1},
+        "arm": {"pid.p": 1.0, "pid.i": 2.0},
+        "/ns/hand": {"grip": True},
+    }
+    with pytest.raises(NotFoundError, match="nowhere"):
+        parse(["--ros-args", "--params-file", "/nowhere"])
+    file.write_text("a: 1")
+    with pytest.raises(YamlError, match="ros__parameters"):
+        parse(["--ros-args", "--params-file", str(file)])
