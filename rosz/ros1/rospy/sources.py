@@ -126,7 +126,7 @@ class Source:
             if self._members:
                 return
             self.closed = True
-            state.sources.pop(self.name, None)
+            state.sources.pop((self.name, self.data_class), None)
         if self._publisher is not None:
             self._publisher.close()
 
@@ -201,10 +201,10 @@ def acquire_source(
 ) -> Source:
     """Return what publishes on a topic, made at the first asking."""
     with state.lock:
-        source: Source | None = state.sources.get(name)
+        source: Source | None = state.sources.get((name, data_class))
         made = source is None
         if source is None:
-            source = state.sources[name] = Source(name, data_class, queue_size)
+            source = state.sources[name, data_class] = Source(name, data_class, queue_size)
             source.is_latch = latch
     if made:
         when_ready(source.open)

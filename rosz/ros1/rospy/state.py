@@ -51,8 +51,9 @@ class State:
         params: Parameters as seen before there is a node.
         init_call: The arguments of ``init_node``, which a second call must repeat.
         waiting: What to do as soon as there is a node, in order.
-        sources: Topics that this process publishes on, by name.
-        sinks: Topics that it subscribes to, by name.
+        sources: Topics that this process publishes on, by name and class of messages.
+        sinks: Topics that it subscribes to, by name and class of messages.
+        local: Of each thread, the message that it is delivering, and what tells its origin.
         hooks: What to call when the node shuts down, by the stage it belongs to, in order.
         shutdown: Set when the end has begun, and the program's own hooks have been called.
         ended: Set when all hooks have been called.
@@ -68,8 +69,9 @@ class State:
         self.params: Params | None = None
         self.init_call: tuple[Any, ...] | None = None
         self.waiting: list[Callable[[Node], object]] = []
-        self.sources: dict[str, Any] = {}
-        self.sinks: dict[str, Any] = {}
+        self.sources: dict[tuple[str, type[Any]], Any] = {}
+        self.sinks: dict[tuple[str, type[Any]], Any] = {}
+        self.local = threading.local()
         self.hooks: dict[str, list[Callable[..., object]]] = {
             "client": [],
             "preshutdown": [],
