@@ -68,8 +68,8 @@ def test_the_mimic_example_of_the_tutorials(network: Network, rosz: Callable[...
     commands.wait_for_subscribers(timeout=20)
     user.context.graph.wait_for(
         lambda view: (
-            view.publishers("/turtlesim2/turtle1/cmd_vel")
-            and view.subscriptions("/turtlesim1/turtle1/pose")
+            bool(view.publishers("/turtlesim2/turtle1/cmd_vel"))
+            and any(t.node == "mimic" for t in view.subscriptions("/turtlesim1/turtle1/pose"))
         ),
         20,
         "the mimic",
