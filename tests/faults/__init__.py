@@ -1,0 +1,1 @@
+"""What breaks around nodes: processes, disks, descriptors, clocks. Figures show with ``-s``."""
