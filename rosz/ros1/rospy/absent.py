@@ -11,7 +11,9 @@ from rosz.errors import near_miss
 __all__ = ("attribute",)
 
 _PREFIX = "rosz.ros1."
-_NO_MASTER = "there is no master and no XML-RPC here; rospy.get_master() answers what a master would"
+_NO_MASTER = (
+    "there is no master and no XML-RPC here; rospy.get_master() answers what a master would"
+)
 _NO_TCPROS = "messages travel over Zenoh, not TCPROS; use rospy.Publisher and rospy.Subscriber"
 _REASONS = {
     "get_registration_listeners": _NO_MASTER,
@@ -32,9 +34,7 @@ _REASONS = {
 }
 
 
-def attribute(
-    module: str, homes: Mapping[str, str] | None = None
-) -> Callable[[str], Any]:
+def attribute(module: str, homes: Mapping[str, str] | None = None) -> Callable[[str], Any]:
     """Make the ``__getattr__`` of a module.
 
     Args:

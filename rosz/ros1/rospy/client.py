@@ -14,6 +14,7 @@ from rosz import names
 from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.core import signal_shutdown, wait_for_shutdown
 from rosz.ros1.rospy.exceptions import ROSException, ROSInitException
+from rosz.ros1.rospy.loggers import serve_loggers
 from rosz.ros1.rospy.logs import (
     DEBUG,
     ERROR,
@@ -39,7 +40,6 @@ from rosz.ros1.rospy.params import (
 from rosz.ros1.rospy.state import arguments, context, run_hooks, set_arguments, state
 
 if TYPE_CHECKING:
-    from rosz.node import Node
     from rosz.ros1.rospy.msproxy import MasterProxy
 
 __all__ = (
@@ -117,7 +117,6 @@ def init_node(  # noqa: PLR0917  # rospy's signature
 
 
 def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) -> None:
-    from rosz.node import Node
 
     if not names.is_valid(name) or names.is_private(name):
         warnings.warn(
@@ -132,7 +131,8 @@ def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) 
         node.log.setLevel(LEVELS[log_level])
     node.on_shutdown(_ended)
     state.node = node
-    Bridge.install()
+    Bridge.install(node.log.level)
+    serve_loggers(node)
     waiting, state.waiting = state.waiting, []
     for act in waiting:
         act(node)
@@ -178,7 +178,8 @@ def get_published_topics(namespace: str = "/") -> list[list[str]]:
     Args:
         namespace: Only those in there.
     """
-    return get_master().getPublishedTopics(namespace)[2]
+    topics: list[list[str]] = get_master().getPublishedTopics(namespace)[2]
+    return topics
 
 
 def get_master(env: dict[str, str] | None = None) -> MasterProxy:  # noqa: ARG001

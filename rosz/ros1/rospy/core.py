@@ -198,8 +198,6 @@ def deprecated(function: Callable[..., object]) -> Callable[..., object]:
     return function
 
 
-
-
 __getattr__ = attribute(
     __name__,
     {

@@ -133,11 +133,15 @@ class Bridge(logging.Handler):
             log.handle(record)
 
     @classmethod
-    def install(cls) -> None:
-        """Take what comes to ``rosout`` from now on."""
+    def install(cls, level: int) -> None:
+        """Take what comes to ``rosout`` from now on.
+
+        Args:
+            level: Least level that the node logs.
+        """
         python = logging.getLogger(_BASE)
         if not any(isinstance(handler, cls) for handler in python.handlers):
             python.addHandler(cls())
             python.propagate = False
             if python.level == logging.NOTSET:
-                python.setLevel(logging.INFO)
+                python.setLevel(level)

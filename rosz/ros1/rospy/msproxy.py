@@ -22,7 +22,6 @@ from rosz.wire import Token
 __all__ = ("MasterProxy",)
 
 
-
 class MasterProxy:
     """Answers to the calls of the master's API that programs make (ROS wiki, ROS/Master_API).
 
@@ -32,7 +31,7 @@ class MasterProxy:
     @property
     def target(self) -> str:
         """Where a master would be: nowhere."""
-        return self.getUri()[2]
+        return str(self.getUri()[2])
 
     def getPid(self) -> list[Any]:  # noqa: N802  # the master's names
         """Return the id of this process, which answers for itself."""

@@ -1,4 +1,4 @@
-"""Names as rospy's functions see them: nothing is refused, everything is tidied (ROS wiki, Names)."""
+"""Names as rospy sees them: nothing is refused, everything is tidied (ROS wiki, Names)."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def get_resolved_mappings() -> dict[str, str]:
     return dict(state.node.remaps) if state.node is not None else {}
 
 
-def initialize_mappings(node_name: str) -> None:  # noqa: ARG001  # rospy's signature
+def initialize_mappings(node_name: str) -> None:
     """Do nothing: remappings are resolved whenever there is a node."""
 
 

@@ -177,9 +177,7 @@ def wait_for_message(
         while not arrived.wait(min(max(deadline - time.monotonic(), 0.0), _SLICE)):
             _check_running()
             if time.monotonic() >= deadline:
-                raise ROSException(
-                    f"timeout exceeded while waiting for message on topic {topic}"
-                )
+                raise ROSException(f"timeout exceeded while waiting for message on topic {topic}")
     finally:
         subscriber.unregister()
     return found[0]

@@ -187,9 +187,7 @@ def params() -> Params:
         return state.node.params
     with state.lock:
         if state.params is None:
-            state.params = Params(
-                context().params, UNNAMED, arguments().resolved_remaps(UNNAMED)
-            )
+            state.params = Params(context().params, UNNAMED, arguments().resolved_remaps(UNNAMED))
         return state.params
 
 

@@ -1,4 +1,6 @@
-"""Publishers and subscribers by rospy's names (ROS wiki, rospy/Overview/Publishers and Subscribers).
+"""Publishers and subscribers by rospy's names.
+
+ROS wiki, rospy/Overview/Publishers and Subscribers.
 
 As in rospy all publishers of one topic in a process are one to the outside, and so are all its
 subscribers: `Source` and `Sink` are what they share.
@@ -54,9 +56,11 @@ class Topic:
         if data_class is None:
             raise ValueError("topic parameter 'data_class' is not initialized")
         if not isinstance(data_class, type):
-            raise ValueError(f"data_class [{data_class}] is not a class")
+            raise ValueError(f"data_class [{data_class}] is not a class")  # noqa: TRY004  # rospy's
         if not hasattr(data_class, "_md5sum") or not hasattr(data_class, "_type"):
-            raise ValueError(f"data_class [{type(data_class).__name__}] is not a message data class")
+            raise ValueError(
+                f"data_class [{type(data_class).__name__}] is not a message data class"
+            )
         if not is_valid(name):
             warnings.warn(
                 f"'{name}' is not a legal ROS graph resource name. This may cause problems with"
@@ -100,7 +104,7 @@ class Publisher(Topic):
 
     impl: Source | None
 
-    def __init__(
+    def __init__(  # noqa: PLR0917  # rospy's signature
         self,
         name: str,
         data_class: type[Any],
@@ -163,7 +167,7 @@ class Subscriber(Topic):
 
     impl: Sink | None
 
-    def __init__(
+    def __init__(  # noqa: PLR0917  # rospy's signature
         self,
         name: str,
         data_class: type[Any],
