@@ -1,0 +1,136 @@
+"""rosmsg as a module: definitions of messages and services (ROS wiki, rosmsg)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rosz.errors import RoszError
+from rosz.introspect.definitions import Definitions
+from rosz.ros1.importer import type_store
+from rosz.ros1.rospkg import ResourceNotFound, RosPack
+
+__all__ = (
+    "MODE_MSG",
+    "MODE_SRV",
+    "ROSMsgException",
+    "get_msg_text",
+    "get_srv_text",
+    "iterate_packages",
+    "list_msgs",
+    "list_srvs",
+    "list_types",
+    "rosmsg_md5",
+    "rosmsg_search",
+)
+
+MODE_MSG = ".msg"
+MODE_SRV = ".srv"
+
+
+class ROSMsgException(Exception):
+    """A definition that is not there, or cannot be read."""
+
+
+def get_msg_text(type_: str, raw: bool = False, rospack: RosPack | None = None) -> str:  # noqa: ARG001
+    """Return the definition of a message.
+
+    Args:
+        type_: ``std_msgs/String``.
+        raw: Whether to return it as it is written; otherwise without comments and with the fields
+            of the messages in it.
+        rospack: Not used: all that can be imported is found.
+
+    Raises:
+        ROSMsgException: There is none, or it is not well-formed.
+    """
+    return _text(type_, MODE_MSG, raw=raw)
+
+
+def get_srv_text(type_: str, raw: bool = False, rospack: RosPack | None = None) -> str:  # noqa: ARG001
+    """Return the definition of a service; see `get_msg_text`."""
+    return _text(type_, MODE_SRV, raw=raw)
+
+
+def _definitions(mode: str) -> Definitions:
+    if mode not in {MODE_MSG, MODE_SRV}:
+        raise ValueError(f"Unknown mode: {mode}; expected {MODE_MSG} or {MODE_SRV}")
+    return Definitions(type_store(), "msg" if mode == MODE_MSG else "srv")
+
+
+def _text(name: str, mode: str, *, raw: bool) -> str:
+    definitions = _definitions(mode)
+    try:
+        full = definitions.find(name)[0]
+        return definitions.text(full) if raw else definitions.show(full)
+    except RoszError as error:
+        raise ROSMsgException(f"Unable to load {mode[1:]} [{name}]: {error}") from error
+
+
+def rosmsg_md5(mode: str, type_: str) -> str:
+    """Return the hash that ROS 1 identifies a definition by.
+
+    Raises:
+        ROSMsgException: There is none of that name, or it is not well-formed.
+    """
+    definitions = _definitions(mode)
+    try:
+        return definitions.md5(definitions.find(type_)[0])
+    except RoszError as error:
+        raise ROSMsgException(f"Unable to load {mode[1:]} [{type_}]: {error}") from error
+
+
+def list_msgs(package: str, rospack: RosPack | None = None) -> list[str]:
+    """Return the names of the messages of a package, as ``package/Name``."""
+    return list_types(package, MODE_MSG, rospack)
+
+
+def list_srvs(package: str, rospack: RosPack | None = None) -> list[str]:
+    """Return the names of the services of a package, as ``package/Name``."""
+    return list_types(package, MODE_SRV, rospack)
+
+
+def list_types(package: str, mode: str = MODE_MSG, rospack: RosPack | None = None) -> list[str]:
+    """Return the names of the types of a kind that a package has.
+
+    Raises:
+        ResourceNotFound: There is no such package.
+        ValueError: There is no such kind.
+    """
+    kind: Any = "msg" if mode == MODE_MSG else "srv"
+    _definitions(mode)
+    store = type_store()
+    if not store.has(package, kind):
+        (rospack or RosPack()).get_path(package)
+        return []
+    return store.names(kind, package)
+
+
+def iterate_packages(rospack: RosPack, mode: str) -> Iterator[tuple[str, str]]:
+    """Yield the packages that have types of a kind, with the folders that hold them.
+
+    Raises:
+        ValueError: There is no such kind.
+    """
+    _definitions(mode)
+    for name in rospack.list():
+        folder = Path(rospack.get_path(name), mode[1:])
+        if folder.is_dir():
+            yield name, str(folder)
+
+
+def rosmsg_search(rospack: RosPack, mode: str, base_type: str) -> Iterator[str]:
+    """Yield the types of a base name, of whatever package.
+
+    Args:
+        rospack: Where packages are.
+        mode: `MODE_MSG` or `MODE_SRV`.
+        base_type: ``String``.
+    """
+    for name, _ in iterate_packages(rospack, mode):
+        try:
+            found = list_types(name, mode, rospack)
+        except ResourceNotFound:
+            continue
+        yield from (one for one in found if one.rpartition("/")[2] == base_type)

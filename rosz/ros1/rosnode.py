@@ -1,0 +1,251 @@
+"""rosnode as a module: nodes, their state and their end (ROS wiki, rosnode)."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Sequence
+
+from rosz.errors import NotFoundError, RoszError
+from rosz.introspect import control, nodes
+from rosz.introspect.survey import Survey
+from rosz.introspect.topics import in_namespace
+from rosz.ros1.rosgraph import Master, MasterException, live
+from rosz.ros1.rosgraph.names import script_resolve_name
+from rosz.wire import Token
+
+__all__ = (
+    "ID",
+    "NAME",
+    "ROSNodeException",
+    "ROSNodeIOException",
+    "get_api_uri",
+    "get_machines_by_nodes",
+    "get_node_connection_info_description",
+    "get_node_info_description",
+    "get_node_names",
+    "get_nodes_by_machine",
+    "kill_nodes",
+    "rosnode_cleanup",
+    "rosnode_info",
+    "rosnode_listnodes",
+    "rosnode_ping",
+    "rosnode_ping_all",
+)
+
+NAME = "rosnode"
+ID = "/rosnode"
+_KILLED = "rosnode kill"
+
+
+class ROSNodeException(Exception):
+    """Something wrong with a node."""
+
+
+class ROSNodeIOException(ROSNodeException):
+    """The network did not answer."""
+
+
+def get_node_names(namespace: str | None = None) -> list[str]:
+    """Return the full names of nodes, sorted.
+
+    Args:
+        namespace: Only those in it.
+    """
+    found = dict.fromkeys(live.survey().view.nodes())
+    return [name for name in found if in_namespace(name, namespace or "/")]
+
+
+def get_api_uri(master: Master, caller_id: str, skip_cache: bool = False) -> str | None:  # noqa: ARG001
+    """Return the address of a node; None if there is no such node.
+
+    Args:
+        master: What to ask.
+        caller_id: Full name of the node.
+        skip_cache: Not used: nothing is remembered.
+    """
+    try:
+        return master.lookupNode(caller_id)
+    except MasterException:
+        return None
+
+
+def get_machines_by_nodes() -> list[str]:
+    """Return the hosts that nodes run on."""
+    return nodes.machines(nodes.list_nodes(live.survey()))
+
+
+def get_nodes_by_machine(machine: str) -> list[str]:
+    """Return the names of the nodes on a machine, sorted.
+
+    Raises:
+        ROSNodeException: None runs there.
+    """
+    try:
+        return nodes.on_machine(nodes.list_nodes(live.survey()), machine)
+    except NotFoundError as error:
+        raise ROSNodeException(str(error)) from error
+
+
+def kill_nodes(node_names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Have nodes shut down, and wait until they are gone.
+
+    Args:
+        node_names: Full names.
+
+    Returns:
+        The names of those that are gone, and of those that are not.
+    """
+    found = live.survey()
+    gone: list[str] = []
+    failed: list[str] = []
+    for name in node_names:
+        members = found.members(name)
+        try:
+            for member in members:
+                control.end(live.context().session, member, _KILLED)
+        except RoszError:
+            failed.append(name)
+        else:
+            (gone if members else failed).append(name)
+    return gone, failed
+
+
+def _member(found: Survey, name: str) -> Token | None:
+    members = found.members(name)
+    return members[-1] if members else None
+
+
+def rosnode_ping(
+    node_name: str,
+    max_count: int | None = None,
+    verbose: bool = False,
+    skip_cache: bool = False,  # noqa: ARG001  # ROS 1's
+) -> bool:
+    """Ask a node whether it is there, once a second.
+
+    Args:
+        node_name: Its name.
+        max_count: How often; for ever when not given.
+        verbose: Whether to write what comes back to stdout.
+        skip_cache: Not used: nothing is remembered.
+
+    Returns:
+        Whether it answered each time.
+
+    Raises:
+        ROSNodeException: There is no such node.
+    """
+    name = script_resolve_name(NAME, node_name)
+    pause = threading.Event()
+    sent = 0
+    while max_count is None or sent < max_count:
+        if sent:
+            pause.wait(1.0)
+        found = live.survey()
+        member = _member(found, name)
+        if member is None:
+            if verbose:
+                sys.stderr.write(f"cannot ping [{name}]: unknown node\n")
+            return False
+        began = time.perf_counter()
+        try:
+            control.ask_info(live.context().session, member)
+        except RoszError as error:
+            if verbose:
+                sys.stderr.write(f"connection to [{name}] failed: {error}\n")
+            return False
+        sent += 1
+        if verbose:
+            passed = (time.perf_counter() - began) * 1e3
+            address = live.address(found, member)
+            sys.stdout.write(f"reply from {address}\ttime={passed:f}ms\n")
+    return True
+
+
+def rosnode_ping_all(
+    verbose: bool = False,
+    skip_cache: bool = False,  # noqa: ARG001  # ROS 1's
+) -> tuple[list[str], list[str]]:
+    """Ask all nodes whether they are there, once.
+
+    Args:
+        verbose: Whether to write what comes back to stdout.
+        skip_cache: Not used: nothing is remembered.
+
+    Returns:
+        The names of those that answered, and of those that did not.
+    """
+    answered: list[str] = []
+    silent: list[str] = []
+    for name in get_node_names():
+        (answered if rosnode_ping(name, 1, verbose) else silent).append(name)
+    return answered, silent
+
+
+def rosnode_cleanup() -> None:
+    """Do nothing: a node that is dead is gone from all lists at once."""
+
+
+def rosnode_listnodes(
+    namespace: str | None = None, list_uri: bool = False, list_all: bool = False
+) -> None:
+    """Write the names of nodes to stdout.
+
+    Args:
+        namespace: Only those in it.
+        list_uri: Write their addresses instead.
+        list_all: Write both.
+    """
+    master = Master(ID)
+    for name in get_node_names(namespace):
+        address = get_api_uri(master, name) if list_uri or list_all else ""
+        text = f"{address} \t{name}" if list_all else address or name
+        sys.stdout.write(f"{text}\n")
+
+
+def get_node_info_description(node_name: str) -> str:
+    """Return what ``rosnode info`` says about a node without asking it."""
+    found = live.survey()
+    member = _member(found, node_name)
+    if member is None:
+        return f"Node [{node_name}]\nPublications: None\n\nSubscriptions: None\n\nServices: None\n"
+    return nodes.describe(found, member).partition("\n")[2]
+
+
+def get_node_connection_info_description(node_api: str, master: Master) -> str:  # noqa: ARG001
+    """Return whom a node exchanges messages with.
+
+    Args:
+        node_api: Its address, as `get_api_uri` returns it.
+        master: Not used.
+
+    Raises:
+        ROSNodeIOException: No node has that address.
+    """
+    found = live.survey()
+    for token in found.view.tokens:
+        if live.address(found, token) == node_api:
+            process = found.process(token)
+            pid = f"Pid: {process.pid}\n" if process is not None else ""
+            return pid + nodes.connections(found, token)
+    raise ROSNodeIOException(f"Communication with node[{node_api}] failed!")
+
+
+def rosnode_info(node_name: str, quiet: bool = False) -> None:
+    """Write what there is to say about a node to stdout.
+
+    Args:
+        node_name: Its name.
+        quiet: Whether to leave out whom it is connected with.
+    """
+    name = script_resolve_name(NAME, node_name)
+    sys.stdout.write(f"{'-' * 80}\n{get_node_info_description(name)}\n")
+    master = Master(ID)
+    address = get_api_uri(master, name)
+    if address is None:
+        sys.stderr.write(f"cannot contact [{name}]: unknown node\n")
+    elif not quiet:
+        sys.stdout.write(f"\ncontacting node {address} ...\n")
+        sys.stdout.write(get_node_connection_info_description(address, master) + "\n")

@@ -1,0 +1,239 @@
+"""rosparam as a module: the parameters, YAML in and out (ROS wiki, rosparam)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rosz.errors import ParamError, YamlError
+from rosz.params.yaml import dump, load, load_documents
+from rosz.ros1.rosgraph import Master, live
+from rosz.ros1.rosgraph.names import GLOBALNS, get_ros_namespace, make_global_ns
+
+__all__ = (
+    "GLOBALNS",
+    "NAME",
+    "NS",
+    "RosParamException",
+    "RosParamIOException",
+    "delete_param",
+    "dump_params",
+    "get_param",
+    "get_param_server",
+    "list_params",
+    "load_file",
+    "load_str",
+    "print_params",
+    "set_param",
+    "set_param_raw",
+    "upload_params",
+)
+
+NAME = "rosparam"
+NS = "_ns"
+
+
+class RosParamException(Exception):
+    """Something wrong with parameters or with a file of them."""
+
+
+class RosParamIOException(RosParamException):
+    """A file that cannot be read or written."""
+
+
+def get_param_server() -> Master:
+    """Return what answers for the parameters: ``getParam``, ``setParam`` and so on."""
+    return Master(NAME)
+
+
+def get_param(param: str) -> Any:
+    """Return a parameter, or all below a namespace.
+
+    Raises:
+        MasterError: It is not set.
+    """
+    return get_param_server().getParam(param)
+
+
+def set_param(param: str, value: str, verbose: bool = False) -> None:
+    """Set a parameter to what a YAML text says; a dict leaf by leaf.
+
+    Args:
+        param: Its name.
+        value: The text.
+        verbose: Whether to tell what is set.
+
+    Raises:
+        RosParamException: The text is no YAML, or says what no parameter can be.
+    """
+    try:
+        found = load(value)
+    except YamlError as error:
+        raise RosParamException(str(error)) from error
+    set_param_raw(param, found, verbose)
+
+
+def set_param_raw(param: str, value: Any, verbose: bool = False) -> None:
+    """Set a parameter to a value; a dict leaf by leaf, as one change.
+
+    Args:
+        param: Its name.
+        value: The value.
+        verbose: Whether to tell what is set.
+
+    Raises:
+        RosParamException: It is none that a parameter may have.
+    """
+    _upload(param, value)
+    if verbose:
+        for name, leaf in _leaves(param, value):
+            sys.stdout.write(f"set parameter [{name}] to [{leaf}]\n")
+
+
+def upload_params(ns: str, values: Any, verbose: bool = False) -> None:
+    """Set all that a dict says below a namespace, and leave the rest.
+
+    Args:
+        ns: The namespace.
+        values: A dict; below the root nothing else will do.
+        verbose: Whether to tell what is set.
+
+    Raises:
+        RosParamException: A value is none that a parameter may have.
+    """
+    if ns == GLOBALNS and not isinstance(values, dict):
+        raise RosParamException("global / can only be set to a dictionary")
+    if verbose:
+        print_params(values, ns)
+    _upload(ns, values)
+
+
+def _upload(name: str, value: Any) -> None:
+    try:
+        live.params(get_param_server().caller_id).update(dict(_leaves(name, value)))
+    except ParamError as error:
+        raise RosParamException(str(error)) from error
+
+
+def print_params(params: Any, ns: str) -> None:
+    """Write names and values to stdout, a line each."""
+    for name, value in _leaves(ns, params):
+        sys.stdout.write(f"{name}={value}\n")
+
+
+def _leaves(name: str, value: Any) -> list[tuple[str, Any]]:
+    if not isinstance(value, dict):
+        return [(name, value)]
+    start = name if name.endswith("/") else f"{name}/"
+    odd = [key for key in value if not isinstance(key, str)]
+    if odd:
+        raise RosParamException(
+            f"YAML dictionaries must have string keys, got {odd[0]!r}; invalid dictionary is:"
+            f"\n{value}"
+        )
+    return [leaf for key in value for leaf in _leaves(start + key, value[key])]
+
+
+def delete_param(param: str, verbose: bool = False) -> None:
+    """Delete a parameter and all below it; of the root, all.
+
+    Args:
+        param: Its name.
+        verbose: Whether to tell that it is done.
+
+    Raises:
+        MasterError: It is not set.
+    """
+    if param == GLOBALNS:
+        get_param_server().setParam(GLOBALNS, {})
+    else:
+        get_param_server().deleteParam(param)
+    if verbose:
+        what = "ENTIRE parameter server" if param == GLOBALNS else f"parameter [{param}]"
+        sys.stdout.write(f"deleted {what}\n")
+
+
+def list_params(ns: str) -> list[str]:
+    """Return the names of all parameters in a namespace, sorted."""
+    space = make_global_ns(ns)
+    return sorted(name for name in get_param_server().getParamNames() if name.startswith(space))
+
+
+def load_str(
+    str: str,  # noqa: A002  # ROS 1's
+    filename: str,
+    default_namespace: str | None = None,
+    verbose: bool = False,
+) -> list[tuple[Any, str]]:
+    """Return the documents of a YAML text, each with the namespace it belongs to.
+
+    Args:
+        str: The text; angles such as ``deg(90)`` are read, too.
+        filename: Where it is from, for errors.
+        default_namespace: For documents that do not name one with ``_ns``.
+        verbose: Whether to tell namespaces that documents name.
+
+    Raises:
+        YAMLError: It is no YAML.
+    """
+    space = default_namespace or get_ros_namespace()
+    try:
+        found = load_documents(str, space, filename)
+    except YamlError as error:
+        # What rosparam's own callers catch.
+        raise yaml.YAMLError(f"{error}") from error
+    for name, _ in found if verbose else ():
+        if name != space:
+            sys.stdout.write(f"reading parameters into namespace [{name}]\n")
+    return [(value, name) for name, value in found]
+
+
+def load_file(
+    filename: str, default_namespace: str | None = None, verbose: bool = False
+) -> list[tuple[Any, str]]:
+    """Return the documents of a YAML file; see `load_str`.
+
+    Args:
+        filename: The file; ``-`` is standard input.
+        default_namespace: For documents that do not name one.
+        verbose: Whether to tell what is done.
+
+    Raises:
+        RosParamException: There is no such file.
+        YAMLError: It is no YAML.
+    """
+    if filename == "-":
+        return load_str(sys.stdin.read(), filename, default_namespace, verbose)
+    path = Path(filename)
+    if not path.is_file():
+        raise RosParamException(f"file [{filename}] does not exist")
+    if verbose:
+        sys.stdout.write(f"reading parameters from [{filename}]\n")
+    return load_str(path.read_text("utf-8"), filename, default_namespace, verbose)
+
+
+def dump_params(filename: str | None, param: str, verbose: bool = False) -> None:
+    """Write a parameter, or all below a namespace, to a file as YAML.
+
+    Args:
+        filename: The file; standard output when None, empty or ``-``.
+        param: The name.
+        verbose: Whether to tell what is written.
+
+    Raises:
+        RosParamIOException: The file cannot be written.
+        MasterError: The parameter is not set.
+    """
+    tree = get_param(param)
+    if verbose:
+        print_params(tree, param)
+    if not filename or filename == "-":
+        sys.stdout.write(dump(tree))
+        return
+    try:
+        Path(filename).write_text(dump(tree), encoding="utf-8")
+    except OSError as error:
+        raise RosParamIOException(f"cannot write [{filename}]: {error.strerror}") from error
