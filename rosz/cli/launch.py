@@ -105,6 +105,18 @@ def command(
         str, typer.Option(metavar="NODE", help="Have a running launch end a node.")
     ] = "",
     json: Annotated[bool, typer.Option("--json", help="With --status: as JSON.")] = False,
+    machine: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NAME=][USER@]ADDRESS[:PORT]",
+            help="Where a machine of the file is; without NAME, where nodes run that name none.",
+        ),
+    ] = None,
+    lost_after: Annotated[
+        float,
+        typer.Option(metavar="SECONDS", help="Without a word from another machine: it is lost."),
+    ] = 30.0,
+    agent: Annotated[bool, typer.Option("--agent", hidden=True)] = False,
     skip_log_check: Annotated[bool, typer.Option("--skip-log-check", hidden=True)] = True,
     port: Annotated[str, typer.Option("--port", "-p", hidden=True)] = "",
     core: Annotated[bool, typer.Option("--core", hidden=True)] = False,
@@ -119,6 +131,11 @@ def command(
             "there is no master, and so no port: 'rosz core' keeps a meeting point, ROS_DOMAIN_ID"
             " keeps groups of nodes apart"
         )
+    if agent:
+        from rosz.launch.run.agent import serve
+
+        serve()
+        return 0
     if status or restart or stop:
         from rosz.cli.launch_control import control
 
@@ -136,7 +153,7 @@ def command(
     if question is not None:
         sys.stdout.write(job.answer(*question))
         return 0
-    from rosz.launch.run import Options, Timeouts
+    from rosz.launch.run import MachineCall, Options, Timeouts
 
     options = Options(
         screen=screen,
@@ -147,6 +164,8 @@ def command(
         verbose=verbose,
         overview=not no_summary,
         title=not disable_title,
+        machines=tuple(map(MachineCall.parse, machine or ())),
+        silence=_positive("--lost-after", lost_after),
         timeouts=Timeouts(
             _positive("--sigint-timeout", sigint_timeout),
             _positive("--sigterm-timeout", sigterm_timeout),

@@ -66,7 +66,7 @@ def _show(session: Session, domain: int, *, as_json: bool) -> None:
 
 def table(launch: LaunchStatus, before: LaunchStatus) -> str:
     """Return a launch as text, shares of processor time counted since an earlier look."""
-    head = ("NODE", "STATE", "PID", "RESTARTS", "CPU", "MEMORY", "UPTIME")
+    head = ("NODE", "STATE", "PID", "RESTARTS", "CPU", "MEMORY", "UPTIME", "MACHINE")
     earlier = {node.name: node.cpu for node in before.nodes}
     seconds = launch.sampled - before.sampled
     rows = [head, *(_row(node, earlier.get(node.name, node.cpu), seconds) for node in launch.nodes)]
@@ -87,6 +87,7 @@ def _row(node: NodeStatus, cpu_before: float, seconds: float) -> tuple[str, ...]
         share if node.pid else "-",
         f"{node.memory / 1e6:.0f} MB" if node.pid else "-",
         _duration(node.uptime) if node.pid else "-",
+        node.machine or "-",
     )
 
 

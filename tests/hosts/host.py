@@ -132,10 +132,10 @@ class Host:
         """Start a ``rosz`` command."""
         return self.execute(sys.executable, "-m", "rosz", *argv, **variables)
 
-    def ask(self, *argv: str, timeout: float = PATIENCE, **variables: str) -> str:
+    def ask(self, *argv: str, **variables: str) -> str:
         """Run a ``rosz`` command that must succeed, and return its output."""
         program = self.rosz(*argv, **variables)
-        code = program.exit_code(timeout)
+        code = program.exit_code()
         assert code == 0, f"rosz {' '.join(argv)}: exit code {code}\n{program.output}"
         return program.output
 

@@ -8,6 +8,7 @@ from rosz.launch.run.command import Command, Workplace, run_command
 from rosz.launch.run.control import LaunchStatus, NodeStatus, order, statuses
 from rosz.launch.run.host import Child, Host, Job
 from rosz.launch.run.hub import Hub, wants_hub
+from rosz.launch.run.machines import MachineCall
 from rosz.launch.run.network import GraphReadiness, Network
 from rosz.launch.run.parameters import ParamStore, core_params
 from rosz.launch.run.process import Readiness, Timeouts
@@ -21,6 +22,7 @@ __all__ = (
     "Hub",
     "Job",
     "LaunchStatus",
+    "MachineCall",
     "Network",
     "NodeStatus",
     "Options",

@@ -14,8 +14,8 @@ from typing import Literal
 import msgspec
 
 from rosz.errors import LaunchError, NotFoundError, RoszError, WaitTimeout, near_miss
-from rosz.launch.run.family import Usage, usage
-from rosz.launch.run.loop import Loop
+from rosz.launch.run.family import Usage
+from rosz.launch.run.loop import Loop, Timer
 from rosz.launch.run.process import Process
 from rosz.launch.run.summary import exit_reason
 from rosz.launch.run.supervisor import Supervisor
@@ -26,6 +26,7 @@ __all__ = ("LaunchStatus", "NodeStatus", "Order", "Panel", "order", "statuses")
 
 _STATUS_SECONDS = 2.0
 _ORDER_SECONDS = 60.0
+_MEASURE_SECONDS = 1.0
 
 
 class Order(msgspec.Struct, frozen=True):
@@ -53,6 +54,7 @@ class NodeStatus(msgspec.Struct, frozen=True):
         uptime: Seconds since its latest start; 0 when it does not run.
         cpu: Seconds of processor time that it and its descendants have used.
         memory: Bytes that they hold.
+        machine: Where it runs: the address of another machine, or the name of the launch's own.
     """
 
     name: str
@@ -64,6 +66,7 @@ class NodeStatus(msgspec.Struct, frozen=True):
     uptime: float
     cpu: float
     memory: int
+    machine: str = ""
 
 
 class LaunchStatus(msgspec.Struct, frozen=True):
@@ -96,7 +99,6 @@ class Panel:
         loop: Where orders are carried out.
         supervisor: Who carries them out.
         files: Launch files.
-        tag: What marks the processes of this launch.
     """
 
     def __init__(
@@ -108,13 +110,11 @@ class Panel:
         supervisor: Supervisor,
         *,
         files: tuple[str, ...],
-        tag: str,
     ) -> None:
         self._run_id = run_id
         self._loop = loop
         self._supervisor = supervisor
         self._files = files
-        self._tag = tag
         self._key = own_key(domain, "launch", run_id, session.zid)
         self._queryable: Closable = session.queryable(
             self._key, lambda query: loop.post(lambda: self._serve(query))
@@ -123,7 +123,7 @@ class Panel:
     def _serve(self, query: Query) -> None:
         try:
             asked = msgspec.json.decode(query.payload or b"", type=Order)
-            self._carry_out(asked, lambda: self._answer(query))
+            self._carry_out(asked, lambda: self._measure(lambda used: self._answer(query, used)))
         except (msgspec.MsgspecError, RoszError) as error:
             with query:
                 query.reply_error(str(error))
@@ -138,13 +138,38 @@ class Panel:
         else:
             self._supervisor.stop(self._supervisor.find(asked.node), done)
 
-    def _answer(self, query: Query) -> None:
-        with query:
-            query.reply(self._key, msgspec.json.encode(self.status()))
+    def _measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
+        """Have all machines count what is used there; those that take too long are left out."""
+        total: dict[int, Usage] = {}
+        waiting = len(self._supervisor.hosts)
+        timer: Timer | None = None
 
-    def status(self) -> LaunchStatus:
-        """Return how the launch stands."""
-        used = usage(self._tag)
+        def finish() -> None:
+            nonlocal waiting
+            waiting = 0
+            if timer is not None:
+                timer.cancel()
+            done(total)
+
+        def add(used: dict[int, Usage]) -> None:
+            nonlocal waiting
+            total.update(used)
+            waiting -= 1
+            if waiting == 0:
+                finish()
+
+        if not waiting:
+            done(total)
+            return
+        timer = self._loop.later(_MEASURE_SECONDS, finish)
+        for host in self._supervisor.hosts:
+            host.measure(add)
+
+    def _answer(self, query: Query, used: dict[int, Usage]) -> None:
+        with query:
+            query.reply(self._key, msgspec.json.encode(self._status(used)))
+
+    def _status(self, used: dict[int, Usage]) -> LaunchStatus:
         return LaunchStatus(
             run_id=self._run_id,
             host=socket.gethostname(),
@@ -152,7 +177,7 @@ class Panel:
             files=self._files,
             sampled=time.monotonic(),
             nodes=tuple(
-                self._node(process, used.get(f"{self._tag}:{process.owner}", Usage()))
+                self._node(process, used.get(process.owner, Usage()))
                 for process in self._supervisor.processes
             ),
         )
@@ -172,6 +197,7 @@ class Panel:
             uptime=self._loop.now() - process.began if process.alive else 0.0,
             cpu=used.cpu,
             memory=used.memory,
+            machine=process.place or socket.gethostname(),
         )
 
     def close(self) -> None:

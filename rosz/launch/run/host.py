@@ -1,8 +1,9 @@
-"""Machines that processes run on. This one is `LocalHost`; another would be a `Host` as well."""
+"""Machines that processes run on: this one is `LocalHost`, others are of `remote`."""
 
 from __future__ import annotations
 
 import errno
+import getpass
 import os
 import socket
 import subprocess
@@ -13,18 +14,21 @@ from typing import Protocol
 
 import msgspec
 
-from rosz.errors import LaunchError
+from rosz.errors import LaunchError, RoszError
 from rosz.launch.plan.model import MachinePlan, NodePlan
 from rosz.launch.run.command import TAG, Command, Workplace
-from rosz.launch.run.family import Census, group_lives
+from rosz.launch.run.family import Census, Usage, group_lives, usage
 from rosz.launch.run.folder import RunFolder
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.output import Output, Streams
 
-__all__ = ("Child", "Host", "Job", "LocalHost", "is_local", "remote_refused")
+__all__ = ("Child", "Confirmed", "Ended", "Host", "Job", "LocalHost", "is_local")
 
 Ended = Callable[[int, tuple[str, ...]], None]
 """Gets the exit code, negative for a signal, and the last lines of the output."""
+
+Confirmed = Callable[[RoszError | None], None]
+"""Gets why a process could not be started, or None once it has."""
 
 _HERE = frozenset({"", "localhost", "127.0.0.1", "::1"})
 
@@ -56,6 +60,18 @@ class Child(Protocol):
     def shown(self) -> str:
         """Command line as messages show it."""
 
+    @property
+    def logs(self) -> str:
+        """What matches its logs on its machine; empty where none are kept."""
+
+    @property
+    def place(self) -> str:
+        """Address of its machine; empty for this one."""
+
+    @property
+    def pending(self) -> bool:
+        """Whether its machine has not said yet that it runs."""
+
     def signal(self, number: int) -> None:
         """Signal it and its descendants; those that are gone are no error."""
 
@@ -66,18 +82,26 @@ class Child(Protocol):
 class Host(Protocol):
     """A machine that processes can be started on."""
 
-    def start(self, job: Job, ended: Ended) -> Child:
+    @property
+    def place(self) -> str:
+        """Its address; empty for this machine."""
+
+    def start(self, job: Job, ended: Ended, confirmed: Confirmed) -> Child:
         """Start a process.
 
         Args:
             job: What.
             ended: Called on the loop when the process itself has ended.
+            confirmed: Called on the loop where the child was pending, when it is not any more.
 
         Raises:
             PackageNotFound: The machine has no such package.
             ExecutableNotFound: The package has no such executable.
             LaunchError: The system refuses to start it.
         """
+
+    def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
+        """Have what its processes have used counted, by their owners' numbers."""
 
 
 class LocalChild:
@@ -87,9 +111,16 @@ class LocalChild:
         process: The process.
         command: How it was started.
         census: Where its descendants are found that left the group.
+        logs: What matches its logs.
     """
 
-    def __init__(self, process: subprocess.Popen[bytes], command: Command, census: Census) -> None:
+    place = ""
+    pending = False
+
+    def __init__(
+        self, process: subprocess.Popen[bytes], command: Command, census: Census, logs: str
+    ) -> None:
+        self.logs = logs
         self._process = process
         self._census = census
         self._mark = command.environ[TAG]
@@ -141,6 +172,8 @@ class LocalHost:
         prefixed: Whether lines on the screen begin with the name of their node.
     """
 
+    place = ""
+
     def __init__(
         self,
         loop: Loop,
@@ -159,8 +192,9 @@ class LocalHost:
         self._census = Census(tag)
         self._prefixed = prefixed
 
-    def start(self, job: Job, ended: Ended) -> LocalChild:
+    def start(self, job: Job, ended: Ended, confirmed: Confirmed | None = None) -> LocalChild:
         """Start a process; the arguments and errors are those of `Host.start`."""
+        del confirmed  # it runs when this returns
         log_file = self._folder.node_log(job.label) if self._folder else None
         tag = f"{self._tag}:{job.owner}"
         command = self._workplace.command(job.node, log_file=log_file, tag=tag)
@@ -180,7 +214,8 @@ class LocalHost:
             raise _refused(job, command, error) from error
         finally:
             streams.close()
-        child = LocalChild(process, command, self._census)
+        logs = self._folder.pattern(job.label) if self._folder else ""
+        child = LocalChild(process, command, self._census, logs)
 
         def exited() -> None:
             code = child.code()
@@ -188,6 +223,12 @@ class LocalHost:
 
         self._loop.watch_exit(process.pid, exited)
         return child
+
+    def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
+        """Count what its processes have used, by their owners' numbers."""
+        totals = usage(self._tag)
+        owners = {mark.removeprefix(f"{self._tag}:"): total for mark, total in totals.items()}
+        done({int(owner): total for owner, total in owners.items() if owner.isdigit()})
 
     def _streams(self, job: Job, command: Command) -> Streams:
         prefix = f"[{job.label}] " if self._prefixed else ""
@@ -219,22 +260,29 @@ class LocalHost:
 
 
 def is_local(machine: MachinePlan | None) -> bool:
-    """Tell whether a machine is this one, by its address."""
-    if machine is None or machine.address.lower() in _HERE:
-        return True
-    return machine.address.lower() in {socket.gethostname().lower(), socket.getfqdn().lower()}
+    """Tell whether a machine is this one, by its address, with the user that this process runs as.
 
-
-def remote_refused(machine: MachinePlan) -> Host:
-    """Refuse another machine.
-
-    Raises:
-        LaunchError: Always.
+    As in roslaunch, another user of this machine is reached over ssh.
     """
-    raise LaunchError(
-        f"{machine.place}: machine '{machine.name}' is at '{machine.address}': remote machines"
-        " need an agent there, which this version has not; run 'rosz launch --local' on each"
-    )
+    if machine is None:
+        return True
+    if machine.user and machine.user != getpass.getuser():
+        return False
+    address = machine.address.lower()
+    return address in _HERE or address == socket.gethostname().lower() or _is_ours(address)
+
+
+def _is_ours(address: str) -> bool:
+    """Tell whether a name or address leads to an interface of this machine."""
+    try:
+        found = socket.getaddrinfo(address, 0, type=socket.SOCK_DGRAM)
+    except OSError:  # nobody knows it; ssh may, by its own configuration
+        return False
+    for family, kind, _, _, place in found:
+        with socket.socket(family, kind) as probe, suppress(OSError):
+            probe.bind(place)
+            return True
+    return False
 
 
 def _buffering(command: Command, streams: Streams) -> Mapping[str, str]:

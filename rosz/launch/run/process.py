@@ -117,7 +117,7 @@ class Process:
         self.began = 0.0
         self.ended = 0.0
         self.killed = False
-        self._host = host
+        self.host = host
         self._loop = loop
         self._listener = listener
         self._timeouts = timeouts
@@ -165,7 +165,7 @@ class Process:
         self._cancel_timers()
         job = Job(self.node, self.owner, self.label, again=self.starts > 0)
         try:
-            self.child = self._host.start(job, self._exited)
+            self.child = self.host.start(job, self._exited, self._confirmed)
         except RoszError as error:
             self._fail(error)
             return
@@ -176,7 +176,23 @@ class Process:
         self.tail = ()
         self.starts += 1
         self.began = self._loop.now()
-        self._listener.started(self)
+        if not self.child.pending:
+            self._listener.started(self)
+
+    def _confirmed(self, error: RoszError | None) -> None:
+        """Take note of what another machine says to a start."""
+        if self.over:
+            return  # given up before
+        if error is None:
+            self._listener.started(self)
+            return
+        self.alive = False
+        self._fail(error)
+
+    @property
+    def place(self) -> str:
+        """Address of its machine; empty for this one."""
+        return self.host.place
 
     def _fail(self, error: RoszError) -> None:
         self._cancel_timers()

@@ -12,19 +12,21 @@ from typing import TextIO
 import msgspec
 
 from rosz.errors import LaunchError, ParamNotFound, UsageError
-from rosz.launch.plan.model import MachinePlan, NodePlan, Plan
+from rosz.launch.plan.model import NodePlan, Plan
 from rosz.launch.run import summary
 from rosz.launch.run.command import TAG, Workplace
 from rosz.launch.run.console import Console
 from rosz.launch.run.control import Panel
 from rosz.launch.run.family import kill_family
 from rosz.launch.run.folder import LaunchLog, RunFolder
-from rosz.launch.run.host import Host, LocalHost, is_local, remote_refused
+from rosz.launch.run.host import Host, LocalHost, is_local
 from rosz.launch.run.loop import Loop
+from rosz.launch.run.machines import MachineCall, Machines, meeting_places, moved
 from rosz.launch.run.network import Network
 from rosz.launch.run.output import Output
 from rosz.launch.run.parameters import RUN_ID, carry_out, core_params, launch_uri
 from rosz.launch.run.process import Timeouts
+from rosz.launch.run.protocol import Setup
 from rosz.launch.run.stopping import stopped_by_signals
 from rosz.launch.run.supervisor import Supervisor
 
@@ -43,6 +45,9 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
         verbose: The command line of each process is printed.
         overview: What the launch will do is printed first.
         title: The terminal's window is named after the launch.
+        machines: Where machines are, against what the files say.
+        silence: Seconds without a word from another machine after which it counts as lost, and
+            ends what it runs.
         timeouts: How long processes may take to end.
     """
 
@@ -54,6 +59,8 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
     verbose: bool = False
     overview: bool = True
     title: bool = True
+    machines: tuple[MachineCall, ...] = ()
+    silence: float = 30.0
     timeouts: Timeouts = Timeouts()
 
 
@@ -61,8 +68,9 @@ def forced(plan: Plan, options: Options) -> Plan:
     """Return the plan with what the options force upon all nodes.
 
     Raises:
-        UsageError: All are to be required, and one is to respawn.
+        UsageError: All are to be required, and one is to respawn; or a machine is unknown.
     """
+    plan = moved(plan, options.machines)
     nodes = plan.nodes
     if options.local:
         nodes = tuple(node for node in nodes if is_local(plan.machine(node.machine)))
@@ -90,7 +98,6 @@ class Runner:
         options: How.
         out: Where it is said what goes well.
         err: Where it is said what does not.
-        remote: Gives machines other than this one; may raise `LaunchError`.
     """
 
     def __init__(
@@ -102,15 +109,14 @@ class Runner:
         *,
         out: TextIO,
         err: TextIO,
-        remote: Callable[[MachinePlan], Host] = remote_refused,
     ) -> None:
         self._plan = forced(plan, options)
         self._workplace = workplace
         self._network = network
         self._options = options
         self._console = Console(out, err, verbose=options.verbose)
-        self._remote = remote
         self._loop = Loop()
+        self._machines = Machines(self._loop, self._console)
         self._stop: Callable[[], None] = self._loop.stop
         own = secrets.token_hex(8)
         # Within a node of another launch, that one can still find all that this one starts.
@@ -143,6 +149,7 @@ class Runner:
             output.close()
             self._conclude(supervisor)
         finally:
+            self._machines.close()
             output.close()
             self._loop.close()
             self._console.close()
@@ -171,7 +178,7 @@ class Runner:
             console.strong(f"setting {RUN_ID} to {self.run_id}")
         extra = core_params(self.run_id) if fresh else {}
         carry_out(self._plan, network.store, console, {**extra, **launch_uri(os.getpid())})
-        return self._supervisor(hosts, folder)
+        return self._supervisor(hosts)
 
     def _find_run(self) -> bool:
         """Find out which run this is; tell whether it is a new one."""
@@ -208,20 +215,30 @@ class Runner:
             console.error(f"WARNING: {notice}")
 
     def _hosts(self, local: Host) -> Callable[[NodePlan], Host]:
-        """Return what gives the machine of a node; those of other machines are made here.
+        """Return what gives the machine of a node; other machines are called here.
 
         Raises:
             LaunchError: A machine cannot be used.
         """
-        hosts: dict[str, Host] = {}
-        for name in {node.machine for node in self._plan.nodes}:
-            machine = self._plan.machine(name)
-            hosts[name] = local if machine is None or is_local(machine) else self._remote(machine)
-        return lambda node: hosts[node.machine]
+        setup = Setup(
+            run_id=self.run_id,
+            tag=self._tag,
+            domain=self._workplace.environment.domain,
+            meet=meeting_places(self._workplace.environment),
+            silence=self._options.silence,
+            timeouts=self._options.timeouts,
+            prefixed=self._options.prefixed,
+        )
+        wanted = dict.fromkeys(node.machine for node in self._plan.nodes)
+        others = {
+            name: machine
+            for name in wanted
+            if (machine := self._plan.machine(name)) is not None and not is_local(machine)
+        }
+        called = self._machines.call(others, setup)
+        return lambda node: called.get(node.machine, local)
 
-    def _supervisor(
-        self, hosts: Callable[[NodePlan], Host], folder: RunFolder | None
-    ) -> Supervisor:
+    def _supervisor(self, hosts: Callable[[NodePlan], Host]) -> Supervisor:
         alone = self._network.alone
         if not self._plan.nodes:
             self._console.strong("No processes to monitor")
@@ -232,7 +249,6 @@ class Runner:
             hosts,
             self._loop,
             self._console,
-            folder=folder,
             timeouts=self._options.timeouts,
             readiness=self._network.readiness,
             stay=alone and not self._plan.nodes,
@@ -248,7 +264,6 @@ class Runner:
             self._loop,
             supervisor,
             files=self._plan.files,
-            tag=self._tag,
         )
         try:
             with stopped_by_signals(self._loop, self._console, self.stop, supervisor.kill):

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from rosz.errors import NotFoundError, RoszError, near_miss
 from rosz.launch.plan.model import NodePlan, Wait
 from rosz.launch.run.console import Console
-from rosz.launch.run.folder import RunFolder
 from rosz.launch.run.host import Host
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.process import Process, Readiness, State, Timeouts
@@ -30,7 +29,6 @@ class Supervisor:
         host_of: Gives the machine of a node; may raise `LaunchError`.
         loop: What is waited with; stopped when all is over.
         console: Where it is said what happens.
-        folder: Where logs are kept, for messages; None when they are not.
         timeouts: How long processes may take to end.
         readiness: What nodes may wait for.
         stay: Whether it goes on when nothing runs any more.
@@ -43,7 +41,6 @@ class Supervisor:
         loop: Loop,
         console: Console,
         *,
-        folder: RunFolder | None,
         timeouts: Timeouts,
         readiness: Readiness | None = None,
         stay: bool = False,
@@ -51,7 +48,6 @@ class Supervisor:
         self._loop = loop
         self._stay = stay
         self._console = console
-        self._folder = folder
         self._closing = False
         self._begun = False
         self._told: dict[int, list[Callable[[], None]]] = {}
@@ -70,6 +66,11 @@ class Supervisor:
             )
             for number, node in enumerate(nodes, 1)
         ]
+
+    @property
+    def hosts(self) -> list[Host]:
+        """All machines that its processes run on, each once."""
+        return list({id(process.host): process.host for process in self.processes}.values())
 
     @property
     def closing(self) -> bool:
@@ -140,8 +141,9 @@ class Supervisor:
     def started(self, process: Process) -> None:
         """Say that a process runs."""
         if process.child is not None:
+            where = f" on {process.place}" if process.place else ""
             self._console.strong(
-                f"process[{process.label}]: started with pid [{process.child.pid}]"
+                f"process[{process.label}]: started with pid [{process.child.pid}]{where}"
             )
             self._console.note(f"process[{process.label}]: {process.child.shown}")
         self._tell(process)
@@ -181,9 +183,10 @@ class Supervisor:
             text = (
                 f"process has died [pid {child.pid}, exit code {process.code}, cmd {child.shown}]."
             )
-        if self._folder is None:
+        if process.child is None or not process.child.logs:
             return text
-        return f"{text}\nlog file: {self._folder.pattern(process.label)}"
+        where = f"{process.place}:" if process.place else ""
+        return f"{text}\nlog file: {where}{process.child.logs}"
 
     def respawning(self, process: Process) -> None:
         """Say that a process starts again."""

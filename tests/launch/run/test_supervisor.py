@@ -274,14 +274,15 @@ def test_restart_and_stop_one(tmp_path: Path) -> None:
     assert run.out.getvalue().count("process[b-2]: started") == 1
 
 
-def test_a_remote_machine_is_refused_before_anything_starts(tmp_path: Path) -> None:
+def test_a_remote_machine_is_refused_before_anything_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     machine = MachinePlan("base", "robot1", "", 22, "", "", 10.0, True, HERE)
     node = NodePlan(package="p", type="t", name="n", namespace="/", place=HERE, machine="base")
     started = tmp_path / "started"
+    monkeypatch.setenv("PATH", "/nowhere")
     with (
-        pytest.raises(
-            LaunchError, match=r"test\.launch:3:5: machine 'base' is at 'robot1': remote"
-        ),
+        pytest.raises(LaunchError, match=r"test\.launch:3:5: machine 'base' needs ssh"),
         launch(tmp_path, shell("a", f"touch {started}"), node, plan=Plan(machines=(machine,))) as r,
     ):
         r.join()
