@@ -56,7 +56,7 @@ def templates(folder: Path) -> Path:
 
 
 def generate(file: str, folder: Path) -> Any:
-    options = [str(folder / one) for one in ("bin", "cpp", "py")]
+    options = [str(folder / one) for one in ("bin", "cpp", "sample")]
     (folder / "bin").mkdir(exist_ok=True)
     # Debian's package has no manifest, which roslib.load_manifest() looks for.
     manifest = folder / "dynamic_reconfigure" / "package.xml"
@@ -69,7 +69,8 @@ def generate(file: str, folder: Path) -> Any:
         stdout=subprocess.DEVNULL,
         env={"PATH": "/usr/bin:/bin", "ROS_PACKAGE_PATH": str(folder)},
     )
-    sys.path[:0] = [str(folder / "py" / "cfg")]
+    (folder / "sample" / "__init__.py").touch()
+    sys.path[:0] = [str(folder / "sample" / "cfg")]
     return importlib.import_module(f"{Path(file).stem}Config")
 
 

@@ -15,20 +15,17 @@ from rosz.ros1.dynamic_reconfigure.files import find_files
 from rosz.ros1.importer import install, uninstall
 
 
-@pytest.fixture(autouse=True)
-def names() -> Iterator[None]:
-    install()
-    yield
-    uninstall()
-
-
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A package on the path, and ROS 1's names to import."""
     made = tmp_path / "sample"
     (made / "cfg").mkdir(parents=True)
     (made / "package.xml").write_text("<package><name>sample</name></package>")
     monkeypatch.setenv("ROSZ_PACKAGE_PATH", str(tmp_path))
-    return made
+    uninstall()  # another test's, which knows another path
+    install()
+    yield made
+    uninstall()
 
 
 def write(folder: Path, name: str, text: str) -> Path:
