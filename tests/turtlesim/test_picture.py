@@ -71,6 +71,13 @@ def test_half_a_pixel_is_half_the_color() -> None:
     assert tuple(pixels) == (100, 50, 25, 200, 100, 50, 100, 50, 25)
 
 
+def test_a_quarter_of_the_height_is_a_quarter_of_the_color() -> None:
+    pixels = bytearray(3)
+    low = ((-0.5, 0.25), (0.5, 0.25), (0.5, 0.5), (-0.5, 0.5))
+    picture.paint(pixels, 1, 1, Patch((200, 100, 40), low))
+    assert tuple(pixels) == (50, 25, 10)
+
+
 def test_what_is_outside_is_left_out() -> None:
     world = World()
     world.spawn(0.0, 0.0, 0.0)

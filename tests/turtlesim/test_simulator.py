@@ -71,6 +71,16 @@ def test_a_command_moves_it_for_a_second(scene: Scene) -> None:
     assert stopped.y == START
 
 
+def test_it_goes_to_the_left_and_turns(scene: Scene) -> None:
+    watcher = scene.watch()
+    commands = scene.user.publisher("turtle1/cmd_vel", Twist, queue_size=1)
+    commands.wait_for_subscribers()
+    commands.publish(Twist(Vector3(y=1.5, z=9.0), Vector3(x=9.0, z=0.5)))
+    pose = watcher.wait_for(lambda pose: pose.linear_velocity)
+    assert (pose.linear_velocity, pose.angular_velocity) == (1.5, 0.5)
+    assert pose.y > START
+
+
 def test_the_wall_is_told_of(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
     watcher = scene.watch()
     scene.call("turtle1/teleport_absolute", TeleportAbsolute, 99.0, 5.0, 0.0)

@@ -42,10 +42,12 @@ def test_straight_ahead_for_a_second_and_no_longer(field: Field) -> None:
 
 
 def test_strafing_goes_to_the_left(field: Field) -> None:
-    turtle = Turtle(5.0, 5.0, math.pi / 2)
+    turtle = Turtle(5.0, 5.0, math.pi / 6)
     turtle.command(0.0, forward=3.0, left=4.0, turn=0.0)
     turtle.step(field, 0.0)
-    assert (turtle.x, turtle.y) == pytest.approx((5.0 - 4 * STEP_SECONDS, 5.0 + 3 * STEP_SECONDS))
+    right, up = math.sqrt(3) / 2 * 3 - 4 / 2, 3 / 2 + math.sqrt(3) / 2 * 4
+    assert turtle.x == pytest.approx(5.0 + right * STEP_SECONDS)
+    assert turtle.y == pytest.approx(5.0 + up * STEP_SECONDS)
     assert turtle.speed == 5.0
 
 
