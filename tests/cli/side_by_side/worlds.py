@@ -1,0 +1,200 @@
+"""The scenario in two worlds: a roscore with rospy nodes, and rosz."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from rosz.session.probe import is_answered
+
+__all__ = ("Outcome", "Ros1", "Rosz", "World")
+
+_ROOT = Path(__file__).parents[3]
+_NODES = Path(__file__).with_name("nodes.py")
+_PATIENCE = 40.0
+_SOME = 3
+"""Lines, or seconds, after which what goes on for ever has said enough."""
+
+_PACKAGE = {
+    "package.xml": (
+        "<package><name>demo_pkg</name><version>0.1.0</version><description>d</description>"
+        '<maintainer email="a@b.c">m</maintainer><license>MIT</license></package>'
+    ),
+    "msg/Reading.msg": (
+        "# What a sensor says.\nint32 GOOD=1\nstring UNIT=volt # always\n\nHeader header\n"
+        "time taken\nfloat64[] values\nfloat32[3] noise\nstd_msgs/ColorRGBA[2] lamps\nchar c\n"
+    ),
+    "srv/Ask.srv": "int8 ALL=-1\nstring what\nduration within\n---\nReading[] readings\nbool ok\n",
+}
+"""A package of definitions that both have."""
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """What a command ended with."""
+
+    code: int
+    out: str
+    err: str
+
+
+class World:
+    """Nodes, and commands about them.
+
+    Args:
+        interpreter: What runs the nodes.
+        environ: Variables of all.
+    """
+
+    def __init__(self, interpreter: list[str], environ: dict[str, str]) -> None:
+        self.folder = Path(tempfile.mkdtemp(prefix="rosz-"))
+        self.environ = {**environ, "HOME": str(self.folder), "ROS_HOME": str(self.folder)}
+        self._interpreter = interpreter
+        for name, text in _PACKAGE.items():
+            file = self.folder / "src" / "demo_pkg" / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+        self.environ["ROS_PACKAGE_PATH"] = f"{self.folder}/src:/usr/share"
+        self._programs: list[subprocess.Popen[str]] = []
+
+    def command(self, line: str) -> list[str]:
+        """Return what runs a line such as ``topic list``."""
+        raise NotImplementedError
+
+    def run(self, line: str, *, interrupt: bool = False) -> Outcome:
+        """Run a command to its end, or as long as it takes to say something."""
+        with subprocess.Popen(
+            self.command(line),
+            env={**self.environ, "PYTHONUNBUFFERED": "1"},
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            begun = _beginning(process) if interrupt else ""
+            out, err = process.communicate(timeout=_PATIENCE)
+            return Outcome(process.returncode, begun if interrupt else out, err)
+
+    def start(self, *command: str) -> subprocess.Popen[str]:
+        """Start a program that ends with this world."""
+        process = subprocess.Popen(
+            command,
+            env=self.environ,
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            start_new_session=True,
+        )
+        self._programs.append(process)
+        return process
+
+    def __enter__(self) -> Self:
+        for name in ("talker", "listener"):
+            process = self.start(*self._interpreter, str(_NODES), name)
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            assert line == "ready\n", f"{self._interpreter[0]} {name} says '{line}'"
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        while self._programs:
+            process = self._programs.pop()
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+            if process.stdout is not None:
+                process.stdout.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Ros1(World):
+    """ROS 1 as Debian packages it."""
+
+    def __init__(self) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self._port = probe.getsockname()[1]
+        environ = {
+            "PATH": "/usr/bin:/bin",
+            "LANG": "C.UTF-8",
+            "ROS_MASTER_URI": f"http://127.0.0.1:{self._port}",
+            "ROS_IP": "127.0.0.1",
+        }
+        super().__init__(["/usr/bin/python3"], environ)
+
+    @staticmethod
+    def available() -> bool:
+        """Tell whether it is installed."""
+        tools = ("roscore", "rostopic", "rosservice", "rosnode", "rosmsg", "rosparam")
+        return all(Path("/usr/bin", tool).exists() for tool in tools)
+
+    def command(self, line: str) -> list[str]:
+        group, *words = split(line)
+        return [f"/usr/bin/ros{group}", *words]
+
+    def __enter__(self) -> Self:
+        self.start("/usr/bin/roscore", "-p", str(self._port))
+        deadline = time.monotonic() + _PATIENCE
+        while not is_answered(f"tcp/127.0.0.1:{self._port}"):
+            assert time.monotonic() < deadline, "roscore does not start"
+            time.sleep(0.02)
+        return super().__enter__()
+
+
+class Rosz(World):
+    """rosz, on a network of its own."""
+
+    def __init__(self) -> None:
+        environ = {
+            "PATH": os.environ.get("PATH", ""),
+            "LANG": "C.UTF-8",
+            "PYTHONPATH": str(_ROOT),
+            "PYTHONWARNINGS": "error",
+        }
+        super().__init__([sys.executable, "-m", "rosz.ros1"], environ)
+        self.environ["ROSZ_RENDEZVOUS"] = f"unixsock-stream/{self.folder}/z.sock"
+
+    def command(self, line: str) -> list[str]:
+        return [sys.executable, "-m", "rosz", *split(line)]
+
+
+def _beginning(process: subprocess.Popen[str]) -> str:
+    """Return the first lines of what goes on for ever, and end it then, or after some time."""
+    assert process.stdout is not None
+    said: list[str] = []
+    end = threading.Timer(_SOME, process.send_signal, [signal.SIGINT])
+    end.start()
+    for text in process.stdout:
+        said.append(text)
+        if len(said) == _SOME:
+            process.send_signal(signal.SIGINT)
+            break
+    end.cancel()
+    return "".join(said)
+
+
+def split(line: str) -> list[str]:
+    """Return the words of a line; what stands in braces is one."""
+    return shlex.split(line.replace("{", "'{").replace("}", "}'")) if "{" in line else line.split()
