@@ -1,0 +1,163 @@
+"""message_filters: the same messages in the same order, against the real ones."""
+
+from __future__ import annotations
+
+import random
+import time
+
+import pytest
+from network import Network
+from ros1_oracle import same
+
+from rosz.msgs.builtin_interfaces.msg import Time
+
+_SETUP = """
+import rospy
+import message_filters
+from genpy import Time
+from std_msgs.msg import Header, String
+rospy.rostime.set_rostime_initialized(True)
+class Stamped:
+    def __init__(self, name, seconds):
+        self.name, self.header = name, Header(stamp=Time.from_sec(seconds))
+sources = [message_filters.SimpleFilter() for _ in range(3)]
+heard = []
+def callback(*found):
+    heard.append([one.name if hasattr(one, "name") else one for one in found])
+"""
+
+
+@pytest.fixture(autouse=True)
+def time_without_a_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("filters", "synchronizers"):
+        monkeypatch.setattr(
+            f"rosz.ros1.message_filters.{module}.now", lambda: Time.from_sec(time.time())
+        )
+
+
+def events(seed: int, spread: float) -> list[tuple[int, float]]:
+    """Messages of three sources, out of step and sometimes missing or out of order."""
+    chance = random.Random(seed)
+    made = [
+        (source, round(turn * 0.1 + chance.uniform(0, spread), 4))
+        for turn in range(20)
+        for source in range(3)
+        if chance.random() > 0.1
+    ]
+    for _ in range(5):
+        place = chance.randrange(len(made) - 1)
+        made[place], made[place + 1] = made[place + 1], made[place]
+    return made
+
+
+def feed(made: list[tuple[int, float]]) -> str:
+    return (
+        _SETUP
+        + f"""
+def play():
+    for number, (source, stamp) in enumerate({made}):
+        sources[source].signalMessage(Stamped(f"{{source}}:{{number}}", 1 + stamp))
+"""
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("slop", [0.01, 0.05, 0.2])
+def test_nearly_the_same_stamps(seed: int, slop: float) -> None:
+    same(
+        feed(events(seed, 0.04))
+        + f"""
+message_filters.ApproximateTimeSynchronizer(sources, 5, {slop}).registerCallback(callback)
+play()
+result = heard
+""",
+        "message_filters, rospy",
+        "python3-message-filters",
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_same_stamps(seed: int) -> None:
+    same(
+        feed(events(seed, 0.0))
+        + """
+message_filters.TimeSynchronizer(sources, 5).registerCallback(callback, "more")
+play()
+result = heard
+""",
+        "message_filters, rospy",
+        "python3-message-filters",
+    )
+
+
+def test_messages_without_stamps() -> None:
+    same(
+        _SETUP
+        + """
+message_filters.ApproximateTimeSynchronizer(
+    sources[:2], 5, 10, allow_headerless=True).registerCallback(callback)
+class Plain:
+    name = "plain"
+for source in sources[:2]:
+    source.signalMessage(Plain())
+result = heard
+""",
+        "message_filters, rospy",
+        "python3-message-filters",
+    )
+
+
+def test_cache() -> None:
+    same(
+        _SETUP
+        + """
+cache = message_filters.Cache(sources[0], 3)
+cache.registerCallback(callback)
+result = [str(cache.getLast()), str(cache.getLatestTime()), str(cache.getOldestTime())]
+for number, seconds in enumerate([5, 1, 2, 4, 3]):
+    sources[0].signalMessage(Stamped(str(number), seconds))
+name = lambda one: one.name if one else None
+result += heard + [
+    [one.name for one in cache.getInterval(Time(2), Time(4))],
+    name(cache.getElemAfterTime(Time(3))), name(cache.getElemAfterTime(Time(9))),
+    name(cache.getElemBeforeTime(Time(3))), name(cache.getElemBeforeTime(Time(1))),
+    cache.getLatestTime().to_sec(), cache.getOldestTime().to_sec(), cache.getLast().name,
+]
+""",
+        "message_filters, rospy",
+        "python3-message-filters",
+    )
+
+
+def test_subscribers(network: Network) -> None:
+    program = network.program(
+        """
+        import rosz.ros1
+        import message_filters
+        import rospy
+        from geometry_msgs.msg import PointStamped
+
+        rospy.init_node("pair")
+        subscribers = [message_filters.Subscriber(name, PointStamped) for name in ("a", "b")]
+        print(subscribers[0].getTopic(), subscribers[0].name)
+        def both(a, b):
+            print("both", a.point.x, b.point.x)
+            rospy.signal_shutdown("")
+        message_filters.TimeSynchronizer(subscribers, 10).registerCallback(both)
+        publishers = [rospy.Publisher(name, PointStamped, queue_size=5) for name in ("a", "b")]
+        rate = rospy.Rate(50)
+        while not rospy.is_shutdown():
+            stamp = rospy.Time.now()
+            for x, publisher in enumerate(publishers):
+                message = PointStamped()
+                message.header.stamp, message.point.x = stamp, x
+                publisher.publish(message)
+            try:
+                rate.sleep()
+            except rospy.ROSInterruptException:
+                pass
+        """
+    )
+    program.wait_for("both 0.0 1.0")
+    assert program.exit_code() == 0
+    assert program.lines[0] == "a /a"
