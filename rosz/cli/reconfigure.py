@@ -276,7 +276,7 @@ def _client(
     call = call_of(context)
     full = call.resolve(name, _TOOL)
     with (
-        call.context(lasting=lasting or wait or timeout is not None) as ros,
+        call.context(lasting=lasting or wait) as ros,
         Node(_TOOL, anonymous=True, context=ros) as node,
         Client(node, full, timeout=timeout or _ANSWER_SECONDS) as client,
     ):
