@@ -138,7 +138,7 @@ def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> st
     return remaps.get(resolved, resolved) if remaps else resolved
 
 
-def anonymous(base: str, host: str, pid: int, milliseconds: int) -> str:
+def anonymous(base: str, host: str, pid: int, moment: int) -> str:
     """Make a base name unique to a process and a moment, in the form ROS 1 uses."""
     suffix = re.sub(r"[^A-Za-z0-9_]", "_", host)
-    return f"{base}_{suffix}_{pid}_{milliseconds}"
+    return f"{base}_{suffix}_{pid}_{moment}"

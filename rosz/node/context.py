@@ -21,6 +21,7 @@ from rosz.node.clock import Clock
 from rosz.node.inbox import Inbox
 from rosz.node.mismatch import MismatchWatch
 from rosz.session import Session, SessionConfig
+from rosz.session.presence import is_anybody_there
 from rosz.session.probe import is_answered
 from rosz.session.settle import Settling, serve_links
 
@@ -82,7 +83,11 @@ class Context:
         config = config or SessionConfig.node(self.environment)
         self.passing = config.must_connect
         alone = config.mode == "peer" and not (
-            config.connect or config.listen or config.multicast or is_answered(config.rendezvous)
+            config.connect
+            or config.listen
+            or config.multicast
+            or is_answered(config.rendezvous)
+            or is_anybody_there(config.rendezvous)
         )
         self.session = Session.open(config)
         self.graph = Graph(self.session, self.domain)

@@ -78,8 +78,8 @@ class Node:
     ) -> None:
         self._owns_context = context is None
         if anonymous:
-            milliseconds = time.time_ns() // 1_000_000
-            name = names.anonymous(name, socket.gethostname(), os.getpid(), milliseconds)
+            # ROS 1 counts milliseconds, but has one node in a process.
+            name = names.anonymous(name, socket.gethostname(), os.getpid(), time.time_ns())
         names.check_base(name)
         self.context = context or Context(argv=sys.argv[1:] if argv is None else argv)
         self._closed = threading.Event()

@@ -135,4 +135,4 @@ def test_damaged_messages_change_nothing(caplog: pytest.LogCaptureFixture) -> No
         for data in (b"", seal("bb", 1, b""), seal("bb", 1, b"\xc1"), message("a//b", 1, 1)):
             shared.note(data)
         assert shared.root == {}
-    assert caplog.text.count("wrote what is no parameter") == 4
+    assert caplog.text.count("wrote what is no parameter") == 3  # kinds of damage
