@@ -90,6 +90,11 @@ def test_two_fields_from_one_launch_file(network: Network, rosz: Callable[..., P
     assert launch.exit_code() == 0
 
 
+def test_the_launch_line_of_the_lecture(network: Network, rosz: Callable[..., Program]) -> None:
+    rosz("launch", "turtlesim", "turtlesim_node").wait_for("Spawning turtle [turtle1]")
+    assert network.node("user").params["/turtlesim/background_b"] == 255
+
+
 def test_the_square_on_a_world_without_network() -> None:
     world, square = World(), Square()
     turtle = world.turtles[world.spawn_first()]
