@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import threading
+import uuid
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rosz.cli.group import print_lines, until_stopped
 from rosz.errors import UsageError
+
+if TYPE_CHECKING:
+    from rosz.introspect.core import Core
 
 __all__ = ("app",)
 
@@ -56,9 +60,22 @@ def core_command(
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     file = Path(store).absolute() if store else None
     with until_stopped(), Core(environment, listen or (), connect or (), file) as core:
+        _introduce(core)
         lines = [f"listening on {endpoint}" for endpoint in core.endpoints]
         lines += [f"connecting to {endpoint}" for endpoint in core.connect]
         kept = f"kept in {core.store}" if core.store else "kept in memory"
         lines.append(f"parameters of domain {core.domain} are {kept}")
         print_lines([*lines, "started core; press Ctrl-C to end it"])
         threading.Event().wait()
+
+
+def _introduce(core: Core) -> None:
+    """Set the parameters that a ROS 1 core sets, where nobody has set them before."""
+    from rosz.launch.run.network import ReplicaStore
+    from rosz.launch.run.parameters import core_params
+
+    store = ReplicaStore(core.params)
+    known = core_params(str(uuid.uuid1()))
+    missing = {name: value for name, value in known.items() if not store.has(name)}
+    if missing:
+        store.write(missing)

@@ -45,6 +45,23 @@ def test_it_holds_the_parameters(shell: Shell) -> None:
     assert shell("param", "get", "/speed").out == "3\n"
 
 
+@pytest.mark.usefixtures("core")
+def test_it_sets_what_roscore_sets(shell: Shell) -> None:
+    assert shell("param", "list").lines == ["/rosdistro", "/rosversion", "/run_id"]
+
+
+def test_what_is_set_already_stays(shell: Shell, tmp_path: Path) -> None:
+    store = tmp_path / "params.db"
+    runs = set()
+    for _ in range(2):
+        core = shell.start("core", "--store", str(store))
+        core.wait_for("started core")
+        runs.add(shell("param", "get", "/run_id").out)
+        core.send(signal.SIGINT)
+        core.exit_code()
+    assert len(runs) == 1
+
+
 def test_an_occupied_endpoint_is_one_line_that_names_it(shell: Shell, network: Network) -> None:
     network.node("holder")
     result = shell("core")
