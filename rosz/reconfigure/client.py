@@ -35,6 +35,7 @@ _ECHO_BY: Final = 0.5
 """Seconds that a change waits for its own announcement, so that older ones come before it."""
 
 _HEARD: Final = 20
+_BUSY: Final = "the node is busy, stopped or out of reach"
 
 
 class Client:
@@ -165,9 +166,12 @@ class Client:
                 for group, parent in description.groups
                 if group.id in states
             ]
-        answer = self._service.call(
-            Reconfigure.Request(request), max(deadline - time.monotonic(), 0.0)
-        )
+        try:
+            answer = self._service.call(
+                Reconfigure.Request(request), max(deadline - time.monotonic(), 0.0)
+            )
+        except WaitTimeout as error:
+            raise WaitTimeout(error.what, limit, _BUSY) from error
         return self._settle(_decoded(description, answer.config), deadline)
 
     def update_groups(self, states: Mapping[str, bool], timeout: float | None = None) -> Config:
@@ -206,9 +210,7 @@ class Client:
                 raise ClosedError(f"the client of '{self.name}' is closed")
         if self.name not in find_servers(self.node.context.graph.view()):
             raise self._nobody(limit)
-        raise WaitTimeout(
-            f"{what} from '{self.name}'", limit, "the node is busy, stopped or out of reach"
-        )
+        raise WaitTimeout(f"{what} from '{self.name}'", limit, _BUSY)
 
     def _nobody(self, seconds: float) -> WaitTimeout:
         known = find_servers(self.node.context.graph.view())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -11,6 +10,7 @@ from rosz import reconfigure
 from rosz.errors import ClosedError, ParamError, ServiceError, WaitTimeout
 from rosz.reconfigure import Description
 from rosz.reconfigure.messages import pack_description
+from rosz.reconfigure.servers import SET
 from rosz.ros1.dynamic_reconfigure.encoding import (
     Config,
     decode_description,
@@ -23,6 +23,7 @@ from rosz.ros1.dynamic_reconfigure.exceptions import (
 )
 from rosz.ros1.rospy import state
 from rosz.ros1.rospy.exceptions import ROSException, ROSInterruptException
+from rosz.ros1.rospy.proxy import wait_for_service
 
 __all__ = ("Client",)
 
@@ -64,22 +65,18 @@ class Client:
         description_callback: Callable[[list[dict[str, Any]]], object] | None = None,
     ) -> None:
         self.name = name
+        node = state.node()
+        _wait_for(node.resolve(f"{name}/{SET}"), timeout)
         self._config_callback = config_callback
         self._description_callback = description_callback
         self._decoded: tuple[Description, Config] | None = None
         self._client = reconfigure.Client(
-            state.node(),
+            node,
             name,
             timeout=_ANSWER_BY,
             config_callback=self._on_config,
             description_callback=self._on_description,
         )
-        self._service = f"{self._client.name}/set_parameters"
-        try:
-            self._wait(timeout)
-        except BaseException:
-            self._client.close()
-            raise
 
     @property
     def config(self) -> Config | None:
@@ -181,23 +178,6 @@ class Client:
 
     description_callback = property(get_description_callback, set_description_callback)
 
-    def _wait(self, timeout: float | None) -> None:
-        """Wait for the server; without a timeout until it comes, as launch files count on."""
-        try:
-            try:
-                self._client.wait(timeout or _SILENT_FOR)
-            except WaitTimeout:
-                if timeout:
-                    raise
-                sys.stderr.write(f"Waiting for service {self._service}...\n")
-                self._client.wait(threading.TIMEOUT_MAX / 2)
-        except WaitTimeout as error:
-            raise ROSException(
-                f"timeout exceeded while waiting for service {self._service}: {error}"
-            ) from error
-        except ClosedError as error:
-            raise ROSInterruptException("rospy shutdown") from error
-
     def _patiently(
         self, ask: Callable[[float], T | None], timeout: float | None, what: str
     ) -> T | None:
@@ -238,6 +218,20 @@ class Client:
     def _on_description(self, description: Description) -> None:
         if self._description_callback is not None:
             self._description_callback(extract_params(self._decode(description)))
+
+
+def _wait_for(service: str, timeout: float | None) -> None:
+    """Wait for the server; without a timeout until it comes, as launch files count on."""
+    if timeout:
+        wait_for_service(service, timeout)
+        return
+    try:
+        wait_for_service(service, _SILENT_FOR)
+    except ROSException as error:
+        if isinstance(error, ROSInterruptException):
+            raise
+        sys.stderr.write(f"Waiting for service {service}...\n")
+        wait_for_service(service)
 
 
 def _check(description: Description, changes: Mapping[str, Any]) -> None:
