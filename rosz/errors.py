@@ -27,6 +27,11 @@ One root, so that ``except RoszError`` catches all that rosz reports and nothing
     │   └── ServiceNotFound
     ├── ParamError                  a parameter value or write is not acceptable
     ├── StoreError                  a file of parameters cannot be used
+    ├── TransformError              a transform between two frames cannot be given
+    │   ├── FrameNotFound           no such frame
+    │   ├── FramesNotConnected      the frames belong to separate trees
+    │   ├── ExtrapolationNeeded     nothing is known that early or that late
+    │   └── TransformArgument       what is no frame, or no transform
     └── LaunchError                 a launch or a process in it failed
 
 Texts are lower case, quote the offending value, say what was expected and what to do next.
@@ -43,6 +48,9 @@ __all__ = (
     "DefinitionError",
     "EncodeError",
     "ExecutableNotFound",
+    "ExtrapolationNeeded",
+    "FrameNotFound",
+    "FramesNotConnected",
     "InvalidName",
     "LaunchError",
     "LaunchFileError",
@@ -59,6 +67,8 @@ __all__ = (
     "SourceError",
     "StoreError",
     "TimeMovedBackwards",
+    "TransformArgument",
+    "TransformError",
     "TransportError",
     "TypeNotFound",
     "UsageError",
@@ -309,6 +319,26 @@ class ParamError(RoszError):
 
 class StoreError(RoszError):
     """A file of parameters that is damaged, in use, or cannot be read or written."""
+
+
+class TransformError(RoszError):
+    """A transform between two coordinate frames that cannot be given."""
+
+
+class FrameNotFound(TransformError):
+    """No transform has told of a frame of that name."""
+
+
+class FramesNotConnected(TransformError):
+    """Two frames that belong to separate trees."""
+
+
+class ExtrapolationNeeded(TransformError):
+    """A transform at a time that is before or after all that is known."""
+
+
+class TransformArgument(TransformError):
+    """What is no name of a frame, or no transform."""
 
 
 class LaunchError(RoszError):

@@ -50,6 +50,7 @@ MODULES = (
     "rostopic",
     "rosunit",
     "tf",
+    "tf2_geometry_msgs",
     "tf2_ros",
 )
 """ROS 1's Python modules; those that lie beside this one are importable under their own names."""

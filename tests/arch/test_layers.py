@@ -46,6 +46,7 @@ FLOORS = {
     "rosz.launch.run": 6,
     "rosz.reconfigure": 6,
     "rosz.turtlebot3_sim": 6,
+    "rosz.transforms": 6,
     "rosz.turtlesim": 6,
     "rosz.ros1": 7,
     "rosz.workspace": 7,
