@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 
+from rosz.errors import ClosedError
 from rosz.node.clock import Clock
 from rosz.node.severity import severity
 
@@ -128,6 +129,8 @@ class RosoutSink(logging.Handler):
             try:
                 publish(*line)
                 self._tell_dropped(publish)
+            except ClosedError:
+                continue  # the node ended before this began
             except Exception as error:  # noqa: BLE001  # whatever publishing may raise
                 if not told and not self._closed_for_good:
                     told = True

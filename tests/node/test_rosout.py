@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 from simulation import PATIENCE, START, SimulatedClock
 
+from rosz.errors import ClosedError
 from rosz.node import rosout
 from rosz.node.log import NodeLog
 
@@ -184,6 +185,27 @@ def test_failing_publisher_is_told_once_and_not_to_itself(bench: Bench) -> None:
     assert [tried.get(timeout=PATIENCE) for _ in range(2)] == ["one", "two"]
     assert tried.empty()
     assert sorted(told) == ["cannot publish the log on /rosout: no route", "one", "two"]
+
+
+def test_a_publisher_that_ended_first_is_no_trouble(bench: Bench) -> None:
+    told: list[str] = []
+
+    class Collect(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            told.append(record.getMessage())
+
+    bench.log.addHandler(Collect())
+    tried: queue.Queue[object] = queue.Queue()
+
+    def publish(*line: object) -> None:
+        tried.put(line[2])
+        raise ClosedError("the publisher is closed")
+
+    bench.log.publish_to(publish)
+    bench.log.info("one")
+    bench.messages()
+    assert tried.get(timeout=PATIENCE) == "one"
+    assert told == ["one"]
 
 
 def test_closing_publishes_the_rest_and_ends_the_thread(bench: Bench) -> None:
