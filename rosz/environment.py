@@ -111,7 +111,10 @@ def package_index(environment: Environment) -> PackageIndex:
     Installed distributions register folders of packages under the entry point group
     ``rosz.packages``: each entry names a module, and its folder is searched.
     """
-    return PackageIndex([*environment.package_roots, *_registered_roots(), *shipped_roots()])
+    # Asking what is installed takes longer than most commands do, and few need it.
+    return PackageIndex(
+        lambda: [*environment.package_roots, *_registered_roots(), *shipped_roots()]
+    )
 
 
 def shipped_roots() -> list[Path]:

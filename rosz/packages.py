@@ -7,7 +7,7 @@ The index looks in the folders that it is given, in order, and the first package
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -110,11 +110,17 @@ class PackageIndex:
     """The packages found in a list of folders.
 
     Args:
-        roots: Folders that are packages or hold some at any depth; earlier ones win.
+        roots: Folders that are packages or hold some at any depth; earlier ones win. Or what gives
+            them, when they are asked for.
     """
 
-    def __init__(self, roots: Sequence[Path]) -> None:
-        self.roots = tuple(roots)
+    def __init__(self, roots: Sequence[Path] | Callable[[], Sequence[Path]]) -> None:
+        self._given = roots
+
+    @cached_property
+    def roots(self) -> tuple[Path, ...]:
+        """The folders that are searched."""
+        return tuple(self._given() if callable(self._given) else self._given)
 
     @property
     def _known(self) -> dict[str, Package]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -25,6 +26,8 @@ __all__ = ("app",)
 
 _TOOL = "rosparam"
 _FAILED = 1
+_WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_YAML_WORDS = frozenset({"yes", "no", "on", "off", "true", "false", "null", "y", "n"})
 
 
 class _Group(LightGroup):
@@ -106,8 +109,6 @@ def get_command(
     json: _Json = False,
 ) -> int:
     """Print a parameter, or all below a namespace, as YAML."""
-    from rosz.params.yaml import format_get, pretty
-
     with _client(context) as (client, resolve):
         full = resolve(name)
         _tell(verbose, f"getting parameter [{full}]")
@@ -118,8 +119,23 @@ def get_command(
     if json:
         print_json(value)
     else:
-        sys.stdout.write(pretty(value) if readable else format_get(value))
+        sys.stdout.write(_plain(value) or _as_yaml(value, readable=readable))
     return 0
+
+
+def _plain(value: Value) -> str:
+    """Return a value that is the same in YAML and in Python, without what loads for YAML."""
+    if isinstance(value, bool):
+        return f"{value}\n".lower()
+    if isinstance(value, int) or (isinstance(value, str) and _WORD.fullmatch(value)):
+        return f"{value}\n" if str(value).lower() not in _YAML_WORDS else ""
+    return ""
+
+
+def _as_yaml(value: Value, *, readable: bool) -> str:
+    from rosz.params.yaml import format_get, pretty
+
+    return pretty(value) if readable else format_get(value)
 
 
 @app.command("set", cls=_SetCommand)

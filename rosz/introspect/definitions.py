@@ -69,20 +69,22 @@ class Definitions:
         name = name.removesuffix(f".{self._kind}")
         if "::" in name or "." in name:
             raise UsageError(f"'{name}' is no type; expected a form such as 'std_msgs/String'")
-        known = self._store.names(self._kind)
         if "/" not in name:
+            known = self._store.names(self._kind)
             found = [one for one in known if one.rpartition("/")[2] == name]
             if not found:
                 bases = {one.rpartition("/")[2] for one in known}
                 raise TypeNotFound(name, f"no package has it{near_miss(name, bases)}")
             return [self._full(one) for one in found]
         package, _, rest = name.partition("/")
-        short = f"{package}/{rest.removeprefix(f'{self._kind}/')}"
-        if short not in known:
+        full = f"{package}/{self._kind}/{rest.removeprefix(f'{self._kind}/')}"
+        try:
+            self._store.definition(full)
+        except (TypeNotFound, ValueError):  # the latter for too many slashes
             # The store knows best why not.
             look = self._store.message if self._kind == "msg" else self._store.service
             look(name)
-        return [self._full(short)]
+        return [full]
 
     def _full(self, name: str) -> str:
         package, _, base = name.partition("/")

@@ -9,13 +9,16 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from params.network import Network, until
 from params.ros1 import Ros1, available
 
 from rosz.cli.main import run
+from rosz.cli.param import _plain
 from rosz.params.replica import Replica
+from rosz.params.yaml import format_get, pretty
 
 from .command import ROSZ, environ
 
@@ -439,3 +442,13 @@ def test_a_writer_is_told_who_did_not_hear(
         "WARNING: written, but not yet known to mute program (pid 7 on elsewhere), "
         "which did not answer\n",
     )
+
+
+@pytest.mark.parametrize(
+    "value",
+    [True, False, 0, -7, 1 << 62, "c3", "_x", "Hello", "yes", "No", "null", "y", "", "a b", "1",
+     "é", "a: b", "1e5", "e1", "nan", "inf", "NaN", 1.5, [1], {}],
+)  # fmt: skip
+def test_what_is_printed_without_yaml_is_as_with_it(value: Any) -> None:
+    assert _plain(value) in {"", format_get(value)}
+    assert _plain(value) in {"", pretty(value)}
