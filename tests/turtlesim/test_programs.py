@@ -58,6 +58,18 @@ def test_without_a_window_if_told_so(rosz: Callable[..., Program]) -> None:
     program.wait_for("No window: the parameter ~headless is set. 'rosz turtlesim snapshot")
 
 
+def test_a_python_without_tk_says_what_to_install(network: Network) -> None:
+    program = network.program(
+        """
+        import sys
+        sys.modules["tkinter"] = None
+        from rosz.turtlesim.program import main
+        main()
+        """
+    )
+    program.wait_for("No window: this Python has no tkinter (Debian and Ubuntu: apt install")
+
+
 def test_the_mimic_example_of_the_tutorials(network: Network, rosz: Callable[..., Program]) -> None:
     file = network.folder / "turtlemimic.launch"
     file.write_text(MIMIC)

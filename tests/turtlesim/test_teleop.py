@@ -189,3 +189,11 @@ def test_without_keys_it_says_so(network: Network) -> None:
     program.process.stdin.close()
     program.wait_for("no more keys to read: run it in a terminal of its own")
     assert program.exit_code() == 0
+
+
+def test_a_launch_without_a_terminal_gives_it_no_keys(network: Network) -> None:
+    file = network.folder / "keys.launch"
+    file.write_text(LAUNCH)
+    launch = network.run("-m", "rosz", "launch", str(file))
+    launch.wait_for("no more keys to read: run it in a terminal of its own")
+    assert launch.exit_code() == 0
