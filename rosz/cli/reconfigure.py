@@ -12,10 +12,11 @@ import typer
 
 from rosz.cli.group import call_of, new_group, print_json, print_lines, until_stopped, warn
 from rosz.cli.light import LightCommand
+from rosz.cli.reconfigure_show import flatten, show_change, show_description
 from rosz.errors import NotFoundError, UsageError, WaitTimeout, near_miss
 
 if TYPE_CHECKING:
-    from rosz.reconfigure import Client, Config, Description, Group, Setting
+    from rosz.reconfigure import Client, Config
 
 __all__ = ("app",)
 
@@ -207,14 +208,7 @@ def describe_command(
     """Tell what there is to set: types, values, bounds, choices, groups."""
     with _client(context, node, timeout, wait=wait) as client:
         description, config = client.description(), client.config()
-    only = description.setting(setting) if setting else None
-    if json:
-        rows = [_row(one, config) for one in ([only] if only else description.settings.values())]
-        print_json(rows[0] if only else {"settings": rows, "groups": _group_rows(description)})
-    elif only:
-        print_lines(_describe(only, config, ""))
-    else:
-        print_lines(_describe_group(description.root, config, config["groups"], ""))
+    show_description(description, config, setting, as_json=json)
 
 
 @app.command("watch")
@@ -239,16 +233,16 @@ def watch_command(
         until_stopped(),
         _client(context, node, timeout, wait=wait, lasting=True) as client,
     ):
-        before = _flat(client.config())
+        before = flatten(client.config())
         client.config_callback = configs.put
         sys.stderr.write(f"watching [{client.name}]; press Ctrl-C to end\n")
         sys.stderr.flush()
         left = count
         while left is None or left > 0:
-            now = _flat(configs.get())
+            now = flatten(configs.get())
             changed = [name for name in now if now[name] != before.get(name)]
             for name in changed[:left]:
-                _print_change(name, before.get(name), now[name], as_json=json)
+                show_change(name, before.get(name), now[name], as_json=json)
             left = None if left is None else left - len(changed)
             before = now
 
@@ -310,78 +304,3 @@ def _change(client: Client, changes: Mapping[str, Any], *, as_json: bool) -> Non
             warn(f"{name} is {config[name]!r} and not {value!r}: the node decided so")
     if as_json:
         print_json(config)
-
-
-def _describe_group(group: Group, config: Config, tree: Config, indent: str) -> Iterator[str]:
-    for setting in group.settings:
-        yield from _describe(setting, config, indent)
-    for inner in group.groups:
-        state = tree["groups"][inner.name]
-        notes = ", ".join(filter(None, (inner.type, "" if state["state"] else "not shown")))
-        yield f"{indent}[{inner.name}]{' ' + notes if notes else ''}"
-        yield from _describe_group(inner, config, state, indent + "  ")
-
-
-def _describe(setting: Setting, config: Config, indent: str) -> Iterator[str]:
-    yield f"{indent}{setting.name} ({setting.kind}) = {config[setting.name]!r}"
-    if setting.description:
-        yield f"{indent}    {setting.description}"
-    bounds = ""
-    if setting.kind in {"int", "double"}:
-        bounds = f", min {setting.min!r}, max {setting.max!r}"
-    yield f"{indent}    default {setting.default!r}{bounds}, level {setting.level}"
-    choices = setting.choices
-    width = max((len(choice.name) for choice in choices), default=0)
-    for choice in choices:
-        yield f"{indent}    {choice.name:<{width}}  {choice.value!r}  {choice.description}".rstrip()
-
-
-def _row(setting: Setting, config: Config) -> dict[str, Any]:
-    return {
-        "name": setting.name,
-        "type": setting.kind,
-        "value": config[setting.name],
-        "default": setting.default,
-        "min": setting.min,
-        "max": setting.max,
-        "level": setting.level,
-        "description": setting.description,
-        "choices": setting.choices,
-    }
-
-
-def _group_rows(description: Description) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": group.name,
-            "id": group.id,
-            "parent": parent,
-            "type": group.type,
-            "settings": [setting.name for setting in group.settings],
-        }
-        for group, parent in description.groups
-    ]
-
-
-def _flat(config: Config) -> dict[str, Any]:
-    """Return the values by name, and the states of groups by ``groups/<name>``."""
-    values = {name: value for name, value in config.items() if name != "groups"}
-    return values | dict(_states(config["groups"], "groups"))
-
-
-def _states(tree: Config, place: str) -> Iterator[tuple[str, bool]]:
-    for name, inner in tree["groups"].items():
-        yield f"{place}/{name}", inner["state"]
-        yield from _states(inner, f"{place}/{name}")
-
-
-def _print_change(name: str, old: Any, new: Any, *, as_json: bool) -> None:
-    if as_json:
-        import msgspec
-
-        change = {"name": name, "old": old, "new": new}
-        print_lines([msgspec.json.encode(change).decode()])
-        return
-    from rosz.params.yaml import inline
-
-    print_lines([f"~ {name}: {inline(old)} -> {inline(new)}"])

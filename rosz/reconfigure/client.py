@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -34,7 +34,12 @@ __all__ = ("Client",)
 _ECHO_BY: Final = 0.5
 """Seconds that a change waits for its own announcement, so that older ones come before it."""
 
+_SERVICE_BY: Final = 1.0
+"""Seconds that a change waits for the service of a server that is there."""
+
 _HEARD: Final = 20
+"""Announcements remembered."""
+
 _BUSY: Final = "the node is busy, stopped or out of reach"
 
 
@@ -82,11 +87,14 @@ class Client:
             self._service = stack.enter_context(
                 node.client(f"{self.name}/{SET}", Reconfigure, timeout=timeout)
             )
-            for topic, kind, heard in (
-                (DESCRIPTIONS, ConfigDescription, self._on_description),
-                (UPDATES, ConfigMessage, self._on_update),
-            ):
-                stack.enter_context(node.subscription(f"{self.name}/{topic}", kind, heard))
+            self._described = stack.enter_context(
+                node.subscription(
+                    f"{self.name}/{DESCRIPTIONS}", ConfigDescription, self._on_description
+                )
+            )
+            stack.enter_context(
+                node.subscription(f"{self.name}/{UPDATES}", ConfigMessage, self._on_update)
+            )
             self._parts = stack.pop_all()
         node.keep(self)
 
@@ -166,6 +174,10 @@ class Client:
                 for group, parent in description.groups
                 if group.id in states
             ]
+        if self._described.publishers():
+            # It is there; its service may be a moment behind.
+            with suppress(WaitTimeout):
+                self._service.wait_for_service(min(limit, _SERVICE_BY))
         try:
             answer = self._service.call(
                 Reconfigure.Request(request), max(deadline - time.monotonic(), 0.0)
