@@ -9,17 +9,18 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rosz.environment import Environment, package_index
 from rosz.errors import RoszError
 from rosz.introspect.survey import Survey, ros1_type, take
-from rosz.message.schema import slots
 from rosz.packages import PackageIndex
 from rosz.session import Session, SessionConfig
 from rosz.session.probe import is_answered
-from rosz.typestore import TypeStore
 from rosz.wire import Kind
+
+if TYPE_CHECKING:
+    from rosz.typestore import TypeStore
 
 __all__ = ("Suggestions",)
 
@@ -65,6 +66,8 @@ class Suggestions:
 
     @property
     def _types(self) -> TypeStore:
+        from rosz.typestore import TypeStore
+
         return TypeStore(self._packages, self._environment.home / "rosz")
 
     @property
@@ -89,6 +92,8 @@ class Suggestions:
 
     def fields(self, word: str) -> list[str]:
         """Return the fields of a topic that a word names, with a part of a field or without."""
+        from rosz.message.schema import slots
+
         survey = self._survey()
         for topic, types in ({} if survey is None else survey.view.topics()).items():
             if word.startswith(f"{topic}/"):

@@ -8,8 +8,11 @@ from importlib import import_module
 
 import pytest
 import typer
+from network import Network
 
 from rosz.cli.main import COMMANDS, run
+from rosz.msgs.std_msgs.msg import String
+from rosz.msgs.std_srvs.srv import Empty
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -32,6 +35,62 @@ def test_a_command_loads_little(name: str) -> None:
     code = f"import sys, rosz.cli.{name}; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+HEAVY = {
+    "asyncio",
+    "importlib.metadata",
+    "numpy",
+    "pydantic",
+    "rich",
+    "rosz.idl.grammar",
+    "rosz.launch",
+    "rosz.msgs",
+    "rosz.node",
+    "rosz.params",
+    "rosz.typestore",
+    "yaml",
+    "zenoh",
+}
+"""What takes its time to load, and only some commands need."""
+
+
+@pytest.mark.parametrize(
+    ("line", "needs"),
+    [
+        ("--help", set()),
+        ("topic list", {"zenoh"}),
+        ("topic info /chatter", {"zenoh"}),
+        ("topic find std_msgs/String", {"zenoh"}),
+        ("service list", {"zenoh"}),
+        ("service type /reset", {"zenoh"}),
+        ("node list", {"zenoh"}),
+        ("node machine", {"zenoh"}),
+        ("param get /speed", {"zenoh", "rosz.params"}),
+        ("param set /speed 4", {"zenoh", "rosz.params", "yaml"}),
+        ("msg md5 std_msgs/String", {"zenoh", "rosz.msgs", "rosz.typestore", "rosz.idl.grammar"}),
+        ("pkg find rosz_tutorials", {"zenoh", "importlib.metadata"}),
+        ("env bash", {"zenoh"}),
+        ("complete bash rostopic echo /", {"zenoh"}),
+    ],
+)
+def test_a_command_loads_what_it_needs(network: Network, line: str, needs: set[str]) -> None:
+    node = network.node("talker")
+    node.publisher("/chatter", String)
+    node.service("/reset", Empty, lambda _: Empty.Response())
+    node.params["/speed"] = 3
+    program = network.program(
+        """
+        import sys
+        from rosz.cli.main import run
+        code = run(sys.argv[1:])
+        print("\\nloaded", code, *sys.modules)
+        """,
+        *line.split(" ", 2 if line.startswith("complete") else -1),
+    )
+    _, code, *loaded = program.wait_for("loaded ").split()
+    assert code == "0", program.output
+    assert HEAVY & set(loaded) <= needs
 
 
 @pytest.mark.parametrize(
