@@ -1,0 +1,79 @@
+"""tf2_geometry_msgs: points, poses, vectors and wrenches in other frames (ROS wiki).
+
+PyKDL's types are not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rosz.msgs.geometry_msgs.msg import (
+    Point,
+    PointStamped,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Vector3,
+    Vector3Stamped,
+    Wrench,
+    WrenchStamped,
+)
+from rosz.transforms import Pose as Plain
+from rosz.transforms import compose
+from rosz.transforms.listener import pose_of
+from rosz.transforms.poses import rotate
+
+__all__ = (
+    "do_transform_point",
+    "do_transform_pose",
+    "do_transform_vector3",
+    "do_transform_wrench",
+    "transformation_of",
+)
+
+
+def do_transform_point(point: PointStamped, transform: Any) -> PointStamped:
+    """Return a point in the frame that a TransformStamped leads to."""
+    p = point.point
+    moved = compose(pose_of(transform.transform), Plain((p.x, p.y, p.z), (0.0, 0.0, 0.0, 1.0)))
+    return PointStamped(transform.header, Point(*moved.translation))
+
+
+def do_transform_pose(pose: PoseStamped, transform: Any) -> PoseStamped:
+    """Return a pose in the frame that a TransformStamped leads to."""
+    p, q = pose.pose.position, pose.pose.orientation
+    moved = compose(pose_of(transform.transform), Plain((p.x, p.y, p.z), (q.x, q.y, q.z, q.w)))
+    return PoseStamped(
+        transform.header, Pose(Point(*moved.translation), Quaternion(*moved.rotation))
+    )
+
+
+def do_transform_vector3(vector3: Vector3Stamped, transform: Any) -> Vector3Stamped:
+    """Return a vector, which only turns, in the frame that a TransformStamped leads to."""
+    return Vector3Stamped(transform.header, _turned(vector3.vector, transform))
+
+
+def do_transform_wrench(wrench: WrenchStamped, transform: Any) -> WrenchStamped:
+    """Return a wrench, which only turns, in the frame that a TransformStamped leads to."""
+    parts = wrench.wrench
+    turned = Wrench(_turned(parts.force, transform), _turned(parts.torque, transform))
+    return WrenchStamped(transform.header, turned)
+
+
+def _turned(vector: Vector3, transform: Any) -> Vector3:
+    rotation = pose_of(transform.transform).rotation
+    return Vector3(*rotate(rotation, (vector.x, vector.y, vector.z)))
+
+
+_KINDS: dict[type[Any], Callable[..., Any]] = {
+    PointStamped: do_transform_point,
+    PoseStamped: do_transform_pose,
+    Vector3Stamped: do_transform_vector3,
+    WrenchStamped: do_transform_wrench,
+}
+
+
+def transformation_of(message: Any) -> Callable[..., Any] | None:
+    """Return what brings a message into another frame; None if there is nothing."""
+    return _KINDS.get(type(message))

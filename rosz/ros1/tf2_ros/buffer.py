@@ -1,0 +1,292 @@
+"""tf2_ros's classes over `rosz.transforms`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rosz.errors import ExtrapolationNeeded as ExtrapolationException
+from rosz.errors import FrameNotFound as LookupException
+from rosz.errors import FramesNotConnected as ConnectivityException
+from rosz.errors import TransformArgument as InvalidArgumentException
+from rosz.errors import TransformError as TransformException
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from rosz.msgs.std_msgs.msg import Header
+from rosz.ros1 import tf2_geometry_msgs
+from rosz.ros1.rospy import state
+from rosz.transforms import Buffer as Frames
+from rosz.transforms import Pose
+from rosz.transforms import StaticTransformBroadcaster as _StaticBroadcaster
+from rosz.transforms import TransformBroadcaster as _Broadcaster
+from rosz.transforms import TransformListener as _Listener
+from rosz.transforms.history import History
+from rosz.transforms.listener import pose_of
+
+__all__ = (
+    "Buffer",
+    "BufferInterface",
+    "ConnectivityException",
+    "ExtrapolationException",
+    "InvalidArgumentException",
+    "LookupException",
+    "StaticTransformBroadcaster",
+    "TimeoutException",
+    "TransformBroadcaster",
+    "TransformException",
+    "TransformListener",
+    "TypeException",
+)
+
+_TEN_SECONDS = 10 * 10**9
+
+
+class TimeoutException(TransformException):
+    """A transform that did not become known in time."""
+
+
+class TypeException(TransformException):
+    """A type that nobody knows how to transform."""
+
+
+def _ns(value: Any) -> int:
+    """Return a time or duration, or seconds, as nanoseconds."""
+    return value.to_nsec() if hasattr(value, "to_nsec") else round(float(value or 0) * 1e9)
+
+
+class BufferInterface:
+    """What can be asked for transforms."""
+
+    def lookup_transform(
+        self, target_frame: str, source_frame: str, time: Any, timeout: Any = None
+    ) -> TransformStamped:
+        """Return what brings coordinates of the source frame into the target frame.
+
+        Args:
+            target_frame: The frame that coordinates are wanted in.
+            source_frame: The frame that they are in.
+            time: When; 0 for the latest.
+            timeout: How long to wait for it to be known; not at all when not given.
+
+        Raises:
+            TransformException: It is not known; the class says why.
+        """
+        raise NotImplementedError
+
+    def transform(
+        self, object_stamped: Any, target_frame: str, timeout: Any = None, new_type: Any = None
+    ) -> Any:
+        """Return a stamped point, pose, vector or wrench in another frame.
+
+        Args:
+            object_stamped: It.
+            target_frame: The frame.
+            timeout: How long to wait for the transform to be known.
+            new_type: Not taken: results are of the type that was given.
+
+        Raises:
+            TypeException: It is none of these.
+            TransformException: The transform is not known.
+        """
+        act = tf2_geometry_msgs.transformation_of(object_stamped)
+        if act is None or new_type is not None:
+            raise TypeException(
+                f"cannot transform {type(object_stamped).__name__}; expected PointStamped,"
+                " PoseStamped, Vector3Stamped or WrenchStamped of geometry_msgs"
+            )
+        header = object_stamped.header
+        found = self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout)
+        return act(object_stamped, found)
+
+
+class Buffer(BufferInterface):
+    """Transforms of the last seconds.
+
+    Args:
+        cache_time: How long transforms are kept; ten seconds when not given.
+        debug: Not used: the service ``tf2_frames`` is not there.
+    """
+
+    def __init__(self, cache_time: Any = None, debug: bool = True) -> None:  # noqa: ARG002
+        self.frames = Frames(_TEN_SECONDS if cache_time is None else _ns(cache_time))
+
+    def set_transform(self, transform: TransformStamped, authority: str) -> None:
+        """Take note of a transform."""
+        self._set(transform, authority, static=False)
+
+    def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
+        """Take note of a transform that holds for all times."""
+        self._set(transform, authority, static=True)
+
+    def _set(self, transform: TransformStamped, authority: str, *, static: bool) -> None:
+        self.frames.set(
+            transform.header.frame_id,
+            transform.child_frame_id,
+            _ns(transform.header.stamp),
+            pose_of(transform.transform),
+            static=static,
+            authority=authority,
+        )
+
+    def clear(self) -> None:
+        """Forget what is not static."""
+        self.frames.clear()
+
+    def lookup_transform(
+        self, target_frame: str, source_frame: str, time: Any, timeout: Any = None
+    ) -> TransformStamped:
+        """Return what brings coordinates of the source frame into the target frame."""
+        self.can_transform(target_frame, source_frame, time, timeout)
+        return self.lookup_transform_core(target_frame, source_frame, time)
+
+    def lookup_transform_core(
+        self, target_frame: str, source_frame: str, time: Any
+    ) -> TransformStamped:
+        """Return the same without waiting."""
+        pose, stamp = self.frames.lookup(target_frame, source_frame, _ns(time))
+        return _stamped(target_frame, source_frame, pose, stamp)
+
+    def lookup_transform_full(
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        *waiting: Any,
+    ) -> TransformStamped:
+        """Return what brings coordinates of one time into a frame at another time.
+
+        Args:
+            target_frame: The frame that coordinates are wanted in.
+            target_time: When.
+            source_frame: The frame that they are in.
+            source_time: When they were there.
+            fixed_frame: A frame that does not move meanwhile.
+            waiting: How long to wait for it to be known.
+
+        Raises:
+            TransformException: It is not known; the class says why.
+        """
+        call = target_frame, _ns(target_time), source_frame, _ns(source_time), fixed_frame
+        self._wait(lambda: not self._why_not_full(*call), *waiting)
+        pose, stamp = self.frames.lookup_full(*call)
+        return _stamped(target_frame, source_frame, pose, stamp)
+
+    def can_transform(
+        self,
+        target_frame: str,
+        source_frame: str,
+        time: Any,
+        timeout: Any = None,
+        return_debug_tuple: bool = False,
+    ) -> Any:
+        """Tell whether a transform is known.
+
+        Args:
+            target_frame: The frame that coordinates are wanted in.
+            source_frame: The frame that they are in.
+            time: When; 0 for the latest.
+            timeout: How long to wait for it.
+            return_debug_tuple: Whether to return why not, too.
+        """
+        stamp = _ns(time)
+        self._wait(lambda: not self.frames.why_not(target_frame, source_frame, stamp), timeout)
+        reason = self.frames.why_not(target_frame, source_frame, stamp)
+        return (not reason, reason) if return_debug_tuple else not reason
+
+    def can_transform_full(
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        *waiting: Any,
+    ) -> bool:
+        """Tell whether a transform between two times is known; see `lookup_transform_full`."""
+        call = target_frame, _ns(target_time), source_frame, _ns(source_time), fixed_frame
+        self._wait(lambda: not self._why_not_full(*call), *waiting)
+        return not self._why_not_full(*call)
+
+    def _why_not_full(self, *call: Any) -> str:
+        try:
+            self.frames.lookup_full(*call)
+        except TransformException as error:
+            return str(error) or "unknown"
+        return ""
+
+    def _wait(self, known: Callable[[], bool], timeout: Any = None) -> None:
+        if timeout is not None and _ns(timeout) > 0 and not known():
+            self.frames.wait(known, _ns(timeout), state.node().now)
+
+    def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
+        """Return the latest time at which a transform is known."""
+        return Time.from_nsec(self.frames.latest_common(target_frame, source_frame))
+
+    def all_frames_as_string(self) -> str:
+        """Return who is whose parent, a line each."""
+        return "".join(
+            f"Frame {name} exists with parent {one.newest.parent}.\n"
+            for name, one in self.frames.histories().items()
+        )
+
+    def all_frames_as_yaml(self) -> str:
+        """Return what is known of each frame, as YAML."""
+        return "".join(
+            f"{name}: \n  parent: '{one.newest.parent}'\n  broadcaster: '{one.authority}'\n"
+            f"  rate: {_rate(one):.3f}\n  most_recent_transform: {one.latest / 1e9:.3f}\n"
+            f"  oldest_transform: {one.oldest / 1e9:.3f}\n"
+            f"  buffer_length: {(one.latest - one.oldest) / 1e9:.3f}\n"
+            for name, one in self.frames.histories().items()
+        )
+
+
+def _rate(history: History) -> float:
+    """Return transforms per second, as tf2 counts them."""
+    return len(history) / max((history.latest - history.oldest) / 1e9, 1e-4)
+
+
+def _stamped(target: str, source: str, pose: Pose, stamp: int) -> TransformStamped:
+    header = Header(stamp=Time.from_nsec(stamp), frame_id=target)
+    transform = Transform(Vector3(*pose.translation), Quaternion(*pose.rotation))
+    return TransformStamped(header, source, transform)
+
+
+class TransformListener:
+    """Puts what others tell into a buffer.
+
+    Args:
+        buffer: Where to put it.
+        queue_size: Not used, as rospy's other options.
+    """
+
+    def __init__(self, buffer: Buffer, queue_size: int | None = None, **_options: Any) -> None:  # noqa: ARG002
+        self.buffer = buffer
+        self._listener = _Listener(buffer.frames, state.node())
+
+    def unregister(self) -> None:
+        """Listen no more."""
+        self._listener.close()
+
+
+class TransformBroadcaster:
+    """Tells of frames that move."""
+
+    def __init__(self) -> None:
+        self._broadcaster = _Broadcaster(state.node())
+
+    def sendTransform(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
+        """Tell of a TransformStamped, or of several."""
+        self._broadcaster.send(transform)
+
+
+class StaticTransformBroadcaster:
+    """Tells of frames that do not move, whoever comes later, too."""
+
+    def __init__(self) -> None:
+        self._broadcaster = _StaticBroadcaster(state.node())
+
+    def sendTransform(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
+        """Tell of a TransformStamped, or of several."""
+        self._broadcaster.send(transform)

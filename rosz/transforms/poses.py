@@ -1,0 +1,89 @@
+"""Arithmetic of translations and rotations, in plain numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+__all__ = ("IDENTITY", "Pose", "Quaternion", "Vector", "compose", "interpolate", "invert", "rotate")
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+"""``x, y, z, w``."""
+
+_NEARLY_ONE = 1.0 - 1e-9
+
+
+class Pose(NamedTuple):
+    """A translation in metres, and the rotation before it."""
+
+    translation: Vector
+    rotation: Quaternion
+
+
+IDENTITY = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+
+
+def _multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def rotate(rotation: Quaternion, vector: Vector) -> Vector:
+    """Return a vector, turned."""
+    x, y, z, w = rotation
+    vx, vy, vz = vector
+    # With t = 2 q x v it is v + w t + q x t: half the products of two quaternions.
+    tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
+
+
+def compose(outer: Pose, inner: Pose) -> Pose:
+    """Return the pose that does the inner one first, then the outer one."""
+    ox, oy, oz = outer.translation
+    ix, iy, iz = rotate(outer.rotation, inner.translation)
+    return Pose((ox + ix, oy + iy, oz + iz), _multiply(outer.rotation, inner.rotation))
+
+
+def invert(pose: Pose) -> Pose:
+    """Return the pose that undoes one."""
+    x, y, z, w = pose.rotation
+    back = (-x, -y, -z, w)
+    tx, ty, tz = rotate(back, pose.translation)
+    return Pose((-tx, -ty, -tz), back)
+
+
+def interpolate(before: Pose, after: Pose, fraction: float) -> Pose:
+    """Return a pose on the way from one to another, by the shorter turn.
+
+    Args:
+        before: The pose at fraction 0.
+        after: The pose at fraction 1.
+        fraction: How far along the way.
+    """
+    (ax, ay, az), (bx, by, bz) = before.translation, after.translation
+    middle = (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)
+    return Pose(middle, _slerp(before.rotation, after.rotation, fraction))
+
+
+def _slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
+    cosine = sum(p * q for p, q in zip(a, b, strict=True))
+    sign = 1.0 if cosine >= 0.0 else -1.0
+    cosine = abs(cosine)
+    if cosine > _NEARLY_ONE:
+        return a
+    angle = math.acos(cosine)
+    early = math.sin((1.0 - fraction) * angle) / math.sin(angle)
+    late = sign * math.sin(fraction * angle) / math.sin(angle)
+    x, y, z, w = (early * p + late * q for p, q in zip(a, b, strict=True))
+    return x, y, z, w

@@ -1,0 +1,80 @@
+"""tf and tf2_ros in programs of their own."""
+
+from __future__ import annotations
+
+from network import Network
+
+ROBOT = """
+    import rosz.ros1
+    import rospy, tf, tf2_ros
+    from geometry_msgs.msg import TransformStamped
+    rospy.init_node("robot")
+    static = tf2_ros.StaticTransformBroadcaster()
+    fixed = TransformStamped()
+    fixed.header.frame_id, fixed.child_frame_id = "base", "laser"
+    fixed.transform.translation.z = 0.5
+    fixed.transform.rotation.w = 1.0
+    static.sendTransform(fixed)
+    broadcaster = tf.TransformBroadcaster()
+    turn = tf.transformations.quaternion_from_euler(0, 0, 1.5707963267948966)
+    while not rospy.is_shutdown():
+        broadcaster.sendTransform((1, 2, 0), turn, rospy.Time.now(), "base", "map")
+        rospy.sleep(0.02)
+"""
+
+
+def test_tf_and_tf2(network: Network) -> None:
+    network.program(ROBOT)
+    viewer = network.program(
+        """
+        import rosz.ros1
+        import rospy, tf, tf2_ros, tf2_geometry_msgs
+        from geometry_msgs.msg import PointStamped, PoseStamped
+        rospy.init_node("viewer")
+        listener = tf.TransformListener()
+        listener.waitForTransform("/map", "/laser", rospy.Time(0), rospy.Duration(15))
+        position, rotation = listener.lookupTransform("/map", "/laser", rospy.Time(0))
+        print([round(x, 3) for x in position], [round(x, 3) for x in rotation])
+        point = PointStamped()
+        point.header.frame_id, point.point.x = "laser", 1.0
+        moved = listener.transformPoint("map", point)
+        print(moved.header.frame_id, round(moved.point.x, 3), round(moved.point.y, 3))
+        pose = PoseStamped()
+        pose.header.frame_id, pose.pose.orientation.w = "laser", 1.0
+        print(round(listener.transformPose("map", pose).pose.position.y, 3))
+        print(listener.frameExists("/laser"), listener.getFrameStrings())
+        try:
+            listener.lookupTransform("/map", "/nothing", rospy.Time(0))
+        except (tf.LookupException, tf.ConnectivityException, tf.ExtrapolationException) as error:
+            print(error)
+        try:
+            listener.waitForTransform("map", "nothing", rospy.Time(0), rospy.Duration(0.1))
+        except tf.Exception as error:
+            print(error)
+        buffer = tf2_ros.Buffer()
+        tf2_ros.TransformListener(buffer)
+        found = buffer.lookup_transform("map", "laser", rospy.Time(0), rospy.Duration(15))
+        print(found.header.frame_id, found.child_frame_id, found.transform.translation.z)
+        print(round(buffer.transform(point, "map").point.y, 3))
+        later = rospy.Time.now() + rospy.Duration(0.2)
+        print(buffer.can_transform("map", "base", later, rospy.Duration(15)))
+        try:
+            buffer.transform(3, "map")
+        except tf2_ros.TypeException as error:
+            print(error)
+        """
+    )
+    assert viewer.exit_code() == 0, viewer.output
+    assert viewer.lines == [
+        "[1.0, 2.0, 0.5] [0.0, 0.0, 0.707, 0.707]",
+        "map 1.0 3.0",
+        "2.0",
+        "True ['base', 'laser', 'map']",
+        '"nothing" passed to lookupTransform argument source_frame does not exist. ',
+        "canTransform: source_frame nothing does not exist.",
+        "map laser 0.5",
+        "3.0",
+        "True",
+        "cannot transform int; expected PointStamped, PoseStamped, Vector3Stamped or WrenchStamped"
+        " of geometry_msgs",
+    ]

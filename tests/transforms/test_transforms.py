@@ -1,0 +1,246 @@
+"""Trees of frames, against real tf2, and over a network."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from network import Network, eventually
+from ros1_oracle import same
+
+from rosz.errors import (
+    ExtrapolationNeeded,
+    FrameNotFound,
+    FramesNotConnected,
+    TransformArgument,
+    TransformError,
+)
+from rosz.msgs.geometry_msgs.msg import TransformStamped
+from rosz.msgs.rosgraph_msgs.msg import Clock
+from rosz.qos import CLOCK
+from rosz.transforms import (
+    IDENTITY,
+    Buffer,
+    Pose,
+    StaticTransformBroadcaster,
+    TransformBroadcaster,
+    TransformListener,
+    compose,
+    invert,
+)
+
+S = 10**9
+_REAL = "tf2_ros", "python3-tf2-ros"
+
+_SETUP = """
+import tf2_ros
+from genpy import Duration, Time
+from geometry_msgs.msg import TransformStamped
+buffer = tf2_ros.Buffer(Duration(10), debug=False)
+def tell(parent, child, seconds, numbers, static=False):
+    made = TransformStamped()
+    made.header.frame_id, made.child_frame_id = parent, child
+    made.header.stamp = Time.from_sec(seconds)
+    t, r = made.transform.translation, made.transform.rotation
+    t.x, t.y, t.z, r.x, r.y, r.z, r.w = numbers
+    (buffer.set_transform_static if static else buffer.set_transform)(made, "me")
+def ask(target, source, seconds):
+    try:
+        found = buffer.lookup_transform_core(target, source, Time.from_sec(seconds))
+    except Exception as error:
+        name = type(error).__name__
+        return [{"FrameNotFound": "LookupException",
+                 "FramesNotConnected": "ConnectivityException",
+                 "ExtrapolationNeeded": "ExtrapolationException",
+                 "TransformArgument": "InvalidArgumentException"}.get(name, name), str(error)]
+    t, r = found.transform.translation, found.transform.rotation
+    return [found.header.stamp.to_sec(), found.header.frame_id, found.child_frame_id] + [
+        round(x, 6) + 0.0 for x in (t.x, t.y, t.z, r.x, r.y, r.z, r.w)]
+"""
+
+
+def numbers(chance: random.Random) -> list[float]:
+    rotation = [chance.gauss(0, 1) for _ in range(4)]
+    length = sum(part * part for part in rotation) ** 0.5
+    return [chance.uniform(-5, 5) for _ in range(3)] + [part / length for part in rotation]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_trees(seed: int) -> None:
+    chance = random.Random(seed)
+    lines: list[str] = []
+    frames = ["f0", "other"]
+    for number in range(1, 8):
+        parent = chance.choice(frames[:1] + frames[2:]) if number < 7 else "other"
+        child = f"f{number}"
+        frames.append(child)
+        if chance.random() < 0.3:
+            lines.append(f"tell({parent!r}, {child!r}, 0, {numbers(chance)}, static=True)")
+            continue
+        times = sorted(round(chance.uniform(1, 6), 2) for _ in range(chance.randint(1, 4)))
+        chance.shuffle(times)
+        lines += [f"tell({parent!r}, {child!r}, {time}, {numbers(chance)})" for time in times]
+    questions = [
+        (chance.choice(frames), chance.choice(frames), chance.choice([0, 0, 2.5, 3.5, 9.0]))
+        for _ in range(60)
+    ]
+    same(
+        _SETUP + "\n".join(lines) + f"\nresult = [ask(*one) for one in {questions}]\n",
+        *_REAL,
+    )
+
+
+def test_answers_of_tf2_word_by_word() -> None:
+    same(
+        _SETUP
+        + """
+q = [0, 0, 0, 1]
+tell("map", "odom", 1, [1, 0, 0] + q); tell("map", "odom", 2, [2, 0, 0] + q)
+tell("odom", "base", 1.5, [3, 0, 0] + q); tell("x", "y", 1, [0, 0, 0] + q)
+tell("/m", "/n", 1, [0, 0, 0] + q); tell("base", "tool", 0, [1, 2, 3] + q, static=True)
+result = [ask(target, source, seconds) for target, source, seconds in [
+    ("map", "base", 0), ("map", "base", 1.5), ("map", "base", 3), ("map", "base", 0.5),
+    ("map", "y", 0), ("map", "nope", 0), ("nope", "map", 0), ("map", "odom", 5),
+    ("map", "odom", 0.5),
+    ("odom", "map", 1.25), ("base", "map", 1.5), ("base", "base", 0), ("map", "map", 0),
+    ("m", "n", 0), ("/m", "n", 0), ("map", "tool", 0), ("base", "tool", 7), ("base", "tool", 0),
+    ("tool", "y", 0), ("", "map", 0),
+]] + [
+    buffer.all_frames_as_yaml(), buffer.all_frames_as_string(),
+    list(buffer.can_transform("map", "nope", Time(0), return_debug_tuple=True)),
+    list(buffer.can_transform("nope", "map", Time(0), return_debug_tuple=True)),
+    bool(buffer.can_transform("map", "base", Time(0))),
+    buffer.get_latest_common_time("map", "base").to_sec(),
+    ask("map", "base", 1.5) == ask("map", "base", 0),
+]
+""".replace("all_frames_as_yaml()", "all_frames_as_yaml().strip()"),
+        *_REAL,
+    )
+
+
+def test_fixed_frames() -> None:
+    same(
+        _SETUP
+        + """
+for seconds in (1, 2, 3):
+    tell("map", "a", seconds, [seconds, 0, 0, 0, 0, 0, 1])
+    tell("map", "b", seconds, [0, seconds, 0, 0, 0, 0.6, 0.8])
+found = buffer.lookup_transform_full("a", Time(3), "b", Time.from_sec(1.5), "map")
+result = [found.header.stamp.to_sec(), found.header.frame_id, found.child_frame_id,
+          [round(getattr(found.transform.translation, axis), 6) for axis in "xyz"]]
+""",
+        *_REAL,
+    )
+
+
+def test_old_transforms_are_forgotten() -> None:
+    buffer = Buffer(length_ns=2 * S)
+    assert buffer.set("map", "base", 10 * S, IDENTITY)
+    assert not buffer.set("map", "base", 10 * S, IDENTITY)
+    assert not buffer.set("map", "base", 7 * S, IDENTITY)
+    assert buffer.set("map", "base", 9 * S, IDENTITY)
+    assert buffer.set("map", "base", 12 * S, IDENTITY)
+    with pytest.raises(ExtrapolationNeeded):
+        buffer.lookup("map", "base", 9 * S)
+    buffer.set("base", "arm", 0, IDENTITY, static=True)
+    buffer.clear()
+    assert buffer.frames() == ["arm", "base"]
+
+
+def test_a_frame_may_get_another_parent() -> None:
+    buffer = Buffer()
+    buffer.set("shelf", "cup", 1 * S, Pose((1.0, 0.0, 0.0), IDENTITY.rotation))
+    buffer.set("hand", "cup", 2 * S, Pose((2.0, 0.0, 0.0), IDENTITY.rotation))
+    assert buffer.lookup("shelf", "cup", S)[0].translation[0] == 1.0
+    assert buffer.lookup("hand", "cup", 2 * S)[0].translation[0] == 2.0
+    assert buffer.lookup("shelf", "cup", 3 * S // 2)[0].translation[0] == 1.0
+    with pytest.raises(FramesNotConnected):
+        buffer.lookup("shelf", "cup")
+
+
+def test_rings_are_told() -> None:
+    buffer = Buffer()
+    for parent, child in (("a", "b"), ("b", "c"), ("c", "a"), ("d", "e")):
+        buffer.set(parent, child, S, IDENTITY)
+    with pytest.raises(TransformError, match="loop"):
+        buffer.lookup("e", "a", S)
+    with pytest.raises(TransformError, match="loop"):
+        buffer.lookup("e", "a")
+
+
+@pytest.mark.parametrize(
+    ("parent", "child", "pose", "text"),
+    [
+        ("", "b", IDENTITY, "no frame_id"),
+        ("a", "", IDENTITY, "without a child_frame_id"),
+        ("a", "/a", IDENTITY, "to itself"),
+        ("a", "b", Pose((float("nan"), 0.0, 0.0), IDENTITY.rotation), "a number that is none"),
+        ("a", "b", Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "of length 0; expected 1"),
+    ],
+)
+def test_what_is_no_transform(parent: str, child: str, pose: Pose, text: str) -> None:
+    with pytest.raises(TransformArgument, match=text):
+        Buffer().set(parent, child, 0, pose)
+
+
+def test_undoing() -> None:
+    chance = random.Random(3)
+    for _ in range(50):
+        x, y, z, *rotation = numbers(chance)
+        a, b, c, d = rotation
+        pose = Pose((x, y, z), (a, b, c, d))
+        back = compose(invert(pose), pose)
+        assert back.translation == pytest.approx((0, 0, 0), abs=1e-9)
+        assert back.rotation == pytest.approx((0, 0, 0, 1), abs=1e-9)
+
+
+def transform(parent: str, child: str, x: float, seconds: int = 1) -> TransformStamped:
+    made = TransformStamped(child_frame_id=child)
+    made.header.frame_id = parent
+    made.header.stamp.sec = seconds
+    made.transform.translation.x = x
+    made.transform.rotation.w = 1.0
+    return made
+
+
+def test_over_the_network(network: Network) -> None:
+    robot, viewer = network.node("robot"), network.node("viewer")
+    static = StaticTransformBroadcaster(robot)
+    static.send(transform("base", "laser", 0.5))
+    static.send([transform("base", "arm", 0.25)])
+    buffer = Buffer()
+    with pytest.raises(FrameNotFound):
+        buffer.lookup("map", "laser")
+    listener = TransformListener(buffer, viewer)
+    moving = TransformBroadcaster(robot)
+    moving._publisher.wait_for_subscribers()
+    moving.send(transform("map", "base", 2.0))
+    assert buffer.wait(lambda: not buffer.why_not("map", "laser"), 15 * S, viewer.now)
+    assert buffer.wait(lambda: buffer.has("arm"), 15 * S, viewer.now)
+    pose, stamp = buffer.lookup("map", "laser")
+    assert (pose.translation[0], stamp) == (2.5, S)
+    assert not buffer.wait(lambda: False, S // 100, viewer.now)
+    listener.close()
+
+
+def test_time_that_moves_back_clears(network: Network) -> None:
+    robot = network.node("robot")
+    robot.params.set("/use_sim_time", True)
+    clock = robot.publisher("/clock", Clock, qos=CLOCK)
+    viewer = network.node("viewer")
+    buffer = Buffer()
+    TransformListener(buffer, viewer)
+    clock.wait_for_subscribers()
+
+    def set_clock(seconds: int) -> None:
+        message = Clock()
+        message.clock.sec = seconds
+        clock.publish(message)
+        eventually(lambda: viewer.now() == seconds * S, "the time")
+
+    set_clock(10)
+    buffer.set("map", "base", S, IDENTITY)
+    set_clock(11)
+    assert buffer.has("base")
+    set_clock(5)
+    eventually(lambda: not buffer.has("base"), "the empty buffer")
