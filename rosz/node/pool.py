@@ -1,42 +1,60 @@
-"""Threads for what takes its time: service calls, connection callbacks."""
+"""Threads for work that takes its time: service calls, connection callbacks."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import Generic, TypeVar
 
-__all__ = ("Pool",)
-
-_IDLE_SECONDS = 5.0
-_SPARE = 2
-"""Threads that stay however idle: one to set out, and one to wait meanwhile."""
+__all__ = ("Jobs", "Pool")
 
 J = TypeVar("J")
 
 
-class Pool(Generic[J]):
-    """A queue, and at most ``size`` daemon threads that work on what is put there, in order.
-
-    Who sets out with a job sees to it that somebody else waits for the next. So who puts jobs need
-    not know of threads, and ``put`` runs no Python: it is fit for Zenoh's threads.
-
-    Args:
-        size: Most threads at one time.
-        name: Of the threads, for stack dumps.
-        work: Called with each job; must not raise.
+class Jobs(Generic[J]):
+    """A queue of jobs for a pool.
 
     Attributes:
         put: Takes a job.
     """
 
-    def __init__(self, size: int, name: str, work: Callable[[J], object]) -> None:
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[J | None] = SimpleQueue()
+        self.put: Callable[[J], None] = self._queue.put
+
+    def take(self) -> J | None:
+        """Wait for a job and return it; ``None`` at the end, however often it is asked for."""
+        job = self._queue.get()
+        if job is None:
+            self._queue.put(None)
+        return job
+
+    def close(self) -> None:
+        """Have it end after what was put until now; again is no error."""
+        self._queue.put(None)
+
+
+class Pool(Generic[J]):
+    """At most ``size`` daemon threads that take jobs from somewhere, and work on them in order.
+
+    Who sets out with a job sees to it that somebody else waits for the next. So who brings jobs
+    need not know of threads. Threads are started as they are needed, and stay until the end.
+
+    Args:
+        size: Most threads at one time.
+        name: Of the threads, for stack dumps.
+        take: Waits for a job and returns it; ``None`` at the end, to every thread that asks.
+        work: Called with each job; must not raise.
+    """
+
+    def __init__(
+        self, size: int, name: str, take: Callable[[], J | None], work: Callable[[J], object]
+    ) -> None:
         self._size = size
         self._name = name
+        self._take = take
         self._work = work
-        self._jobs: SimpleQueue[J | None] = SimpleQueue()
-        self.put: Callable[[J], None] = self._jobs.put
         self._lock = threading.Lock()
         self._threads = 1
         self._idle = 1
@@ -46,16 +64,7 @@ class Pool(Generic[J]):
         threading.Thread(target=self._run, name=self._name, daemon=True).start()
 
     def _run(self) -> None:
-        while True:
-            try:
-                job = self._jobs.get(timeout=_IDLE_SECONDS)
-            except Empty:
-                if self._is_one_too_many():
-                    return
-                continue
-            if job is None:
-                self._jobs.put(None)
-                return
+        while (job := self._take()) is not None:
             self._set_out()
             try:
                 self._work(job)
@@ -72,15 +81,3 @@ class Pool(Generic[J]):
             self._threads += 1
             self._idle += 1
         self._start()
-
-    def _is_one_too_many(self) -> bool:
-        with self._lock:
-            if self._idle <= _SPARE:
-                return False
-            self._idle -= 1
-            self._threads -= 1
-            return True
-
-    def close(self) -> None:
-        """Have the threads end when all that was put until now is done; again is no error."""
-        self._jobs.put(None)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from rosz.errors import ClosedError, EncodeError
 from rosz.node.endpoint import Endpoint, Withdrawal
 from rosz.node.inbox import address
-from rosz.node.pool import Pool
+from rosz.node.pool import Jobs, Pool
 from rosz.qos import QoS
 from rosz.wire import Kind, Token, pack
 
@@ -204,13 +204,14 @@ class Publisher(Endpoint, Generic[M]):
                 if not (self.closed and isinstance(error, ClosedError)):
                     self.node.log.report(f"connection callback of '{self.name}' failed", error)
 
-        pool = Pool(1, f"rosz-links{self.name}", tell)
+        changes: Jobs[tuple[Token, bool]] = Jobs()
+        Pool(1, f"rosz-links{self.name}", changes.take, tell)
 
         def changed(token: Token, alive: bool) -> None:
             if self.matches(token):
-                pool.put((token, alive))
+                changes.put((token, alive))
 
-        self._declared.append(Withdrawal(pool.close))
+        self._declared.append(Withdrawal(changes.close))
         self._declared.append(self.node.listen(changed))
 
     def disown(self, reason: str) -> None:

@@ -1,6 +1,6 @@
 """The services that every node of ROS 2 has: its parameters, and how its types are defined.
 
-They share a queryable and a few threads: one declaration instead of seven, and no thread each.
+Those of one package share a queryable and its threads.
 """
 
 from __future__ import annotations
@@ -69,7 +69,6 @@ class Bundle:
         self.node = node
         self.parts: dict[str, _Part] = {}
         self._parameters = Ros2Parameters(node)
-        self._pool = Pool(_THREADS, f"rosz-ros2{node.name}", self._serve)
         self._open: list[Any] = []
         try:
             self._declare()
@@ -83,7 +82,9 @@ class Bundle:
         services = self._services()
         for package in sorted({kind._type_name.partition("/")[0] for kind, _ in services.values()}):
             key = _ANY_HERE.format(domain=domain, node=node.name, package=package)
-            self._open.append(session.questions(key, self._pool.put, complete=True))
+            questions = session.questions(key, complete=True)
+            self._open.append(questions)
+            Pool(_THREADS, f"rosz-ros2{node.name}", questions.take, self._serve)
         for name, (kind, handler) in services.items():
             self._open.append(_Part(self, f"{node.name}/{name}", kind, handler))
 
@@ -124,16 +125,14 @@ class Bundle:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _serve(self, raw: Any) -> None:
-        query = Query(raw)
+    def _serve(self, query: Query) -> None:
         part = self.parts.get(query.key)
         if part is None:
             query.close()
         else:
-            part.serve(raw)
+            part.serve(query)
 
     def close(self) -> None:
         """Undeclare them; again is no error."""
         while self._open:
             self._open.pop().close()
-        self._pool.close()

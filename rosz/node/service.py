@@ -49,26 +49,18 @@ class Service(Endpoint):
         )
         self.service_type = service_type
         self._handler = handler
-        self._pool: Pool[Any] | None = None
         self._open(threads)
         self.announce()
 
     def _open(self, threads: int) -> None:
         """Take questions in from now on."""
-        self._pool = pool = Pool(threads, f"rosz-srv{self.name}", self.serve)
-        self._declared.append(
-            self.node.context.session.questions(self.key, pool.put, complete=True)
-        )
+        questions = self.node.context.session.questions(self.key, complete=True)
+        self._declared.append(questions)
+        Pool(threads, f"rosz-srv{self.name}", questions.take, self.serve)
 
-    def close(self) -> None:
-        """Undeclare it, its token first; from any thread, again is no error."""
-        super().close()
-        if self._pool is not None:
-            self._pool.close()
-
-    def serve(self, raw: Any) -> None:
-        """Answer a question as Zenoh has it."""
-        with Query(raw) as query:
+    def serve(self, query: Query) -> None:
+        """Answer a question, and close it."""
+        with query:
             if self.closed:
                 return
             try:

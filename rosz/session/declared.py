@@ -10,12 +10,13 @@ from typing import Any, Protocol
 import zenoh
 
 from rosz.errors import ClosedError, TransportError
-from rosz.session.samples import Sample
+from rosz.session.samples import Query, Sample
 
 __all__ = (
     "Closable",
     "Declared",
     "Pumped",
+    "Questions",
     "RawPublisher",
     "Ring",
     "channel",
@@ -123,6 +124,25 @@ class Ring(Declared):
             return Sample(self._recv())
         except zenoh.ZError as error:
             raise ClosedError(f"the subscriber of '{self._key}' is closed") from error
+
+
+class Questions(Declared):
+    """A queryable whose questions wait until they are taken."""
+
+    def __init__(self, key: str, entity: Any) -> None:
+        super().__init__(f"queryable '{key}'", entity)
+        self._recv = entity.handler.recv
+
+    def take(self) -> Query | None:
+        """Return the oldest question, waiting for one; any number of threads may.
+
+        Returns:
+            The question, which whoever takes it closes; ``None`` when this is closed.
+        """
+        try:
+            return Query(self._recv())
+        except zenoh.ZError:
+            return None
 
 
 class RawPublisher(Declared):

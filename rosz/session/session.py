@@ -24,6 +24,7 @@ from rosz.session.declared import (
     Closable,
     Declared,
     Pumped,
+    Questions,
     RawPublisher,
     Ring,
     channel,
@@ -33,6 +34,7 @@ from rosz.session.declared import (
 from rosz.session.ending import ClosedSession, still_open
 from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
+from rosz.session.presence import Presence
 from rosz.session.probe import first_answered
 from rosz.session.refusals import refusals, tell_refusals
 from rosz.session.samples import Query, Reply, Sample, to_timestamp
@@ -109,6 +111,7 @@ class Session:
         self.secured = secured
         self._raw: Any = raw
         self._closing = threading.Lock()
+        self._presence: Presence | None = None
         self.zid = str(raw.zid())
         self.clock = HybridClock(self.zid)
 
@@ -139,7 +142,9 @@ class Session:
         try:
             with mapped(f"open a session ({where})"), _one_receiver():
                 if config.mode == "peer" and config.hold_rendezvous:
-                    return cls(open_at(settings, config.rendezvous), secured=secured)
+                    session = cls(open_at(settings, config.rendezvous), secured=secured)
+                    session._presence = Presence(config.rendezvous, session.zid)
+                    return session
                 return cls(zenoh.open(settings), secured=secured)
         except TransportError as error:
             if _NOBODY not in str(error):
@@ -316,19 +321,19 @@ class Session:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        return self.questions(key, lambda raw: callback(Query(raw)), complete=complete)
+        with mapped(f"serve '{key}'"):
+            entity = self._raw.declare_queryable(
+                key, direct(lambda raw: callback(Query(raw))), complete=complete
+            )
+        return Declared(f"queryable '{key}'", entity)
 
-    def questions(
-        self, key: str, put: Callable[[Any], object], *, complete: bool = False
-    ) -> Closable:
-        """Declare that questions on a key are answered here, and have them put into a queue.
+    def questions(self, key: str, *, complete: bool = False) -> Questions:
+        """Declare that questions on a key are answered here, by threads that take them.
 
-        The fastest way to a thread of one's own: when ``put`` is the method of a `SimpleQueue`, no
-        Python runs on Zenoh's thread.
+        The fastest way to threads of one's own: what arrives does not wait for Python.
 
         Args:
             key: Key expression.
-            put: Gets each query as Zenoh has it; who takes it out makes a `Query` of it.
             complete: Whether the answers here are all there are; ROS 2 clients ask only such.
 
         Raises:
@@ -336,8 +341,7 @@ class Session:
             TransportError: The key is malformed.
         """
         with mapped(f"serve '{key}'"):
-            entity = self._raw.declare_queryable(key, direct(put), complete=complete)
-        return Declared(f"queryable '{key}'", entity)
+            return Questions(key, self._raw.declare_queryable(key, channel(), complete=complete))
 
     def ask(
         self,
@@ -487,6 +491,8 @@ class Session:
         # Zenoh's threads are not here to answer: even to free the session would wait for ever.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._raw))
         self._closing = threading.Lock()
+        if self._presence is not None:
+            self._presence.close()
         self._raw = ClosedSession(why)
 
     def close(self) -> None:
@@ -495,6 +501,8 @@ class Session:
             if self.closed:
                 return
             raw, self._raw = self._raw, ClosedSession("the session is closed")
+            if self._presence is not None:
+                self._presence.close()
             raw.close()
             sweep()
 
