@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rosz import names
 from rosz.node import Node
+from rosz.node.rosout import RosoutSink
 from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.core import signal_shutdown, wait_for_shutdown
 from rosz.ros1.rospy.exceptions import ROSException, ROSInitException
@@ -112,13 +113,15 @@ def init_node(  # noqa: PLR0917  # rospy's signature
             return
         if argv is not None:
             set_arguments(command)
-        _begin(name, anonymous=anonymous, log_level=log_level, signals=not disable_signals)
+        node = _begin(name, anonymous=anonymous, log_level=log_level, signals=not disable_signals)
         state.init_call = call
-    del disable_rosout
+    if disable_rosout:
+        for sink in node.log.handlers[:]:
+            if isinstance(sink, RosoutSink):
+                node.log.removeHandler(sink)
 
 
-def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) -> None:
-
+def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) -> Node:
     if not names.is_valid(name) or names.is_private(name):
         warnings.warn(
             f"'{name}' is not a legal ROS base name. This may cause problems with other ROS tools.",
@@ -137,6 +140,7 @@ def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) 
     waiting, state.waiting = state.waiting, []
     for act in waiting:
         act(node)
+    return node
 
 
 def _ended(reason: str) -> None:

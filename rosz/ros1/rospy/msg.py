@@ -8,8 +8,11 @@ from typing import Any, ClassVar, Self
 from rosz.errors import EncodeError
 from rosz.message.base import Writable
 from rosz.ros1.rospy.absent import attribute
+from rosz.time import DurationValue, TimeValue
 
 __all__ = ("AnyMsg", "args_kwds_to_message", "encode", "in_words_of_genpy")
+
+_STAMPS = (TimeValue, DurationValue)
 
 
 class AnyMsg:
@@ -60,15 +63,14 @@ def args_kwds_to_message(
         raise TypeError("publish() can be called with arguments or keywords, but not both.")
     if kwds:
         return _by_name(data_class, kwds)
-    if len(args) == 1 and hasattr(args[0], "_md5sum"):
+    if len(args) == 1 and hasattr(args[0], "_md5sum") and not isinstance(args[0], _STAMPS):
         given = args[0]
         if given._md5sum in {data_class._md5sum, AnyMsg._md5sum} or data_class is AnyMsg:
             return given
         single = data_class._slot_types
         if len(single) == 1 and single[0] == given._type:
             return data_class(given)
-        expected = single[0] if len(single) == 1 else data_class._type
-        raise TypeError(f"expected [{expected}] but got [{given._type}]")
+        raise TypeError(f"expected [{(*single, data_class._type)[0]}] but got [{given._type}]")
     slots = list(data_class.__slots__)
     if not args:
         return data_class()

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any
 
+from rosz.graph import View
 from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.params import (
     delete_param,
@@ -43,7 +44,7 @@ class MasterProxy:
 
     def getSystemState(self) -> list[Any]:  # noqa: N802
         """Return publishers, subscribers and services, each by name with the nodes."""
-        view = context().graph.view()
+        view = _view()
         topics, services = view.topics(), view.services()
         published = [[n, _nodes(view.publishers(n))] for n in topics if view.publishers(n)]
         heard = [[n, _nodes(view.subscriptions(n))] for n in topics if view.subscriptions(n)]
@@ -52,13 +53,13 @@ class MasterProxy:
 
     def getTopicTypes(self) -> list[Any]:  # noqa: N802
         """Return all topics with their types."""
-        topics = context().graph.view().topics()
+        topics = _view().topics()
         return [1, "current system state", [[n, _ros1(types[0])] for n, types in topics.items()]]
 
     def getPublishedTopics(self, subgraph: str = "/") -> list[Any]:  # noqa: N802
         """Return the topics that somebody publishes on, with their types."""
         found: defaultdict[str, list[str]] = defaultdict(list)
-        view = context().graph.view()
+        view = _view()
         below = subgraph.rstrip("/") + "/"
         for name in view.topics():
             for publisher in view.publishers(name):
@@ -68,15 +69,15 @@ class MasterProxy:
 
     def lookupNode(self, node_name: str) -> list[Any]:  # noqa: N802
         """Return what identifies the process of a node."""
-        for process in context().graph.view().processes(node_name):
+        for process in _view().processes(node_name):
             return [1, "node api", f"rosz://{process.host}:{process.pid}/"]
-        if node_name in context().graph.view().nodes():
+        if node_name in _view().nodes():
             return [1, "node api", ""]
         return [-1, f"unknown node [{node_name}]", ""]
 
     def lookupService(self, service: str) -> list[Any]:  # noqa: N802
         """Return what identifies a server of a service."""
-        servers = context().graph.view().servers(service)
+        servers = _view().servers(service)
         if not servers:
             return [-1, "no provider", ""]
         return [1, "rosrpc URI", f"rosz://{servers[0].node_name}{service}"]
@@ -138,6 +139,11 @@ class MasterProxy:
             f"there is no master here, and nothing stands in for its '{name}'; what"
             f" it would tell is in {', '.join(sorted(n for n in vars(MasterProxy) if n[0] != '_'))}"
         )
+
+
+def _view() -> View:
+    """Return the graph as it is at this moment, this node's newest parts included."""
+    return context().graph.refresh()
 
 
 def _nodes(tokens: list[Token]) -> list[str]:

@@ -10,7 +10,7 @@ from rosz.node import Node, SubscriberLink
 from rosz.node import Publisher as NodePublisher
 from rosz.qos import QoS
 from rosz.ros1.rospy.exceptions import ROSException, ROSSerializationException
-from rosz.ros1.rospy.msg import in_words_of_genpy
+from rosz.ros1.rospy.msg import AnyMsg, in_words_of_genpy
 from rosz.ros1.rospy.state import is_shutdown, state, when_ready
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Source:
     def open(self, node: Node) -> None:
         """Begin to publish, now that there is a node."""
         with self._lock:
-            if self.closed:
+            if self.closed or self.data_class is AnyMsg:
                 return
             before = self._publisher
             depth = self._queue_size
@@ -137,6 +137,9 @@ class Source:
             ROSException: There is no node yet, or the topic is closed.
             ROSSerializationException: A field has a value that does not fit.
         """
+        if self.data_class is AnyMsg:
+            self._pass_on(message)
+            return
         publisher = self._publisher
         if publisher is None:
             if is_shutdown():
@@ -158,6 +161,25 @@ class Source:
             # A program that asks whether it is shut down, and then publishes, may be too late.
             if not is_shutdown():
                 raise ROSException("publish() to a closed topic") from error
+
+    def _pass_on(self, message: AnyMsg) -> None:
+        """Send bytes as they came, on a topic of the type that the first ones had."""
+        node = state.node
+        if node is None or is_shutdown():
+            return
+        with self._lock:
+            if self._publisher is None:
+                origin = message._connection_header  # noqa: SLF001  # rospy's name for it
+                if "type" not in origin:
+                    raise ROSException(
+                        f"cannot publish on '{self.name}': its type is not known before a message"
+                        " that a subscriber with rospy.AnyMsg received is published"
+                    )
+                package, _, name = origin["type"].partition("/")
+                kind: Any = node.context.types.message(f"{package}/msg/{name}")
+                qos = QoS(depth=1, durability="transient_local") if self.is_latch else QoS()
+                self._publisher = node.keep(NodePublisher(node, self.name, kind, qos))
+        self._publisher.publish_raw(message._buff)  # noqa: SLF001
 
     def _refuse(self, publisher: NodePublisher[Any], error: EncodeError) -> None:
         """Raise over a message that cannot be sent; only tell, as in rospy, if nobody listens."""

@@ -27,9 +27,7 @@ def start(network: Network, script: str, *argv: str, **variables: str) -> Progra
     return network.run("-m", "rosz.ros1", str(path), *argv, **variables)
 
 
-def run(
-    network: Network, script: str, *argv: str, code: int = 0, **variables: str
-) -> list[str]:
+def run(network: Network, script: str, *argv: str, code: int = 0, **variables: str) -> list[str]:
     """Run a program to its end, and return its lines."""
     program = start(network, script, *argv, **variables)
     ended = program.exit_code(30)

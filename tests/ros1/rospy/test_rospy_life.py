@@ -167,9 +167,7 @@ def test_signals_end_it(
     program.send(number)
     assert program.exit_code() == 0, program.output
     # Loops that look at the flag alone may see it a moment before the last hooks have been called.
-    assert sorted(program.lines) == sorted(
-        [*ended(f"signal-{number.value}"), *after, "end True"]
-    )
+    assert sorted(program.lines) == sorted([*ended(f"signal-{number.value}"), *after, "end True"])
     assert program.lines[: len(STOPPED)] == STOPPED
 
 

@@ -1,0 +1,167 @@
+"""rospy's logging functions; lines as real rospy 1.15 writes them."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from network import Network, eventually
+from rospy_programs import run, start
+
+from rosz.msgs.rcl_interfaces.msg import Log
+
+_STAMP = re.compile(r"\[\d{10}\.\d{6}\]")
+
+
+def stamped(lines: list[str]) -> list[str]:
+    return [_STAMP.sub("[T]", line) for line in lines]
+
+
+def test_levels_and_forms(network: Network) -> None:
+    assert stamped(
+        run(
+            network,
+            """
+            import rospy
+            rospy.init_node("logs")
+            rospy.logdebug("hidden")
+            rospy.loginfo("%s and %d", "text", 5)
+            rospy.loginfo("100 %")
+            rospy.loginfo({"a": 1})
+            rospy.loginfo("child", logger_name="part")
+            rospy.logout("out")
+            rospy.logwarn("warn %d%%", 3)
+            rospy.logerr("two\\nlines")
+            rospy.logfatal("fatal")
+            rospy.core.logerr("core")
+            print(rospy.DEBUG, rospy.INFO, rospy.WARN, rospy.ERROR, rospy.FATAL)
+            """,
+        )
+    ) == [
+        "[INFO] [T]: text and 5",
+        "[INFO] [T]: 100 %",
+        "[INFO] [T]: {'a': 1}",
+        "[INFO] [T]: child",
+        "[INFO] [T]: out",
+        "[WARN] [T]: warn 3%",
+        "[ERROR] [T]: two",
+        "lines",
+        "[FATAL] [T]: fatal",
+        "[ERROR] [T]: core",
+        "1 2 4 8 16",
+    ]
+
+
+def test_not_too_often(network: Network) -> None:
+    assert stamped(
+        run(
+            network,
+            """
+            import rospy
+            rospy.init_node("logs")
+            for i in range(3):
+                rospy.loginfo_once("once")
+                rospy.loginfo_throttle(60, "throttled %d", i)
+                rospy.logwarn_throttle(0, "each time")
+                rospy.loginfo_throttle_identical(60, "same")
+                rospy.logerr_throttle_identical(60, "text %d", i // 2)
+                rospy.logdebug_once("hidden")
+            """,
+        )
+    ) == [
+        "[INFO] [T]: once",
+        "[INFO] [T]: throttled 0",
+        "[WARN] [T]: each time",
+        "[INFO] [T]: same",
+        "[ERROR] [T]: text 0",
+        "[WARN] [T]: each time",
+        "[WARN] [T]: each time",
+        "[ERROR] [T]: text 1",
+    ]
+
+
+def test_streams(network: Network) -> None:
+    assert run(
+        network,
+        """
+        import io, sys, rospy
+        rospy.init_node("logs", log_level=rospy.DEBUG)
+        sys.stdout, sys.stderr = out, error = io.StringIO(), io.StringIO()
+        for log in (rospy.logdebug, rospy.loginfo, rospy.logwarn, rospy.logerr, rospy.logfatal):
+            log("x")
+        sys.stdout = sys.__stdout__
+        print(out.getvalue().count("DEBUG"), out.getvalue().count("\\n"))
+        print(error.getvalue().count("\\n"))
+        """,
+    ) == ["1 2", "3"]
+
+
+@pytest.mark.parametrize(
+    ("form", "line"),
+    [
+        ("${node} ${logger} ${severity} ${message}", "/logs rosout INFO text"),
+        ("${function}:${message}", "speak:text"),
+    ],
+)
+def test_the_form_of_a_line(network: Network, form: str, line: str) -> None:
+    assert run(
+        network,
+        """
+        import rospy
+        rospy.init_node("logs")
+        def speak():
+            rospy.loginfo("text")
+        speak()
+        """,
+        ROSCONSOLE_FORMAT=form,
+    ) == [line]
+
+
+def test_levels_set_by_service_and_pythons_own_loggers(network: Network) -> None:
+    assert stamped(
+        run(
+            network,
+            """
+            import logging
+            import rospy
+            from roscpp.srv import GetLoggers, SetLoggerLevel
+            rospy.init_node("logs")
+            rospy.wait_for_service("~set_logger_level", 10)
+            rospy.wait_for_service("~get_loggers", 10)
+            set_level = rospy.ServiceProxy("~set_logger_level", SetLoggerLevel)
+            set_level("rosout", "debug")
+            rospy.logdebug("shown")
+            print(rospy.ServiceProxy("~get_loggers", GetLoggers)().loggers)
+            set_level("rosout", "error")
+            rospy.logwarn("hidden")
+            set_level("rosout", "nonsense")
+            rospy.logerr("still")
+            logging.getLogger("rosout").error("python's")
+            logging.getLogger("rosout.part").error("and below")
+            """,
+        )
+    ) == [
+        "[DEBUG] [T]: shown",
+        "[Logger(name='rosout', level='DEBUG')]",
+        "[ERROR] [T]: still",
+        "[ERROR] [T]: python's",
+        "[ERROR] [T]: and below",
+    ]
+
+
+def test_rosout(network: Network) -> None:
+    node = network.node("reader")
+    lines: list[Log] = []
+    node.subscription("/rosout", Log, lines.append)
+    for name, muted in (("mute", True), ("loud", False)):
+        start(
+            network,
+            f"""
+            import rospy
+            rospy.init_node("{name}", disable_rosout={muted})
+            rospy.logwarn("from {name}")
+            rospy.spin()
+            """,
+        ).wait_for(f"from {name}")
+    eventually(lambda: "from loud" in [line.msg for line in lines], "the line on /rosout")
+    assert "from mute" not in [line.msg for line in lines]

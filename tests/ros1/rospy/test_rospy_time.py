@@ -1,0 +1,224 @@
+"""rospy's times, rates and timers; as real rospy 1.15 has them."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import pytest
+from network import Network
+from rospy_programs import run
+
+from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
+from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
+from rosz.msgs.std_msgs.msg import Header
+from rosz.ros1.rospy import rostime
+
+Time: Any = rostime.Time
+Duration: Any = rostime.Duration
+
+
+@pytest.mark.parametrize(
+    ("made", "shown"),
+    [
+        (Time(), "rospy.Time[0]"),
+        (Time(1), "rospy.Time[1000000000]"),
+        (Time(1.5), "rospy.Time[1500000000]"),
+        (Time(1, 1500000000), "rospy.Time[2500000000]"),
+        (Time(secs=1, nsecs=5), "rospy.Time[1000000005]"),
+        (Time(1, -5), "rospy.Time[999999995]"),
+        (Time.from_sec(1.5), "rospy.Time[1500000000]"),
+        (Time.from_seconds(2), "rospy.Time[2000000000]"),
+        (Duration(-1.5), "rospy.Duration[-1500000000]"),
+        (Duration(0, -1), "rospy.Duration[-1]"),
+        (Duration.from_sec(0.1), "rospy.Duration[100000000]"),
+        (Time(5) + Duration(2), "rospy.Time[7000000000]"),
+        (Time(5) - Duration(2), "rospy.Time[3000000000]"),
+        (Duration(3) * 2, "rospy.Duration[6000000000]"),
+        (0.5 * Duration(3), "rospy.Duration[1500000000]"),
+        (Duration(3) / 2, "rospy.Duration[1500000000]"),
+        (-Duration(3), "rospy.Duration[-3000000000]"),
+        (abs(Duration(-3)), "rospy.Duration[3000000000]"),
+        (Duration(7) % Duration(3), "rospy.Duration[1000000000]"),
+        (sum([Duration(1), Duration(2)], Duration()), "rospy.Duration[3000000000]"),
+        (max(Time(1), Time(3)), "rospy.Time[3000000000]"),
+        (copy.deepcopy(Time(1, 2)), "rospy.Time[1000000002]"),
+        (pickle.loads(pickle.dumps(Time(1, 2))), "rospy.Time[1000000002]"),
+    ],
+    ids=str,
+)
+def test_values(made: object, shown: str) -> None:
+    assert repr(made) == shown
+
+
+def test_differences_and_comparisons() -> None:
+    assert type(Time(5) - Time(2)) is DurationMessage
+    assert (Time(5) - Time(2)).to_sec() == 3.0
+    assert Duration(7) // Duration(2) == 3
+    assert Duration(3) / Duration(2) == 1.5
+    assert Time(3) == TimeMessage(3, 0)
+    assert Time(3) > TimeMessage(2, 9)
+    assert isinstance(Time(3), TimeMessage)
+    assert not isinstance(TimeMessage(), rostime.Time)
+    assert not Time()
+    assert {Time(1): 2}[TimeMessage(1, 0)] == 2
+    assert Time(1, 5).to_nsec() == 1000000005
+    assert (Time(1).secs, Time(1, 5).nsecs) == (1, 5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [((-1,), TypeError), ((0, -1), TypeError), ((1.5, 3), ValueError), (("a",), ValueError)],
+)
+def test_what_is_no_time(arguments: tuple[Any, ...], error: type[Exception]) -> None:
+    with pytest.raises(error):
+        Time(*arguments)
+
+
+def test_times_in_messages() -> None:
+    header = Header(stamp=Time(3, 5), frame_id="map")
+    assert Header.from_cdr(header.to_cdr()).stamp == Time(3, 5)
+    assert type(header.stamp - Time(1)) is DurationMessage
+
+
+def test_clock_functions(network: Network) -> None:
+    assert run(
+        network,
+        """
+        import time, rospy
+        show("wall", rospy.rostime.is_wallclock)
+        rospy.rostime.set_rostime_initialized(True)
+        rospy.init_node("times")
+        print(rospy.rostime.is_rostime_initialized(), rospy.rostime.is_wallclock())
+        print(abs(rospy.get_time() - time.time()) < 1)
+        print(abs(rospy.Time.now().to_sec() - time.time()) < 1)
+        print(type(rospy.get_rostime()) is rospy.Time, type(rospy.get_time()))
+        began = time.monotonic()
+        rospy.sleep(rospy.Duration(0.05))
+        rospy.sleep(0.05)
+        print(time.monotonic() - began >= 0.1)
+        show("negative", lambda: rospy.sleep(-1))
+        show("text", lambda: rospy.sleep("a"))
+        show("zero", lambda: rospy.Rate(0))
+        """,
+    ) == [
+        "wall -> True",
+        "True True",
+        "True",
+        "True",
+        "True <class 'float'>",
+        "True",
+        "negative -> None",
+        "text -> TypeError | '<' not supported between instances of 'str' and 'int'",
+        "zero -> ZeroDivisionError | float division by zero",
+    ]
+
+
+def test_rate(network: Network) -> None:
+    assert run(
+        network,
+        """
+        import time, rospy
+        rospy.init_node("rates")
+        rate = rospy.Rate(50)
+        print(rate.sleep_dur, type(rate.last_time) is rospy.Time)
+        began = time.monotonic()
+        for _ in range(10):
+            rate.sleep()
+        print(0.19 <= time.monotonic() - began < 2)
+        time.sleep(0.5)
+        print(rate.remaining().to_sec() < -0.4)
+        rate.sleep()
+        print(rate.remaining().to_sec() <= 0.02)
+        """,
+    ) == ["20000000 True", "True", "True", "True"]
+
+
+def test_timers(network: Network) -> None:
+    lines = run(
+        network,
+        """
+        import threading, rospy
+        rospy.init_node("timers")
+        events, three = [], threading.Event()
+        def take(event):
+            events.append(event)
+            if len(events) == 3:
+                three.set()
+        timer = rospy.Timer(rospy.Duration(0.02), take)
+        print(isinstance(timer, threading.Thread), timer.daemon, timer.is_alive(), three.wait(10))
+        timer.shutdown()
+        timer.join(10)
+        print(timer.is_alive())
+        first, third = events[0], events[2]
+        print(first.last_expected, first.last_real, first.last_duration)
+        print(type(third.last_real) is rospy.Time, third.last_duration < 1)
+        print((third.current_expected - third.last_expected).to_sec())
+        print(third.current_real >= third.current_expected)
+        once = []
+        rospy.Timer(rospy.Duration(0.01), once.append, oneshot=True).join(10)
+        print(len(once))
+        def fail(event):
+            raise ValueError("boom")
+        failing = rospy.Timer(rospy.Duration(0.01), fail)
+        failing.join(10)
+        print(failing.is_alive())
+        """,
+    )
+    assert lines[:7] == [
+        "True True True True",
+        "False",
+        "None None None",
+        "True True",
+        "0.02",
+        "True",
+        "1",
+    ]
+    assert lines[-2:] == ["ValueError: boom", "False"]
+
+
+def test_simulated_time(network: Network) -> None:
+    node = network.node("simulator")
+    node.params.set("/use_sim_time", True)
+    lines = run(
+        network,
+        """
+        import threading, rospy
+        from rosgraph_msgs.msg import Clock
+        rospy.init_node("simulated")
+        ticks = rospy.Publisher("/clock", Clock, queue_size=1)
+        print(rospy.rostime.is_wallclock(), rospy.get_time())
+        seconds = [10.0]
+        step = [0.25]
+        def tick():
+            while not rospy.is_shutdown():
+                ticks.publish(rospy.Time.from_sec(seconds[0]))
+                seconds[0] += step[0]
+                pause.wait(0.01)
+        pause = threading.Event()
+        threading.Thread(target=tick, daemon=True).start()
+        rospy.sleep(1)
+        start = rospy.get_time()
+        rospy.sleep(5)
+        print(5 <= rospy.get_time() - start < 8)
+        rate = rospy.Rate(1)
+        rate.sleep()
+        rate.sleep()
+        again = threading.Event()
+        rospy.Timer(rospy.Duration(2), lambda event: again.set(), oneshot=True)
+        print(again.wait(20))
+        def back():
+            seconds[0], step[0] = 1.0, 0.0
+        threading.Timer(0.1, back).start()
+        show("back", lambda: rospy.sleep(1e6))
+        print(rospy.get_time())
+        """,
+    )
+    assert lines == [
+        "False 0.0",
+        "True",
+        "True",
+        "back -> ROSTimeMovedBackwardsException | ROS time moved backwards",
+        "1.0",
+    ]
