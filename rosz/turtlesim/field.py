@@ -37,6 +37,13 @@ class Field:
         self.pixels = bytearray()
         self.fill(color)
 
+    def copy(self) -> Field:
+        """Return a picture that goes its own way from here."""
+        twin = Field(0, 0, (0, 0, 0))
+        twin.width, twin.height, twin.version = self.width, self.height, self.version
+        twin.pixels = bytearray(self.pixels)
+        return twin
+
     def fill(self, color: Color) -> None:
         """Give all pixels one colour."""
         self.pixels = bytearray(bytes(color) * (self.width * self.height))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import struct
 import zlib
+from collections.abc import Iterable
 
-from rosz.turtlesim.field import Color, span
+from rosz.turtlesim.field import Color, Field, span
 from rosz.turtlesim.shape import Patch, looks
-from rosz.turtlesim.world import World
+from rosz.turtlesim.turtle import Turtle
 
 __all__ = ("encode_png", "paint", "take")
 
@@ -19,11 +20,15 @@ _LINES = 4
 """Lines looked at in each row of pixels, for smooth edges."""
 
 
-def take(world: World) -> bytes:
-    """Return a picture of a world as PNG."""
-    field = world.field
+def take(field: Field, turtles: Iterable[Turtle]) -> bytes:
+    """Return a picture as PNG.
+
+    Args:
+        field: What was drawn; it stays as it is.
+        turtles: Who is on it, from the lowest to the uppermost.
+    """
     pixels = bytearray(field.pixels)
-    for turtle in world.turtles.values():
+    for turtle in turtles:
         for patch in looks(turtle):
             paint(pixels, field.width, field.height, patch)
     return encode_png(pixels, field.width, field.height)

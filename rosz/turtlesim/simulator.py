@@ -81,7 +81,9 @@ class Simulator:
     def picture(self) -> Picture:
         """Return a picture of the field and its turtles."""
         with self._lock:
-            return Picture(self._node.name, picture.take(self._world))
+            field, turtles = self._world.field.copy(), self._copies()
+        # Painting takes longer than a step: the turtles do not wait for it.
+        return Picture(self._node.name, picture.take(field, turtles))
 
     def view(self, known: int) -> View:
         """Return what there is to see.
@@ -91,12 +93,12 @@ class Simulator:
         """
         with self._lock:
             field = self._world.field
-            turtles = tuple(
-                Turtle(turtle.x, turtle.y, turtle.theta, turtle.kind)
-                for turtle in self._world.turtles.values()
-            )
             pixels = bytes(field.pixels) if field.version != known else None
-            return View(pixels, field.version, turtles)
+            return View(pixels, field.version, self._copies())
+
+    def _copies(self) -> tuple[Turtle, ...]:
+        turtles = self._world.turtles.values()
+        return tuple(Turtle(one.x, one.y, one.theta, one.kind) for one in turtles)
 
     def _step(self, _: TimerEvent) -> None:
         with self._lock:

@@ -86,6 +86,13 @@ def test_every_change_is_a_new_version() -> None:
     assert versions == sorted(set(versions))
 
 
+def test_a_copy_goes_its_own_way() -> None:
+    field = Field(4, 3, BLACK)
+    copy = field.copy()
+    field.fill(WHITE)
+    assert (copy.width, copy.height, drawn(copy)) == (4, 3, set())
+
+
 def test_spans_of_a_triangle() -> None:
     triangle = ((0.0, 0.0), (4.0, 0.0), (2.0, 4.0))
     assert span(triangle, 2.0) == (1.0, 3.0)

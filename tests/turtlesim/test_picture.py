@@ -13,6 +13,10 @@ from rosz.turtlesim.world import BACKGROUND, World
 from . import png
 
 
+def taken(world: World) -> bytes:
+    return picture.take(world.field, world.turtles.values())
+
+
 def test_png_gives_back_the_pixels() -> None:
     pixels = random.Random(1).randbytes(3 * 7 * 5)
     image = png.read(picture.encode_png(pixels, 7, 5))
@@ -21,7 +25,7 @@ def test_png_gives_back_the_pixels() -> None:
 
 
 def test_an_empty_field_has_one_color() -> None:
-    image = png.read(picture.take(World()))
+    image = png.read(taken(World()))
     assert (image.width, image.height) == (500, 500)
     assert image.colors() == {BACKGROUND}
 
@@ -30,7 +34,7 @@ def test_the_turtle_is_in_the_picture_and_not_on_the_field() -> None:
     world = World()
     world.spawn_first()
     before = bytes(world.field.pixels)
-    image = png.read(picture.take(world))
+    image = png.read(taken(world))
     changed = [(x, y) for y in range(500) for x in range(500) if image.at(x, y) != BACKGROUND]
     assert bytes(world.field.pixels) == before
     xs, ys = [x for x, _ in changed], [y for _, y in changed]
@@ -59,7 +63,7 @@ def test_the_line_is_below_the_turtle() -> None:
     world.spawn_first()
     world.turtles["turtle1"].teleport_by(3.0, 0.0)
     assert list(world.step(0.0)) == []
-    image = png.read(picture.take(world))
+    image = png.read(taken(world))
     assert image.at(300, 250) == world.turtles["turtle1"].pen.color
     assert image.at(384, 250) not in {BACKGROUND, world.turtles["turtle1"].pen.color}
 
@@ -82,5 +86,5 @@ def test_what_is_outside_is_left_out() -> None:
     world = World()
     world.spawn(0.0, 0.0, 0.0)
     world.spawn(50.0, 50.0, 0.0)
-    image = png.read(picture.take(world))
+    image = png.read(taken(world))
     assert image.at(0, 499) != BACKGROUND
