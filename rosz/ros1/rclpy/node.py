@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeVar
 
-from rosz import names
 from rosz.errors import UsageError
 from rosz.node import Node as RoszNode
 from rosz.node.standard import simulate
@@ -14,8 +13,10 @@ from rosz.ros1.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCall
 from rosz.ros1.rclpy.client import Client
 from rosz.ros1.rclpy.clock import Clock, Rate, ROSClock
 from rosz.ros1.rclpy.declared import Declared
-from rosz.ros1.rclpy.exceptions import NotInitializedException, ParameterNotDeclaredException
+from rosz.ros1.rclpy.exceptions import NotInitializedException
 from rosz.ros1.rclpy.logging import RcutilsLogger, write_as_rclpy
+from rosz.ros1.rclpy.node_graph import NodeGraph
+from rosz.ros1.rclpy.node_parameters import NodeParameters
 from rosz.ros1.rclpy.parameter import Parameter
 from rosz.ros1.rclpy.publisher import Publisher
 from rosz.ros1.rclpy.qos import QoSProfile, to_qos
@@ -24,7 +25,6 @@ from rosz.ros1.rclpy.subscription import Subscription
 from rosz.ros1.rclpy.timer import Timer
 
 if TYPE_CHECKING:
-    from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
     from rosz.ros1.rclpy.context import Context
     from rosz.ros1.rclpy.executors import Entity, Executor
 
@@ -34,7 +34,7 @@ P = TypeVar("P")
 _SECOND = 1_000_000_000
 
 
-class Node:
+class Node(NodeParameters, NodeGraph):
     """A node whose callbacks run while it is spun, and only then.
 
     Args:
@@ -136,19 +136,6 @@ class Node:
     def get_logger(self) -> RcutilsLogger:
         """Return its logger."""
         return RcutilsLogger(self._logger_name, self._node.log)
-
-    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
-        """Return the global name that the name of a topic means.
-
-        Args:
-            topic: Any legal name.
-            only_expand: Whether to leave remappings out.
-        """
-        if only_expand:
-            return names.resolve(topic, self._node.name)
-        return self._node.resolve(topic)
-
-    resolve_service_name = resolve_topic_name
 
     # What it has.
 
@@ -343,132 +330,6 @@ class Node:
     def timers(self) -> Iterator[Timer]:
         """Its timers."""
         return (part for part in self._parts if isinstance(part, Timer))
-
-    # Parameters.
-
-    def declare_parameter(
-        self,
-        name: str,
-        value: Any = None,
-        descriptor: ParameterDescriptor | None = None,
-        ignore_override: bool = False,
-    ) -> Parameter:
-        """Declare a parameter; what the command line or a launch file says counts more.
-
-        Args:
-            name: Its name.
-            value: Its default value, or a ``Parameter.Type`` for one without.
-            descriptor: What there is to say about it.
-            ignore_override: Whether the default counts, whatever else is said.
-
-        Raises:
-            ParameterAlreadyDeclaredException: It is declared already.
-            InvalidParameterTypeException: What was given is of another type.
-        """
-        return self._declared.declare(name, value, descriptor, ignore_override)
-
-    def declare_parameters(
-        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
-    ) -> list[Parameter]:
-        """Declare several parameters: tuples of what `declare_parameter` takes.
-
-        Args:
-            namespace: What their names begin with, before a dot; may be empty.
-            parameters: Name, and perhaps default value and descriptor, of each.
-            ignore_override: Whether the defaults count.
-        """
-        start = f"{namespace}." if namespace else ""
-        declared: list[Parameter] = []
-        for name, *rest in parameters:
-            value, descriptor = (*rest, None, None)[:2]
-            declared.append(
-                self._declared.declare(start + name, value, descriptor, ignore_override)
-            )
-        return declared
-
-    def undeclare_parameter(self, name: str) -> None:
-        """Forget a parameter."""
-        self._declared.undeclare(name)
-
-    def has_parameter(self, name: str) -> bool:
-        """Tell whether a parameter is declared."""
-        return self._declared.has(name)
-
-    def get_parameter(self, name: str) -> Parameter:
-        """Return a parameter.
-
-        Raises:
-            ParameterNotDeclaredException: It is not declared.
-            ParameterUninitializedException: It was declared by type alone, and is not set.
-        """
-        return self._declared.get(name)
-
-    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
-        """Return several parameters."""
-        return [self._declared.get(name) for name in names]
-
-    def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
-        """Return a parameter, or something else where it is not declared."""
-        try:
-            return self._declared.get(name)
-        except ParameterNotDeclaredException:
-            return alternative_value
-
-    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """Return the parameters of a namespace, by the rest of their names."""
-        return self._declared.below(prefix)
-
-    def describe_parameter(self, name: str) -> ParameterDescriptor:
-        """Return what was said about a parameter when it was declared."""
-        return self._declared.descriptor(name)
-
-    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
-        """Set parameters; each result tells whether that one was set."""
-        return self._declared.set(parameter_list)
-
-    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
-        """Set all parameters or none."""
-        return self._declared.set_together(parameter_list)
-
-    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
-        """Have a function asked before parameters are set."""
-        self._declared.add_check(callback)
-
-    def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
-        """Ask a function no more."""
-        self._declared.remove_check(callback)
-
-    # Who else is there.
-
-    def get_node_names(self) -> list[str]:
-        """Return the base names of all nodes."""
-        return [names.basename(name) for name in self._view().nodes()]
-
-    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
-        """Return base name and namespace of all nodes."""
-        return [
-            (names.basename(name), names.namespace(name).rstrip("/") or "/")
-            for name in self._view().nodes()
-        ]
-
-    def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:  # noqa: ARG002
-        """Return all topics with their types."""
-        return list(self._view().topics().items())
-
-    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Return all services with their types."""
-        return list(self._view().services().items())
-
-    def count_publishers(self, topic_name: str) -> int:
-        """Return how many publishers a topic has."""
-        return len(self._view().publishers(self.resolve_topic_name(topic_name)))
-
-    def count_subscribers(self, topic_name: str) -> int:
-        """Return how many subscriptions a topic has."""
-        return len(self._view().subscriptions(self.resolve_topic_name(topic_name)))
-
-    def _view(self) -> Any:
-        return self._node.context.graph.view()
 
     def __enter__(self) -> Self:
         return self
