@@ -10,7 +10,7 @@ import msgspec
 
 from rosz.errors import DecodeError
 from rosz.node.logger import NodeLogger
-from rosz.wire import unpack
+from rosz.wire import read
 
 if TYPE_CHECKING:
     from rosz.message import Message
@@ -46,8 +46,8 @@ class MessageInfo(msgspec.Struct, frozen=True):
     type_name: str
 
 
-Taken = tuple[Any, MessageInfo]
-"""A message with its info."""
+Taken = tuple[Any, MessageInfo | None]
+"""A message with its info, where that is wanted."""
 
 
 class _Sender:
@@ -68,10 +68,17 @@ class Channel:
         type_name: ``pkg/msg/Name``.
         message_type: Class to decode into; bytes are passed on as they are when not given.
         log: Told of damage, once per kind.
+        with_info: Whether anybody wants to know where messages come from.
     """
 
     def __init__(
-        self, topic: str, type_name: str, message_type: type[Message] | None, log: NodeLogger
+        self,
+        topic: str,
+        type_name: str,
+        message_type: type[Message] | None,
+        log: NodeLogger,
+        *,
+        with_info: bool = True,
     ) -> None:
         self._topic = topic
         self._type_name = type_name
@@ -81,6 +88,7 @@ class Channel:
             self._decode = message_type._decode
             self._has_header = message_type._has_header
         self._log = log
+        self._with_info = with_info
         self._senders: dict[bytes, _Sender] = {}
         self._complained: set[str] = set()
 
@@ -93,10 +101,19 @@ class Channel:
 
     def take(self, sample: Sample | Reply) -> Taken | None:
         """Decode one sample; ``None`` when it is damaged or was there before."""
+        sequence, source_time, gid, lost = 0, 0, b"", 0
         try:
-            info = self._origin(sample.attachment)
-            if info is None:
-                return None
+            attachment = sample.attachment
+            if attachment is not None:
+                sequence, source_time, gid = read(attachment)
+                if sequence > 0:
+                    sender = self._senders.get(gid) or self._sender(gid)
+                    last = sender.last
+                    if sequence <= last and sender.replays:
+                        return None
+                    sender.last = sequence
+                    if last and sequence > last:
+                        lost = sequence - last - 1
             payload = sample.payload
             message: Any = payload if self._decode is None else self._decode(payload)
         except DecodeError as error:
@@ -104,26 +121,11 @@ class Channel:
             return None
         if self._has_header:
             # ROS 1 code reads the sequence number from there.
-            message.header.seq = info.sequence
-        return message, info
-
-    def _origin(self, attachment: bytes | None) -> MessageInfo | None:
-        """Read the attachment, and count what is missing; ``None`` for a sample seen before."""
+            message.header.seq = sequence
+        if not self._with_info:
+            return message, None
         now = time.time_ns()
-        if attachment is None:
-            return MessageInfo(0, now, 0, b"", 0, self._type_name)
-        origin = unpack(attachment)
-        gid, sequence = origin.gid, origin.sequence
-        lost = 0
-        if sequence > 0:
-            sender = self._sender(gid)
-            last, sender.last = sender.last, sequence
-            if last:
-                if sequence <= last and sender.replays:
-                    sender.last = last
-                    return None
-                lost = max(sequence - last - 1, 0)
-        return MessageInfo(origin.source_time, now, sequence, gid, lost, self._type_name)
+        return message, MessageInfo(source_time, now, sequence, gid, lost, self._type_name)
 
     def _sender(self, gid: bytes) -> _Sender:
         sender = self._senders.get(gid)

@@ -18,9 +18,10 @@ from rosz.errors import (
 from rosz.node.endpoint import Endpoint
 from rosz.node.mismatch import mismatch
 from rosz.qos import QoS
-from rosz.wire import Kind, Token, pack
+from rosz.wire import Kind, pack
 
 if TYPE_CHECKING:
+    from rosz.graph import View
     from rosz.message import Message
     from rosz.message import Service as ServiceType
     from rosz.node.node import Node
@@ -32,6 +33,9 @@ _ATTEMPTS = 10
 _PAUSE = 0.02
 _AT_ONCE = 0.01
 """Seconds within which a question that reaches nobody comes back."""
+
+_SAME = 0.001
+"""Seconds by which a timeout may differ from the one that is declared."""
 
 _GRACE = 1.0
 """Seconds given to a server that is there, but was not heard of yet."""
@@ -51,6 +55,9 @@ class Client(Endpoint):
         self._sequence = 0
         self._lock = threading.Lock()
         self._calls: set[Answers] = set()
+        self._known: tuple[View | None, bool] = None, False
+        self._asker = node.context.session.asker(self.key, timeout=timeout, target="all_complete")
+        self._declared.append(self._asker)
         self.announce()
 
     def __call__(self, *args: Any, timeout: float | None = None, **fields: Any) -> Any:
@@ -93,7 +100,7 @@ class Client(Endpoint):
                 return self._response(reply, limit)
             # Nobody was asked: the way to a server may be a moment behind its token. But who was
             # asked, and ended without an answer, may have done the work: it is not asked again.
-            if time.monotonic() - began > _AT_ONCE or not self._servers():
+            if time.monotonic() - began > _AT_ONCE or not self._is_served():
                 break
             time.sleep(_PAUSE)
         raise ServiceError(f"service [{self.name}]: the server ended before it answered")
@@ -107,22 +114,24 @@ class Client(Endpoint):
             self.ensure_open("call")
             self._sequence += 1
             attachment = pack(self._sequence, time.time_ns(), self.gid)
-        answers = self.node.context.session.ask(
-            self.key,
-            timeout=left,
-            payload=payload,
-            attachment=attachment,
-            target="all_complete",
-        )
-        with self._lock:
-            self._calls.add(answers)
-            if self.closed:
-                answers.cancel()
+        if abs(self._asker.timeout - left) < _SAME:
+            answers = self._asker.ask(payload, attachment)
+        else:
+            answers = self.node.context.session.ask(
+                self.key,
+                timeout=left,
+                payload=payload,
+                attachment=attachment,
+                target="all_complete",
+            )
+        # Whoever closes the client cancels those that he finds there.
+        self._calls.add(answers)
+        if self.closed:
+            answers.cancel()
         try:
-            first = next(iter(answers), None)
+            first = answers.first()
         finally:
-            with self._lock:
-                self._calls.discard(answers)
+            self._calls.discard(answers)
         if first is None and self.closed:
             raise ClosedError(f"the call of '{self.name}' was cancelled: shutting down")
         return first
@@ -144,19 +153,23 @@ class Client(Endpoint):
             f"answer of service '{self.name}'", limit, "the server is busy, stopped or out of reach"
         )
 
-    def _servers(self) -> list[Token]:
-        """Return those that serve this name with this type."""
+    def _is_served(self) -> bool:
+        """Tell whether anybody serves this name with this type, looking once at each view."""
         view = self.node.context.graph.view()
-        return [token for token in view.servers(self.name) if self.matches(token)]
+        seen, served = self._known
+        if seen is not view:
+            served = any(map(self.matches, view.servers(self.name)))
+            self._known = view, served
+        return served
 
     def _find_server(self, limit: float) -> None:
         """Make sure that somebody serves the name, waiting while the process is still joining."""
-        if self._servers():
+        if self._is_served():
             return
         self.ensure_open("call")
         context = self.node.context
         context.settled.wait(min(limit, _GRACE))
-        if self._servers():
+        if self._is_served():
             return
         view = context.graph.refresh(min(limit, _GRACE))
         others = view.servers(self.name)
@@ -199,9 +212,7 @@ class Client(Endpoint):
             raise WaitTimeout(what, timeout, hint) from error
 
     def _finish(self) -> None:
-        with self._lock:
-            calls = list(self._calls)
-        for answers in calls:
+        for answers in self._calls.copy():
             answers.cancel()
 
     def disown(self, reason: str) -> None:

@@ -46,7 +46,9 @@ class Subscription(Reader[M], Endpoint):
         )
         Reader.__init__(self, node, topic, callback, qos, with_info=with_info)
         self.message_type = message_type
-        self._channel = Channel(topic, type_name, None if raw else message_type, node.log)
+        self._channel = Channel(
+            topic, type_name, None if raw else message_type, node.log, with_info=with_info
+        )
         context = node.context
         self._declared.append(
             self._subscribe(

@@ -38,12 +38,15 @@ class Answers:
         self._token = token
 
     def __iter__(self) -> Iterator[Reply]:
-        while True:
-            try:
-                raw = self._recv()
-            except zenoh.ZError:  # the channel is empty, and nothing more will come
-                return
-            yield Reply(raw)
+        while (reply := self.first()) is not None:
+            yield reply
+
+    def first(self) -> Reply | None:
+        """Wait for the next answer and return it; ``None`` when there is none."""
+        try:
+            return Reply(self._recv())
+        except zenoh.ZError:  # the channel is empty, and nothing more will come
+            return None
 
     def cancel(self) -> None:
         """Expect no more answers: who iterates is done; from any thread, again is no error."""

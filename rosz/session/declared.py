@@ -10,9 +10,11 @@ from typing import Any, Protocol
 import zenoh
 
 from rosz.errors import ClosedError, TransportError
+from rosz.session.answers import Answers
 from rosz.session.samples import Query, Sample
 
 __all__ = (
+    "Asker",
     "Closable",
     "Declared",
     "Pumped",
@@ -124,6 +126,41 @@ class Ring(Declared):
             return Sample(self._recv())
         except zenoh.ZError as error:
             raise ClosedError(f"the subscriber of '{self._key}' is closed") from error
+
+
+class Asker(Declared):
+    """A question that is declared once and asked often.
+
+    Args:
+        key: Key expression.
+        entity: What was declared.
+        timeout: Seconds that were declared with it.
+
+    Attributes:
+        timeout: As given.
+    """
+
+    def __init__(self, key: str, entity: Any, timeout: float) -> None:
+        super().__init__(f"querier '{key}'", entity)
+        self._key = key
+        self._get = entity.get
+        self.timeout = timeout
+
+    def ask(self, payload: bytes, attachment: bytes) -> Answers:
+        """Ask, and have the answers to wait for; see `Session.ask`.
+
+        Raises:
+            ClosedError: The session is closed.
+        """
+        cancel = zenoh.CancellationToken()
+        try:
+            handler = self._get(
+                channel(), payload=payload, attachment=attachment, cancellation_token=cancel
+            )
+        except zenoh.ZError:
+            with mapped(f"ask '{self._key}'"):
+                raise
+        return Answers(handler, cancel)
 
 
 class Questions(Declared):

@@ -21,6 +21,7 @@ from rosz.session.advanced import advanced_publisher, advanced_subscriber
 from rosz.session.answers import Answers, AskOptions, Target
 from rosz.session.config import SessionConfig, key_settings, overrides, zenoh_settings
 from rosz.session.declared import (
+    Asker,
     Closable,
     Declared,
     Pumped,
@@ -384,6 +385,22 @@ class Session:
                 cancellation_token=cancel,
             )
         return Answers(handler, cancel)
+
+    def asker(self, key: str, *, timeout: float, target: Target = "all") -> Asker:
+        """Declare a question that is asked often; the arguments are those of `ask`.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The key is malformed.
+        """
+        with mapped(f"ask '{key}'"):
+            entity = self._raw.declare_querier(
+                key,
+                target=_TARGETS[target],
+                consolidation=zenoh.ConsolidationMode.NONE,
+                timeout=timeout,
+            )
+        return Asker(key, entity, timeout)
 
     def get(self, key: str, *, timeout: float, **options: Unpack[AskOptions]) -> list[Reply]:
         """Ask, and wait for all answers; the arguments are those of `ask`.

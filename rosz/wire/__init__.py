@@ -1,6 +1,6 @@
 """The text and bytes that rosz shares with ROS 2's rmw_zenoh; pure."""
 
-from rosz.wire.attachment import Attachment, pack, unpack
+from rosz.wire.attachment import Attachment, pack, read, unpack
 from rosz.wire.gid import gid
 from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, endpoint_key, own_key, ros_type
 from rosz.wire.processes import ProcessToken, format_process, parse_process, processes_key
@@ -26,6 +26,7 @@ __all__ = (
     "parse_qos",
     "parse_token",
     "processes_key",
+    "read",
     "ros_type",
     "tokens_key",
     "unpack",

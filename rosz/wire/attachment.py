@@ -11,7 +11,7 @@ import msgspec
 
 from rosz.errors import DecodeError
 
-__all__ = ("Attachment", "pack", "unpack")
+__all__ = ("Attachment", "pack", "read", "unpack")
 
 GID_SIZE = 16
 _LAYOUT = Struct("<qqB16s")
@@ -46,6 +46,15 @@ def unpack(data: bytes | None) -> Attachment:
     """
     if data is None:
         raise DecodeError("attachment", -1, "missing; the sender is no ROS 2 or rosz node")
+    return Attachment(*read(data))
+
+
+def read(data: bytes) -> tuple[int, int, bytes]:
+    """Read an attachment's sequence number, source time and GID, which every sample costs.
+
+    Raises:
+        DecodeError: It is of an older release's layout, or damaged.
+    """
     if len(data) != _LAYOUT.size:
         if len(data) == _OLD_SIZE:
             raise DecodeError(
@@ -55,4 +64,4 @@ def unpack(data: bytes | None) -> Attachment:
     sequence, source_time, size, gid = _LAYOUT.unpack(data)
     if size != GID_SIZE:
         raise DecodeError("attachment", 16, f"a GID of {size} bytes, expected {GID_SIZE}")
-    return Attachment(sequence, source_time, gid)
+    return sequence, source_time, gid
