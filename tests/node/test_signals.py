@@ -11,11 +11,17 @@ from network import Network, Program
 from rosz.node import signals
 
 POLITE = """
+    import time
     import rosz
+
+    def tell(_):
+        while not node.context.cooperative:  # the main thread may be slow to get to its wait
+            time.sleep(0.001)
+        print("ready", flush=True)
 
     with rosz.Node("polite") as node:
         node.on_shutdown(lambda reason: print(f"hook: {{reason}}\\n", end="", flush=True))
-        waiting = node.timer(0.05, lambda _: print("ready", flush=True), oneshot=True)
+        waiting = node.timer(0.05, tell, oneshot=True)
         {wait}
     print("done", flush=True)
 """
