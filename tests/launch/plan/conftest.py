@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from roslaunch_oracle import Roslaunch, Rosz, environment, real_roslaunch
+
+from .roslaunch_oracle import Roslaunch, Rosz, environment, real_roslaunch
 
 PACKAGES = Path(__file__).with_name("packages")
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import random
 
-from corpus import FILES, VALID
-from fake_outside import Outside
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rosz.errors import LaunchFileError
 from rosz.launch.plan import LaunchText, Plan, describe_args, plan
+
+from .corpus import FILES, VALID
+from .fake_outside import Outside
 
 SEEDS = [case.path.read_bytes() for case in VALID if "pass_all" not in case.name]
 PIECES = [

@@ -6,10 +6,11 @@ import json
 
 import msgspec
 import pytest
-from fake_outside import Outside, plan_of
 
 from rosz.errors import LaunchFileError, NotFoundError
 from rosz.launch.plan import Condition, LaunchText, Place, Plan, plan
+
+from .fake_outside import Outside, plan_of
 
 NODE = '<node pkg="p" type="t" name="n" {}/>'
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from fake_outside import Outside, plan_of
 
 from rosz.errors import LaunchError, NotFoundError
 from rosz.launch.plan import ArgDoc, LaunchText, describe_args, report
+
+from .fake_outside import Outside, plan_of
 
 NODES = (
     '<group ns="g"><env name="A" value="1 2"/><remap from="x" to="y"/>'

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 
 import pytest
-from corpus import INVALID, VALID, Case, expected, plain
-from roslaunch_oracle import Roslaunch, Rosz, differences
+
+from .corpus import INVALID, VALID, Case, expected, plain
+from .roslaunch_oracle import Roslaunch, Rosz, differences
 
 EXPECTED = expected()
 

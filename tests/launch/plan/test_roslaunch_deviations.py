@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from roslaunch_oracle import Roslaunch, Rosz
+
+from .roslaunch_oracle import Roslaunch, Rosz
 
 # What could harm, or cannot mean anything, is refused although roslaunch takes it.
 STRICTER = {

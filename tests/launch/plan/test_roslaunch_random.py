@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 
 from hypothesis import HealthCheck, event, given, settings
-from launch_trees import Tree, launch_trees
-from roslaunch_oracle import Roslaunch, Rosz, differences
+
+from .launch_trees import Tree, launch_trees
+from .roslaunch_oracle import Roslaunch, Rosz, differences
 
 EXAMPLES = int(os.environ.get("ROSZ_LAUNCH_EXAMPLES", "150"))
 
