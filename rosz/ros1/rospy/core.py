@@ -27,8 +27,8 @@ from rosz.ros1.rospy.names import (
     remap_name,
     resolve_name,
 )
+from rosz.ros1.rospy.state import cooperate, run_hooks, state
 from rosz.ros1.rospy.state import is_shutdown as ended
-from rosz.ros1.rospy.state import run_hooks, state
 
 __all__ = (
     "ROSException",
@@ -70,9 +70,7 @@ def is_initialized() -> bool:
 
 def is_shutdown() -> bool:
     """Tell whether the end has begun."""
-    if state.context is not None:
-        # Who asks ends by itself, and need not be interrupted.
-        state.context.cooperative = True
+    cooperate()
     return ended()
 
 

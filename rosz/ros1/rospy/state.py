@@ -21,6 +21,7 @@ __all__ = (
     "State",
     "arguments",
     "context",
+    "cooperate",
     "has_node",
     "helper",
     "is_shutdown",
@@ -194,6 +195,15 @@ def params() -> Params:
 def is_shutdown() -> bool:
     """Tell whether the end has begun."""
     return state.shutdown.is_set() or (state.context is not None and state.context.is_shutdown)
+
+
+def cooperate() -> None:
+    """Take note that the program asks for its end, and need not be interrupted by an exception.
+
+    What hooks ask, when the end has begun, tells nothing of the program.
+    """
+    if state.context is not None and state.ender is None:
+        state.context.cooperative = True
 
 
 def when_ready(act: Callable[[Node], object]) -> None:

@@ -22,8 +22,8 @@ from rosz.ros1.rospy.rostime import (
     is_wallclock,
     wallsleep,
 )
+from rosz.ros1.rospy.state import cooperate, state
 from rosz.ros1.rospy.state import is_shutdown as ended
-from rosz.ros1.rospy.state import state
 from rosz.time import DurationValue, TimeValue
 
 if TYPE_CHECKING:
@@ -64,8 +64,7 @@ def sleep(duration: float | AnyDuration) -> None:
 
 
 def _sleep_ns(nanoseconds: int) -> None:
-    if state.context is not None:
-        state.context.cooperative = True
+    cooperate()
     began = time.monotonic_ns()
     try:
         slept = clock().sleep(nanoseconds)
