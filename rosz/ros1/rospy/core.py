@@ -60,6 +60,8 @@ __all__ = (
 )
 
 
+_SLICE = 0.5
+
 atexit.register(run_hooks, "atexit")
 
 
@@ -131,8 +133,9 @@ def add_shutdown_hook(h: Callable[[str], object]) -> None:
 
 def wait_for_shutdown() -> None:
     """Wait until the end has begun; any thread, any number of them."""
-    if state.context is not None:
-        state.context.wait_for_shutdown()
+    # In slices: a signal that Python sees right before a wait would have to wait, too.
+    while state.context is not None and not state.context.wait_for_shutdown(_SLICE):
+        pass
 
 
 def get_node_uri() -> str | None:
