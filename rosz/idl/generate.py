@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from rosz.errors import DefinitionError, TypeNotFound, near_miss
+from rosz.idl.action import action_messages, action_parts
 from rosz.idl.catalog import Catalog, Definition
 from rosz.idl.module import MARKER, index_module, message_module, service_module
 
@@ -40,18 +41,27 @@ def read_definition(file: Path) -> Definition:
 class Folders:
     """Definitions in the folders of packages: ``<package>/msg/*.msg`` and ``srv/*.srv``.
 
+    The messages that ROS 1 makes of ``<package>/action/*.action`` count as messages.
+
     Args:
         folder: Gives the folder of a package by its name; None where there is no such package.
+        actions: Whether messages of actions count.
     """
 
-    def __init__(self, folder: Callable[[str], Path | None]) -> None:
+    def __init__(self, folder: Callable[[str], Path | None], *, actions: bool = True) -> None:
         self._folder = folder
+        self._actions = actions
 
     def names(self, package: str, kind: str) -> list[str]:
         """Return the full names of a package's types of one kind, sorted."""
         folder = self._folder(package)
-        files = sorted((folder / kind).glob(f"*.{kind}")) if folder else []
-        return [f"{package}/{kind}/{file.stem}" for file in files]
+        if folder is None:
+            return []
+        bases = {file.stem for file in (folder / kind).glob(f"*.{kind}")}
+        if kind == "msg" and self._actions:
+            actions = (folder / "action").glob("*.action")
+            bases.update(part for file in actions for part in action_parts(file.stem))
+        return [f"{package}/{kind}/{base}" for base in sorted(bases)]
 
     def find(self, name: str) -> Definition:
         """Return the definition of a full name.
@@ -66,11 +76,22 @@ class Folders:
             raise TypeNotFound(name, f"there is no package '{package}'")
         file = folder / kind / f"{base}.{kind}"
         if not file.is_file():
+            made = self._of_action(folder, base) if kind == "msg" and self._actions else None
+            if made is not None:
+                return made
             known = self.names(package, kind)
             raise TypeNotFound(
                 name, f"'{folder / kind}' has no '{base}.{kind}'{near_miss(name, known)}"
             )
         return read_definition(file)
+
+    def _of_action(self, folder: Path, base: str) -> Definition | None:
+        """Return the definition of a message that an action gives; None if none gives it."""
+        for file in (folder / "action").glob("*.action"):
+            if base in action_parts(file.stem):
+                found = read_definition(file)
+                return Definition(action_messages(file.stem, found.text)[base], found.path)
+        return None
 
 
 def shipped_module(name: str) -> str:
@@ -124,7 +145,8 @@ def shipped_sources(interfaces: Path) -> dict[str, dict[str, str]]:
         DefinitionError: A definition is not well-formed, or refers to what is not there.
     """
     packages = sorted(file.parent.name for file in interfaces.glob("*/package.xml"))
-    folders = Folders(lambda name: interfaces / name if name in packages else None)
+    # Their actions are ROS 2's; who wants ROS 1's messages of them gets them compiled.
+    folders = Folders(lambda name: interfaces / name if name in packages else None, actions=False)
     catalog = Catalog(folders.find)
     named = {p: (folders.names(p, "msg"), folders.names(p, "srv")) for p in packages}
     return {

@@ -1,0 +1,172 @@
+"""actionlib: goals, results, feedback and giving way, between programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from network import Network
+from ros1_oracle import real
+
+from rosz.packages import PackageIndex
+from rosz.typestore import TypeStore
+
+ACTION = "# what to count to\nint32 top\n---\nint32 sum\n---\nint32 now\n"
+
+SERVER = """
+    import rosz.ros1
+    import actionlib, rospy
+    from counting.msg import CountAction, CountFeedback, CountResult
+
+    def execute(goal):
+        if goal.top < 0:
+            raise ValueError("below nothing")
+        if goal.top == 0:
+            return
+        total = 0
+        for number in range(1, goal.top + 1):
+            if server.is_preempt_requested():
+                server.set_preempted(CountResult(total), "interrupted")
+                return
+            total += number
+            server.publish_feedback(CountFeedback(number))
+            rospy.sleep(0.01)
+        server.set_succeeded(CountResult(total), "counted")
+
+    rospy.init_node("server")
+    server = actionlib.SimpleActionServer("count", CountAction, execute, auto_start=False)
+    server.start()
+    print("ready", flush=True)
+    rospy.spin()
+"""
+
+CLIENT = """
+    import rosz.ros1
+    import actionlib, rospy
+    from actionlib_msgs.msg import GoalStatus
+    from counting.msg import CountAction, CountGoal
+    rospy.init_node("client")
+    client = actionlib.SimpleActionClient("count", CountAction)
+    assert client.wait_for_server(rospy.Duration(15))
+"""
+
+
+@pytest.fixture
+def path(network: Network) -> str:
+    """A package path with a package that has an action."""
+    folder = network.folder / "src" / "counting"
+    (folder / "action").mkdir(parents=True)
+    (folder / "action" / "Count.action").write_text(ACTION)
+    (folder / "package.xml").write_text("<package><name>counting</name></package>")
+    return str(folder.parent)
+
+
+def test_goals(network: Network, path: str) -> None:
+    network.program(SERVER, ROSZ_PACKAGE_PATH=path).wait_for("ready")
+    client = network.program(
+        CLIENT
+        + """
+    heard = []
+    client.send_goal(
+        CountGoal(4),
+        done_cb=lambda state, result: heard.append(("done", state, result.sum)),
+        active_cb=lambda: heard.append("active"),
+        feedback_cb=lambda feedback: heard.append(feedback.now),
+    )
+    print(client.wait_for_result(rospy.Duration(15)), client.get_state(), client.get_result().sum,
+          client.get_goal_status_text(), client.simple_state)
+    print(sorted(heard, key=str))
+    print(client.send_goal_and_wait(CountGoal(-1), rospy.Duration(15)),
+          client.get_goal_status_text())
+    print(client.send_goal_and_wait(CountGoal(0), rospy.Duration(15)),
+          client.get_goal_status_text())
+    print(client.send_goal_and_wait(CountGoal(100000), rospy.Duration(0.2), rospy.Duration(15)),
+          client.get_goal_status_text())
+""",
+        ROSZ_PACKAGE_PATH=path,
+    )
+    assert client.exit_code() == 0, client.output
+    assert client.lines == [
+        "True 3 10 counted 2",
+        "[('done', 3, 10), 1, 2, 3, 4, 'active']",
+        "4 Exception in execute callback: below nothing",
+        "4 No terminal state was set.",
+        "2 interrupted",
+    ]
+
+
+def test_a_newer_goal_takes_over(network: Network, path: str) -> None:
+    network.program(SERVER, ROSZ_PACKAGE_PATH=path).wait_for("ready")
+    first = network.program(
+        CLIENT
+        + """
+    client.send_goal(CountGoal(100000), active_cb=lambda: print("active", flush=True))
+    client.wait_for_result()
+    print(client.get_state(), client.get_result().sum > 0)
+""",
+        ROSZ_PACKAGE_PATH=path,
+    )
+    first.wait_for("active")
+    second = network.program(
+        CLIENT + "    print(client.send_goal_and_wait(CountGoal(3)), client.get_result().sum)\n",
+        "__name:=second",
+        ROSZ_PACKAGE_PATH=path,
+    )
+    assert second.exit_code() == 0, second.output
+    assert second.lines == ["3 6"]
+    assert first.exit_code() == 0, first.output
+    assert first.lines == ["active", "2 True"]
+
+
+def test_goal_callbacks(network: Network, path: str) -> None:
+    program = network.program(
+        """
+        import rosz.ros1
+        import actionlib, rospy, threading
+        from counting.msg import CountAction, CountGoal, CountResult
+        rospy.init_node("both")
+        server = actionlib.SimpleActionServer("count", CountAction, auto_start=False)
+        cancelled = threading.Event()
+        server.register_goal_callback(lambda: print("goal", server.accept_new_goal().top))
+        def give_way():
+            print("preempt", server.is_preempt_requested())
+            server.set_preempted(CountResult(1))
+        server.register_preempt_callback(give_way)
+        server.start()
+        client = actionlib.SimpleActionClient("count", CountAction)
+        print(client.get_state(), client.wait_for_server(rospy.Duration(15)))
+        active = threading.Event()
+        client.send_goal(CountGoal(7), active_cb=active.set)
+        active.wait(15)
+        client.cancel_all_goals()
+        print(client.wait_for_result(rospy.Duration(15)), client.get_state(), server.is_active())
+        lost = actionlib.SimpleActionClient("nothing", CountAction)
+        print(lost.wait_for_server(rospy.Duration(0.05)))
+        """,
+        ROSZ_PACKAGE_PATH=path,
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines == ["9 True", "goal 7", "preempt True", "True 2 False", "False"]
+
+
+def test_messages_of_actions_are_those_of_ros1(tmp_path: Path) -> None:
+    text = "int64 a\nint64 b\n---\nint64 sum\n---\n"
+    folder = tmp_path / "actionlib" / "action"
+    folder.mkdir(parents=True)
+    (folder / "TwoInts.action").write_text(text)
+    (tmp_path / "actionlib" / "package.xml").write_text("<package><name>actionlib</name></package>")
+    store = TypeStore(PackageIndex([tmp_path]))
+    names = store.names("msg", "actionlib")
+    ours = {name: store.message(name)._md5sum for name in names}
+    theirs = real(
+        f"""
+        import actionlib.msg
+        result = {{
+            name: getattr(actionlib.msg, name.split("/")[1])._md5sum for name in {names}
+        }}
+        """,
+        "actionlib",
+        "python3-actionlib",
+    )
+    assert len(ours) == 7
+    assert ours == theirs
