@@ -77,6 +77,9 @@ def command(
     sigterm_timeout: Annotated[
         float, typer.Option(metavar="SECONDS", help="From SIGTERM to SIGKILL.")
     ] = 2.0,
+    keys: Annotated[
+        str, typer.Option(metavar="DIR", help="Keys that links beyond this machine need.")
+    ] = "",
     pid: Annotated[
         str, typer.Option(metavar="FILE", help="Write the process id of the launch to a file.")
     ] = "",
@@ -149,7 +152,7 @@ def command(
         dump_params=dump_params,
         dump_plan=dump_plan,
     )
-    job = _Job(words or ())
+    job = _Job(words or (), Path(keys).expanduser().absolute() if keys else None)
     if question is not None:
         sys.stdout.write(job.answer(*question))
         return 0
@@ -196,12 +199,15 @@ class _Job:
 
     Args:
         words: All that is no option.
+        keys: Folder of the keys that it and its nodes use, in place of ``ROSZ_KEYS``.
     """
 
-    def __init__(self, words: Sequence[str]) -> None:
+    def __init__(self, words: Sequence[str], keys: Path | None) -> None:
         from rosz.launch.plan import SystemContext, parse_arguments
 
         self.environ = dict(os.environ)
+        if keys is not None:
+            self.environ["ROSZ_KEYS"] = str(keys)
         self.cwd = Path.cwd()
         self.environment = Environment.read(self.environ, self.cwd)
         self.packages = package_index(self.environment)
