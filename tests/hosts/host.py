@@ -182,6 +182,7 @@ class Host:
 
     def close(self) -> None:
         """Leave nothing of it behind."""
+        self.kill()  # first all, as one may hold what another writes to
         while self._programs:
             self._programs.pop().close()
         self.namespace.close()

@@ -24,7 +24,7 @@ from rosz.launch.run.command import Workplace
 from rosz.launch.run.family import kill_family, usage
 from rosz.launch.run.folder import RunFolder
 from rosz.launch.run.host import Child, LocalHost
-from rosz.launch.run.loop import Loop
+from rosz.launch.run.loop import Loop, Timer
 from rosz.launch.run.output import Output
 from rosz.launch.run.pipe import Lines, Outbox
 from rosz.launch.run.protocol import (
@@ -78,7 +78,7 @@ class Agent:
         self._output: Output | None = None
         self._host: LocalHost | None = None
         self._children: dict[int, Child] = {}
-        self._deadline = self._loop.now() + _SETUP_SECONDS
+        self._patience: Timer | None = None
         self._ending = False
 
     def run(self) -> None:
@@ -88,7 +88,7 @@ class Agent:
         self._outbox.send(Hello(PROTOCOL, rosz_version(), socket.gethostname()))
         self._loop.watch(self._requests.fd, self._heard)
         self._listen()
-        self._watch_silence()
+        self._expect()
         try:
             self._loop.run()
         finally:
@@ -103,19 +103,18 @@ class Agent:
 
     def _heard(self) -> None:
         for line in self._requests.read():
-            self._deadline = self._loop.now() + (
-                self._setup.silence if self._setup else _SETUP_SECONDS
-            )
             self._obey(self._decoder.decode(line))
         if self._requests.ended:
             self._end()
-
-    def _watch_silence(self) -> None:
-        left = self._deadline - self._loop.now()
-        if left <= 0:
-            self._end()
         else:
-            self._loop.later(left, self._watch_silence)
+            self._expect()
+
+    def _expect(self) -> None:
+        """End when nothing more is heard for too long."""
+        if self._patience is not None:
+            self._patience.cancel()
+        seconds = self._setup.silence if self._setup else _SETUP_SECONDS
+        self._patience = self._loop.later(seconds, self._end)
 
     def _listen(self) -> None:
         """Pass on what nodes write to the screen, unless too much of it waits already."""
@@ -145,7 +144,6 @@ class Agent:
 
     def _set_up(self, setup: Setup) -> None:
         self._setup = setup
-        self._deadline = self._loop.now() + setup.silence
         self._environ["ROS_DOMAIN_ID"] = str(setup.domain)
         environment = Environment.read(self._environ)
         reaches = _reaches(environment, setup, self._environ.get("SSH_CONNECTION", ""))

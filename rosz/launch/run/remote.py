@@ -179,7 +179,7 @@ class RemoteHost:
             self._loop.later(self._silence / _PINGS, self._ping)
 
     def _late(self) -> None:
-        self._fail(f"no answer from '{self.place}' within {self._machine.timeout:g} s")
+        self._fail(f"'{self.place}' does not answer within {self._machine.timeout:g} s")
 
     def _heard(self) -> None:
         for line in self._out.read():
