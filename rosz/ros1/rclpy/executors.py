@@ -194,7 +194,7 @@ class Executor:
 
     def _entities(self) -> Iterable[Entity]:
         for node in self._nodes:
-            yield from node.entities()
+            yield from node.rosz_entities()
 
     def _collect(self, entities: Iterable[Entity]) -> Iterable[tuple[Job, CallbackGroup]]:
         for entity in entities:

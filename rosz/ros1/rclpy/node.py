@@ -37,6 +37,8 @@ _SECOND = 1_000_000_000
 class Node(NodeParameters, NodeGraph):
     """A node whose callbacks run while it is spun, and only then.
 
+    Names of rosz's own begin with ``rosz_``, so that classes of users are free to have any others.
+
     Args:
         node_name: Base name; ``__node:=`` on the command line overrides it.
         context: What it shares with others; the default one when not given.
@@ -61,7 +63,7 @@ class Node(NodeParameters, NodeGraph):
         parameter_overrides: Sequence[Parameter] | None = None,
         **options: Any,
     ) -> None:
-        self._parts: list[Any] = []
+        self._rosz_parts: list[Any] = []
         self.context = context or state.default_context()
         if not self.context.ok():
             raise NotInitializedException("cannot create node")
@@ -69,28 +71,28 @@ class Node(NodeParameters, NodeGraph):
         if unknown:
             raise UsageError(f"Node takes no '{min(unknown)}' in rosz")
         self.executor: Executor | None = None
-        self._node = RoszNode(node_name, namespace=namespace, context=self.context.opened)
-        self._clock = ROSClock(self._node.clock)
-        self._logger_name = self._node.name.strip("/").replace("/", ".")
-        write_as_rclpy(self._node.log, self._logger_name)
+        self.rosz_node = RoszNode(node_name, namespace=namespace, context=self.context.opened)
+        self._clock = ROSClock(self.rosz_node.clock)
+        self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
+        write_as_rclpy(self.rosz_node.log, self._rosz_logger_name)
         self.default_callback_group: CallbackGroup = MutuallyExclusiveCallbackGroup()
         given = self.context.given
         if given.level:
-            self._node.log.set_level("", given.level)
-        overrides = self._overrides(given.params)
+            self.rosz_node.log.set_level("", given.level)
+        overrides = self._rosz_overrides(given.params)
         overrides |= {one.name: one.value for one in parameter_overrides or ()}
-        self._declared = Declared(self._node, overrides, self._call_soon)
-        self.declare_parameter("use_sim_time", self._node.clock.simulated)
-        if self.get_parameter("use_sim_time").value and not self._node.clock.simulated:
-            simulate(self._node)
+        self._rosz_declared = Declared(self.rosz_node, overrides, self._rosz_call_soon)
+        self.declare_parameter("use_sim_time", self.rosz_node.clock.simulated)
+        if self.get_parameter("use_sim_time").value and not self.rosz_node.clock.simulated:
+            simulate(self.rosz_node)
         if options.get("automatically_declare_parameters_from_overrides"):
             for name, value in overrides.items():
                 if not self.has_parameter(name):
                     self.declare_parameter(name, value)
 
-    def _overrides(self, params: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    def _rosz_overrides(self, params: dict[str, dict[str, Any]]) -> dict[str, Any]:
         found: dict[str, Any] = {}
-        for node in ("", self._node.base_name, self._node.name):
+        for node in ("", self.rosz_node.base_name, self.rosz_node.name):
             found |= params.get(node, {})
         return found
 
@@ -101,33 +103,33 @@ class Node(NodeParameters, NodeGraph):
 
     # What executors ask.
 
-    def entities(self) -> Iterator[Entity]:
+    def rosz_entities(self) -> Iterator[Entity]:
         """Yield what has callbacks, timers first, as they run in rclpy."""
-        parts = list(self._parts)
+        parts = list(self._rosz_parts)
         yield from (part for part in parts if isinstance(part, Timer))
         yield from (part for part in parts if isinstance(part, Subscription | Service))
 
-    def _wake(self) -> None:
+    def _rosz_wake(self) -> None:
         executor = self.executor
         if executor is not None:
             executor.wake()
 
-    def _call_soon(self, job: Callable[[], object]) -> None:
+    def _rosz_call_soon(self, job: Callable[[], object]) -> None:
         (self.executor or state.global_executor()).call_soon(job)
 
     # Who it is.
 
     def get_name(self) -> str:
         """Return its base name."""
-        return self._node.base_name
+        return self.rosz_node.base_name
 
     def get_namespace(self) -> str:
         """Return its namespace."""
-        return self._node.namespace
+        return self.rosz_node.namespace
 
     def get_fully_qualified_name(self) -> str:
         """Return its full name."""
-        return self._node.name
+        return self.rosz_node.name
 
     def get_clock(self) -> Clock:
         """Return its clock, which tells ROS time."""
@@ -135,7 +137,7 @@ class Node(NodeParameters, NodeGraph):
 
     def get_logger(self) -> RcutilsLogger:
         """Return its logger."""
-        return RcutilsLogger(self._logger_name, self._node.log)
+        return RcutilsLogger(self._rosz_logger_name, self.rosz_node.log)
 
     # What it has.
 
@@ -153,8 +155,8 @@ class Node(NodeParameters, NodeGraph):
             topic: Name of the topic.
             qos_profile: A profile, or the depth of its queue.
         """
-        raw = self._node.publisher(topic, msg_type, qos=to_qos(qos_profile))
-        return self._keep(Publisher(raw, qos_profile))
+        raw = self.rosz_node.publisher(topic, msg_type, qos=to_qos(qos_profile))
+        return self._rosz_keep(Publisher(raw, qos_profile))
 
     def create_subscription(
         self,
@@ -177,16 +179,16 @@ class Node(NodeParameters, NodeGraph):
             callback_group: The group of the callback; the node's own when not given.
             raw: Whether to pass the encoded bytes on.
         """
-        return self._keep(
+        return self._rosz_keep(
             Subscription(
-                self._node,
+                self.rosz_node,
                 topic,
                 msg_type,
                 callback,
                 to_qos(qos_profile),
                 raw=raw,
                 group=callback_group or self.default_callback_group,
-                wake=self._wake,
+                wake=self._rosz_wake,
             )
         )
 
@@ -207,15 +209,15 @@ class Node(NodeParameters, NodeGraph):
             clock: Whose time to go by; the node's when not given.
             autostart: Whether it begins at once, or with ``reset``.
         """
-        return self._keep(
+        return self._rosz_keep(
             Timer(
                 round(timer_period_sec * _SECOND),
                 callback,
-                self._node.clock,
+                self.rosz_node.clock,
                 clock=clock or self._clock,
                 group=callback_group or self.default_callback_group,
-                wake=self._wake,
-                report=self._node.log.report,
+                wake=self._rosz_wake,
+                report=self.rosz_node.log.report,
                 autostart=autostart,
             )
         )
@@ -237,14 +239,14 @@ class Node(NodeParameters, NodeGraph):
             callback: Gets a request and an empty response, and returns the response.
             callback_group: The group of the callback; the node's own when not given.
         """
-        return self._keep(
+        return self._rosz_keep(
             Service(
-                self._node,
+                self.rosz_node,
                 srv_name,
                 srv_type,
                 callback,
                 group=callback_group or self.default_callback_group,
-                wake=self._wake,
+                wake=self._rosz_wake,
             )
         )
 
@@ -255,7 +257,9 @@ class Node(NodeParameters, NodeGraph):
             srv_type: Its type.
             srv_name: Its name.
         """
-        return self._keep(Client(self._node, srv_name, srv_type, call_soon=self._call_soon))
+        return self._rosz_keep(
+            Client(self.rosz_node, srv_name, srv_type, call_soon=self._rosz_call_soon)
+        )
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:  # noqa: ARG002
         """Return a pace-maker for a loop.
@@ -269,39 +273,39 @@ class Node(NodeParameters, NodeGraph):
         """
         if frequency <= 0:
             raise UsageError(f"a rate is '{frequency}' Hz; expected above 0")
-        return Rate(int(_SECOND / frequency), self._node.clock)
+        return Rate(int(_SECOND / frequency), self.rosz_node.clock)
 
-    def _keep(self, part: P) -> P:
-        self._parts.append(part)
-        self._wake()
+    def _rosz_keep(self, part: P) -> P:
+        self._rosz_parts.append(part)
+        self._rosz_wake()
         return part
 
-    def _destroy(self, part: Any) -> bool:
-        if part not in self._parts:
+    def _rosz_destroy(self, part: Any) -> bool:
+        if part not in self._rosz_parts:
             return False
-        self._parts.remove(part)
+        self._rosz_parts.remove(part)
         part.destroy()
         return True
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """End a publisher; tell whether it was one of the node."""
-        return self._destroy(publisher)
+        return self._rosz_destroy(publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
         """End a subscription; tell whether it was one of the node."""
-        return self._destroy(subscription)
+        return self._rosz_destroy(subscription)
 
     def destroy_timer(self, timer: Timer) -> bool:
         """End a timer; tell whether it was one of the node."""
-        return self._destroy(timer)
+        return self._rosz_destroy(timer)
 
     def destroy_service(self, service: Service) -> bool:
         """End a service; tell whether it was one of the node."""
-        return self._destroy(service)
+        return self._rosz_destroy(service)
 
     def destroy_client(self, client: Client) -> bool:
         """End a client; tell whether it was one of the node."""
-        return self._destroy(client)
+        return self._rosz_destroy(client)
 
     def destroy_rate(self, rate: Rate) -> bool:
         """End a rate."""
@@ -312,24 +316,24 @@ class Node(NodeParameters, NodeGraph):
         """End the node with all it has; again is no error."""
         if self.executor is not None:
             self.executor.remove_node(self)
-        while self._parts:
-            self._parts.pop().destroy()
-        self._node.close()
+        while self._rosz_parts:
+            self._rosz_parts.pop().destroy()
+        self.rosz_node.close()
 
     @property
     def publishers(self) -> Iterator[Publisher]:
         """Its publishers."""
-        return (part for part in self._parts if isinstance(part, Publisher))
+        return (part for part in self._rosz_parts if isinstance(part, Publisher))
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
         """Its subscriptions."""
-        return (part for part in self._parts if isinstance(part, Subscription))
+        return (part for part in self._rosz_parts if isinstance(part, Subscription))
 
     @property
     def timers(self) -> Iterator[Timer]:
         """Its timers."""
-        return (part for part in self._parts if isinstance(part, Timer))
+        return (part for part in self._rosz_parts if isinstance(part, Timer))
 
     def __enter__(self) -> Self:
         return self

@@ -13,7 +13,7 @@ __all__ = ("NodeGraph",)
 class NodeGraph:
     """The names of a node, and its view of the others."""
 
-    _node: RoszNode
+    rosz_node: RoszNode
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """Return the global name that the name of a topic means.
@@ -23,37 +23,37 @@ class NodeGraph:
             only_expand: Whether to leave remappings out.
         """
         if only_expand:
-            return names.resolve(topic, self._node.name)
-        return self._node.resolve(topic)
+            return names.resolve(topic, self.rosz_node.name)
+        return self.rosz_node.resolve(topic)
 
     resolve_service_name = resolve_topic_name
 
     def get_node_names(self) -> list[str]:
         """Return the base names of all nodes."""
-        return [names.basename(name) for name in self._view().nodes()]
+        return [names.basename(name) for name in self._rosz_view().nodes()]
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
         """Return base name and namespace of all nodes."""
         return [
             (names.basename(name), names.namespace(name).rstrip("/") or "/")
-            for name in self._view().nodes()
+            for name in self._rosz_view().nodes()
         ]
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:  # noqa: ARG002
         """Return all topics with their types."""
-        return list(self._view().topics().items())
+        return list(self._rosz_view().topics().items())
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
         """Return all services with their types."""
-        return list(self._view().services().items())
+        return list(self._rosz_view().services().items())
 
     def count_publishers(self, topic_name: str) -> int:
         """Return how many publishers a topic has."""
-        return len(self._view().publishers(self.resolve_topic_name(topic_name)))
+        return len(self._rosz_view().publishers(self.resolve_topic_name(topic_name)))
 
     def count_subscribers(self, topic_name: str) -> int:
         """Return how many subscriptions a topic has."""
-        return len(self._view().subscriptions(self.resolve_topic_name(topic_name)))
+        return len(self._rosz_view().subscriptions(self.resolve_topic_name(topic_name)))
 
-    def _view(self) -> Any:
-        return self._node.context.graph.view()
+    def _rosz_view(self) -> Any:
+        return self.rosz_node.context.graph.view()

@@ -16,7 +16,7 @@ __all__ = ("NodeParameters",)
 class NodeParameters:
     """The parameters of a node."""
 
-    _declared: Declared
+    _rosz_declared: Declared
 
     def declare_parameter(
         self,
@@ -37,7 +37,7 @@ class NodeParameters:
             ParameterAlreadyDeclaredException: It is declared already.
             InvalidParameterTypeException: What was given is of another type.
         """
-        return self._declared.declare(name, value, descriptor, ignore_override)
+        return self._rosz_declared.declare(name, value, descriptor, ignore_override)
 
     def declare_parameters(
         self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
@@ -54,17 +54,17 @@ class NodeParameters:
         for name, *rest in parameters:
             value, descriptor = (*rest, None, None)[:2]
             declared.append(
-                self._declared.declare(start + name, value, descriptor, ignore_override)
+                self._rosz_declared.declare(start + name, value, descriptor, ignore_override)
             )
         return declared
 
     def undeclare_parameter(self, name: str) -> None:
         """Forget a parameter."""
-        self._declared.undeclare(name)
+        self._rosz_declared.undeclare(name)
 
     def has_parameter(self, name: str) -> bool:
         """Tell whether a parameter is declared."""
-        return self._declared.has(name)
+        return self._rosz_declared.has(name)
 
     def get_parameter(self, name: str) -> Parameter:
         """Return a parameter.
@@ -73,39 +73,39 @@ class NodeParameters:
             ParameterNotDeclaredException: It is not declared.
             ParameterUninitializedException: It was declared by type alone, and is not set.
         """
-        return self._declared.get(name)
+        return self._rosz_declared.get(name)
 
     def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
         """Return several parameters."""
-        return [self._declared.get(name) for name in names]
+        return [self._rosz_declared.get(name) for name in names]
 
     def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
         """Return a parameter, or something else where it is not declared."""
         try:
-            return self._declared.get(name)
+            return self._rosz_declared.get(name)
         except ParameterNotDeclaredException:
             return alternative_value
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
         """Return the parameters of a namespace, by the rest of their names."""
-        return self._declared.below(prefix)
+        return self._rosz_declared.below(prefix)
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Return what was said about a parameter when it was declared."""
-        return self._declared.descriptor(name)
+        return self._rosz_declared.descriptor(name)
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
         """Set parameters; each result tells whether that one was set."""
-        return self._declared.set(parameter_list)
+        return self._rosz_declared.set(parameter_list)
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
         """Set all parameters or none."""
-        return self._declared.set_together(parameter_list)
+        return self._rosz_declared.set_together(parameter_list)
 
     def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
         """Have a function asked before parameters are set."""
-        self._declared.add_check(callback)
+        self._rosz_declared.add_check(callback)
 
     def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
         """Ask a function no more."""
-        self._declared.remove_check(callback)
+        self._rosz_declared.remove_check(callback)

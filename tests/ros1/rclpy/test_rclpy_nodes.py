@@ -276,7 +276,7 @@ def test_parameters_of_the_command_line(start: Start) -> None:
 def test_parameters_are_those_of_the_store(world: World, network: Network) -> None:
     other = network.node("other")
     other.params.set("/robot/speed", 4)
-    eventually(lambda: world.node._node.params.has("~speed"), "the parameter")
+    eventually(lambda: world.node.rosz_node.params.has("~speed"), "the parameter")
     assert world.node.declare_parameter("speed", 1.0).value == 4.0
     world.node.declare_parameter("pid.p", 1.0)
     assert other.params.get("/robot/pid/p") == 1.0
