@@ -161,12 +161,22 @@ def warn(text: str) -> None:
 
 
 @contextmanager
-def until_stopped() -> Iterator[None]:
-    """Let Ctrl-C, or a request to terminate, be the regular end of what goes on for ever."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+def until_stopped(*, itself: bool = False) -> Iterator[None]:
+    """Let Ctrl-C, or a request to terminate, be the regular end of what goes on for ever.
+
+    Args:
+        itself: Whether to take the signals, for what opens no context, which else does. Then enter
+            it late: what loads meanwhile may lose the exception that a signal raises.
+    """
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    if itself:
+        for number, present in before.items():
+            if present is signal.SIG_DFL:
+                signal.signal(number, signal.default_int_handler)
     try:
         yield
     except KeyboardInterrupt:
         return
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, present in before.items():
+            signal.signal(number, present)

@@ -286,9 +286,13 @@ def watch_command(
     from queue import SimpleQueue
 
     changes: SimpleQueue[Changed] = SimpleQueue()
-    with _client(context, lasting=True) as (client, resolve), until_stopped():
+    with _client(context, lasting=True) as (client, resolve):
         full = resolve(name)
-        with client.follow() as follower, follower.watch(full, changes.put):
+        with (
+            client.follow() as follower,
+            follower.watch(full, changes.put),
+            until_stopped(itself=True),
+        ):
             _complain(f"watching [{full}]; press Ctrl-C to end")
             left = count
             while left is None or left > 0:

@@ -40,9 +40,19 @@ def list_packages(
 
 
 @app.command("find")
-def find_package(name: Annotated[str, typer.Argument(metavar="PACKAGE")]) -> None:
+def find_package(
+    name: Annotated[str, typer.Argument(metavar="PACKAGE")],
+    *,
+    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+) -> None:
     """Print the folder of a package."""
-    sys.stdout.write(f"{_index().find(name).path}\n")
+    package = _index().find(name)
+    if json:
+        from rosz.cli.group import print_json
+
+        print_json({"name": package.name, "path": str(package.path)})
+    else:
+        sys.stdout.write(f"{package.path}\n")
 
 
 @app.command("create")

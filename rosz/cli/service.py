@@ -72,13 +72,21 @@ def info_command(context: typer.Context, service: _ServiceName, *, json: _Json =
 
 
 @app.command("type")
-def type_command(context: typer.Context, service: _ServiceName) -> None:
+def type_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the type of a service."""
     from rosz.introspect.services import server
     from rosz.introspect.survey import ros1_type
 
     call = call_of(context)
-    print_lines([ros1_type(server(call.survey().view, call.resolve(service, _TOOL)).type_name)])
+    name = ros1_type(server(call.survey().view, call.resolve(service, _TOOL)).type_name)
+    _print_one("type", name, as_json=json)
+
+
+def _print_one(title: str, value: str, *, as_json: bool) -> None:
+    if as_json:
+        print_json({title: value})
+    else:
+        print_lines([value])
 
 
 @app.command("find")
@@ -99,32 +107,38 @@ def find_command(
 
 
 @app.command("args")
-def args_command(context: typer.Context, service: _ServiceName) -> None:
+def args_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the arguments that a service takes."""
     from rosz.introspect.fill import list_arguments
     from rosz.introspect.services import server
 
     call = call_of(context)
     token = server(call.survey().view, call.resolve(service, _TOOL))
-    print_lines([list_arguments(call.types.service(token.type_name).Request)])
+    names = list_arguments(call.types.service(token.type_name).Request)
+    if json:
+        print_json({"args": names.split()})
+    else:
+        print_lines([names])
 
 
 @app.command("node")
-def node_command(context: typer.Context, service: _ServiceName) -> None:
+def node_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the node that serves a service."""
     from rosz.introspect.services import server
 
     call = call_of(context)
-    print_lines([server(call.survey().view, call.resolve(service, _TOOL)).node_name])
+    token = server(call.survey().view, call.resolve(service, _TOOL))
+    _print_one("node", token.node_name, as_json=json)
 
 
 @app.command("uri")
-def uri_command(context: typer.Context, service: _ServiceName) -> None:
+def uri_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the key that a service is called by on Zenoh."""
     from rosz.introspect.services import server, uri
 
     call = call_of(context)
-    print_lines([uri(server(call.survey().view, call.resolve(service, _TOOL)))])
+    token = server(call.survey().view, call.resolve(service, _TOOL))
+    _print_one("uri", uri(token), as_json=json)
 
 
 @app.command("call")

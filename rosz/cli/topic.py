@@ -203,29 +203,41 @@ def hz_command(
     wall_time: Annotated[
         bool, typer.Option("--wall-time", help="Measure wall time, not simulated time.")
     ] = False,
+    json: _Json = False,
 ) -> None:
     """Print every second how many messages come."""
     from rosz.cli.topic_follow import hz
     from rosz.introspect.expression import Filter
 
     chosen = Filter(condition) if condition else None
-    hz(call_of(context), topics, window=_window(window), condition=chosen, wall_time=wall_time)
+    hz(
+        call_of(context),
+        topics,
+        window=_window(window),
+        condition=chosen,
+        wall_time=wall_time,
+        as_json=json,
+    )
 
 
 @app.command("bw")
-def bw_command(context: typer.Context, topic: _TopicName, *, window: _Window = None) -> None:
+def bw_command(
+    context: typer.Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
+) -> None:
     """Print every second how many bytes come."""
     from rosz.cli.topic_follow import bw
 
-    bw(call_of(context), topic, window=_window(window))
+    bw(call_of(context), topic, window=_window(window), as_json=json)
 
 
 @app.command("delay")
-def delay_command(context: typer.Context, topic: _TopicName, *, window: _Window = None) -> None:
+def delay_command(
+    context: typer.Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
+) -> None:
     """Print every second how old messages are, by the stamp in their header."""
     from rosz.cli.topic_follow import delay
 
-    delay(call_of(context), topic, window=_window(window))
+    delay(call_of(context), topic, window=_window(window), as_json=json)
 
 
 def _window(given: int | None) -> int | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,8 @@ from rosz.node import Context, Node
 from rosz.qos import QoS
 
 if TYPE_CHECKING:
+    from msgspec import Struct
+
     from rosz.introspect.echo import EchoOptions
     from rosz.introspect.expression import Filter
     from rosz.introspect.fields import Target
@@ -145,6 +147,7 @@ def hz(
     window: int | None,
     condition: Filter | None,
     wall_time: bool,
+    as_json: bool,
 ) -> None:
     """Print rates."""
     from rosz.introspect.rate import RateMeter, report, report_all
@@ -159,9 +162,14 @@ def hz(
                 _tap(node, token, lambda _, tick=meter.tick: tick(clock()))  # type: ignore[misc]
             else:
                 _filtered(node, token, condition, meter, clock)
+            if not as_json:
+                print_lines([f"subscribed to [{token.name}]"])
         while not node.is_shutdown:
             node.context.wait_for_shutdown(_PERIOD)
             found = {name: meter.stats() for name, meter in meters.items()}
+            if as_json:
+                _print_stats(found)
+                continue
             text = report_all(found) if len(found) > 1 else report(*found.values())
             print_lines([text])
 
@@ -170,7 +178,16 @@ def _tap(node: Node, token: Token, callback: Callable[[Sample], None]) -> None:
     from rosz.introspect.tap import open_tap
 
     open_tap(node, token.name, token.type_name, token.type_hash, callback)
-    print_lines([f"subscribed to [{token.name}]"])
+
+
+def _print_stats(found: Mapping[str, Struct | None]) -> None:
+    """Print what was measured as JSON, a line for each topic that has sent something."""
+    import msgspec
+
+    for name, stats in found.items():
+        if stats is not None:
+            row = {"topic": name, **msgspec.structs.asdict(stats)}
+            print_lines([msgspec.json.encode(row).decode()])
 
 
 def _filtered(node: Node, token: Token, condition: Filter, meter: Any, clock: Any) -> None:
@@ -179,10 +196,9 @@ def _filtered(node: Node, token: Token, condition: Filter, meter: Any, clock: An
             meter.tick(clock())
 
     node.subscription(token.name, find_class(node.context, token), arrived, qos=_QUEUE)
-    print_lines([f"subscribed to [{token.name}]"])
 
 
-def bw(call: Call, topic: str, *, window: int | None) -> None:
+def bw(call: Call, topic: str, *, window: int | None, as_json: bool) -> None:
     """Print bandwidth."""
     from rosz.introspect.bandwidth import BandwidthMeter, report
 
@@ -190,14 +206,18 @@ def bw(call: Call, topic: str, *, window: int | None) -> None:
         meter = BandwidthMeter(window)
         _, token = _target(node, topic)
         _tap(node, token, lambda sample: meter.add(sample.size, time.monotonic_ns()))
+        if not as_json:
+            print_lines([f"subscribed to [{token.name}]"])
         while not node.is_shutdown:
             node.context.wait_for_shutdown(_PERIOD)
             stats = meter.stats(time.monotonic_ns())
-            if stats is not None:
+            if as_json:
+                _print_stats({token.name: stats})
+            elif stats is not None:
                 print_lines([report(stats)])
 
 
-def delay(call: Call, topic: str, *, window: int | None) -> None:
+def delay(call: Call, topic: str, *, window: int | None, as_json: bool) -> None:
     """Print ages."""
     from rosz.introspect.delay import DelayMeter, read_stamp, report
 
@@ -214,7 +234,11 @@ def delay(call: Call, topic: str, *, window: int | None) -> None:
             meter.add(read_stamp(sample.payload, token.type_name), node.now())
 
         _tap(node, token, arrived)
+        if not as_json:
+            print_lines([f"subscribed to [{token.name}]"])
         while not node.is_shutdown:
             node.context.wait_for_shutdown(_PERIOD)
-            if meter.begun:
+            if as_json:
+                _print_stats({token.name: meter.stats()})
+            elif meter.begun:
                 print_lines([report(meter.stats())])

@@ -81,16 +81,20 @@ class _Shelf:
         else:
             print_lines(names)
 
-    def md5(self, name: _TypeName = "") -> None:
-        self._hashes(name, lambda definitions, one: definitions.md5(one))
+    def md5(self, name: _TypeName = "", *, json: _Json = False) -> None:
+        self._hashes(name, lambda definitions, one: definitions.md5(one), as_json=json)
 
-    def hash(self, name: _TypeName = "") -> None:
-        self._hashes(name, lambda definitions, one: definitions.hash(one))
+    def hash(self, name: _TypeName = "", *, json: _Json = False) -> None:
+        self._hashes(name, lambda definitions, one: definitions.hash(one), as_json=json)
 
-    def _hashes(self, name: str, of: Callable[[Definitions, str], str]) -> None:
+    def _hashes(self, name: str, of: Callable[[Definitions, str], str], *, as_json: bool) -> None:
         definitions = self._definitions()
         asked = _asked(name)
-        for one in definitions.find(asked):
+        found = definitions.find(asked)
+        if as_json:
+            print_json({_short(one): of(definitions, one) for one in found})
+            return
+        for one in found:
             title = "" if "/" in asked else f"[{_short(one)}]: "
             print_lines([title + of(definitions, one)])
 
