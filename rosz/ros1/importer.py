@@ -11,6 +11,7 @@ A name imported this way is the very module that rosz has, under one more name: 
 
 from __future__ import annotations
 
+import copy  # noqa: F401  # looks for Jython's "org" as it loads: no package to search for
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
