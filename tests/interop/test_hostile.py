@@ -10,13 +10,14 @@ from typing import Any
 import pytest
 import zenoh
 from network import PATIENCE, Network, eventually
-from plain import Plain, plain_session
 
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.sensor_msgs.msg import PointCloud2
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import MessageInfo, Node
 from rosz.session.settle import place
+
+from .plain import Plain, plain_session
 
 STRING = f"std_msgs::msg::dds_::String_/{String._type_hash}"
 ADD = f"example_interfaces::srv::dds_::AddTwoInts_/{AddTwoInts._type_hash}"

@@ -12,7 +12,6 @@ import pytest
 import xxhash
 import zenoh
 from network import PATIENCE, Network
-from plain import Plain, plain_session
 
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.geometry_msgs.msg import Twist
@@ -20,6 +19,8 @@ from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import SubscriberLink
 from rosz.qos import QoS
+
+from .plain import Plain, plain_session
 
 STRING = (
     "std_msgs::msg::dds_::String_/"

@@ -16,8 +16,9 @@ from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 import pytest
-from cfg_samples import BESIDE, SAMPLES
 from network import PATIENCE, Network, Program, eventually
+
+from .cfg_samples import BESIDE, SAMPLES
 
 pytestmark = pytest.mark.timeout(120)
 

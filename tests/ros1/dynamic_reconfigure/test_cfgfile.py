@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from cfg_samples import BROKEN, OLD, SAMPLES
 
 from rosz.errors import SourceError
 from rosz.ros1.dynamic_reconfigure.cfgfile import load, run
 from rosz.ros1.dynamic_reconfigure.files import find_files
 from rosz.ros1.importer import install, uninstall
+
+from .cfg_samples import BROKEN, OLD, SAMPLES
 
 
 @pytest.fixture

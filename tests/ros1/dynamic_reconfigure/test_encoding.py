@@ -10,7 +10,6 @@ from typing import Any
 
 import msgspec
 import pytest
-from cfg_samples import BESIDE, SAMPLES
 
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import GroupState
@@ -18,6 +17,8 @@ from rosz.reconfigure.messages import pack_config, pack_description
 from rosz.ros1.dynamic_reconfigure import encoding, get_parameter_names
 from rosz.ros1.dynamic_reconfigure.cfgfile import describe, load
 from rosz.ros1.importer import install, uninstall
+
+from .cfg_samples import BESIDE, SAMPLES
 
 PYTHON = Path("/usr/bin/python3")
 CHANGES = {"a": 1, "b": True, "c": "x", "d": 0.5}

@@ -7,10 +7,11 @@ from pathlib import Path
 from textwrap import dedent
 
 import pytest
-from cfg_samples import BESIDE, SAMPLES
 from network import Network, Program, eventually
 
 from rosz.reconfigure import Client, Config, Description, Server, Setting
+
+from .cfg_samples import BESIDE, SAMPLES
 
 PROGRAMS = Path(__file__).with_name("programs")
 HEAD = """

@@ -14,9 +14,10 @@ from typing import IO, NamedTuple
 from xmlrpc.client import ServerProxy
 
 import pytest
-from likeness import likeness
 from network import Network, eventually
-from scenarios import Part, Scenario
+
+from .likeness import likeness
+from .scenarios import Part, Scenario
 
 __all__ = ("Outcome", "Ros", "Rosz")
 

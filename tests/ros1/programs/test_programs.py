@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 from network import Network
-from scenarios import SCENARIOS, Scenario
-from stage import SCRIPTS, Ros, Rosz
+
+from .scenarios import SCENARIOS, Scenario
+from .stage import SCRIPTS, Ros, Rosz
 
 
 @pytest.fixture(scope="module")

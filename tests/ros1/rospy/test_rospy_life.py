@@ -6,7 +6,8 @@ import signal
 
 import pytest
 from network import Network, eventually
-from rospy_programs import run, start
+
+from .rospy_programs import run, start
 
 HOOKS = """
     import sys, threading, time

@@ -6,9 +6,10 @@ import re
 
 import pytest
 from network import Network, eventually
-from rospy_programs import run, start
 
 from rosz.msgs.rcl_interfaces.msg import Log
+
+from .rospy_programs import run, start
 
 _STAMP = re.compile(r"\[\d{10}\.\d{6}\]")
 

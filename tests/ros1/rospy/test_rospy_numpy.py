@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 from network import Network
-from rospy_programs import run
 
 from rosz.msgs.nav_msgs.msg import OccupancyGrid
 from rosz.msgs.sensor_msgs.msg import Image, JointState, LaserScan, MultiDOFJointState
 from rosz.ros1.rospy.numpy_msg import numpy_msg
+
+from .rospy_programs import run
 
 np = pytest.importorskip("numpy")
 

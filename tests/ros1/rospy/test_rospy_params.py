@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from network import Network
-from rospy_programs import run
+
+from .rospy_programs import run
 
 BEGIN = """
     import rospy

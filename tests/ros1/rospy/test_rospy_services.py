@@ -6,7 +6,8 @@ import signal
 
 import pytest
 from network import Network
-from rospy_programs import run, start
+
+from .rospy_programs import run, start
 
 BEGIN = """
     import threading, time

@@ -8,12 +8,13 @@ from typing import Any
 
 import pytest
 from network import Network
-from rospy_programs import run
 
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.msgs.std_msgs.msg import Header
 from rosz.ros1.rospy import rostime
+
+from .rospy_programs import run
 
 Time: Any = rostime.Time
 Duration: Any = rostime.Duration

@@ -6,9 +6,10 @@ import threading
 
 import pytest
 from network import PATIENCE, Network
-from rospy_programs import run, start
 
 from rosz.msgs.std_msgs.msg import String
+
+from .rospy_programs import run, start
 
 BEGIN = """
     import threading, time, warnings
