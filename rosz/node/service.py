@@ -11,7 +11,7 @@ from rosz.node.endpoint import Endpoint
 from rosz.node.pool import Pool
 from rosz.qos import QoS
 from rosz.session import Query
-from rosz.wire import Kind, pack, unpack
+from rosz.wire import Kind, pack, read
 
 if TYPE_CHECKING:
     from rosz.message import Message
@@ -60,19 +60,21 @@ class Service(Endpoint):
 
     def serve(self, query: Query) -> None:
         """Answer a question, and close it."""
-        with query:
+        try:
             if self.closed:
                 return
-            try:
-                attachment = query.attachment
-                origin = unpack(attachment) if attachment is not None else None
-                payload = self._answer(query.payload or b"")
-                sequence, gid = (origin.sequence, origin.gid) if origin else (0, _NO_GID)
-                query.reply(self.key, payload, attachment=pack(sequence, time.time_ns(), gid))
-            except TransportError as error:
-                self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
-            except (ServiceError, DecodeError) as error:
-                self._refuse(query, str(error))
+            attachment = query.attachment
+            sequence, gid = 0, _NO_GID
+            if attachment is not None:
+                sequence, _, gid = read(attachment)
+            payload = self._answer(query.payload or b"")
+            query.reply(self.key, payload, attachment=pack(sequence, time.time_ns(), gid))
+        except TransportError as error:
+            self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
+        except (ServiceError, DecodeError) as error:
+            self._refuse(query, str(error))
+        finally:
+            query.close()
 
     def _answer(self, request: bytes) -> bytes:
         """Return the encoded response.
