@@ -21,12 +21,10 @@ from rosz.ros1.rospy.client import (
     spin,
 )
 from rosz.ros1.rospy.core import (
-    add_client_shutdown_hook as on_shutdown,
-)
-from rosz.ros1.rospy.core import (
     get_node_uri,
     get_ros_root,
     is_shutdown,
+    on_shutdown,
     parse_rosrpc_uri,
     signal_shutdown,
 )

@@ -49,6 +49,7 @@ __all__ = (
     "is_initialized",
     "is_shutdown",
     "is_shutdown_requested",
+    "on_shutdown",
     "parse_rosrpc_uri",
     "remap_name",
     "resolve_name",
@@ -111,6 +112,9 @@ def add_client_shutdown_hook(h: Callable[[], object]) -> None:
         TypeError: It cannot be called.
     """
     _add_hook("client", h)
+
+
+on_shutdown = add_client_shutdown_hook
 
 
 def add_preshutdown_hook(h: Callable[[str], object]) -> None:

@@ -53,7 +53,6 @@ def set_param(param_name: str, param_value: Any) -> None:
 
     Raises:
         TypeError: The value is none that a parameter may have.
-        OverflowError: A whole number takes more than 64 bits.
     """
     if not isinstance(param_name, str):
         raise TypeError(f"expected a name, got {type(param_name).__name__} {param_name!r}")

@@ -33,6 +33,7 @@ _FOREVER = 30 * 86400.0
 
 _SLICE = 0.5
 _REFUSED = "responded with an error: "
+_MISMATCH = "is not available: "
 _ENDED = "rospy shutdown"
 
 
@@ -46,7 +47,8 @@ class ServiceProxy(ServiceEnd):
         headers: Accepted; connections here have no headers of their own.
 
     Raises:
-        ValueError: The name is none, or the class is none of a service.
+        ValueError: The name is none.
+        AttributeError: The class is none of a service.
     """
 
     def __init__(
@@ -87,7 +89,11 @@ class ServiceProxy(ServiceEnd):
         except EncodeError as error:
             raise in_words_of_genpy(request, error) from error
         except ServiceNotFound as error:
-            raise ServiceException(f"service [{name}] unavailable") from error
+            _, other, why = str(error).partition(_MISMATCH)
+            text = (
+                f"unable to connect to service: {why}" if other else f"service [{name}] unavailable"
+            )
+            raise ServiceException(text) from error
         except ServiceError as error:
             _, refused, text = str(error).partition(_REFUSED)
             if refused:

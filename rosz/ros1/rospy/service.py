@@ -43,7 +43,8 @@ class ServiceEnd:
         response_class: Class of its responses.
 
     Raises:
-        ValueError: The name is none, or the class is none of a service.
+        ValueError: The name is none.
+        AttributeError: The class is none of a service.
     """
 
     def __init__(self, name: str, service_class: type[Any]) -> None:
@@ -74,7 +75,9 @@ class Service(ServiceEnd):
             and traceback.
 
     Raises:
-        ValueError: The name is none, or the class is none of a service.
+        ValueError: The name is none.
+        AttributeError: The class is none of a service.
+        ServiceException: This process has a service of that name.
     """
 
     def __init__(
@@ -91,6 +94,10 @@ class Service(ServiceEnd):
         self.error_handler = error_handler
         self._over = threading.Event()
         self._service: NodeService | None = None
+        with state.lock:
+            if self.resolved_name in state.services:
+                raise ServiceException(f"service [{self.resolved_name}] already registered")
+            state.services[self.resolved_name] = self
         when_ready(self._open)
 
     def _open(self, node: Node) -> None:
@@ -154,6 +161,9 @@ class Service(ServiceEnd):
         """
         del reason
         self._over.set()
+        with state.lock:
+            if state.services.get(self.resolved_name) is self:
+                del state.services[self.resolved_name]
         if self._service is not None:
             self._service.close()
 

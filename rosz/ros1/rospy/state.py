@@ -54,6 +54,7 @@ class State:
         waiting: What to do as soon as there is a node, in order.
         sources: Topics that this process publishes on, by name and class of messages.
         sinks: Topics that it subscribes to, by name and class of messages.
+        services: Services of this process, by name.
         local: Of each thread, the message that it is delivering, and what tells its origin.
         hooks: What to call when the node shuts down, by the stage it belongs to, in order.
         shutdown: Set when the end has begun, and the program's own hooks have been called.
@@ -72,6 +73,7 @@ class State:
         self.waiting: list[Callable[[Node], object]] = []
         self.sources: dict[tuple[str, type[Any]], Any] = {}
         self.sinks: dict[tuple[str, type[Any]], Any] = {}
+        self.services: dict[str, Any] = {}
         self.local = threading.local()
         self.hooks: dict[str, list[Callable[..., object]]] = {
             "client": [],

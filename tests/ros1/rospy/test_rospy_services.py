@@ -135,11 +135,12 @@ def test_what_a_call_takes(network: Network) -> None:
     show("value", lambda: add("a", "b"))
     add.close()
     print(add(1, 2).sum, add.resolved_name, add.service_class is AddTwoInts)
+    show("twice", lambda: rospy.Service("s", AddTwoInts, print))
     show("no class", lambda: rospy.ServiceProxy("s", str))
     show("no name", lambda: rospy.Service("", AddTwoInts, print))
     show("other type", lambda: rospy.ServiceProxy("s", Trigger)())
 """,
-    )[:9] == [
+    )[:10] == [
         "3 7 11 0",
         "2 2 9",
         "one -> TypeError | Invalid number of arguments, args should be ['a', 'b'] args are(1,)",
@@ -147,6 +148,7 @@ def test_what_a_call_takes(network: Network) -> None:
         "keyword -> AttributeError | c is not an attribute of AddTwoIntsRequest",
         "value -> _FieldError | field a must be an integer type",
         "3 /s True",
+        "twice -> ServiceException | service [/s] already registered",
         "no class -> AttributeError | service_class must be the class of a service,"
         " got <class 'str'>; it has no attribute '_request_class'",
         "no name -> ValueError | service name is not a non-empty string",
