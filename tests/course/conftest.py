@@ -8,6 +8,9 @@ import pytest
 from network import Network
 from terminal import Desk
 
+collect_ignore = ["pub_sub", "src"]
+"""The course's own packages: a program there may be called test_params.py."""
+
 
 @pytest.fixture
 def desk(network: Network) -> Iterator[Desk]:

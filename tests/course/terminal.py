@@ -17,15 +17,17 @@ from pathlib import Path
 import pytest
 from network import Network
 
-__all__ = ("Desk", "Terminal", "without_times")
+__all__ = ("COURSE", "Desk", "Terminal", "without_times")
 
 COURSE = Path(__file__).parent
+"""Where the course lies."""
 _PROMPT = "\x1d$ "
 _DECORATION = re.compile(r"\x1b\][^\a]*\a|\x1b\[[\d;?]*[a-zA-Z]|\r")
 _TIMES = re.compile(r"\[\d{9,}\.\d+\]")
 _PIDS = re.compile(r"pid \[\d+\]")
 _RUN_IDS = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 _PATIENCE = 30.0
+_END = 5.0
 
 
 def without_times(text: str) -> str:
@@ -55,7 +57,6 @@ class Terminal:
             stderr=theirs,
             cwd=folder,
             env={**variables, "PS1": _PROMPT, "TERM": "dumb", "HISTFILE": ""},
-            start_new_session=True,
         )
         os.close(theirs)
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -117,15 +118,20 @@ class Terminal:
         return self.prompt("an end after Ctrl-C")
 
     def close(self) -> None:
-        """End the shell, and what was started from it."""
+        """End what runs, by Ctrl-C where that helps, and the shell."""
+        os.write(self._file, b"\x03")
+        deadline = time.monotonic() + _END
+        with self._changed:
+            while not self._text.endswith(_PROMPT) and time.monotonic() < deadline:
+                self._changed.wait(0.1)
         for child in _session(self._shell.pid):
             try:
                 os.kill(child, signal.SIGKILL)
             except ProcessLookupError:
                 continue
         self._shell.wait()
+        self._reader.join(_END)
         os.close(self._file)
-        self._reader.join(_PATIENCE)
 
 
 def _session(leader: int) -> list[int]:
