@@ -5,10 +5,11 @@ import threading
 from queue import SimpleQueue
 
 import pytest
-from network import Network, eventually
+from network import PATIENCE, Network, eventually
 
 from rosz.errors import ClosedError, ParamError, ServiceError, ServiceNotFound, WaitTimeout
 from rosz.reconfigure import Client, Config, Description, find_servers
+from rosz.reconfigure import client as client_module
 
 from .robots import ROBOT, Robot
 
@@ -67,7 +68,9 @@ def test_what_it_gives_is_the_callers_own(network: Network) -> None:
     assert client.config().groups.state is True
 
 
-def test_a_callback_may_change_settings(network: Network) -> None:
+def test_a_callback_may_change_settings(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Were it to wait for the announcement, which is its own to take in, it would take that long.
+    monkeypatch.setattr(client_module, "_ECHO_BY", 2 * PATIENCE)
     robot = Robot(network.node("robot"))
     done = threading.Event()
 
@@ -77,10 +80,21 @@ def test_a_callback_may_change_settings(network: Network) -> None:
             done.set()
 
     client = Client(network.node("other"), "robot", config_callback=told)
-    client.update({"steps": 7})
-    assert done.wait(15)
+    robot.server.update({"steps": 7})
+    assert done.wait(PATIENCE)
     eventually(lambda: client.config().steps == 8, "the change of the callback")
     assert robot.server.config.steps == 8
+
+
+def test_a_change_holds_here_before_it_is_announced(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_module, "_ECHO_BY", 0.0)
+    Robot(network.node("robot"))
+    client = Client(network.node("other"), "robot")
+    assert client.config().steps == 50
+    client.update({"steps": 7})
+    assert client.config().steps == 7
 
 
 def test_reading_after_writing_never_finds_the_old_value(network: Network) -> None:

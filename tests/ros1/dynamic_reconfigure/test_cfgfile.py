@@ -99,6 +99,12 @@ def test_files_are_told_from_others_of_that_ending(folder: Path) -> None:
     assert find_files(folder) == [ours, deep]
 
 
+def test_a_file_of_the_modules_name_comes_first(folder: Path) -> None:
+    write(folder, "Another", SAMPLES["Tutorials"])
+    named = write(folder, "Tutorials", SAMPLES["Tutorials"])
+    assert load("sample.cfg.TutorialsConfig", find_files(folder)).__file__ == str(named)
+
+
 def test_the_name_given_to_generate_counts(folder: Path) -> None:
     file = write(folder, "lower_case", SAMPLES["Tutorials"])
     write(folder, "Broken", "import dynamic_reconfigure\n1 / 0")

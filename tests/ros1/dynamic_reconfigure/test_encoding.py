@@ -168,6 +168,14 @@ def test_the_state_of_any_group_is_found() -> None:
     ]  # fmt: skip
 
 
+def test_a_level_of_all_bits() -> None:
+    given = {"name": "a", "type": "int", "level": -1, "description": "", "edit_method": ""}
+    group = {"name": "G", "type": "", "parent": 0, "id": 0, "parameters": [given], "groups": []}
+    (message,) = encoding.encode_groups(None, group)
+    assert message.to_cdr()
+    assert message.parameters[0].level == 0xFFFFFFFF
+
+
 def test_groups_as_a_list() -> None:
     groups = [{"name": "G", "state": False, "id": 1, "parent": 0}]
     message = encoding.encode_config({"a": 1, "groups": groups}, flat=False)
