@@ -57,6 +57,11 @@ class Plain:
         )
         return queue
 
+    def put(self, key: str, payload: bytes, **options: Any) -> None:
+        """Publish a sample, which waits for the link if that is full rather than be dropped."""
+        block = zenoh.CongestionControl.BLOCK
+        self.session.put(key, payload, congestion_control=block, **options)
+
     def token(self, key: str) -> None:
         """Declare a liveliness token."""
         self._kept.append(self.session.liveliness().declare_token(key))

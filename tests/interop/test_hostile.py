@@ -63,8 +63,8 @@ def test_attachments(
 ) -> None:
     got = listen(node, form)
     for _ in range(20):
-        plain.session.put(f"42/chatter/{STRING}", HELLO, attachment=damage)
-    plain.session.put(f"42/chatter/{STRING}", HELLO, attachment=FINE)
+        plain.put(f"42/chatter/{STRING}", HELLO, attachment=damage)
+    plain.put(f"42/chatter/{STRING}", HELLO, attachment=FINE)
     assert got() == String("hello")
     node.close()
     assert capfd.readouterr().err.count("dropping damaged samples on '/chatter'") == 1
@@ -77,9 +77,9 @@ def test_payloads(
 ) -> None:
     got = listen(node, form)
     for _ in range(20):
-        plain.session.put(f"42/chatter/{STRING}", damage, attachment=FINE)
+        plain.put(f"42/chatter/{STRING}", damage, attachment=FINE)
     later = struct.pack("<qqB16s", 100, 2, 16, GID)
-    plain.session.put(f"42/chatter/{STRING}", HELLO, attachment=later)
+    plain.put(f"42/chatter/{STRING}", HELLO, attachment=later)
     assert got() == String("hello")
     node.close()
     assert capfd.readouterr().err.count("dropping damaged samples on '/chatter'") == 1
@@ -108,8 +108,8 @@ def test_kinds_of_damage_are_bounded(
     key = f"42/cloud/sensor_msgs::msg::dds_::PointCloud2_/{PointCloud2._type_hash}"
     cloud = PointCloud2(data=bytes(1000)).to_cdr()
     for end in range(len(cloud)):
-        plain.session.put(key, cloud[:end], attachment=FINE)
-    plain.session.put(key, cloud, attachment=struct.pack("<qqB16s", 9999, 2, 16, GID))
+        plain.put(key, cloud[:end], attachment=FINE)
+    plain.put(key, cloud, attachment=struct.pack("<qqB16s", 9999, 2, 16, GID))
     assert got.get(timeout=PATIENCE) == PointCloud2(data=bytes(1000))
     node.close()
     assert capfd.readouterr().err.count("dropping damaged samples on '/cloud'") <= 10
@@ -119,7 +119,7 @@ def test_no_attachment_is_no_damage(node: Node, plain: Plain) -> None:
     """Plain Zenoh publishers are welcome; where a sample comes from is then unknown."""
     got: SimpleQueue[tuple[String, MessageInfo]] = SimpleQueue()
     node.subscription("chatter", String, lambda *both: got.put(both), with_info=True)
-    plain.session.put(f"42/chatter/{STRING}", HELLO)
+    plain.put(f"42/chatter/{STRING}", HELLO)
     message, info = got.get(timeout=PATIENCE)
     assert message == String("hello")
     assert (info.sequence, info.gid, info.source_time, info.lost) == (0, b"", 0, 0)
@@ -134,7 +134,7 @@ def test_strange_sequence_numbers(node: Node, plain: Plain) -> None:
     numbers = [0, 1, 1, 0, -5, 7, 3, (1 << 63) - 1, -(1 << 63), 2]
     for number in numbers:
         attachment = struct.pack("<qqB16s", number, 2, 16, GID)
-        plain.session.put(f"42/chatter/{STRING}", HELLO, attachment=attachment)
+        plain.put(f"42/chatter/{STRING}", HELLO, attachment=attachment)
     assert [got.get(timeout=PATIENCE) for _ in numbers] == numbers
 
 
@@ -197,11 +197,11 @@ def test_what_is_addressed_to_nobody(node: Node, plain: Plain) -> None:
     zid = node.context.session.zid
     subscription = node.subscription("chatter", String)
     for number in ("x", "-1", "99999999999999999999"):
-        plain.session.put(f"@rosz/42/inbox/{zid}/{number}", b"junk")
+        plain.put(f"@rosz/42/inbox/{zid}/{number}", b"junk")
     inbox = f"@rosz/42/inbox/{zid}/{subscription.token.entity_id}"
-    plain.session.put(inbox, b"junk")
+    plain.put(inbox, b"junk")
     plain.session.delete(inbox)
-    plain.session.put(inbox, HELLO, attachment=FINE)
+    plain.put(inbox, HELLO, attachment=FINE)
     assert subscription.get() == String("hello")
 
 
@@ -234,7 +234,7 @@ def test_answers_about_links(network: Network, plain: Plain) -> None:
 def test_deletes_are_no_messages(node: Node, plain: Plain) -> None:
     subscription = node.subscription("chatter", String)
     plain.session.delete(f"42/chatter/{STRING}")
-    plain.session.put(f"42/chatter/{STRING}", HELLO, attachment=FINE)
+    plain.put(f"42/chatter/{STRING}", HELLO, attachment=FINE)
     assert subscription.get() == String("hello")
 
 

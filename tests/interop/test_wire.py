@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import xxhash
 import zenoh
-from network import PATIENCE, Network
+from network import PATIENCE, Network, eventually
 
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.geometry_msgs.msg import Twist
@@ -183,12 +183,16 @@ def test_latched_cache(network: Network, plain: Plain) -> None:
         publisher.publish(text)
     node.context.settled.wait(PATIENCE)
     zid = node.context.session.zid
-    replies = plain.ask(
-        f"42/map/{STRING}/@adv/pub/{zid}/**?_max=2;_anyke",
-        target=zenoh.QueryTarget.ALL,
-        accept_replies=zenoh.ReplyKeyExpr.ANY,
-    )
-    samples = [reply.ok for reply in replies]
+
+    def ask() -> list[zenoh.Reply]:
+        return plain.ask(
+            f"42/map/{STRING}/@adv/pub/{zid}/**?_max=2;_anyke",
+            target=zenoh.QueryTarget.ALL,
+            accept_replies=zenoh.ReplyKeyExpr.ANY,
+        )
+
+    eventually(ask, "the cache is known")
+    samples = [reply.ok for reply in ask()]
     assert [sample and sample.payload.to_bytes()[8:-1] for sample in samples] == [b"two", b"three"]
     assert [sample and str(sample.key_expr) for sample in samples] == [f"42/map/{STRING}"] * 2
     assert [split(sample and sample.attachment)[0] for sample in samples] == [2, 3]
