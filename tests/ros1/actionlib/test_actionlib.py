@@ -127,7 +127,10 @@ def test_goal_callbacks(network: Network, path: str) -> None:
         rospy.init_node("both")
         server = actionlib.SimpleActionServer("count", CountAction, auto_start=False)
         cancelled = threading.Event()
-        server.register_goal_callback(lambda: print("goal", server.accept_new_goal().top))
+        def take_on():
+            print("goal", server.next_goal.goal.top)
+            server.accept_new_goal()
+        server.register_goal_callback(take_on)
         def give_way():
             print("preempt", server.is_preempt_requested())
             server.set_preempted(CountResult(1))
