@@ -193,8 +193,9 @@ class Client(Endpoint):
 
         Raises:
             WaitTimeout: Nobody did in time.
-            ClosedError: The context was shut down meanwhile.
+            ClosedError: The client is closed, or the context was shut down meanwhile.
         """
+        self.ensure_open("wait for")
         graph = self.node.context.graph
         what = f"service '{self.name}' of type '{self.token.type_name}'"
         try:

@@ -252,6 +252,9 @@ class Context:
         self._hooks = []
         self.session.disown(_FORKED)
         self.graph.disown()
+        replica = self.__dict__.get("params")  # where it has been used
+        if replica is not None:
+            replica.disown()
         for endpoint in self._endpoints:
             endpoint.disown(_FORKED)
 

@@ -234,6 +234,10 @@ class Replica(Reading):
         """Whether it is closed."""
         return self._closed
 
+    def disown(self) -> None:
+        """Refuse every write from now on, touching neither threads nor links: after a fork."""
+        self._closed = True
+
     def close(self) -> None:
         """Leave the others; again is no error."""
         if self._closed:

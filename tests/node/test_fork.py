@@ -1,0 +1,129 @@
+"""A forked child can use nothing of its parent's, is told so at once, and harms nobody."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from network import Network
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+
+PARENT = """
+    import os
+    import rosz
+    from rosz.errors import ClosedError
+    from rosz.msgs.example_interfaces.srv import AddTwoInts
+    from rosz.msgs.std_msgs.msg import String
+
+    node = rosz.Node("parent")
+    publisher = node.publisher("chatter", String)
+    latched = node.publisher("latched", String, latch=True)
+    subscription = node.subscription("chatter", String)
+    node.subscription("chatter", String, lambda m: None)
+    node.service("add", AddTwoInts, lambda request: request.a + request.b)
+    client = node.client("add", AddTwoInts)
+    assert client(1, 2).sum == 3
+
+    CALLS = {
+        "publish": lambda: publisher.publish("x"),
+        "latched": lambda: latched.publish("x"),
+        "get": lambda: subscription.get(1),
+        "call": lambda: client(1, 2),
+        "wait": lambda: client.wait_for_service(1),
+        "declare": lambda: node.publisher("new", String),
+        "listen": lambda: node.subscription("new", String, print),
+        "serve": lambda: node.service("new", AddTwoInts, print),
+        "set": lambda: node.params.set("/x", 1),
+        "graph": lambda: node.context.graph.wait_for_node("/x", 1),
+    }
+
+    def attempt():
+        for name, call in CALLS.items():
+            try:
+                call()
+            except ClosedError:
+                print(name, "refused", flush=True)
+            except BaseException as error:
+                print(name, "failed:", type(error).__name__, error, flush=True)
+            else:
+                print(name, "went through", flush=True)
+        node.close()
+        node.context.close()
+"""
+NAMES = ("publish", "latched", "get", "call", "wait", "declare", "listen", "serve", "set", "graph")
+
+
+def test_everything_is_refused(network: Network) -> None:
+    """With `os.fork`; the parent goes on as if nothing had been."""
+    program = network.program(
+        PARENT
+        + """
+    child = os.fork()
+    if not child:
+        attempt()
+        raise SystemExit(0)
+    assert os.waitpid(child, 0)[1] == 0, "the child failed"
+    publisher.publish("after")
+    assert subscription.get().data == "after"
+    assert client(2, 2).sum == 4
+    print("parent goes on", flush=True)
+    """
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines == [*(f"{name} refused" for name in NAMES), "parent goes on"]
+
+
+def test_what_it_is_told(network: Network) -> None:
+    program = network.program(
+        PARENT
+        + """
+    if not os.fork():
+        publisher.publish("x")
+    os.wait()
+    """
+    )
+    assert program.exit_code() == 0, program.output
+    told = program.wait_for("rosz.errors.ClosedError")
+    assert "forked from one that uses rosz" in told
+    assert "start the child first, or use the 'spawn' method of multiprocessing" in told
+
+
+def test_multiprocessing(network: Network) -> None:
+    """A child that does not touch rosz computes and ends as ever; so does one that is spawned."""
+    program = network.program(
+        PARENT
+        + """
+    import multiprocessing
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        print(pool.map(abs, [-1, -2]), flush=True)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        print(pool.map(abs, [-3]), flush=True)
+    assert client(2, 2).sum == 4
+    """
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines == ["[1, 2]", "[3]"]
+
+
+def test_a_child_with_a_node_of_its_own(network: Network) -> None:
+    """Forked first, then rosz in both: that works."""
+    program = network.program(
+        """
+        import os
+        child = os.fork()
+        import rosz
+        from rosz.msgs.std_msgs.msg import String
+        if child:
+            with rosz.Node("parent") as node:
+                print("heard", node.subscription("chatter", String).get(15).data, flush=True)
+            assert os.waitpid(child, 0)[1] == 0
+        else:
+            with rosz.Node("child") as node:
+                publisher = node.publisher("chatter", String)
+                publisher.wait_for_subscribers(timeout=15)
+                publisher.publish("hello")
+        """
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines == ["heard hello"]

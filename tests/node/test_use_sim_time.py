@@ -1,0 +1,116 @@
+"""Nodes live in simulated time where /use_sim_time says so: /clock is their only clock."""
+
+from __future__ import annotations
+
+import time
+from queue import SimpleQueue
+
+import pytest
+from network import PATIENCE, Network, eventually
+
+from rosz.errors import TimeMovedBackwards
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.rosgraph_msgs.msg import Clock
+from rosz.node import Node, Publisher
+
+SECOND = 1_000_000_000
+
+
+class Simulator:
+    """Who publishes /clock."""
+
+    def __init__(self, node: Node) -> None:
+        node.params["/use_sim_time"] = True
+        self._clock: Publisher[Clock] = node.publisher("/clock", Clock)
+
+    def tick(self, seconds: float) -> None:
+        self._clock.publish(Clock(clock=Time(*divmod(round(seconds * SECOND), SECOND))))
+
+    def set(self, node: Node, seconds: float) -> None:
+        """Have it that time for a node, which may not be reached at once."""
+
+        def there() -> bool:
+            self.tick(seconds)
+            return node.now() == seconds * SECOND
+
+        eventually(there, f"it is {seconds:g} s")
+
+
+@pytest.fixture
+def simulator(network: Network) -> Simulator:
+    return Simulator(network.node("simulator"))
+
+
+@pytest.fixture
+def node(network: Network, simulator: Simulator) -> Node:  # noqa: ARG001  # there before it
+    return network.node("inside")
+
+
+def test_time_is_that_of_the_clock(simulator: Simulator, node: Node) -> None:
+    assert node.now() == 0
+    simulator.set(node, 100.5)
+    simulator.set(node, 100.75)
+
+
+def test_who_started_before_stays_outside(network: Network) -> None:
+    """The parameter is read at the start, as in ROS 1."""
+    early = network.node("early")
+    simulator = Simulator(network.node("simulator"))
+    inside = network.node("inside")
+    simulator.set(inside, 5)
+    assert abs(early.now() - time.time_ns()) < 60 * SECOND
+
+
+def test_sleep_timer_and_rate(network: Network, simulator: Simulator, node: Node) -> None:
+    simulator.set(node, 1)
+    ticks: SimpleQueue[int] = SimpleQueue()
+    node.timer(10, lambda event: ticks.put(event.current_real))
+    woke: SimpleQueue[tuple[str, int]] = SimpleQueue()
+
+    def sleep() -> None:
+        assert node.sleep(5)
+        woke.put(("sleep", node.now()))
+
+    def keep_pace() -> None:
+        rate = node.rate(0.25)
+        rate.sleep()
+        woke.put(("rate", node.now()))
+
+    for wait in (sleep, keep_pace):
+        network.thread(wait)
+    eventually(lambda: len(node.clock._source.sleepers) == 3, "all sleep")
+    simulator.set(node, 4.5)
+    assert woke.empty()
+    simulator.set(node, 5)
+    assert woke.get(timeout=PATIENCE) == ("rate", 5 * SECOND)
+    simulator.set(node, 6)
+    assert woke.get(timeout=PATIENCE) == ("sleep", 6 * SECOND)
+    assert ticks.empty()
+    simulator.set(node, 11)
+    assert ticks.get(timeout=PATIENCE) == 11 * SECOND
+
+
+def test_jump_back(network: Network, simulator: Simulator, node: Node) -> None:
+    simulator.set(node, 100)
+    raised: SimpleQueue[str] = SimpleQueue()
+
+    def sleep() -> None:
+        try:
+            node.sleep(50)
+        except TimeMovedBackwards as error:
+            raised.put(str(error))
+
+    network.thread(sleep)
+    eventually(lambda: len(node.clock._source.sleepers) == 1, "it sleeps")
+    simulator.set(node, 3)
+    assert raised.get(timeout=PATIENCE)
+    assert node.now() == 3 * SECOND
+
+
+def test_end_without_a_tick(network: Network, node: Node) -> None:
+    """Who waits for a clock that never comes can still be ended."""
+    ended: SimpleQueue[bool] = SimpleQueue()
+    network.thread(lambda: ended.put(node.sleep(1)))
+    eventually(lambda: len(node.clock._source.sleepers) == 1, "it sleeps")
+    node.close()
+    assert ended.get(timeout=PATIENCE) is False

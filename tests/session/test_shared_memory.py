@@ -1,0 +1,76 @@
+"""Large samples by shared memory: used where it can be, and never missed where it cannot."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from textwrap import dedent
+
+import pytest
+from network import Network, Program
+
+TALKER = """
+    import rosz
+    from rosz.msgs.sensor_msgs.msg import Image
+    node = rosz.Node("talker")
+    images = node.publisher("images", Image, queue_size=0)
+    images.wait_for_subscribers(timeout=15)
+    for number in range(20):
+        images.publish(height=number, data=bytes([number]) * 300_000)
+    print("sent", flush=True)
+    node.spin()
+"""
+LISTENER = """
+    import pathlib, rosz
+    from rosz.msgs.sensor_msgs.msg import Image
+    node = rosz.Node("listener")
+    images = node.subscription("images", Image, queue_size=0)
+    print("ready", flush=True)
+    for number in range(20):
+        image = images.get(15)
+        assert image.height == number, f"{image.height} instead of {number}"
+        assert image.data == bytes([number]) * 300_000, "damaged"
+    print("shared:", ".zenoh" in pathlib.Path("/proc/self/maps").read_text(), flush=True)
+"""
+# A /dev/shm of that size, for this process alone.
+SMALL = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs -o size=$0 none /dev/shm && exec "$@"')
+
+
+def can_unshare() -> bool:
+    if sys.platform != "linux":
+        return False
+    try:
+        return (
+            subprocess.run([*SMALL, "64k", "true"], check=False, capture_output=True).returncode
+            == 0
+        )
+    except FileNotFoundError:
+        return False
+
+
+def exchanged(network: Network, threshold: str, *wrapper: str) -> str:
+    """Send images from a program to another one, and return what that says of the way."""
+    variables = network.variables(ROSZ_SHM=threshold)
+    listener = network.program(LISTENER, ROSZ_SHM=threshold)
+    listener.wait_for("ready")
+    talker = Program([*wrapper, sys.executable, "-c", dedent(TALKER)], variables)
+    try:
+        line = listener.wait_for("shared: ")
+        talker.wait_for("sent")
+        assert listener.exit_code() == 0
+    finally:
+        talker.close()
+    return line
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize(("threshold", "shared"), [("100000", True), ("0", False)])
+def test_switch(network: Network, threshold: str, shared: bool) -> None:
+    assert exchanged(network, threshold) == f"shared: {shared}"
+
+
+@pytest.mark.skipif(not can_unshare(), reason="needs Linux and the privilege to mount")
+@pytest.mark.parametrize("size", ["64k", "1m"])
+def test_full(network: Network, size: str) -> None:
+    """Where /dev/shm has no room, everything arrives on the ordinary way."""
+    assert exchanged(network, "100000", *SMALL, size)
