@@ -54,21 +54,15 @@ class RosPack:
         return self.ros_paths
 
     def list(self) -> list[str]:
-        """Return the names of all packages.
-
-        Raises:
-            InvalidManifest: A package.xml cannot be read.
-        """
-        try:
-            return self._index.names()
-        except PackageError as error:
-            raise InvalidManifest(str(error)) from error
+        """Return the names of all packages; those whose package.xml cannot be read are left out."""
+        return self._index.names()
 
     def get_path(self, name: str) -> str:
         """Return the folder of a package.
 
         Raises:
             ResourceNotFound: There is none of that name.
+            InvalidManifest: The package.xml in a folder of that name cannot be read.
         """
         try:
             return str(self._index.find(name).path)

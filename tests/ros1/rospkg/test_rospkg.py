@@ -108,7 +108,9 @@ def test_dependencies(packs: rospkg.RosPack) -> None:
 def test_a_broken_manifest_is_named(tmp_path: Path) -> None:
     make(tmp_path, "arm", "<package><name>arm</name>")
     with pytest.raises(rospkg.InvalidManifest, match=r"arm/package\.xml"):
-        rospkg.RosPack([str(tmp_path)]).get_path("leg")
+        rospkg.RosPack([str(tmp_path)]).get_path("arm")
+    make(tmp_path, "hand")
+    assert rospkg.RosPack([str(tmp_path)]).list() == ["hand"]
 
 
 @pytest.mark.usefixtures("packs")
