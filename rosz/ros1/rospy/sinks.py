@@ -18,6 +18,10 @@ from rosz.wire import Token, format_token, gid
 __all__ = ("Sink", "acquire_sink")
 
 _Member = tuple[object, Callable[..., object] | None, Any]
+_NO_LIMIT = 10_000
+"""Messages that wait for a callback at most where no limit is given: more than TCP and the queue of
+a publisher hold in rospy, and in Zenoh's own queue, which is many times as fast as one in Python.
+"""
 _HEADER = "_connection_header"
 
 
@@ -51,7 +55,7 @@ class Sink:
             if self.closed:
                 return
             depth = self.queue_size or 0
-            qos = QoS(depth=depth) if depth > 0 else QoS(history="keep_all")
+            qos = QoS(depth=depth if depth > 0 else _NO_LIMIT)
             if self.data_class is AnyMsg:
                 self._subscription = GenericSubscription(
                     node, self.name, self._take_any, qos, raw=True, with_info=True

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.errors import TimeMovedBackwards
 from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.core import is_shutdown
 from rosz.ros1.rospy.exceptions import (
     ROSInterruptException,
     ROSTimeMovedBackwardsException,
@@ -56,11 +55,13 @@ def sleep(duration: float | AnyDuration) -> None:
     seconds = duration.to_sec() if isinstance(duration, DurationValue) else duration
     if seconds < 0:
         return
-    if state.node is None or (is_wallclock() and is_shutdown()):
-        # As in rospy: hooks that stop a robot and wait for it may still do so.
+    if state.node is None or state.ender is threading.current_thread():
+        # As in rospy: hooks that stop a robot and wait for it may do so.
         wallsleep(seconds)
-        return
-    _sleep_ns(round(seconds * _SECOND))
+    elif ended():
+        _sleep_out(seconds)
+    else:
+        _sleep_ns(round(seconds * _SECOND))
 
 
 def _sleep_ns(nanoseconds: int) -> None:
@@ -72,10 +73,14 @@ def _sleep_ns(nanoseconds: int) -> None:
         raise ROSTimeMovedBackwardsException((error.after - error.before) / _SECOND) from error
     if slept:
         return
-    left = (nanoseconds - (time.monotonic_ns() - began)) / _SECOND
-    if not is_wallclock() or left > _SLEPT_OUT:
+    _sleep_out((nanoseconds - (time.monotonic_ns() - began)) / _SECOND)
+
+
+def _sleep_out(seconds: float) -> None:
+    """Sleep what is left of a sleep when the node is shut down."""
+    if not is_wallclock() or seconds > _SLEPT_OUT:
         raise ROSInterruptException(_ENDED)
-    wallsleep(left)
+    wallsleep(seconds)
 
 
 class Rate:

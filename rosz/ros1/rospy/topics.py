@@ -152,7 +152,7 @@ class Subscriber(Topic):
         data_class: Class of its messages; ``rospy.AnyMsg`` for whatever comes.
         callback: Gets each message, on a thread of the topic, one at a time.
         callback_args: A second argument for the callback, if it is not None.
-        queue_size: The newest so many messages wait for their turn; all when not given.
+        queue_size: The newest so many messages wait for their turn; 10 000 when not given, or 0.
         buff_size: Accepted; no buffer has to be large enough for a message here.
         tcp_nodelay: Accepted; small messages never wait here.
 
