@@ -34,8 +34,8 @@ __all__ = ("Client",)
 _ECHO_BY: Final = 0.5
 """Seconds that a change waits for its own announcement, so that older ones come before it."""
 
-_SERVICE_BY: Final = 1.0
-"""Seconds that a change waits for the service of a server that is there."""
+_SERVICE_BY: Final = 2.0
+"""Seconds that a change waits for the service of a server that was heard of."""
 
 _HEARD: Final = 20
 """Announcements remembered."""
@@ -87,14 +87,11 @@ class Client:
             self._service = stack.enter_context(
                 node.client(f"{self.name}/{SET}", Reconfigure, timeout=timeout)
             )
-            self._described = stack.enter_context(
-                node.subscription(
-                    f"{self.name}/{DESCRIPTIONS}", ConfigDescription, self._on_description
-                )
-            )
-            stack.enter_context(
-                node.subscription(f"{self.name}/{UPDATES}", ConfigMessage, self._on_update)
-            )
+            for topic, kind, heard in (
+                (DESCRIPTIONS, ConfigDescription, self._on_description),
+                (UPDATES, ConfigMessage, self._on_update),
+            ):
+                stack.enter_context(node.subscription(f"{self.name}/{topic}", kind, heard))
             self._parts = stack.pop_all()
         node.keep(self)
 
@@ -174,10 +171,9 @@ class Client:
                 for group, parent in description.groups
                 if group.id in states
             ]
-        if self._described.publishers():
-            # It is there; its service may be a moment behind.
-            with suppress(WaitTimeout):
-                self._service.wait_for_service(min(limit, _SERVICE_BY))
+        # The server told what it has; the way to its service may be a moment behind.
+        with suppress(WaitTimeout):
+            self._service.wait_for_service(min(limit, _SERVICE_BY))
         try:
             answer = self._service.call(
                 Reconfigure.Request(request), max(deadline - time.monotonic(), 0.0)
