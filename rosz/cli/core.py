@@ -59,15 +59,15 @@ def core_command(
     if keys:
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     file = Path(store).absolute() if store else None
-    with Core(environment, listen or (), connect or (), file) as core:
+    with until_stopped() as ready, Core(environment, listen or (), connect or (), file) as core:
         _introduce(core)
         lines = [f"listening on {endpoint}" for endpoint in core.endpoints]
         lines += [f"connecting to {endpoint}" for endpoint in core.connect]
         kept = f"kept in {core.store}" if core.store else "kept in memory"
         lines.append(f"parameters of domain {core.domain} are {kept}")
+        ready()
         print_lines([*lines, "started core; press Ctrl-C to end it"])
-        with until_stopped(itself=True):
-            threading.Event().wait()
+        threading.Event().wait()
 
 
 def _introduce(core: Core) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -161,22 +161,24 @@ def warn(text: str) -> None:
 
 
 @contextmanager
-def until_stopped(*, itself: bool = False) -> Iterator[None]:
+def until_stopped() -> Iterator[Callable[[], None]]:
     """Let Ctrl-C, or a request to terminate, be the regular end of what goes on for ever.
 
-    Args:
-        itself: Whether to take the signals, for what opens no context, which else does. Then enter
-            it late: what loads meanwhile may lose the exception that a signal raises.
+    It gives a function to call when all is ready to go on: from then on they raise an exception
+    here. Before, they end the process at once: while modules load, an exception may get lost.
     """
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    if itself:
-        for number, present in before.items():
-            if present is signal.SIG_DFL:
+    taken: list[signal.Signals] = []
+
+    def take() -> None:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) is signal.SIG_DFL:
+                taken.append(number)
                 signal.signal(number, signal.default_int_handler)
+
     try:
-        yield
+        yield take
     except KeyboardInterrupt:
         return
     finally:
-        for number, present in before.items():
-            signal.signal(number, present)
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)

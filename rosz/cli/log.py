@@ -116,10 +116,11 @@ def _follow(
     color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
     left = count
     with (
-        until_stopped(),
+        until_stopped() as ready,
         call.context(lasting=True) as context,
         Node(_TOOL, anonymous=True, context=context) as node,
     ):
+        ready()
         for sample in _samples(node, Log):
             try:
                 line = read_line(Log.from_cdr(sample.payload), context.graph.view().nodes())

@@ -100,7 +100,8 @@ def ping_command(
     if not node:
         names = "\n".join(call.survey().view.nodes())
         raise UsageError(f"no node is given; there are:\n{names}")
-    with until_stopped(itself=True):
+    with until_stopped() as ready:
+        ready()
         return ping(call, node, count)
     return 0
 

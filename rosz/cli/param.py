@@ -286,13 +286,10 @@ def watch_command(
     from queue import SimpleQueue
 
     changes: SimpleQueue[Changed] = SimpleQueue()
-    with _client(context, lasting=True) as (client, resolve):
+    with until_stopped() as ready, _client(context, lasting=True) as (client, resolve):
         full = resolve(name)
-        with (
-            client.follow() as follower,
-            follower.watch(full, changes.put),
-            until_stopped(itself=True),
-        ):
+        with client.follow() as follower, follower.watch(full, changes.put):
+            ready()
             _complain(f"watching [{full}]; press Ctrl-C to end")
             left = count
             while left is None or left > 0:

@@ -230,9 +230,10 @@ def watch_command(
 
     configs: SimpleQueue[Config] = SimpleQueue()
     with (
-        until_stopped(),
+        until_stopped() as ready,
         _client(context, node, timeout, wait=wait, lasting=True) as client,
     ):
+        ready()
         before = flatten(client.config())
         client.config_callback = configs.put
         sys.stderr.write(f"watching [{client.name}]; press Ctrl-C to end\n")

@@ -54,7 +54,8 @@ def call_service(call: Call, name: str, words: Sequence[str], options: CallOptio
     """
     arguments = read_arguments(words)
     # Waiting is to be outlived by nothing, so it is done as a peer.
-    with until_stopped(), call.context(lasting=options.wait) as context:
+    with until_stopped() as ready, call.context(lasting=options.wait) as context:
+        ready()
         token = _find(context, call.resolve(name, _TOOL), wait=options.wait)
         service_type = context.types.service(token.type_name)
         request_type = service_type.Request

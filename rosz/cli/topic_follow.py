@@ -37,10 +37,11 @@ _QUEUE = QoS(depth=10_000)
 def _node(call: Call) -> Iterator[Node]:
     """Be a node until stopped."""
     with (
-        until_stopped(),
+        until_stopped() as ready,
         call.context(lasting=True) as context,
         Node(_TOOL, anonymous=True, context=context) as node,
     ):
+        ready()
         yield node
 
 

@@ -44,8 +44,9 @@ def pub(
     arguments = read_arguments(words)
     documents = read_file(Path(file)) if file else None
     latched = options.rate is None or latch
-    with until_stopped(), call.context(lasting=not options.once) as context:
+    with until_stopped() as ready, call.context(lasting=not options.once) as context:
         cls = context.types.message(type_name)
+        ready()
         from_elsewhere = bool(file) or (not arguments and bool(cls.__slots__))
         if from_elsewhere and not file and sys.stdin.isatty():
             raise UsageError(f"no values are given; they are: {list_arguments(cls)}")

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-import pytest
-from network import Network
+import secrets
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import suppress
 
+import pytest
+from network import Network, Program
+
+from rosz.launch.run.command import TAG
+from rosz.launch.run.family import kill_family
 from rosz.msgs.geometry_msgs.msg import Point, Pose, PoseStamped, Twist
 from rosz.msgs.std_msgs.msg import Header, String
 from rosz.node import Node
 
+from .command import ROSZ
+from .launching import Start
 from .shell import Shell, latch
 
 
@@ -29,3 +39,25 @@ def talker(network: Network) -> Node:
     latch(node, "/robot/pose", PoseStamped(header=Header(frame_id="map"), pose=pose))
     latch(node, "/robot/text", String("hello"))
     return node
+
+
+@pytest.fixture
+def launch(network: Network) -> Iterator[Start]:
+    """Starts launches on a network of the test's own, and leaves none behind."""
+    tag = secrets.token_hex(8)
+    programs: list[Program] = []
+
+    def start(*words: str, **variables: str) -> Program:
+        environ = network.variables(**{TAG: tag}, **variables)
+        program = Program([*ROSZ, "launch", *words], environ)
+        programs.append(program)
+        return program
+
+    yield start
+    for program in programs:
+        with suppress(ProcessLookupError):
+            program.send(signal.SIGTERM)
+        with suppress(subprocess.TimeoutExpired):
+            program.process.wait(10)
+        program.close()
+    kill_family(tag)

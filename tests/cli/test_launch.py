@@ -3,41 +3,19 @@
 from __future__ import annotations
 
 import re
-import secrets
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from pathlib import Path
 
 import pytest
 from network import Network, Program, eventually
 
-from rosz.launch.run.command import TAG
-from rosz.launch.run.family import kill_family
+from .command import ROSZ, package
+from .launching import EXAMPLE, Start, rosz, runs, started
 
-from .command import ROOT, ROSZ, package
-
-EXAMPLE = str(ROOT / "launch/pub_and_sub.launch")
 HEARD = re.compile(
     r"\[INFO\] \[\d{10}\.\d{6}\] \[/listeners/subscriber\]: I heard (\d+)$", re.MULTILINE
 )
-Start = Callable[..., Program]
-
-
-def started(program: Program) -> dict[str, int]:
-    """Return label and process id of all that a launch has started, the last of each."""
-    found = re.findall(r"process\[(.*)-\d+\]: started with pid \[(\d+)\]", program.output)
-    return {label: int(pid) for label, pid in found}
-
-
-def runs(pid: int) -> bool:
-    """Tell whether a process runs."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def heard(program: Program) -> list[int]:
@@ -56,40 +34,6 @@ def hears(program: Program, at_least: int = 0) -> None:
         )
     except pytest.fail.Exception as error:
         raise AssertionError(program.output) from error
-
-
-@pytest.fixture
-def launch(network: Network) -> Iterator[Start]:
-    """Starts launches on a network of the test's own, and leaves none behind."""
-    tag = secrets.token_hex(8)
-    programs: list[Program] = []
-
-    def start(*words: str, **variables: str) -> Program:
-        environ = network.variables(**{TAG: tag}, **variables)
-        program = Program([*ROSZ, "launch", *words], environ)
-        programs.append(program)
-        return program
-
-    yield start
-    for program in programs:
-        with suppress(ProcessLookupError):
-            program.send(signal.SIGTERM)
-        with suppress(subprocess.TimeoutExpired):
-            program.process.wait(10)
-        program.close()
-    kill_family(tag)
-
-
-def rosz(network: Network, *words: str) -> subprocess.CompletedProcess[str]:
-    """Run another command on the network."""
-    return subprocess.run(
-        [*ROSZ, *words],
-        env=network.variables(),
-        capture_output=True,
-        text=True,
-        timeout=40,
-        check=False,
-    )
 
 
 def test_the_example(launch: Start, network: Network) -> None:
