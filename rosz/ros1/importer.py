@@ -53,6 +53,8 @@ MODULES = (
     "tf",
     "tf2_geometry_msgs",
     "tf2_ros",
+    "tf_conversions",
+    "tf_transformations",
 )
 """ROS 1's Python modules; those that lie beside this one are importable under their own names."""
 

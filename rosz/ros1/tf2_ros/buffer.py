@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,7 @@ from rosz.errors import TransformError as TransformException
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.std_msgs.msg import Header
+from rosz.node import Node
 from rosz.ros1 import tf2_geometry_msgs
 from rosz.ros1.rospy import state
 from rosz.transforms import Buffer as Frames
@@ -50,8 +52,16 @@ class TypeException(TransformException):
 
 
 def _ns(value: Any) -> int:
-    """Return a time or duration, or seconds, as nanoseconds."""
+    """Return a time or duration of rospy or rclpy, or seconds, as nanoseconds."""
+    if hasattr(value, "nanoseconds"):
+        return int(value.nanoseconds)
     return value.to_nsec() if hasattr(value, "to_nsec") else round(float(value or 0) * 1e9)
+
+
+def _node_of(node: Any) -> Node:
+    """Return the node that is meant: one of rclpy, or that of the process."""
+    given: Node | None = getattr(node, "rosz_node", None)
+    return state.node() if given is None else given
 
 
 class BufferInterface:
@@ -109,6 +119,7 @@ class Buffer(BufferInterface):
 
     def __init__(self, cache_time: Any = None, debug: bool = True) -> None:  # noqa: ARG002
         self.frames = Frames(_TEN_SECONDS if cache_time is None else _ns(cache_time))
+        self.now: Callable[[], int] = time.time_ns
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
         """Take note of a transform."""
@@ -218,7 +229,7 @@ class Buffer(BufferInterface):
 
     def _wait(self, known: Callable[[], bool], timeout: Any = None) -> None:
         if timeout is not None and _ns(timeout) > 0 and not known():
-            self.frames.wait(known, _ns(timeout), state.node().now)
+            self.frames.wait(known, _ns(timeout), self.now)
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
         """Return the latest time at which a transform is known."""
@@ -258,12 +269,14 @@ class TransformListener:
 
     Args:
         buffer: Where to put it.
-        queue_size: Not used, as rospy's other options.
+        node: A node of rclpy; not used otherwise, as rospy's options.
     """
 
-    def __init__(self, buffer: Buffer, queue_size: int | None = None, **_options: Any) -> None:  # noqa: ARG002
+    def __init__(self, buffer: Buffer, node: Any = None, **_options: Any) -> None:
         self.buffer = buffer
-        self._listener = _Listener(buffer.frames, state.node())
+        listening = _node_of(node)
+        buffer.now = listening.now
+        self._listener = _Listener(buffer.frames, listening)
 
     def unregister(self) -> None:
         """Listen no more."""
@@ -271,10 +284,14 @@ class TransformListener:
 
 
 class TransformBroadcaster:
-    """Tells of frames that move."""
+    """Tells of frames that move.
 
-    def __init__(self) -> None:
-        self._broadcaster = _Broadcaster(state.node())
+    Args:
+        node: A node of rclpy; the process's own when not given.
+    """
+
+    def __init__(self, node: Any = None) -> None:
+        self._broadcaster = _Broadcaster(_node_of(node))
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
         """Tell of a TransformStamped, or of several."""
@@ -282,10 +299,14 @@ class TransformBroadcaster:
 
 
 class StaticTransformBroadcaster:
-    """Tells of frames that do not move, whoever comes later, too."""
+    """Tells of frames that do not move, whoever comes later, too.
 
-    def __init__(self) -> None:
-        self._broadcaster = _StaticBroadcaster(state.node())
+    Args:
+        node: A node of rclpy; the process's own when not given.
+    """
+
+    def __init__(self, node: Any = None) -> None:
+        self._broadcaster = _StaticBroadcaster(_node_of(node))
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
         """Tell of a TransformStamped, or of several."""

@@ -78,3 +78,46 @@ def test_tf_and_tf2(network: Network) -> None:
         "cannot transform int; expected PointStamped, PoseStamped, Vector3Stamped or WrenchStamped"
         " of geometry_msgs",
     ]
+
+
+def test_nodes_of_rclpy(network: Network) -> None:
+    program = network.program(
+        """
+        import rosz.ros1
+        import rclpy, rospkg.common, tf_conversions
+        from geometry_msgs.msg import TransformStamped
+        from rclpy.duration import Duration
+        from rclpy.time import Time
+        from tf.msg import tfMessage
+        from tf2_ros import Buffer, TransformBroadcaster, TransformException, TransformListener
+        from tf_transformations import euler_from_quaternion, quaternion_from_euler
+
+        rclpy.init()
+        node = rclpy.create_node("n")
+        broadcaster = TransformBroadcaster(node)
+        buffer = Buffer()
+        listener = TransformListener(buffer, node)
+        def tell():
+            made = TransformStamped()
+            made.header.stamp = node.get_clock().now().to_msg()
+            made.header.frame_id, made.child_frame_id = "odom", "base"
+            q = made.transform.rotation
+            q.x, q.y, q.z, q.w = quaternion_from_euler(0, 0, 1)
+            broadcaster.sendTransform(made)
+        def look():
+            try:
+                found = buffer.lookup_transform("odom", "base", Time())
+            except TransformException as error:
+                node.get_logger().info(str(error), once=True)
+                return
+            q = found.transform.rotation
+            print("yaw", round(euler_from_quaternion([q.x, q.y, q.z, q.w])[2], 3))
+            print(buffer.can_transform("odom", "base", Time(), timeout=Duration(seconds=1.0)))
+            rclpy.shutdown()
+        node.create_timer(0.02, tell)
+        node.create_timer(0.02, look)
+        rclpy.spin(node)
+        """
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines[-2:] == ["yaw 1.0", "True"]
