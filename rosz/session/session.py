@@ -55,18 +55,22 @@ _TARGETS = {
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 _NOBODY = "Unable to connect to any of"
 _RUNTIME = "ZENOH_RUNTIME"
+_ROUTER_RECEIVERS = 16
 
 
 @contextmanager
-def _one_receiver() -> Iterator[None]:
-    """Have Zenoh receive on one thread, unless the user says otherwise.
+def _receivers(mode: str) -> Iterator[None]:
+    """Have Zenoh receive on one thread, or on several in a router, unless the user says otherwise.
 
     Two hand a link's data to each other from core to core, which makes a round trip a quarter
-    longer. Zenoh reads this once, when the first session of the process opens.
+    longer. But a link that is given up holds its thread for seconds, and all links with it: to a
+    router that loses several at once, that matters more. Zenoh reads this once, when the first
+    session of the process opens.
     """
     given = _RUNTIME in os.environ
     if not given:
-        os.environ[_RUNTIME] = "(rx: (worker_threads: 1))"
+        count = _ROUTER_RECEIVERS if mode == "router" else 1
+        os.environ[_RUNTIME] = f"(rx: (worker_threads: {count}))"
     try:
         yield
     finally:
@@ -141,7 +145,7 @@ class Session:
         tell_refusals(config)
         where = ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
         try:
-            with mapped(f"open a session ({where})"), _one_receiver():
+            with mapped(f"open a session ({where})"), _receivers(config.mode):
                 if config.mode == "peer" and config.hold_rendezvous:
                     session = cls(open_at(settings, config.rendezvous), secured=secured)
                     session._presence = Presence(config.rendezvous, session.zid)

@@ -15,12 +15,13 @@ import sys
 import rosz
 from rosz.msgs.std_msgs.msg import String
 with rosz.Node(sys.argv[1] if sys.argv[1:] else "talker") as node:
-    chatter = node.publisher("chatter", String, queue_size=10)
+    topic = sys.argv[2] if sys.argv[2:] else "chatter"
+    chatter = node.publisher(topic, String, queue_size=10)
     print("talking", flush=True)
     for tick in node.rate(20):
         chatter.publish(String(data=str(tick)))
 """
-"""Publishes a number on ``chatter`` twenty times a second."""
+"""Publishes a number on ``chatter``, or another topic, twenty times a second."""
 
 LISTENER = """
 import sys
