@@ -1,7 +1,8 @@
 """rospy's logging functions, which write to the log of the node (ROS wiki, rospy/Overview/Logging).
 
 Before there is a node they go to Python's logger ``rosout``, as in rospy: warnings and worse reach
-stderr. Afterwards what is logged to that logger, and those below it, becomes the node's.
+stderr. Afterwards what is logged to that logger and those below it becomes the node's, and so does
+the level that is set on it.
 """
 
 from __future__ import annotations
@@ -75,8 +76,17 @@ def _write(level: int, msg: object, args: tuple[object, ...], options: dict[str,
         plain = logging.getLogger(f"{_BASE}.{child}" if child else _BASE)
         plain.log(level, msg, *args, stacklevel=_CALLER, **options)
         return
+    _follow_python()
     log = state.node.log.child(child) if child else state.node.log
     log.log(level, msg, *args, stacklevel=_CALLER, **options)
+
+
+def _follow_python() -> None:
+    """Take over the level that the program has set on Python's logger ``rosout``."""
+    level = logging.getLogger(_BASE).level
+    if level != state.python_level and state.node is not None:
+        state.python_level = level
+        state.node.log.setLevel(level)
 
 
 def _plain(level: int, **fixed: bool) -> _Log:
@@ -145,3 +155,4 @@ class Bridge(logging.Handler):
             python.propagate = False
             if python.level == logging.NOTSET:
                 python.setLevel(level)
+        state.python_level = python.level

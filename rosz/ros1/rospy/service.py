@@ -15,6 +15,7 @@ from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.msg import args_kwds_to_message, encode
 from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
 from rosz.ros1.rospy.state import has_node, state, when_ready
+from rosz.wire import Token, format_token, gid
 
 __all__ = ("Service", "ServiceException")
 
@@ -62,6 +63,14 @@ class ServiceEnd:
         self.response_class: type[Any] = service_class._response_class
 
 
+class _Server(NodeService):
+    """A server whose handler is told who calls."""
+
+    def handle(self, request: Any, caller: bytes) -> Any:
+        """Have the handler answer a request."""
+        return self._handler(request, caller)
+
+
 class Service(ServiceEnd):
     """A service of this node.
 
@@ -93,7 +102,7 @@ class Service(ServiceEnd):
         self.buff_size = buff_size
         self.error_handler = error_handler
         self._over = threading.Event()
-        self._service: NodeService | None = None
+        self._service: _Server | None = None
         with state.lock:
             if self.resolved_name in state.services:
                 raise ServiceException(f"service [{self.resolved_name}] already registered")
@@ -103,7 +112,7 @@ class Service(ServiceEnd):
     def _open(self, node: Node) -> None:
         if not self._over.is_set():
             self._service = node.keep(
-                NodeService(
+                _Server(
                     node,
                     self.resolved_name,
                     self.service_class,
@@ -113,12 +122,30 @@ class Service(ServiceEnd):
                 )
             )
 
-    def _handle(self, request: Any) -> Any:
+    def connection_header(self, caller: bytes) -> dict[str, str]:
+        """Return what rospy calls the header of the connection that a request came on.
+
+        Args:
+            caller: Gid of the client.
+        """
+        known: list[Token] = []
+        if self._service is not None:
+            known = self._service.node.context.graph.view().clients(self.resolved_name)
+        names = (token.node_name for token in known if gid(format_token(token)) == caller)
+        return {
+            "callerid": next(names, ""),
+            "md5sum": self.service_class._md5sum,
+            "service": self.resolved_name,
+            "type": self.service_class._type,
+        }
+
+    def _handle(self, request: Any, caller: bytes) -> Any:
         """Return the response to a request.
 
         Raises:
             Refusal: There is none; the text is for the caller.
         """
+        state.local.delivery = (request, self, caller)
         try:
             response = self._response(self.handler(request))
             encode(response)

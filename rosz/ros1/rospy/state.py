@@ -55,6 +55,7 @@ class State:
         sources: Topics that this process publishes on, by name and class of messages.
         sinks: Topics that it subscribes to, by name and class of messages.
         services: Services of this process, by name.
+        python_level: Level of Python's logger ``rosout`` when last looked at.
         local: Of each thread, the message that it is delivering, and what tells its origin.
         hooks: What to call when the node shuts down, by the stage it belongs to, in order.
         shutdown: Set when the end has begun, and the program's own hooks have been called.
@@ -74,6 +75,7 @@ class State:
         self.sources: dict[tuple[str, type[Any]], Any] = {}
         self.sinks: dict[tuple[str, type[Any]], Any] = {}
         self.services: dict[str, Any] = {}
+        self.python_level = 0
         self.local = threading.local()
         self.hooks: dict[str, list[Callable[..., object]]] = {
             "client": [],

@@ -55,7 +55,8 @@ def sleep(duration: float | AnyDuration) -> None:
     seconds = duration.to_sec() if isinstance(duration, DurationValue) else duration
     if seconds < 0:
         return
-    if state.node is None or state.ender is threading.current_thread():
+    in_hook = state.ender is threading.current_thread() and not state.ended.is_set()
+    if state.node is None or in_hook:
         # As in rospy: hooks that stop a robot and wait for it may do so.
         wallsleep(seconds)
     elif ended():

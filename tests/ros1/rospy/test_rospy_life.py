@@ -14,7 +14,7 @@ HOOKS = """
     import rospy
 
     def say(*words):
-        print(*words, flush=True)
+        print(" ".join(map(str, words)) + "\\n", end="", flush=True)
 
     rospy.on_shutdown(lambda: say("hook 1", rospy.is_shutdown()))
     rospy.init_node("life")

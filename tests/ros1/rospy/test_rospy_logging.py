@@ -139,6 +139,9 @@ def test_levels_set_by_service_and_pythons_own_loggers(network: Network) -> None
             rospy.logerr("still")
             logging.getLogger("rosout").error("python's")
             logging.getLogger("rosout.part").error("and below")
+            from rospy.impl.rosout import _rospy_to_logging_levels
+            logging.getLogger("rosout").setLevel(_rospy_to_logging_levels[rospy.DEBUG])
+            rospy.logdebug("shown again")
             """,
         )
     ) == [
@@ -147,6 +150,7 @@ def test_levels_set_by_service_and_pythons_own_loggers(network: Network) -> None
         "[ERROR] [T]: still",
         "[ERROR] [T]: python's",
         "[ERROR] [T]: and below",
+        "[DEBUG] [T]: shown again",
     ]
 
 

@@ -8,5 +8,8 @@ __all__ = ()
 
 __getattr__ = attribute(
     __name__,
-    {name: f"rosz.ros1.rospy.impl.{name}" for name in ("tcpros", "tcpros_base", "tcpros_service")},
+    {
+        name: f"rosz.ros1.rospy.impl.{name}"
+        for name in ("rosout", "tcpros", "tcpros_base", "tcpros_service")
+    },
 )
