@@ -16,16 +16,19 @@ from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 import pytest
-from network import PATIENCE, Network, Program, eventually
+from network import Network, Program, eventually
 
 from .cfg_samples import BESIDE, SAMPLES
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = pytest.mark.timeout(300)
 
 PROGRAMS = Path(__file__).with_name("programs")
 PYTHON = "/usr/bin/python3"
 _PROGRAM_SAYS = re.compile(r"\[\(|/|serving|end")
 """Lines of the server itself: what the libraries log of a fault is theirs."""
+
+_LONGEST = 60
+"""Seconds for one command; ROS 1's take one each where nothing else runs."""
 
 NAME = "dynamic_tutorials"
 DYNPARAM = Path("/usr/lib/dynamic_reconfigure/dynparam")
@@ -73,7 +76,7 @@ class Side:
             env=self._variables,
             capture_output=True,
             text=True,
-            timeout=PATIENCE,
+            timeout=_LONGEST,
             check=False,
         )
 
@@ -176,12 +179,12 @@ def _play(side: Side, config: str, steps: Sequence[Sequence[str]]) -> list[str]:
     server = side.start("server.py", config)
     printed: list[str] = []
     try:
-        server.wait_for("serving")
+        server.wait_for("serving", _LONGEST)
         for program, *words in steps:
             done = side.dynparam(*words) if program == "dynparam" else side.run(program)
             printed += [f"$ {program} {' '.join(words)}", *done.splitlines()]
         server.send(signal.SIGINT)
-        assert server.exit_code() == 0
+        assert server.exit_code(_LONGEST) == 0
     finally:
         server.close()
     return [*printed, *filter(_PROGRAM_SAYS.match, server.lines)]
@@ -216,10 +219,8 @@ def test_dynparam(ros: Side, rosz: Side, tmp_path: Path) -> None:
     steps = [
         ["dynparam", "list"],
         ["dynparam", "set", NAME, "int_param", "-3"],
-        ["dynparam", "set", NAME, "size", "Large"],
         ["dynparam", "set", NAME, "str_param", "007"],
-        ["dynparam", "set", "--timeout=5", NAME, "{int_param: 4, double_param: 0.75}"],
-        ["dynparam", "get", "--timeout", "5", f"/{NAME}"],
+        ["dynparam", "set", "--timeout=5", NAME, "{int_param: 4, size: Large}"],
         ["dynparam", "load", NAME, str(saved)],
         ["dynparam", "set_from_parameters", NAME, "_double_param:=0.5", "_str_param:=from here"],
         ["dynparam", "get", NAME],
