@@ -67,7 +67,7 @@ class Service(Endpoint):
             sequence, gid = 0, _NO_GID
             if attachment is not None:
                 sequence, _, gid = read(attachment)
-            payload = self._answer(query.payload or b"")
+            payload = self._answer(query.payload or b"", gid)
             query.reply(self.key, payload, attachment=pack(sequence, time.time_ns(), gid))
         except TransportError as error:
             self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
@@ -76,7 +76,17 @@ class Service(Endpoint):
         finally:
             query.close()
 
-    def _answer(self, request: bytes) -> bytes:
+    def handle(self, request: Any, caller: bytes) -> Any:
+        """Have the handler answer a request.
+
+        Args:
+            request: The request.
+            caller: The gid of the client that sent it; zeros where it does not say.
+        """
+        del caller
+        return self._handler(request)
+
+    def _answer(self, request: bytes, caller: bytes) -> bytes:
         """Return the encoded response.
 
         Raises:
@@ -87,7 +97,7 @@ class Service(Endpoint):
         types = self.service_type
         message = types.Request._decode(request)
         try:
-            result = self._handler(message)
+            result = self.handle(message, caller)
         except Refusal:
             raise
         except ServiceError as error:  # a refusal, which is no fault of the handler

@@ -64,11 +64,21 @@ class ServiceEnd:
 
 
 class _Server(NodeService):
-    """A server whose handler is told who calls."""
+    """A server that tells who calls.
+
+    Args:
+        node: Its node.
+        service: Whom it tells.
+    """
+
+    def __init__(self, node: Node, service: Service) -> None:
+        self._service = service
+        name, kind = service.resolved_name, service.service_class
+        super().__init__(node, name, kind, service.handler, SERVICES, _THREADS)
 
     def handle(self, request: Any, caller: bytes) -> Any:
-        """Have the handler answer a request."""
-        return self._handler(request, caller)
+        """Have a request answered."""
+        return self._service.answer(request, caller)
 
 
 class Service(ServiceEnd):
@@ -111,16 +121,7 @@ class Service(ServiceEnd):
 
     def _open(self, node: Node) -> None:
         if not self._over.is_set():
-            self._service = node.keep(
-                _Server(
-                    node,
-                    self.resolved_name,
-                    self.service_class,
-                    self._handle,
-                    SERVICES,
-                    _THREADS,
-                )
-            )
+            self._service = node.keep(_Server(node, self))
 
     def connection_header(self, caller: bytes) -> dict[str, str]:
         """Return what rospy calls the header of the connection that a request came on.
@@ -139,8 +140,12 @@ class Service(ServiceEnd):
             "type": self.service_class._type,
         }
 
-    def _handle(self, request: Any, caller: bytes) -> Any:
+    def answer(self, request: Any, caller: bytes) -> Any:
         """Return the response to a request.
+
+        Args:
+            request: The request.
+            caller: Gid of the client.
 
         Raises:
             Refusal: There is none; the text is for the caller.
