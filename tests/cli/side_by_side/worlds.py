@@ -14,7 +14,7 @@ import threading
 import time
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import IO, Self
 
 import msgspec
 
@@ -26,7 +26,7 @@ _ROOT = Path(__file__).parents[3]
 _NODES = Path(__file__).with_name("nodes.py")
 _PATIENCE = 40.0
 _SOME = 3
-"""Lines, or seconds, after which what goes on for ever has said enough."""
+"""Lines after which what goes on for ever has said enough."""
 
 _PACKAGE = {
     "package.xml": (
@@ -84,9 +84,11 @@ class World:
             stderr=subprocess.PIPE,
             text=True,
         ) as process:
-            begun = _beginning(process) if interrupt else ""
-            out, err = process.communicate(timeout=_PATIENCE)
-            return Outcome(process.returncode, begun if interrupt else out, err)
+            if interrupt:
+                out, err = _beginning(process)
+            else:
+                out, err = process.communicate(timeout=_PATIENCE)
+            return Outcome(process.wait(_PATIENCE), out, err)
 
     def start(self, *command: str) -> subprocess.Popen[str]:
         """Start a program that ends with this world."""
@@ -180,19 +182,27 @@ class Rosz(World):
         return [sys.executable, "-m", "rosz", *split(line)]
 
 
-def _beginning(process: subprocess.Popen[str]) -> str:
-    """Return the first lines of what goes on for ever, and end it then, or after some time."""
+def _beginning(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """Return the first lines of what goes on for ever, and end it then, or when it complains."""
     assert process.stdout is not None
+    assert process.stderr is not None
+    complaints: list[str] = []
+
+    def listen(stream: IO[str]) -> None:
+        for line in stream:
+            if not complaints:
+                process.send_signal(signal.SIGINT)
+            complaints.append(line)
+
+    listener = threading.Thread(target=listen, args=(process.stderr,), daemon=True)
+    listener.start()
     said: list[str] = []
-    end = threading.Timer(_SOME, process.send_signal, [signal.SIGINT])
-    end.start()
-    for text in process.stdout:
-        said.append(text)
+    for line in process.stdout:
+        said.append(line)
         if len(said) == _SOME:
             process.send_signal(signal.SIGINT)
-            break
-    end.cancel()
-    return "".join(said)
+    listener.join(_PATIENCE)
+    return "".join(said[:_SOME]), "".join(complaints)
 
 
 def split(line: str) -> list[str]:
