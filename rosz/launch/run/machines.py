@@ -20,7 +20,7 @@ __all__ = ("MachineCall", "Machines", "meeting_places", "moved")
 
 _CALL = re.compile(
     r"(?:(?P<name>[^=@]+)=)?(?:(?P<user>[^@]+)@)?"
-    r"(?P<address>\[[^]]+\]|[^@:\s]+)(?::(?P<port>[0-9]{1,5}))?"
+    r"(?P<address>\[[^]]+\]|[^-@:=\s][^@:=\s]*)(?::(?P<port>[0-9]{1,5}))?"
 )
 _SSH_PORT = 22
 _TIMEOUT = 10.0

@@ -1,0 +1,77 @@
+"""Who answers first of those that are wanted."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+from network import Network
+
+from rosz.errors import TransportError
+from rosz.session import Session, SessionConfig
+from rosz.session.probe import first_answered
+
+NOWHERE = "tcp/192.0.2.1:9"
+"""An address that nobody has: no answer at all, or none but a router's."""
+
+
+@pytest.fixture
+def served() -> Iterator[str]:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"tcp/127.0.0.1:{server.getsockname()[1]}"
+
+
+@pytest.fixture
+def refused() -> str:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
+
+
+def test_the_most_wanted_that_answers(served: str, refused: str) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        other = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+        assert first_answered([served, other], 5) == served
+        assert first_answered([other, served], 5) == other
+        assert first_answered([refused, other], 5) == other
+
+
+def test_one_out_of_reach_holds_up_nobody_for_long(served: str) -> None:
+    began = time.monotonic()
+    assert first_answered([NOWHERE, served], 10) == served
+    assert time.monotonic() - began < 5
+
+
+def test_nobody_answers(refused: str) -> None:
+    assert first_answered([refused, NOWHERE], 0.3) == ""
+
+
+def test_one_that_comes_later(refused: str) -> None:
+    place = refused.removeprefix("tcp/127.0.0.1:")
+    servers: list[socket.socket] = []
+    late = threading.Timer(
+        0.2, lambda: servers.append(socket.create_server(("127.0.0.1", int(place))))
+    )
+    late.start()
+    assert first_answered([refused], 10) == refused
+    late.join()
+    servers[0].close()
+
+
+def test_a_client_of_several_places_goes_where_somebody_is(network: Network, refused: str) -> None:
+    network.node("there")
+    config = SessionConfig(
+        mode="client", rendezvous=refused, connect=(network.rendezvous,), must_connect=True
+    )
+    with Session.open(config) as session:
+        assert session.peers()
+
+
+def test_a_client_of_several_places_where_nobody_is(refused: str) -> None:
+    config = SessionConfig(
+        mode="client", rendezvous=refused, connect=(refused,), must_connect=True, open_timeout=0.2
+    )
+    with pytest.raises(TransportError, match=r"nobody answers at 'tcp/.*' within 0\.2 s"):
+        Session.open(config)
