@@ -96,7 +96,7 @@ def search_param(param_name: str) -> str | None:
     try:
         return params().search(param_name)
     except ParamError as error:
-        raise ROSException(f"cannot search for parameter: {error}") from error
+        raise ROSException(str(error)) from error
 
 
 def get_param_names() -> list[str]:
