@@ -59,5 +59,6 @@ def launch(network: Network) -> Iterator[Start]:
             program.send(signal.SIGTERM)
         with suppress(subprocess.TimeoutExpired):
             program.process.wait(10)
+    kill_family(tag)  # what is left would keep the pipes open
+    for program in programs:
         program.close()
-    kill_family(tag)
