@@ -17,7 +17,9 @@ BIN = Path(env.__file__).parent / "bin"
 ENV = f"{sys.executable} -P -m rosz env"
 
 
-def evaluate(network: Network, shell: str, *lines: str) -> subprocess.CompletedProcess[str]:
+def evaluate(
+    network: Network, shell: str, *lines: str, timeout: float = 40
+) -> subprocess.CompletedProcess[str]:
     """Run lines in a shell that has evaluated what rosz prints for it."""
     if shutil.which(shell) is None:
         pytest.skip(f"{shell} is not installed: apt install {shell}")
@@ -28,7 +30,7 @@ def evaluate(network: Network, shell: str, *lines: str) -> subprocess.CompletedP
         cwd=network.folder,
         capture_output=True,
         text=True,
-        timeout=40,
+        timeout=timeout,
         check=False,
     )
 
@@ -66,8 +68,43 @@ def test_ros_1_names_mean_rosz(network: Network, shell: str) -> None:
 
 def test_evaluating_twice_changes_nothing(network: Network) -> None:
     again = f'eval "$({ENV} bash)"'
-    done = evaluate(network, "bash", again, 'echo "$PATH" | tr ":" "\\n" | grep -c cli/bin')
-    assert done.stdout == "1\n"
+    done = evaluate(
+        network,
+        "bash",
+        again,
+        'echo "$PATH" | tr ":" "\\n" | grep -c cli/bin',
+        'echo "$PYTHONPATH" | tr ":" "\\n" | grep -c ros1/shell',
+    )
+    assert done.stdout == "1\n1\n"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_script_that_is_run_directly_finds_rospy(network: Network, shell: str) -> None:
+    script = network.folder / "first.py"
+    script.write_text(
+        f"#!{sys.executable}\nfrom std_msgs.msg import String\nimport rospy\n"
+        "rospy.init_node('first')\nprint(rospy.get_name(), String('x').data)\n"
+    )
+    script.chmod(0o755)
+    done = evaluate(network, shell, "./first.py")
+    assert (done.stdout, done.stderr) == ("/first x\n", "")
+
+
+def test_other_scripts_load_nothing_of_rosz(network: Network) -> None:
+    line = "import json, sys; print([name for name in sys.modules if name.startswith('rosz')])"
+    done = evaluate(network, "bash", f'"$ROSZ_PYTHON" -c "{line}"')
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_a_module_that_nobody_has(network: Network) -> None:
+    done = evaluate(network, "bash", '"$ROSZ_PYTHON" -c "import nothing_of_the_kind"')
+    assert done.stderr.endswith("ModuleNotFoundError: No module named 'nothing_of_the_kind'\n")
+
+
+def test_a_sitecustomize_of_the_user_runs_as_well(network: Network) -> None:
+    (network.folder / "sitecustomize.py").write_text("print('mine')\n")
+    line = 'PYTHONPATH="$PYTHONPATH:." "$ROSZ_PYTHON" -c "import rospy; print(rospy.get_name())"'
+    assert evaluate(network, "bash", line).stdout == "mine\n/unnamed\n"
 
 
 @pytest.mark.parametrize(
