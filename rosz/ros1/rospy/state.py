@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rosz import remap
+from rosz.errors import ClosedError
 from rosz.node import Context, Node
 from rosz.params.api import Params
 from rosz.ros1.rospy.exceptions import ROSInitException
@@ -218,7 +219,12 @@ def when_ready(act: Callable[[Node], object]) -> None:
         if state.node is None:
             state.waiting.append(act)
             return
-    act(state.node)
+    try:
+        act(state.node)
+    except ClosedError:
+        # The end may have begun since the first look.
+        if not is_shutdown():
+            raise
 
 
 def helper() -> Node:
