@@ -266,6 +266,8 @@ SHOWING = {
     "msg": ["list", "show", "info", "md5", "hash", "package", "packages"],
     "srv": ["list", "show", "info", "md5", "hash", "package", "packages"],
     "pkg": ["list", "find", "check"],
+    "reconfigure": ["list", "get", "describe", "watch"],
+    "keys": ["list", "check"],
     "log": [""],
     "doctor": [""],
     "env": [""],
