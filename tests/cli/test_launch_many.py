@@ -1,0 +1,67 @@
+"""Launches of many nodes come up and end without a complaint, and stubborn ones end in time."""
+
+from __future__ import annotations
+
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from network import Network, eventually, repeats
+
+from .command import package
+from .launching import Start, runs, started
+
+TALKER = """#!/usr/bin/env python3
+import rosz
+from std_msgs.msg import String
+with rosz.Node("talker") as node:
+    chatter = node.publisher("chatter", String)
+    print("up", flush=True)
+    for _ in node.rate(2):
+        chatter.publish(String(data=node.name))
+"""
+STUBBORN = "#!/bin/sh\ntrap '' INT TERM\necho up\nwhile :; do sleep 1; done\n"
+EXPECTED = re.compile(
+    r"up$|$|\.\.\. |SUMMARY|=+$|NODES|  /|    n\d+ \(|auto-starting|process\[|setting /run_id"
+    r"|\[n\d+-\d+\] killing on exit$|shutting down|done$"
+)
+
+
+def fleet(folder: Path, script: str, count: int) -> str:
+    """Write a launch file of so many nodes, and return its path."""
+    demo = package(folder / "src", "fleet", node=script)
+    nodes = (
+        f'<node pkg="fleet" type="node" name="n{number}" output="screen"/>'
+        for number in range(count)
+    )
+    file = demo / "fleet.launch"
+    file.write_text(f"<launch>{''.join(nodes)}</launch>")
+    return str(file)
+
+
+@pytest.mark.timeout(120)
+def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
+    count = repeats(26, 100)  # more than form a mesh
+    run = launch(fleet(network.folder, TALKER, count))
+    eventually(lambda: run.lines.count("up") == count, "all nodes up", 55)
+    pids = started(run)
+    run.send(signal.SIGINT)
+    assert run.exit_code(40) == 0
+    assert [line for line in run.lines if not EXPECTED.match(line)] == []
+    assert len(pids) == count
+    assert "process[core]: started" in run.output
+    assert not any(map(runs, pids.values()))
+
+
+def test_twenty_stubborn_nodes_end_in_time(launch: Start, network: Network) -> None:
+    file = fleet(network.folder, STUBBORN, 20)
+    run = launch("--sigint-timeout", "0.5", "--sigterm-timeout", "0.5", file)
+    eventually(lambda: run.lines.count("up") == 20, "all nodes up")
+    begin = time.monotonic()
+    run.send(signal.SIGINT)
+    assert run.exit_code() == 0
+    assert 1 <= time.monotonic() - begin < 10
+    assert run.output.count("did not end when asked to, and was killed") == 20
+    assert not any(map(runs, started(run).values()))
