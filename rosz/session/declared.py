@@ -22,7 +22,6 @@ __all__ = (
     "RawPublisher",
     "Ring",
     "channel",
-    "direct",
     "mapped",
 )
 
@@ -49,18 +48,12 @@ def mapped(what: str) -> Iterator[None]:
         raise TransportError(f"cannot {what}: {text}") from error
 
 
-def direct(callback: Callable[[Any], object]) -> Any:
-    """Have a callback run right on Zenoh's thread, where it waits for Python's lock.
-
-    Only for what comes from a link as data or query. What Zenoh tells from its inner work, such as
-    tokens that go when a link ends, must never wait for Python: to undeclare an advanced publisher
-    Zenoh holds Python's lock, and waits for that inner work.
-    """
-    return zenoh.handlers.Callback(callback, indirect=False)
-
-
 def channel() -> Any:
-    """Have what comes wait in a channel, so that Zenoh never waits for Python."""
+    """Have what comes wait in a channel, so that Zenoh never waits for Python.
+
+    To undeclare an advanced publisher Zenoh holds Python's lock, and waits for its inner work; and
+    an interpreter that ends aborts when a thread which is not its own asks for its lock.
+    """
     return zenoh.handlers.FifoChannel(_CHANNEL)
 
 

@@ -1,7 +1,8 @@
 """The Zenoh session: the one door to the network.
 
-Callbacks given here run on Zenoh's threads. They must be short, must not block, and must not call
-back into the session; whoever needs more hands over to a thread of its own.
+No Python runs on Zenoh's threads: what comes waits in channels of Zenoh's, and threads of Python
+take it from there. Else a link would wait for Python's lock, and a thread of Zenoh's that wanted it
+while the interpreter ends would abort the process.
 """
 
 from __future__ import annotations
@@ -29,7 +30,6 @@ from rosz.session.declared import (
     RawPublisher,
     Ring,
     channel,
-    direct,
     mapped,
 )
 from rosz.session.ending import ClosedSession, still_open
@@ -273,9 +273,6 @@ class Session:
         def deliver(raw: zenoh.Sample) -> None:
             callback(Sample(raw))
 
-        if not history:
-            return Declared(what, self._subscribe(key, direct(deliver), 0, recover, origin))
-        # An advanced subscriber calls back with a lock held that its end needs, too.
         entity = self._subscribe(key, channel(), history, recover, origin)
         return Pumped(what, entity, deliver)
 
@@ -319,7 +316,7 @@ class Session:
 
         Args:
             key: Key expression.
-            callback: Gets every query, on a Zenoh thread, and must see to its closing.
+            callback: Gets every query, on a thread of its own, and must see to its closing.
             complete: Whether the answers here are all there are; ROS 2 clients ask only such.
 
         Raises:
@@ -327,10 +324,8 @@ class Session:
             TransportError: The key is malformed.
         """
         with mapped(f"serve '{key}'"):
-            entity = self._raw.declare_queryable(
-                key, direct(lambda raw: callback(Query(raw))), complete=complete
-            )
-        return Declared(f"queryable '{key}'", entity)
+            entity = self._raw.declare_queryable(key, channel(), complete=complete)
+        return Pumped(f"queryable '{key}'", entity, lambda raw: callback(Query(raw)))
 
     def questions(self, key: str, *, complete: bool = False) -> Questions:
         """Declare that questions on a key are answered here, by threads that take them.

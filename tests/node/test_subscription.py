@@ -408,6 +408,7 @@ class TestGeneric:
         """The form of rospy's AnyMsg: bytes, and the name of their type beside them."""
         got: SimpleQueue[tuple[bytes, MessageInfo]] = SimpleQueue()
         listener.subscription("count", None, lambda *both: got.put(both), raw=True, with_info=True)
+        meet(talker, listener)
         talker.publisher("count", Int32).publish(7)
         payload, info = got.get(timeout=PATIENCE)
         assert payload == Int32(7).to_cdr()
