@@ -10,7 +10,7 @@ import pytest
 from network import eventually, repeats
 
 from hosts.host import Host, HostProgram
-from hosts.scripts import COUNTER, LISTENER, TALKER
+from hosts.scripts import COUNTER, LISTENER, TALKER, slack
 from hosts.world import World
 
 LISTEN = "tcp/0.0.0.0:7447"
@@ -115,9 +115,9 @@ def test_a_link_is_cut_and_healed(world: World, linked: str) -> None:
         f"link cut for {seconds} s, linked by {linked}: topics after {topics:.2f} s, parameters"
         f" after {params:.2f} s, graph after {graph:.2f} s"
     )
-    assert topics < AGAIN_BY
-    assert params < AGAIN_BY
-    assert graph < AGAIN_BY + 3  # the commands that look take their time
+    assert topics < AGAIN_BY * slack()
+    assert params < AGAIN_BY * slack()
+    assert graph < (AGAIN_BY + 3) * slack()  # the commands that look take their time
 
 
 @pytest.mark.timeout(120)
@@ -157,7 +157,7 @@ def test_the_router_is_killed_and_started_again(world: World, linked: str) -> No
         f"router killed and started again, linked by {linked}: topics after {topics:.2f} s,"
         f" parameters after {params:.2f} s, graph after {graph:.2f} s"
     )
-    assert topics < AGAIN_BY
+    assert topics < AGAIN_BY * slack()
 
 
 FAST = """
@@ -237,7 +237,7 @@ def test_a_subscriber_stops_while_a_publisher_runs(world: World, where: str) -> 
         f"subscriber stopped on the {where}: publish takes {mean * 1e6:.0f} us (before"
         f" {usual * 1e6:.0f} us, worst {worst * 1e3:.1f} ms), memory grew by {grown / 1e6:.1f} MB"
     )
-    assert mean < 10 * usual + 0.001
+    assert mean < (10 * usual + 0.001) * slack()
     assert grown < 64e6
     stopped.send(signal.SIGCONT)
     heard = counted(stopped)
