@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from rosz.cli.group import print_json
 from rosz.environment import Environment, package_index
 from rosz.errors import NotFoundError
-from rosz.introspect.shells import SHELLS, script
+from rosz.introspect.shells import SHELLS, Shell
 from rosz.workspace import Checked, Problem, check, find_packages, write_setup
 
 __all__ = ("check_packages", "set_up")
@@ -52,11 +53,15 @@ def set_up() -> None:
     workspace = next((f for f in (cwd, *cwd.parents) if (f / "src").is_dir()), None)
     if workspace is None:
         raise NotFoundError(f"no workspace around {cwd}: expected a folder 'src' with packages")
-    programs = str(Path(__file__).parent / "bin")
-    files = write_setup(
-        workspace, {shell: script(shell, programs, sys.executable) for shell in SHELLS}
-    )
+    home = str(Path(__file__).parent.parent)
+    files = write_setup(workspace, {shell: script(shell, home, sys.executable) for shell in SHELLS})
     sys.stdout.write(f"in a new shell: source {_near(str(files[0]), cwd)}\n")
+
+
+def _evaluate(shell: Shell) -> str:
+    """Return the line by which a shell takes what ``rosz env`` prints at that time."""
+    command = f"{shlex.quote(sys.executable)} -P -m rosz env {shell}"
+    return f"{command} | source\n" if shell == "fish" else f'eval "$({command})"\n'
 
 
 def _meant(words: Sequence[str], cwd: Path) -> list[str]:
