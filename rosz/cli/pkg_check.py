@@ -53,8 +53,7 @@ def set_up() -> None:
     workspace = next((f for f in (cwd, *cwd.parents) if (f / "src").is_dir()), None)
     if workspace is None:
         raise NotFoundError(f"no workspace around {cwd}: expected a folder 'src' with packages")
-    home = str(Path(__file__).parent.parent)
-    files = write_setup(workspace, {shell: script(shell, home, sys.executable) for shell in SHELLS})
+    files = write_setup(workspace, {shell: _evaluate(shell) for shell in SHELLS})
     sys.stdout.write(f"in a new shell: source {_near(str(files[0]), cwd)}\n")
 
 
