@@ -41,6 +41,7 @@ def test_no_workspace(tmp_path: Path) -> None:
     assert "no package in the workspace around" in done.stderr
 
 
+@pytest.mark.timeout(120)
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_the_course_of_a_course(network: Network, shell: str) -> None:
     done = evaluate(
@@ -48,7 +49,7 @@ def test_the_course_of_a_course(network: Network, shell: str) -> None:
         shell,
         "mkdir -p catkin_ws/src",
         "cd catkin_ws/src",
-        "catkin_create_pkg beginner_tutorials std_msgs rospy roscpp",
+        '"$ROSZ_PYTHON" -P -m rosz pkg create beginner_tutorials std_msgs rospy roscpp',
         "cd ..",
         "catkin_make -j4 -DCMAKE_BUILD_TYPE=Release",
         f"source devel/setup.{shell}",
@@ -57,9 +58,10 @@ def test_the_course_of_a_course(network: Network, shell: str) -> None:
         "rosls beginner_tutorials",
         "rosmsg show beginner_tutorials/Number",
         "timeout 30 rosrun beginner_tutorials talker.py _rate:=100 &",
-        "sh -c 'until rostopic list 2>/dev/null | grep -q /numbers; do :; done'",
+        "timeout 60 sh -c 'until rostopic list 2>/dev/null | grep -q /numbers; do :; done'",
         "rostopic echo -n 1 /numbers",
         "rosnode kill /talker",
+        timeout=110,
     )
     assert "WARNING: dependency" not in done.stderr
     out = done.stdout
