@@ -39,14 +39,14 @@ def env_command(
     from rosz.introspect.shells import SHELLS, script
 
     name = shell or PurePath(os.environ.get("SHELL", "")).name
-    folder = str(Path(__file__).parent / "bin")
+    home = str(Path(__file__).parent.parent)
     for known in SHELLS:
         if name == known:
-            sys.stdout.write(script(known, folder, sys.executable))
+            sys.stdout.write(script(known, home, sys.executable))
             return
     if shell:
         raise UsageError(
             f"'{shell}' is no shell that is known; expected {', '.join(SHELLS)}"
             f"{near_miss(shell, SHELLS)}"
         )
-    sys.stdout.write(script("bash", folder, sys.executable))
+    sys.stdout.write(script("bash", home, sys.executable))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -63,24 +64,37 @@ def create_package(
     description: Annotated[str, typer.Option("--description", "-d", help="What it is.")] = "",
     maintainer: Annotated[str, typer.Option("--maintainer", "-m", help="Who looks after it.")] = "",
     license_name: Annotated[str, typer.Option("--license", "-l", help="Under what terms.")] = "",
+    bare: Annotated[
+        bool, typer.Option("--bare", help="Without them: two files, as catkin_create_pkg does.")
+    ] = False,
 ) -> None:
     """Create a package in the present folder, with a message, a talker and a launch file."""
-    from rosz.launch.run.template import create
+    from rosz.launch.run.template import create, create_bare
 
-    folder = create(
-        Path.cwd(),
-        name,
-        dependencies or [],
-        description=description,
-        maintainer=maintainer,
-        license_name=license_name,
-    )
+    facts = {"description": description, "maintainer": maintainer, "license_name": license_name}
+    if bare:
+        made = create_bare(Path.cwd(), name, dependencies or [], **facts)
+        _tell_of_bare(made, Path.cwd())
+    else:
+        folder = create(Path.cwd(), name, dependencies or [], **facts)
     index = _index()
     for dependency in dependencies or []:
         if dependency not in index.names() and dependency not in _BUILT_IN:
             sys.stderr.write(f"WARNING: dependency '{dependency}' is not on the package path\n")
+    if not bare:
+        sys.stdout.write(
+            f"created {folder}\nrun it with: rosz launch {folder / 'launch' / 'talker.launch'}\n"
+        )
+
+
+def _tell_of_bare(made: Sequence[Path], parent: Path) -> None:
+    """Say what has been made, in the words of catkin_create_pkg."""
+    for path in made:
+        kind = "folder" if path.is_dir() else "file"
+        sys.stdout.write(f"Created {kind} {path.relative_to(parent)}\n")
     sys.stdout.write(
-        f"created {folder}\nrun it with: rosz launch {folder / 'launch' / 'talker.launch'}\n"
+        f"Successfully created files in {made[0].parent}."
+        " Please adjust the values in package.xml.\n"
     )
 
 

@@ -1,7 +1,8 @@
 """What makes ROS 1's command names mean rosz in a shell, and in all that is started from it.
 
 A folder of small programs goes on the PATH, so that ``timeout 5 rostopic …``, ``nohup roscore`` and
-scripts find them as well. Only roscd, which changes the shell's own folder, is a function. Where a
+scripts find them as well. Only roscd, which changes the shell's own folder, is a function. Another
+folder goes on the PYTHONPATH, so that scripts that are run directly can import rospy. Where a
 person types, the TAB key asks ``rosz complete``.
 """
 
@@ -16,7 +17,7 @@ Shell = Literal["bash", "zsh", "fish"]
 SHELLS: tuple[Shell, ...] = ("bash", "zsh", "fish")
 
 COMMANDS = {
-    "catkin_create_pkg": "pkg create",
+    "catkin_create_pkg": "pkg create --bare",
     "catkin_make": "pkg check --setup",
     "roscore": "core",
     "roslaunch": "launch",
@@ -36,6 +37,10 @@ _HELPERS = ("roscd", "rosed", "rosls", "rospack")
 _POSIX = """\
 export ROSZ_PYTHON={python}
 case ":$PATH:" in *:{folder}:*) ;; *) export PATH={folder}:"$PATH" ;; esac
+case ":${{PYTHONPATH-}}:" in
+  *:{modules}:*) ;;
+  *) export PYTHONPATH="${{PYTHONPATH:+$PYTHONPATH:}}"{modules} ;;
+esac
 unalias roscd 2>/dev/null
 roscd() {{
   [ -n "$1" ] || {{ echo "usage: roscd PACKAGE[/FOLDER]" >&2; return 2; }}
@@ -75,6 +80,7 @@ fi
 _FISH = """\
 set -gx ROSZ_PYTHON {python}
 contains {folder} $PATH; or set -gx PATH {folder} $PATH
+contains {modules} $PYTHONPATH; or set -gx --path PYTHONPATH $PYTHONPATH {modules}
 function roscd
     test -n "$argv[1]"; or begin; echo "usage: roscd PACKAGE[/FOLDER]" >&2; return 2; end
     set -l parts (string split -m 1 / $argv[1])
@@ -89,17 +95,22 @@ end
 """
 
 
-def script(shell: Shell, folder: str, python: str) -> str:
+def script(shell: Shell, home: str, python: str) -> str:
     """Return what a shell has to evaluate.
 
     Args:
         shell: Which one.
-        folder: Where the programs are.
+        home: The folder of rosz itself.
         python: The interpreter that has rosz.
     """
     text = {"bash": _POSIX + _BASH, "zsh": _POSIX + _ZSH, "fish": _FISH}[shell]
     names = " ".join(("rosz", *COMMANDS, *_HELPERS))
-    return text.format(folder=shlex.quote(folder), python=shlex.quote(python), names=names)
+    return text.format(
+        folder=shlex.quote(f"{home}/cli/bin"),
+        modules=shlex.quote(f"{home}/ros1/shell"),
+        python=shlex.quote(python),
+        names=names,
+    )
 
 
 def program(command: str) -> str:

@@ -1,15 +1,18 @@
-"""A new package: a message of its own, a node that publishes it, a launch file that starts that."""
+"""A new package: one that runs at once, or the bare one that catkin's tutorials begin with.
+
+The first has a message of its own, a node that publishes it and a launch file that starts that.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
 from rosz.errors import LaunchError, UsageError
 
-__all__ = ("create",)
+__all__ = ("create", "create_bare")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
@@ -22,6 +25,15 @@ _MANIFEST = """\
   <maintainer email="user@example.com">{maintainer}</maintainer>
   <license>{license_name}</license>
 {dependencies}</package>
+"""
+
+_BUILD = """\
+cmake_minimum_required(VERSION 3.0.2)
+project({name})
+
+find_package(catkin REQUIRED{components})
+
+catkin_package()
 """
 
 _MESSAGE = """\
@@ -81,32 +93,81 @@ def create(
         UsageError: The name is no name of a package.
         LaunchError: The folder exists, or cannot be written.
     """
+    files = {
+        "package.xml": _manifest(name, dependencies, description, maintainer, license_name),
+        "msg/Number.msg": _MESSAGE,
+        "scripts/talker.py": _TALKER.format(name=name),
+        "launch/talker.launch": _LAUNCH.format(name=name),
+    }
+    folder = _write(parent / name, files)
+    (folder / "scripts/talker.py").chmod(0o755)
+    return folder
+
+
+def create_bare(
+    parent: Path,
+    name: str,
+    dependencies: Sequence[str] = (),
+    *,
+    description: str = "",
+    maintainer: str = "",
+    license_name: str = "",
+) -> list[Path]:
+    """Create a package as catkin_create_pkg does: two files, and folders for what is to come.
+
+    Args:
+        parent: Folder to create it in.
+        name: Its name.
+        dependencies: Names of packages that it needs.
+        description: What it is.
+        maintainer: Who looks after it.
+        license_name: Under what terms.
+
+    Returns:
+        What there is now: files, then folders.
+
+    Raises:
+        UsageError: The name is no name of a package.
+        LaunchError: The folder exists, or cannot be written.
+    """
+    components = f" COMPONENTS {' '.join(dependencies)}" if dependencies else ""
+    files = {
+        "package.xml": _manifest(name, dependencies, description, maintainer, license_name),
+        "CMakeLists.txt": _BUILD.format(name=name, components=components),
+    }
+    folder = _write(parent / name, files)
+    folders = [folder / "include" / name] if "roscpp" in dependencies else []
+    if {"roscpp", "rospy"} & {*dependencies}:
+        folders.append(folder / "src")
+    for inner in folders:
+        inner.mkdir(parents=True)
+    return [*(folder / path for path in files), *folders]
+
+
+def _manifest(
+    name: str, dependencies: Sequence[str], description: str, maintainer: str, license_name: str
+) -> str:
     if not _NAME.fullmatch(name):
         raise UsageError(
             f"'{name}' is no name of a package; expected lower-case letters, digits and '_', a"
             " letter first"
         )
-    folder = parent / name
-    depends = "".join(f"  <depend>{escape(package)}</depend>\n" for package in dependencies)
-    files = {
-        "package.xml": _MANIFEST.format(
-            name=name,
-            description=escape(description or f"The {name} package"),
-            maintainer=escape(maintainer or "user"),
-            license_name=escape(license_name or "TODO"),
-            dependencies=depends,
-        ),
-        "msg/Number.msg": _MESSAGE,
-        "scripts/talker.py": _TALKER.format(name=name),
-        "launch/talker.launch": _LAUNCH.format(name=name),
-    }
+    return _MANIFEST.format(
+        name=name,
+        description=escape(description or f"The {name} package"),
+        maintainer=escape(maintainer or "user"),
+        license_name=escape(license_name or "TODO"),
+        dependencies="".join(f"  <depend>{escape(one)}</depend>\n" for one in dependencies),
+    )
+
+
+def _write(folder: Path, files: Mapping[str, str]) -> Path:
     try:
         folder.mkdir()
         for path, text in files.items():
             file = folder / path
             file.parent.mkdir(exist_ok=True)
             file.write_text(text, encoding="utf-8")
-        (folder / "scripts/talker.py").chmod(0o755)
     except FileExistsError as error:
         raise LaunchError(f"'{error.filename}' exists already; choose another name") from error
     except OSError as error:
