@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rosz.errors import RoszError
 
 _USAGE = "usage: python -m rosz.ros1 SCRIPT [ARGUMENTS]\n"
 
 
-def main(argv: Sequence[str]) -> None:
-    """Run the script that the command line names."""
+def main(argv: Sequence[str], begin: Callable[[], object] | None = None) -> None:
+    """Run the script that the command line names.
+
+    Args:
+        argv: Arguments without the program name.
+        begin: Called right before the script runs.
+    """
     from rosz.ros1.importer import install
     from rosz.ros1.script import Script
 
@@ -24,7 +29,10 @@ def main(argv: Sequence[str]) -> None:
     except RoszError as error:
         sys.stderr.write(f"rosz: {error}\n")
         sys.exit(1)
+    if begin is not None:
+        begin()
     script.run(argv[1:])
 
 
-main(sys.argv[1:])
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -96,6 +96,8 @@ def _trimming(show: _Hook, main: ModuleType) -> _Hook:
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         while trace is not None and trace.tb_frame.f_globals is not main.__dict__:
             trace = trace.tb_next
+        if isinstance(error, KeyboardInterrupt) and _is_importing(trace, main):
+            return  # Ctrl-C while modules load: where it hit tells nobody anything
         if isinstance(error, RoszError):
             # It says all there is to say but where the script stood.
             sys.stderr.write(f"rosz: {_place(trace, main)}{error}\n")
@@ -106,6 +108,18 @@ def _trimming(show: _Hook, main: ModuleType) -> _Hook:
             sys.stderr.write(f"rosz: {advice}\n")
 
     return hook
+
+
+def _is_importing(trace: TracebackType | None, main: ModuleType) -> bool:
+    """Tell whether a module was being looked for, or begun, other than the script."""
+    while trace is not None:
+        code = trace.tb_frame.f_code
+        if code.co_filename.startswith("<frozen importlib"):
+            return True
+        if code.co_name == "<module>" and trace.tb_frame.f_globals is not main.__dict__:
+            return True
+        trace = trace.tb_next
+    return False
 
 
 def _place(trace: TracebackType | None, main: ModuleType) -> str:

@@ -16,6 +16,7 @@ SKIPPED = {"share"}
 FLOORS = {
     "rosz": 9,
     "rosz.__main__": 9,
+    "rosz.script": 9,
     "rosz.errors": 0,
     "rosz.names": 0,
     "rosz.remap": 0,

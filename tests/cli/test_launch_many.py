@@ -41,11 +41,14 @@ def fleet(folder: Path, script: str, count: int) -> str:
     return str(file)
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(180)
 def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
     count = repeats(26, 100)  # more than form a mesh
     run = launch(fleet(network.folder, TALKER, count))
-    eventually(lambda: run.lines.count("up") == count, "all nodes up", 55)
+    try:
+        eventually(lambda: run.lines.count("up") == count, "all nodes up", 100)
+    except pytest.fail.Exception as error:
+        raise AssertionError(run.output) from error
     pids = started(run)
     run.send(signal.SIGINT)
     assert run.exit_code(40) == 0

@@ -34,7 +34,7 @@ def test_it_becomes_the_program(workspace: Path) -> None:
     done = rosz(workspace, "run", "--debug", "demo", "node.py", "a")
     assert done.stdout.startswith(f"['a'] {sys.executable} ")
     script = workspace / "src/demo/scripts/node.py"
-    assert done.stderr == f"[rosz run] {sys.executable} -P -m rosz.ros1 {script} a\n"
+    assert done.stderr == f"[rosz run] {sys.executable} -P -m rosz.script {script} a\n"
 
 
 def test_a_prefix_stands_before_it(workspace: Path) -> None:

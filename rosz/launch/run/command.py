@@ -1,7 +1,7 @@
 """From a node of the plan, or the words of ``rosz run``, to what the system executes.
 
 A Python script runs under the interpreter that runs rosz, with the ROS 1 names importable
-(``python -m rosz.ros1 SCRIPT``); any other program runs as it is.
+(``python -m rosz.script SCRIPT``); any other program runs as it is.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TAG = "ROSZ_LAUNCH"
 
 _SHEBANG_BYTES = 256
 _PYTHON = re.compile(r"python[0-9.]*")
-_ROS1 = ("-m", "rosz.ros1")
+_SCRIPT = ("-m", "rosz.script")
 
 
 class Command(msgspec.Struct, frozen=True):
@@ -195,6 +195,6 @@ def _start(prefix: Sequence[str], program: Path, *, python: bool) -> tuple[str, 
         return (*prefix, str(program))
     if prefix and _PYTHON.fullmatch(Path(prefix[0]).name):
         # "python3 -m pdb", "python -u": the interpreter is asked for by name, its options count.
-        return (sys.executable, *prefix[1:], *_ROS1, str(program))
+        return (sys.executable, *prefix[1:], *_SCRIPT, str(program))
     # -P keeps modules that lie in the folder of the launch from hiding those of Python.
-    return (*prefix, sys.executable, "-P", *_ROS1, str(program))
+    return (*prefix, sys.executable, "-P", *_SCRIPT, str(program))

@@ -16,7 +16,7 @@ from rosz.packages import PackageIndex
 
 from .scene import HERE, shell
 
-ROS1 = (sys.executable, "-P", "-m", "rosz.ros1")
+SCRIPT = (sys.executable, "-P", "-m", "rosz.script")
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_arguments_stand_in_roslaunch_order(workplace: Workplace, tmp_path: Path
 def test_scripts_run_under_the_interpreter_of_rosz(workplace: Workplace, name: str) -> None:
     command = workplace.command(node(name), log_file=None, tag="t:1")
     program = workplace.find("demo", name)
-    assert command.argv == (*ROS1, program, "__name:=n")
+    assert command.argv == (*SCRIPT, program, "__name:=n")
     assert command.shown == (program, "__name:=n")
     assert command.python
 
@@ -67,7 +67,7 @@ def test_a_prefix_stands_first(workplace: Workplace) -> None:
     plan = node("talker.py", launch_prefix=("nice", "-n", "5"), output="screen")
     command = workplace.command(plan, log_file=None, tag="t:1")
     assert command.argv[:3] == ("nice", "-n", "5")
-    assert command.argv[3:7] == ROS1
+    assert command.argv[3:7] == SCRIPT
     assert command.direct
 
 
@@ -76,7 +76,7 @@ def test_a_prefix_that_is_python_is_the_interpreter(workplace: Workplace, python
     plan = node("talker.py", launch_prefix=(python, "-m", "pdb"))
     command = workplace.command(plan, log_file=None, tag="t:1")
     program = workplace.find("demo", "talker.py")
-    assert command.argv == (sys.executable, "-m", "pdb", "-m", "rosz.ros1", program, "__name:=n")
+    assert command.argv == (sys.executable, "-m", "pdb", "-m", "rosz.script", program, "__name:=n")
 
 
 def test_variables(workplace: Workplace, tmp_path: Path) -> None:
