@@ -7,6 +7,7 @@ from typing import Any, Literal, TypedDict
 
 import zenoh
 
+from rosz.session.calls import ENDING
 from rosz.session.samples import Reply
 
 __all__ = ("Answers", "AskOptions", "Target")
@@ -43,6 +44,8 @@ class Answers:
 
     def first(self) -> Reply | None:
         """Wait for the next answer and return it; ``None`` when there is none."""
+        if ENDING.is_set():
+            return None
         try:
             return Reply(self._recv())
         except zenoh.ZError:  # the channel is empty, and nothing more will come

@@ -11,8 +11,16 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import FrameType
 
-__all__ = ("wait_for_calls",)
+__all__ = ("ENDING", "wait_for_calls")
+
+ENDING = threading.Event()
+"""Set when the interpreter is about to end: whoever would wait inside Zenoh does not set out.
+
+It has to be asked in the very function that calls Zenoh, so that either that function is seen to be
+under way, or it sees this.
+"""
 
 _HERE = str(Path(__file__).parent)
 _POLL = 0.001
@@ -20,9 +28,9 @@ _OUT_BY = 1.0
 
 
 def wait_for_calls(timeout: float) -> bool:
-    """Wait until no other thread is inside a call of the session.
+    """Wait until no other thread is inside a function of the session, and let none wait there.
 
-    A thread inside Zenoh shows as one whose innermost Python frame is of this package.
+    A thread that is inside such a function, however deep, may be inside Zenoh, or come back to it.
 
     Args:
         timeout: Seconds.
@@ -30,10 +38,11 @@ def wait_for_calls(timeout: float) -> bool:
     Returns:
         Whether that came to be; false when the time was over.
     """
+    ENDING.set()
     deadline = time.monotonic() + timeout
     own = threading.get_ident()
     while any(
-        frame.f_code.co_filename.startswith(_HERE)
+        _is_here(frame)
         for thread, frame in sys._current_frames().items()  # noqa: SLF001  # documented, if odd
         if thread != own
     ):
@@ -41,6 +50,14 @@ def wait_for_calls(timeout: float) -> bool:
             return False
         time.sleep(_POLL)
     return True
+
+
+def _is_here(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(_HERE):
+            return True
+        frame = frame.f_back
+    return False
 
 
 # Registered before anything that uses a session, and so run after all of that has been closed.

@@ -11,6 +11,7 @@ import zenoh
 
 from rosz.errors import ClosedError, TransportError
 from rosz.session.answers import Answers
+from rosz.session.calls import ENDING
 from rosz.session.samples import Query, Sample
 
 __all__ = (
@@ -93,7 +94,7 @@ class Pumped(Declared):
 
 
 def _pump(receive: Callable[[], Any], deliver: Callable[[Any], None]) -> None:
-    while True:
+    while not ENDING.is_set():
         try:
             item = receive()
         except zenoh.ZError:  # undeclared, or the session is closed
@@ -115,6 +116,8 @@ class Ring(Declared):
         Raises:
             ClosedError: The ring or the session was closed.
         """
+        if ENDING.is_set():
+            raise ClosedError(f"the subscriber of '{self._key}' is closed")
         try:
             return Sample(self._recv())
         except zenoh.ZError as error:
@@ -169,6 +172,8 @@ class Questions(Declared):
         Returns:
             The question, which whoever takes it closes; ``None`` when this is closed.
         """
+        if ENDING.is_set():
+            return None
         try:
             return Query(self._recv())
         except zenoh.ZError:
