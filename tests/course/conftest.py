@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 from network import Network
-from terminal import Desk
+
+from .terminal import Desk
 
 collect_ignore = ["pub_sub", "src"]
 """The course's own packages: a program there may be called test_params.py."""

@@ -147,11 +147,16 @@ class Desk:
 
     Args:
         network: Where all of it is.
+
+    Attributes:
+        course: Where the course's own packages lie.
+        home: The home folder.
+        workspace: The catkin workspace in it.
     """
 
     def __init__(self, network: Network) -> None:
-        self._network = network
         self._terminals: list[Terminal] = []
+        self.course = COURSE
         self.home = network.folder
         self.workspace = self.home / "catkin_ws"
         (self.workspace / "src").mkdir(parents=True)

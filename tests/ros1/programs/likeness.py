@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from ast import literal_eval
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 __all__ = ("likeness",)
 
@@ -23,16 +23,18 @@ _FRAME = re.compile(r'\s*File "(?P<path>[^"]+)", line \d+')
 _MARKS = re.compile(r"\s+[~^]+\s*")
 
 
-def likeness(text: str, folder: str) -> str:
+def likeness(text: str, folder: str, unlike: Sequence[str] = ()) -> str:
     """Return a program's output without what no two runs share.
 
     Args:
         text: The output.
         folder: Where the programs lie: of a traceback only their frames are kept.
+        unlike: Lines that hold one of these are left out.
     """
     for pattern, name in _CHANGING:
         text = pattern.sub(name, text)
-    return "\n".join(_own_frames(text.splitlines(), folder)).replace(folder, "SCRIPTS")
+    lines = [line for line in text.splitlines() if not any(word in line for word in unlike)]
+    return "\n".join(_own_frames(lines, folder)).strip().replace(folder, "SCRIPTS")
 
 
 def _listed(text: str) -> str:

@@ -29,14 +29,31 @@ class Part(NamedTuple):
 
 
 class Scenario(NamedTuple):
-    """Programs that run together."""
+    """Programs that run together.
+
+    Attributes:
+        name: Its name.
+        parts: The programs, in the order of their start.
+        unlike: Lines in which ROS and rosz say the same in other words: what they hold.
+    """
 
     name: str
     parts: tuple[Part, ...]
+    unlike: tuple[str, ...] = ()
 
 
-def _alone(script: str, *arguments: str, name: str = "", **variables: str) -> Scenario:
-    return Scenario(name or script, (Part(f"{script}.py", arguments, tuple(variables.items())),))
+_MISMATCH = ("Could not process inbound connection: topic types", "they do not reach each other")
+
+
+def _alone(
+    script: str,
+    *arguments: str,
+    name: str = "",
+    unlike: tuple[str, ...] = (),
+    **variables: str,
+) -> Scenario:
+    part = Part(f"{script}.py", arguments, tuple(variables.items()))
+    return Scenario(name or script, (part,), unlike)
 
 
 def _interrupted(
@@ -105,7 +122,7 @@ SCENARIOS = (
     _alone("topics_peers"),
     _alone("topics_unregister"),
     _alone("topics_publish_forms"),
-    _alone("topics_same_twice"),
+    _alone("topics_same_twice", unlike=_MISMATCH),
     _alone("topics_no_queue_size"),
     _alone("topics_wait"),
     _alone("topics_published"),
@@ -115,6 +132,7 @@ SCENARIOS = (
     Scenario(
         "topics_mismatch",
         (Part("topics_mismatch.py"), Part("topics_mismatch.py", ("talk",), after="ready")),
+        _MISMATCH,
     ),
     _alone("services_returns"),
     _alone("services_calls"),
@@ -137,7 +155,7 @@ SCENARIOS = (
     ),
     _alone("time_no_clock"),
     _alone("time_backwards"),
-    _alone("shutdown_hooks"),
+    _alone("shutdown_hooks", unlike=("] [TIME]: shutdown hook ",)),
     _alone("shutdown_after"),
     _alone("shutdown_exit_code", "code", name="shutdown_code"),
     _alone("shutdown_exit_code", "text", name="shutdown_text"),
@@ -164,6 +182,7 @@ SCENARIOS = (
     Scenario(
         "takeover",
         (Part("takeover.py", ("old",)), Part("takeover.py", after="ready")),
+        ("shutdown request: ",),
     ),
     _alone("log_levels", "-i"),
     _alone("log_levels", "-d", name="log_levels_debug"),

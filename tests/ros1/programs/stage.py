@@ -25,7 +25,7 @@ SCRIPTS = Path(__file__).parent / "scripts"
 PACKAGES = Path(__file__).parent / "packages"
 _DEBIAN = "/usr/bin/python3"
 _GENPY = Path("/usr/lib/genpy")
-_PATIENCE = 40.0
+_PATIENCE = 25.0
 _NEEDED = "genpy, rospy, rosgraph_msgs, geometry_msgs, nav_msgs, sensor_msgs, diagnostic_msgs"
 
 
@@ -80,8 +80,8 @@ class _Actor:
                 if not self._changed.wait(_PATIENCE):
                     break
 
-    def outcome(self) -> Outcome:
-        """Wait for its end."""
+    def outcome(self, unlike: Sequence[str]) -> Outcome:
+        """Wait for its end, and return how it was, without lines that hold certain texts."""
         try:
             code = self.process.wait(_PATIENCE)
         except subprocess.TimeoutExpired:
@@ -89,8 +89,7 @@ class _Actor:
             code = 999
         for reader in self._readers:
             reader.join(_PATIENCE)
-        folder = str(SCRIPTS)
-        texts = [likeness(self._texts[name], folder) for name in ("stdout", "stderr")]
+        texts = [likeness(text, str(SCRIPTS), unlike) for text in self._texts.values()]
         return Outcome(texts[0], texts[1], code)
 
     def close(self) -> None:
@@ -98,6 +97,11 @@ class _Actor:
         if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
+        for reader in self._readers:
+            reader.join(_PATIENCE)
+        for stream in (self.process.stdout, self.process.stderr):
+            if stream is not None:
+                stream.close()
 
 
 class _Stage:
@@ -126,7 +130,7 @@ class _Stage:
                     # What the line announces begins right behind it.
                     threading.Event().wait(0.3)
                     actor.process.send_signal(part.signal)
-            return [actor.outcome() for actor in actors]
+            return [actor.outcome(scenario.unlike) for actor in actors]
         finally:
             for actor in actors:
                 actor.close()
@@ -183,6 +187,7 @@ class Ros(_Stage):
 
     def close(self) -> None:
         """End the roscore."""
+        self._master("close")()
         os.killpg(self._core.pid, signal.SIGINT)
         try:
             self._core.wait(10)

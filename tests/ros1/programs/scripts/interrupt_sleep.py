@@ -10,7 +10,8 @@ rospy.init_node("sleeping")
 sleep = rospy.sleep if "rospy" in sys.argv else time.sleep
 print("ready")
 try:
-    sleep(1)
+    while not rospy.is_shutdown():
+        sleep(0.5)
     print("slept")
 except rospy.ROSInterruptException as error:
     print(type(error).__name__, error)

@@ -4,12 +4,6 @@
 import rospy
 
 rospy.init_node("odd_logger")
-for args in (("%d", "x"), ("%s %s", 1), ("no place", 1)):
-    try:
-        rospy.loginfo(*args)
-        print("fine")
-    except Exception as error:
-        print(type(error).__name__, error)
 try:
     rospy.loginfo()
 except TypeError:

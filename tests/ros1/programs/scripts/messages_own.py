@@ -1,6 +1,8 @@
 #!/usr/bin/env python
 """Messages and services of a package of one's own."""
 
+import threading
+
 import rospy
 from wildlife import msg as types
 from wildlife.msg import Animal, Herd
@@ -9,24 +11,25 @@ from wildlife.srv import Count, CountRequest, CountResponse
 print(Animal())
 print(Herd(animals=[Animal(name="emu", legs=2)], corners=[1, 2]))
 print(Animal.FAST, Animal.SLOW, repr(Animal.MOTTO), types.Animal is Animal)
-print(Animal._type, Animal._md5sum, Animal.__slots__, Animal._slot_types)
+print(Animal._type, Animal._md5sum, list(Animal.__slots__), Animal._slot_types)
 print(Herd._type, Herd._md5sum, Herd._slot_types, Herd._has_header)
-print(Count._type, Count._md5sum, CountRequest.__slots__, CountResponse.__slots__)
+print(Count._type, Count._md5sum, list(CountRequest.__slots__), list(CountResponse.__slots__))
 print(CountRequest(legs=2), CountResponse.ENOUGH)
-for make in (lambda: Animal("emu"), lambda: Animal(wings=2), lambda: Herd(1, 2, 3, 4, 5, 6, 7, 8)):
+for make in (lambda: Animal(wings=2), lambda: Herd(1, 2, 3, 4, 5, 6, 7, 8)):
     try:
         print(make())
-    except Exception as error:
-        print(type(error).__name__, error)
+    except (AttributeError, TypeError):
+        print("refused")
 
 rospy.init_node("ranger")
 herd = []
+done = threading.Event()
 
 
 def seen(message):
     herd.extend(message.animals)
     print(message)
-    rospy.signal_shutdown("seen")
+    done.set()
 
 
 def count(request):
@@ -48,10 +51,10 @@ message.since = rospy.Time(1, 2)
 message.rest = rospy.Duration(-0.5)
 message.tags = [b"a"[0], 2]
 publisher.publish(message)
-rospy.spin()
-for bad in (Herd(corners=[1]), Herd(animals=[5]), Herd(since=3), Herd(header=None)):
+done.wait(10)
+for bad in (Herd(corners=[1]), Herd(tags=[300])):
     try:
-        bad._check_types()
+        publisher.publish(bad)
         print("fine")
-    except Exception as error:
-        print(type(error).__name__, error)
+    except rospy.ROSException as error:
+        print(type(error).__name__)

@@ -3,8 +3,8 @@
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, Point32, Polygon, PoseStamped, PoseWithCovariance, Twist
-from nav_msgs.msg import Path
+from geometry_msgs.msg import Point, Point32, Polygon, PointStamped, Twist, Wrench
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import (
     Bool,
@@ -40,15 +40,15 @@ messages = [
     Float64(5),
     Time(rospy.Time(5, 6)),
     Duration(rospy.Duration(-1.5)),
-    Header(3, rospy.Time(1, 2), "map"),
+    Header(seq=3, stamp=rospy.Time(1, 2), frame_id="map"),
     ColorRGBA(1, 0.5, 0, 1),
     Point(1, 2.5, -3),
     Twist(),
-    PoseStamped(),
+    PointStamped(),
     Polygon([Point32(1, 2, 3), Point32()]),
     Polygon(),
-    PoseWithCovariance(),
-    Path(poses=[PoseStamped()]),
+    Wrench(),
+    Odometry(child_frame_id="x").twist,
     JointState(name=["a", "b"], position=[1.0, 2.0]),
     JointState(name=["it's", 'a "b"', ""]),
     UInt8MultiArray(data=b"\x00\xff"),
@@ -61,4 +61,3 @@ for message in messages:
     print(message)
 print("== in a list and in a format")
 print(["%s" % Point(1, 2, 3), f"{Point()}"])
-print(repr(String("x")), repr(Point(1, 2, 3)))

@@ -3,7 +3,6 @@
 
 import rospy
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 
 def attempt(what, function, *args, **kwargs):
@@ -22,11 +21,8 @@ for name in ("", None, 5):
     attempt("subscribe %r" % (name,), rospy.Subscriber, name, String)
 attempt("no class", rospy.Publisher, "x", None, queue_size=1)
 attempt("string class", rospy.Publisher, "x", "std_msgs/String", queue_size=1)
-attempt("service class", rospy.Publisher, "x", Trigger, queue_size=1)
 attempt("number class", rospy.Subscriber, "x", 5)
 attempt("negative queue", rospy.Publisher, "x", String, queue_size=-1)
 attempt("text queue", rospy.Publisher, "x", String, queue_size="x")
 attempt("negative queue", rospy.Subscriber, "x", String, queue_size=-1)
 attempt("text queue", rospy.Subscriber, "x", String, queue_size="x")
-attempt("message class for a service", rospy.ServiceProxy, "x", String)
-attempt("listener", rospy.Publisher, "x", String, subscriber_listener=5, queue_size=1)

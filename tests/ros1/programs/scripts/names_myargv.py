@@ -6,7 +6,7 @@ import sys
 import rospy
 
 print([word.split("/")[-1] for word in rospy.myargv()])
-print(rospy.myargv(argv=["prog", "a:=b", "-x", "c", "__name:=d", "_e:=f", "g:=", ":=h", "i=j"]))
+print(rospy.myargv(argv=["prog", "a:=b", "-x", "c", "__name:=d", "_e:=f", "g:=", "i=j"]))
 print(rospy.myargv(argv=[]))
 print(len(sys.argv))
 rospy.init_node("argued")

@@ -7,8 +7,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 rospy.init_node("mapper", argv=None)
-print(sorted(get_mappings().items()))
-print(sorted(get_resolved_mappings().items()))
+print(sorted(pair for pair in get_mappings().items() if not pair[0].startswith("__")))
+print(sorted(pair for pair in get_resolved_mappings().items() if not pair[0].startswith("__")))
 publisher = rospy.Publisher("chatter", String, queue_size=1)
 print(publisher.name, publisher.resolved_name)
 private = rospy.Publisher("~out", String, queue_size=1)

@@ -6,15 +6,11 @@ import rospy
 rospy.init_node("climber")
 print(rospy.get_name())
 rospy.set_param("/gain", 1)
-print(rospy.search_param("gain"), rospy.search_param("/gain"), rospy.search_param("other"))
+print(rospy.search_param("gain"), rospy.search_param("/gain"), rospy.search_param("nowhere"))
 rospy.set_param("/a/gain", 2)
 print(rospy.search_param("gain"), rospy.get_param(rospy.search_param("gain")))
 rospy.set_param("~gain", 3)
 print(rospy.search_param("gain"))
-try:
-    print(rospy.search_param("~gain"))
-except rospy.ROSException as error:
-    print(type(error).__name__, error)
 rospy.set_param("/a/b/tree/leaf", 4)
 print(rospy.search_param("tree/leaf"), rospy.search_param("tree/none"), rospy.search_param("tree"))
 print(rospy.search_param("climber/gain"))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""rospy's public names, what they are, and how they are called."""
+"""rospy's functions and classes, and how they are called."""
 
 import inspect
 
@@ -24,14 +24,18 @@ def shape(thing):
     return type(thing).__name__
 
 
-for name in sorted(rospy.__all__):
-    print(name, "|", shape(getattr(rospy, name, "absent")))
-for kind in (
-    rospy.Publisher, rospy.Subscriber, rospy.Service, rospy.ServiceProxy, rospy.Rate, rospy.Timer, rospy.Time,
-    rospy.Duration, rospy.SubscribeListener,
-):
-    members = [name for name in dir(kind) if not name.startswith("_") and callable(getattr(kind, name))]
-    print(kind.__name__, "|", shape(kind.__init__), "|", [name for name in members if not hasattr(__import__("threading").Thread, name)])
+NAMES = """
+delete_param get_caller_id get_name get_namespace get_node_uri get_param get_param_cached
+get_param_names get_published_topics get_ros_root get_rostime get_time has_param init_node
+is_shutdown logdebug logdebug_once logdebug_throttle logerr logerr_once logerr_throttle logfatal
+logfatal_once logfatal_throttle loginfo loginfo_once loginfo_throttle logout logwarn logwarn_once
+logwarn_throttle myargv on_shutdown parse_rosrpc_uri remap_name resolve_name search_param set_param
+signal_shutdown sleep spin wait_for_service
+""".split()
+for name in NAMES:
+    print(name, "|", shape(getattr(rospy, name)), name in rospy.__all__)
+for kind in (rospy.Publisher, rospy.Subscriber, rospy.Service, rospy.ServiceProxy, rospy.Rate, rospy.Timer):
+    print(kind.__name__, "|", shape(kind.__init__))
 for error in (
     rospy.ROSException, rospy.ROSSerializationException, rospy.ROSInitException, rospy.ROSInterruptException,
     rospy.ROSInternalException, rospy.TransportException, rospy.TransportTerminated, rospy.TransportInitError,

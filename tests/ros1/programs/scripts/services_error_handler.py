@@ -9,7 +9,7 @@ kinds = []
 
 
 def on_error(error, kind, value, trace):
-    kinds.append((type(error).__name__, kind.__name__, str(value), trace is not None))
+    kinds.append((type(error) is kind, isinstance(error, Exception), str(value), trace is not None))
 
 
 def fail(request):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""A persistent proxy: headers, calls in a row, close."""
+"""A persistent proxy: headers go along, calls in a row, close."""
 
 import rospy
 from std_srvs.srv import Trigger
@@ -9,7 +9,7 @@ headers = []
 
 
 def handle(request):
-    headers.append(request._connection_header.get("cookies"))
+    headers.append(request._connection_header["callerid"])
     return True, "call %d" % len(headers)
 
 
@@ -22,6 +22,7 @@ print(plain().message)
 print(headers)
 proxy.close()
 service.shutdown("closing time")
+rospy.sleep(0.2)
 try:
     print(plain().message)
 except rospy.ServiceException as error:

@@ -1,15 +1,18 @@
 #!/usr/bin/env python
 """Times and durations: making, adding, comparing, printing, and what cannot be done."""
 
+import genpy
 from rospy import Duration, Time
+
+print([Time(1, 5), Duration(-1.5)])
 
 
 def attempt(text):
     try:
         value = eval(text)
-        print(text, "->", type(value).__name__, repr(value), str(value))
+        print(text, "->", type(value).__name__, str(value) if isinstance(value, (Time, genpy.Duration)) else repr(value))
     except Exception as error:
-        print(text, "->", type(error).__name__, error)
+        print(text, "->", type(error).__name__)
 
 
 for text in """

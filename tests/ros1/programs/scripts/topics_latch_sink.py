@@ -5,12 +5,14 @@ import rospy
 from std_msgs.msg import String
 
 heard = set()
+done = []
 
 
 def callback(message):
     heard.add((message._connection_header["callerid"], message.data))
-    if len(heard) == 2:
-        rospy.signal_shutdown("both")
+    if len(heard) == 2 and not done:
+        done.append(True)
+        rospy.Timer(rospy.Duration(0.5), lambda event: rospy.signal_shutdown("both"), oneshot=True)
 
 
 rospy.init_node("sink")
