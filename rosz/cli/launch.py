@@ -25,6 +25,7 @@ __all__ = ("app", "launch")
 
 app = typer.Typer(add_completion=False)
 
+_LISTED = 8
 _LOOK_SECONDS = 0.1
 
 
@@ -352,6 +353,8 @@ def _first(words: Sequence[str], packages: PackageIndex) -> tuple[str, Sequence[
                 raise
     if is_file:
         return name, words[1:]
+    if Path(name).is_dir() and "/" in name:
+        raise NotFoundError(f"'{name}' is a folder; name a launch file in it")
     raise NotFoundError(f"launch file '{name}' is not there{_hint(name, packages)}")
 
 
@@ -362,7 +365,9 @@ def _hint(name: str, packages: PackageIndex) -> str:
     if Path("launch", name).is_file():
         return f"; did you mean 'launch/{name}'?"
     if name in packages.names():
-        return f"; '{name}' is a package: name one of its launch files as well"
+        own = sorted(file.name for file in packages.find(name).path.glob("launch/*.launch"))
+        which = f", such as {', '.join(own[:_LISTED])}" if own else ""
+        return f"; '{name}' is a package: name one of its launch files as well{which}"
     holders = [
         package.name
         for package in packages.packages()

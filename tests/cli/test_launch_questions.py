@@ -76,7 +76,11 @@ def test_a_package_around_the_file_is_found(tmp_path: Path) -> None:
 ERRORS = {
     ("nope.launch",): (1, "rosz: launch file 'nope.launch' is not there; give its path, or a pac"),
     ("demo.launch",): (1, "; package 'demo' has it: rosz launch demo demo.launch\n"),
-    ("demo",): (1, "'demo' is a package: name one of its launch files as well\n"),
+    ("demo",): (
+        1,
+        "'demo' is a package: name one of its launch files as well, such as demo.launch\n",
+    ),
+    ("src/demo",): (1, "rosz: 'src/demo' is a folder; name a launch file in it\n"),
     ("dem", "demo.launch"): (1, "rosz: package 'dem' not found"),
     ("demo", "dem.launch"): (1, "has no file 'dem.launch'; did you mean 'demo.launch'?\n"),
     ("demo", "demo.launch", "x.launch", "topic:=a"): (1, "rosz: launch file 'x.launch' is not"),
