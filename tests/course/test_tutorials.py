@@ -102,3 +102,22 @@ def test_number_without_a_sound(desk: Desk) -> None:
     values = [int(x) for x in re.findall(r"data: (\d+)", two.type("rostopic echo -n 3 /abc_topic"))]
     assert values == list(range(values[0], values[0] + 3))
     one.interrupt()
+
+
+def test_waypoints(desk: Desk) -> None:
+    """The ROS 2 tutorial: a robot driven from place to place by /odom and /cmd_vel."""
+    desk.add("turtlebot3_waypoints")
+    one, two = desk.terminal(), desk.terminal()
+    one.start("roslaunch turtlebot3_gazebo turtlebot3_empty_world.launch real_time_factor:=4")
+    one.wait_for("TurtleBot3 burger")
+    driven = without_times(two.type("rosrun turtlebot3_waypoints waypoints.py"))
+    assert driven.splitlines() == [
+        "[INFO] [TIME] [waypoints]: reached (0.5, 0.0)",
+        "[INFO] [TIME] [waypoints]: reached (0.5, 0.5)",
+        "[INFO] [TIME] [waypoints]: reached (0.0, 0.5)",
+        "[INFO] [TIME] [waypoints]: reached (0.0, 0.0)",
+        "[INFO] [TIME] [waypoints]: all places reached",
+    ]
+    assert 'frame_id: "odom"' in two.type("rostopic echo -n 1 /odom")
+    assert two.type("rostopic type /cmd_vel") == "geometry_msgs/Twist\n"
+    one.interrupt()
