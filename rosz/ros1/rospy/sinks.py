@@ -23,6 +23,8 @@ _NO_LIMIT = 10_000
 a publisher hold in rospy, and in Zenoh's own queue, which is many times as fast as one in Python.
 """
 _HEADER = "_connection_header"
+_LOGS = frozenset({"/rosout", "/rosout_agg"})
+"""Where programs listen to the log; nobody gathers the second from the first here."""
 
 
 class Sink:
@@ -59,6 +61,12 @@ class Sink:
             if self.data_class is AnyMsg:
                 self._subscription = GenericSubscription(
                     node, self.name, self._take_any, qos, raw=True, with_info=True
+                )
+            elif self.name in _LOGS and self.type == "rosgraph_msgs/Log":
+                from rosz.ros1.rospy.rosout import Ros2Log
+
+                self._subscription = Subscription(
+                    node, "/rosout", Ros2Log, self._take_log, qos, with_info=True
                 )
             else:
                 self._subscription = Subscription(
@@ -146,6 +154,11 @@ class Sink:
         else:
             members = self._members
         self._deliver(message, info, members)
+
+    def _take_log(self, line: Any, info: MessageInfo) -> None:
+        from rosz.ros1.rospy.rosout import to_ros1
+
+        self._take(to_ros1(line), info)
 
     def _take_any(self, payload: bytes, info: MessageInfo) -> None:
         message = AnyMsg()
