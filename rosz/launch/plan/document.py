@@ -20,6 +20,8 @@ _MAX_ENTITY = 4096
 _ATTRIBUTE = re.compile(r"""([^\s=/<>"']+)\s*=\s*("[^"]*"|'[^']*')""")
 _REFERENCE = re.compile(r"&[^;\s]+;")
 _NESTED_ENTITY = re.compile(r"&(?!amp;|lt;|gt;|quot;|apos;)[^;]*;")
+_CURLY = re.compile("[^<>\"']{0,20}([\u2018-\u201f])")
+_TAG_BYTES = 80
 _CLOSING_TAG = re.compile(rb"</\s*([^\s>]+)")
 
 _HINTS = {
@@ -226,7 +228,7 @@ class _Reader:
             found = closing[1].decode("utf-8", "replace") if closing else "?"
             opened = self.open[-1]
             hint = "" if opened.tag in TAGS else near_miss(opened.tag, TAGS)
-            hint = hint or f"; expected </{opened.tag}>"
+            hint = hint or f"; expected </{opened.tag}>{_slash(opened.tag)}"
             reason = f"</{found}> closes <{opened.tag}> of line {opened.line}{hint}"
         elif error.code == expat.errors.codes[expat.errors.XML_ERROR_NO_ELEMENTS]:
             reason = "the file ends before any tag"
@@ -234,10 +236,19 @@ class _Reader:
                 opened = self.open[-1]
                 reason = f"the file ends inside <{opened.tag}> of line {opened.line}"
         else:
-            reason += _HINTS.get(error.code, "")
+            reason += self._quotes(error) or _HINTS.get(error.code, "")
         return LaunchFileError(
             f"not well-formed XML: {reason}", self.document.path, error.lineno, error.offset + 1
         )
+
+    def _quotes(self, error: expat.ExpatError) -> str:
+        """Recognise quotes that a word processor has put in place of those of XML."""
+        if error.code != expat.errors.codes[expat.errors.XML_ERROR_INVALID_TOKEN]:
+            return ""
+        start = self.parser.ErrorByteIndex
+        text = self.document.data[start : start + _TAG_BYTES].decode("utf-8", "replace")
+        found = _CURLY.match(text)
+        return f'; {found[1]} is no quote of XML: write " in its place' if found else ""
 
 
 def parse(path: str, data: bytes) -> Document:
@@ -288,3 +299,9 @@ def _raw_index(raw: str, index: int) -> int:
         reference = _REFERENCE.match(raw, at)
         at = reference.end() if reference else at + 1
     return min(at, len(raw))
+
+
+def _slash(tag: str) -> str:
+    """Say how a tag that holds nothing is closed at once."""
+    holds = tag in TAGS and (TAGS[tag].holds or tag in _TEXT_TAGS)
+    return "" if holds or tag not in TAGS else ", or '/>' in place of its '>'"
