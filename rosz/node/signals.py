@@ -18,13 +18,14 @@ import signal
 import socket
 import threading
 import time
+from collections.abc import Callable
 from types import FrameType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rosz.node.context import Context
 
-__all__ = ("install", "release")
+__all__ = ("install", "of_program", "release")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_FD = -1
@@ -54,6 +55,14 @@ def install(context: Context) -> None:
         handler.add(context)
         for number in taken:
             signal.signal(number, handler)
+
+
+def of_program(number: signal.Signals) -> Callable[[int, FrameType | None], object] | None:
+    """Return the handler that the program itself has set for a signal, if any."""
+    present = signal.getsignal(number)
+    if not callable(present) or isinstance(present, _Handler):
+        return None
+    return None if present is signal.default_int_handler else present
 
 
 def release() -> None:

@@ -54,6 +54,8 @@ def announce(node: Node) -> None:
 def set_initial_params(node: Node) -> None:
     """Set the private parameters that the command line gives (``_name:=value``).
 
+    One without a value (``_name:=``) is not set, as in rospy.
+
     Raises:
         UsageError: A value is no YAML.
     """
@@ -63,9 +65,11 @@ def set_initial_params(node: Node) -> None:
 
     for name, text in node.context.arguments.params.items():
         try:
-            node.params[f"~{name}"] = yaml.safe_load(text)
+            value = yaml.safe_load(text)
         except yaml.YAMLError as error:
             raise UsageError(f"argument '_{name}:={text}' is no YAML value: {error}") from error
+        if value is not None:
+            node.params[f"~{name}"] = value
 
 
 def follow_clock(node: Node) -> None:

@@ -39,6 +39,7 @@ from rosz.ros1.rospy.params import (
     search_param,
     set_param,
 )
+from rosz.ros1.rospy.signals import chain
 from rosz.ros1.rospy.state import arguments, context, run_hooks, set_arguments, state
 
 if TYPE_CHECKING:
@@ -115,6 +116,8 @@ def init_node(  # noqa: PLR0917  # rospy's signature
             set_arguments(command)
         node = _begin(name, anonymous=anonymous, log_level=log_level, signals=not disable_signals)
         state.init_call = call
+    if not disable_signals:
+        chain()
     if disable_rosout:
         for sink in node.log.handlers[:]:
             if isinstance(sink, RosoutSink):
