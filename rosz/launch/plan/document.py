@@ -20,8 +20,7 @@ _MAX_ENTITY = 4096
 _ATTRIBUTE = re.compile(r"""([^\s=/<>"']+)\s*=\s*("[^"]*"|'[^']*')""")
 _REFERENCE = re.compile(r"&[^;\s]+;")
 _NESTED_ENTITY = re.compile(r"&(?!amp;|lt;|gt;|quot;|apos;)[^;]*;")
-_CURLY = re.compile("[^<>\"']{0,20}([\u2018-\u201f])")
-_TAG_BYTES = 80
+_CURLY_QUOTES = frozenset("\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u201f")
 _CLOSING_TAG = re.compile(rb"</\s*([^\s>]+)")
 
 _HINTS = {
@@ -246,9 +245,8 @@ class _Reader:
         if error.code != expat.errors.codes[expat.errors.XML_ERROR_INVALID_TOKEN]:
             return ""
         start = self.parser.ErrorByteIndex
-        text = self.document.data[start : start + _TAG_BYTES].decode("utf-8", "replace")
-        found = _CURLY.match(text)
-        return f'; {found[1]} is no quote of XML: write " in its place' if found else ""
+        found = self.document.data[start : start + 3].decode("utf-8", "replace")
+        return f'; {found} is no quote of XML: write "' if found in _CURLY_QUOTES else ""
 
 
 def parse(path: str, data: bytes) -> Document:
