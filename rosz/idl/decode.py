@@ -16,6 +16,9 @@ from rosz.idl.spec import Field, FieldType, MessageSpec, element_of
 
 __all__ = ("Decoder",)
 
+_STAMPED = "std_msgs/msg/Header"
+"""It has a running number in front, which is not sent."""
+
 _HEADER = 256
 _HEADER_SIZE = 4
 _MUCH = 8192
@@ -135,8 +138,12 @@ class Decoder:
     def _message(self, spec: MessageSpec) -> str:
         if not spec.fields:
             self._scalar("x", "")
-        values = [self._field(field) for field in spec.fields]
-        return f"{self._module.cls(spec.name)}({', '.join(values)})"
+        return self._made(spec, [self._field(field) for field in spec.fields])
+
+    def _made(self, spec: MessageSpec, values: list[str]) -> str:
+        """Return the expression of a message that has its fields' values."""
+        unsent = ["0"] if spec.name == _STAMPED else []
+        return f"{self._module.cls(spec.name)}({', '.join(unsent + values)})"
 
     def _field(self, field: Field) -> str:
         kind = field.type
@@ -293,7 +300,7 @@ class Decoder:
             else self._nested(self._catalog.message(field.type.base), f"{local}_{field.name}")
             for field in spec.fields
         ]
-        return f"{self._module.cls(spec.name)}({', '.join(values)})"
+        return self._made(spec, values)
 
     def _loop(self, kind: FieldType, local: str, count: str) -> None:
         """Read elements one by one."""

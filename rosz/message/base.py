@@ -187,11 +187,11 @@ class Message(msgspec.Struct, gc=False):
         return strify_message(self)
 
 
-class Sequenced(Message, kw_only=True):
+class Sequenced(Message):
     """A header with ROS 1's sequence number.
 
     The number is not on the wire; a receiver fills it from what every sample carries. Two headers
-    are equal when all but this number is.
+    are equal when all but this number is. As in ROS 1 it comes first: ``Header(0, stamp, "map")``.
     """
 
     seq: int = 0

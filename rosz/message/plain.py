@@ -248,7 +248,7 @@ class _Reader:
         if not fields:
             self._take(1, path, "an empty message")
         prefix = f"{path}." if path else ""
-        return cls(*[self._field(slot, prefix + slot.name) for slot in fields])
+        return cls(**{slot.name: self._field(slot, prefix + slot.name) for slot in fields})
 
     def _field(self, slot: Slot, path: str) -> Any:
         if slot.shape == "one":

@@ -32,7 +32,7 @@ TOP = Path(__file__).parents[2]
 def test_construction() -> None:
     assert Twist() == Twist(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0))
     assert Twist(angular=Vector3(z=1.0)).angular.z == 1.0
-    assert Header(Time(1, 2), "map", seq=3).seq == 3
+    assert Header(3, Time(1, 2), "map").seq == 3
     with pytest.raises(TypeError, match="Unexpected keyword argument 'lineer'"):
         Twist(lineer=Vector3())  # type: ignore[call-arg]
     with pytest.raises(AttributeError, match="no attribute 'lineer'"):
@@ -73,7 +73,7 @@ def test_defaults_by_kind() -> None:
 
 
 def test_equality_copies_and_pickles() -> None:
-    pose = PoseStamped(Header(Time(1, 2), "map", seq=9), Pose())
+    pose = PoseStamped(Header(9, Time(1, 2), "map"), Pose())
     for twin in (copy.copy(pose), copy.deepcopy(pose), pickle.loads(pickle.dumps(pose))):
         assert twin == pose
         assert twin.header.seq == 9
@@ -89,7 +89,7 @@ def test_equality_copies_and_pickles() -> None:
 
 def test_repr() -> None:
     assert repr(Vector3(1.0)) == "Vector3(x=1.0, y=0.0, z=0.0)"
-    assert repr(Header()) == "Header(stamp=Time(sec=0, nanosec=0), frame_id='', seq=0)"
+    assert repr(Header()) == "Header(seq=0, stamp=Time(sec=0, nanosec=0), frame_id='')"
 
 
 def test_headers_have_a_sequence_number_beside_the_wire() -> None:
@@ -293,7 +293,7 @@ def test_importing_a_package_is_quick(package: str, tmp_path: Path) -> None:
 
 
 def test_stamps_are_ros_1_times() -> None:
-    header = Header(Time(5, 0))
+    header = Header(0, Time(5, 0))
     assert (header.stamp - Time(3, 500_000_000)).to_sec() == 1.5
     assert header.stamp.secs == 5
     assert Duration(1, 0) + Duration(2, 0) == Duration(3, 0)

@@ -85,7 +85,7 @@ BAD: list[tuple[Message, str]] = [
         "geometry_msgs/PoseStamped.header.frame_id: expected string, got Odd <odd>",
     ),
     (
-        geometry.PoseStamped(std.Header(builtin.Time(-1, 1 << 32))),
+        geometry.PoseStamped(std.Header(0, builtin.Time(-1, 1 << 32))),
         "geometry_msgs/PoseStamped.header.stamp.nanosec: expected uint32, got int 4294967296",
     ),
     (

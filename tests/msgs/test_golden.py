@@ -40,7 +40,7 @@ VECTORS: list[tuple[str, Message, str]] = [
     ("empty string", String(""), "000100000100000000"),
     ("two and three bytes per character", String("é€"), "0001000006000000c3a9e282ac00"),
     ("nothing", Empty(), "0001000000"),
-    ("header", Header(Time(1, 2), "map"), "000100000100000002000000040000006d617000"),
+    ("header", Header(0, Time(1, 2), "map"), "000100000100000002000000040000006d617000"),
     (
         "twist",
         Twist(Vector3(1.0, 2.0, 3.0), Vector3(0.0, 0.0, 0.5)),
@@ -49,7 +49,7 @@ VECTORS: list[tuple[str, Message, str]] = [
     ),
     (
         "image",
-        Image(Header(Time(1, 2), "c"), 2, 1, "rgb8", 0, 3, bytes([1, 2, 3, 4, 5, 6])),
+        Image(Header(0, Time(1, 2), "c"), 2, 1, "rgb8", 0, 3, bytes([1, 2, 3, 4, 5, 6])),
         "000100000100000002000000020000006300000002000000010000000500000072676238"
         "000000000300000006000000010203040506",
     ),
@@ -143,4 +143,4 @@ def test_a_string_of_length_zero_is_empty() -> None:
     """Some writers leave the NUL out of an empty string."""
     assert String.from_cdr(bytes.fromhex("0001000000000000")) == String("")
     header = Header.from_cdr(bytes.fromhex("00010000010000000200000000000000"))
-    assert header == Header(Time(1, 2), "")
+    assert header == Header(0, Time(1, 2), "")

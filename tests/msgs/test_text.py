@@ -165,7 +165,7 @@ def listed(args: Any) -> Any:
 def filled(name: str, args: Any) -> Message:
     message = STORE.message(name)()
     now = Time(*NOW)
-    fill_message_args(message, args, {"now": now, "auto": Header(now)})
+    fill_message_args(message, args, {"now": now, "auto": Header(0, now)})
     return message
 
 

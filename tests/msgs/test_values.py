@@ -43,7 +43,7 @@ def test_there_and_back(name: str) -> None:
 
 
 def test_plain_form() -> None:
-    header = Header(Time(1, 2), "map", seq=5)
+    header = Header(5, Time(1, 2), "map")
     assert to_plain(header) == {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "map"}
     joints = JointState(name=["a"], position=array("d", [1.0]), velocity=[2.0])
     plain = to_plain(joints)
@@ -86,15 +86,15 @@ def test_now_and_auto() -> None:
     def now() -> Time:
         return Time(5, 6)
 
-    assert from_yaml(PoseStamped, "{header: auto}", now).header == Header(Time(5, 6))
+    assert from_yaml(PoseStamped, "{header: auto}", now).header == Header(0, Time(5, 6))
     stamped = from_yaml(PoseStamped, "header: {stamp: now, frame_id: map}", Time(7, 8))
-    assert stamped.header == Header(Time(7, 8), "map")
+    assert stamped.header == Header(0, Time(7, 8), "map")
     with pytest.raises(EncodeError, match=r"header: expected std_msgs/Header, got str 'auto'"):
         from_yaml(PoseStamped, "{header: auto}")
 
 
 def test_spellings_of_ros_1() -> None:
-    assert from_yaml(Header, "{seq: 3, stamp: {secs: 1, nsecs: 2}}") == Header(Time(1, 2))
+    assert from_yaml(Header, "{seq: 3, stamp: {secs: 1, nsecs: 2}}") == Header(0, Time(1, 2))
     assert from_yaml(Header, "{seq: 3}").seq == 3
     assert list(from_yaml(CameraInfo, "{K: [1,2,3,4,5,6,7,8,9]}").k) == [*range(1, 10)]
 

@@ -68,16 +68,16 @@ def value(rng: random.Random, catalog: Catalog, spec: MessageSpec) -> dict[str, 
 
 def build(cls: type[Message], plain: dict[str, Any]) -> Message:
     """Turn a plain value into a message, as a caller would write it: with lists."""
-    members = []
+    members: dict[str, Any] = {}
     for slot in slots(cls):
         member = plain[slot.name.rstrip("_") if slot.name not in plain else slot.name]
         if isinstance(slot.kind, str):
-            members.append(member)
+            members[slot.name] = member
         elif slot.shape == "one":
-            members.append(build(slot.kind, member))
+            members[slot.name] = build(slot.kind, member)
         else:
-            members.append([build(slot.kind, element) for element in member])
-    return cls(*members)
+            members[slot.name] = [build(slot.kind, element) for element in member]
+    return cls(**members)
 
 
 def plain(message: Any) -> Any:

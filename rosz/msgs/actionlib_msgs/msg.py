@@ -227,6 +227,6 @@ class GoalStatusArray(_Message):
                 text = data[q : p - 1].decode()
                 status_list.append(GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text))
             if p > len(data): raise ValueError
-            return GoalStatusArray(Header(Time(sec, nanosec), frame_id), status_list)
+            return GoalStatusArray(Header(0, Time(sec, nanosec), frame_id), status_list)
         except _FAULTS:
             return _explain(data, GoalStatusArray)

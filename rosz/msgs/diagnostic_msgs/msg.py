@@ -279,6 +279,6 @@ class DiagnosticArray(_Message):
                     values.append(KeyValue(key, value))
                 status.append(DiagnosticStatus(level, name, message, hardware_id, values))
             if p > len(data): raise ValueError
-            return DiagnosticArray(Header(Time(sec, nanosec), frame_id), status)
+            return DiagnosticArray(Header(0, Time(sec, nanosec), frame_id), status)
         except _FAULTS:
             return _explain(data, DiagnosticArray)

@@ -215,7 +215,7 @@ class GeoPoseStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             latitude, longitude, altitude, x, y, z, w = _u5(data, p)
-            return GeoPoseStamped(Header(Time(sec, nanosec), frame_id),
+            return GeoPoseStamped(Header(0, Time(sec, nanosec), frame_id),
                 GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x, y, z, w)))
         except _FAULTS:
             return _explain(data, GeoPoseStamped)
@@ -289,10 +289,10 @@ class GeoPath(_Message):
                 p = (p + 3 | 7) - 3
                 latitude, longitude, altitude, x, y, z, w = _u5(data, p)
                 p += 56
-                poses.append(GeoPoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                poses.append(GeoPoseStamped(Header(0, Time(sec_2, nanosec_2), frame_id_2),
                     GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x, y, z, w))))
             if p > len(data): raise ValueError
-            return GeoPath(Header(Time(sec, nanosec), frame_id), poses)
+            return GeoPath(Header(0, Time(sec, nanosec), frame_id), poses)
         except _FAULTS:
             return _explain(data, GeoPath)
 
@@ -339,7 +339,7 @@ class GeoPointStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             latitude, longitude, altitude = _u8(data, p)
-            return GeoPointStamped(Header(Time(sec, nanosec), frame_id),
+            return GeoPointStamped(Header(0, Time(sec, nanosec), frame_id),
                 GeoPoint(latitude, longitude, altitude))
         except _FAULTS:
             return _explain(data, GeoPointStamped)
@@ -453,7 +453,7 @@ class GeoPoseWithCovarianceStamped(_Message):
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return GeoPoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+            return GeoPoseWithCovarianceStamped(Header(0, Time(sec, nanosec), frame_id),
                 GeoPoseWithCovariance(GeoPose(GeoPoint(latitude, longitude, altitude),
                 Quaternion(x, y, z, w)), covariance))
         except _FAULTS:
@@ -878,7 +878,7 @@ class GeographicMap(_Message):
                 value_3 = data[q : p - 1].decode()
                 props_3.append(KeyValue(key_3, value_3))
             if p > len(data): raise ValueError
-            return GeographicMap(Header(Time(sec, nanosec), frame_id), UUID(uuid),
+            return GeographicMap(Header(0, Time(sec, nanosec), frame_id), UUID(uuid),
                 BoundingBox(GeoPoint(latitude, longitude, altitude),
                 GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3)
         except _FAULTS:
@@ -1104,8 +1104,8 @@ class GeographicMapChanges(_Message):
                 p += 16
                 deletes.append(UUID(uuid_5))
             if p > len(data): raise ValueError
-            return GeographicMapChanges(Header(Time(sec, nanosec), frame_id),
-                GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid),
+            return GeographicMapChanges(Header(0, Time(sec, nanosec), frame_id),
+                GeographicMap(Header(0, Time(sec_2, nanosec_2), frame_id_2), UUID(uuid),
                 BoundingBox(GeoPoint(latitude, longitude, altitude),
                 GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3), deletes)
         except _FAULTS:
@@ -1384,7 +1384,7 @@ class RouteNetwork(_Message):
                 value_3 = data[q : p - 1].decode()
                 props_3.append(KeyValue(key_3, value_3))
             if p > len(data): raise ValueError
-            return RouteNetwork(Header(Time(sec, nanosec), frame_id), UUID(uuid),
+            return RouteNetwork(Header(0, Time(sec, nanosec), frame_id), UUID(uuid),
                 BoundingBox(GeoPoint(latitude, longitude, altitude),
                 GeoPoint(latitude_2, longitude_2, altitude_2)), points, segments, props_3)
         except _FAULTS:
@@ -1482,6 +1482,6 @@ class RoutePath(_Message):
                 value = data[q : p - 1].decode()
                 props.append(KeyValue(key, value))
             if p > len(data): raise ValueError
-            return RoutePath(Header(Time(sec, nanosec), frame_id), UUID(uuid), segments, props)
+            return RoutePath(Header(0, Time(sec, nanosec), frame_id), UUID(uuid), segments, props)
         except _FAULTS:
             return _explain(data, RoutePath)

@@ -193,13 +193,13 @@ class GetGeoPathResponse(_Message):
                 p = (p + 3 | 7) - 3
                 latitude, longitude, altitude, x, y, z, w = _u5(data, p)
                 p += 56
-                poses.append(GeoPoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                poses.append(GeoPoseStamped(Header(0, Time(sec_2, nanosec_2), frame_id_2),
                     GeoPose(GeoPoint(latitude, longitude, altitude), Quaternion(x, y, z, w))))
             uuid, uuid_2, uuid_3 = _u6(data, p)
             p = (p + 51 | 7) - 3
             (distance,) = _u7(data, p)
             return GetGeoPathResponse(success, status,
-                GeoPath(Header(Time(sec, nanosec), frame_id), poses), UUID(uuid), UUID(uuid_2),
+                GeoPath(Header(0, Time(sec, nanosec), frame_id), poses), UUID(uuid), UUID(uuid_2),
                 UUID(uuid_3), distance)
         except _FAULTS:
             return _explain(data, GetGeoPathResponse)
@@ -489,7 +489,7 @@ class GetGeographicMapResponse(_Message):
                 props_3.append(KeyValue(key_3, value_3))
             if p > len(data): raise ValueError
             return GetGeographicMapResponse(success, status,
-                GeographicMap(Header(Time(sec, nanosec), frame_id), UUID(uuid),
+                GeographicMap(Header(0, Time(sec, nanosec), frame_id), UUID(uuid),
                 BoundingBox(GeoPoint(latitude, longitude, altitude),
                 GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3))
         except _FAULTS:
@@ -666,7 +666,7 @@ class GetRoutePlanResponse(_Message):
                 props.append(KeyValue(key, value))
             if p > len(data): raise ValueError
             return GetRoutePlanResponse(success, status,
-                RoutePath(Header(Time(sec, nanosec), frame_id), UUID(uuid), segments, props))
+                RoutePath(Header(0, Time(sec, nanosec), frame_id), UUID(uuid), segments, props))
         except _FAULTS:
             return _explain(data, GetRoutePlanResponse)
 
@@ -910,9 +910,9 @@ class UpdateGeographicMapRequest(_Message):
                 p += 16
                 deletes.append(UUID(uuid_5))
             if p > len(data): raise ValueError
-            return UpdateGeographicMapRequest(GeographicMapChanges(Header(Time(sec, nanosec),
+            return UpdateGeographicMapRequest(GeographicMapChanges(Header(0, Time(sec, nanosec),
                 frame_id),
-                GeographicMap(Header(Time(sec_2, nanosec_2), frame_id_2), UUID(uuid),
+                GeographicMap(Header(0, Time(sec_2, nanosec_2), frame_id_2), UUID(uuid),
                 BoundingBox(GeoPoint(latitude, longitude, altitude),
                 GeoPoint(latitude_2, longitude_2, altitude_2)), points, features, props_3),
                 deletes))

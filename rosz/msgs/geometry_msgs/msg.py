@@ -184,7 +184,7 @@ class AccelStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z, x_2, y_2, z_2 = _u4(data, p)
-            return AccelStamped(Header(Time(sec, nanosec), frame_id),
+            return AccelStamped(Header(0, Time(sec, nanosec), frame_id),
                 Accel(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, AccelStamped)
@@ -293,7 +293,7 @@ class AccelWithCovarianceStamped(_Message):
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return AccelWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+            return AccelWithCovarianceStamped(Header(0, Time(sec, nanosec), frame_id),
                 AccelWithCovariance(Accel(Vector3(x, y, z), Vector3(x_2, y_2, z_2)), covariance))
         except _FAULTS:
             return _explain(data, AccelWithCovarianceStamped)
@@ -400,7 +400,7 @@ class InertiaStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             m_2, x, y, z, ixx, ixy, ixz, iyy, iyz, izz = _u6(data, p)
-            return InertiaStamped(Header(Time(sec, nanosec), frame_id),
+            return InertiaStamped(Header(0, Time(sec, nanosec), frame_id),
                 Inertia(m_2, Vector3(x, y, z), ixx, ixy, ixz, iyy, iyz, izz))
         except _FAULTS:
             return _explain(data, InertiaStamped)
@@ -525,7 +525,7 @@ class PointStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z = _u8(data, p)
-            return PointStamped(Header(Time(sec, nanosec), frame_id), Point(x, y, z))
+            return PointStamped(Header(0, Time(sec, nanosec), frame_id), Point(x, y, z))
         except _FAULTS:
             return _explain(data, PointStamped)
 
@@ -670,7 +670,7 @@ class PolygonInstanceStamped(_Message):
             points = list(_starmap(Point32, _i1(data[q : p])))
             p = (p + 3 | 7) - 3
             (id_2,) = _u10(data, p)
-            return PolygonInstanceStamped(Header(Time(sec, nanosec), frame_id),
+            return PolygonInstanceStamped(Header(0, Time(sec, nanosec), frame_id),
                 PolygonInstance(Polygon(points), id_2))
         except _FAULTS:
             return _explain(data, PolygonInstanceStamped)
@@ -723,7 +723,7 @@ class PolygonStamped(_Message):
             p = q + n2 * 12
             points = list(_starmap(Point32, _i1(data[q : p])))
             if p > len(data): raise ValueError
-            return PolygonStamped(Header(Time(sec, nanosec), frame_id), Polygon(points))
+            return PolygonStamped(Header(0, Time(sec, nanosec), frame_id), Polygon(points))
         except _FAULTS:
             return _explain(data, PolygonStamped)
 
@@ -903,7 +903,7 @@ class PoseArray(_Message):
                 e_orientation_w)) for e_position_x, e_position_y, e_position_z, e_orientation_x,
                 e_orientation_y, e_orientation_z, e_orientation_w in _i2(data[q : p])]
             if p > len(data): raise ValueError
-            return PoseArray(Header(Time(sec, nanosec), frame_id), poses)
+            return PoseArray(Header(0, Time(sec, nanosec), frame_id), poses)
         except _FAULTS:
             return _explain(data, PoseArray)
 
@@ -952,7 +952,7 @@ class PoseStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z, x_2, y_2, z_2, w = _u14(data, p)
-            return PoseStamped(Header(Time(sec, nanosec), frame_id),
+            return PoseStamped(Header(0, Time(sec, nanosec), frame_id),
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)))
         except _FAULTS:
             return _explain(data, PoseStamped)
@@ -1060,7 +1060,7 @@ class PoseWithCovarianceStamped(_Message):
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return PoseWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+            return PoseWithCovarianceStamped(Header(0, Time(sec, nanosec), frame_id),
                 PoseWithCovariance(Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), covariance))
         except _FAULTS:
             return _explain(data, PoseWithCovarianceStamped)
@@ -1108,7 +1108,8 @@ class QuaternionStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z, w = _u15(data, p)
-            return QuaternionStamped(Header(Time(sec, nanosec), frame_id), Quaternion(x, y, z, w))
+            return QuaternionStamped(Header(0, Time(sec, nanosec), frame_id),
+                Quaternion(x, y, z, w))
         except _FAULTS:
             return _explain(data, QuaternionStamped)
 
@@ -1204,7 +1205,7 @@ class TransformStamped(_Message):
             child_frame_id = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z, x_2, y_2, z_2, w = _u14(data, p)
-            return TransformStamped(Header(Time(sec, nanosec), frame_id), child_frame_id,
+            return TransformStamped(Header(0, Time(sec, nanosec), frame_id), child_frame_id,
                 Transform(Vector3(x, y, z), Quaternion(x_2, y_2, z_2, w)))
         except _FAULTS:
             return _explain(data, TransformStamped)
@@ -1286,7 +1287,7 @@ class TwistStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z, x_2, y_2, z_2 = _u4(data, p)
-            return TwistStamped(Header(Time(sec, nanosec), frame_id),
+            return TwistStamped(Header(0, Time(sec, nanosec), frame_id),
                 Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, TwistStamped)
@@ -1392,7 +1393,7 @@ class TwistWithCovarianceStamped(_Message):
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return TwistWithCovarianceStamped(Header(Time(sec, nanosec), frame_id),
+            return TwistWithCovarianceStamped(Header(0, Time(sec, nanosec), frame_id),
                 TwistWithCovariance(Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2)), covariance))
         except _FAULTS:
             return _explain(data, TwistWithCovarianceStamped)
@@ -1435,7 +1436,7 @@ class Vector3Stamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z = _u8(data, p)
-            return Vector3Stamped(Header(Time(sec, nanosec), frame_id), Vector3(x, y, z))
+            return Vector3Stamped(Header(0, Time(sec, nanosec), frame_id), Vector3(x, y, z))
         except _FAULTS:
             return _explain(data, Vector3Stamped)
 
@@ -1507,7 +1508,7 @@ class VelocityStamped(_Message):
             reference_frame_id = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z, x_2, y_2, z_2 = _u4(data, p)
-            return VelocityStamped(Header(Time(sec, nanosec), frame_id), body_frame_id,
+            return VelocityStamped(Header(0, Time(sec, nanosec), frame_id), body_frame_id,
                 reference_frame_id, Twist(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, VelocityStamped)
@@ -1589,7 +1590,7 @@ class WrenchStamped(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             x, y, z, x_2, y_2, z_2 = _u4(data, p)
-            return WrenchStamped(Header(Time(sec, nanosec), frame_id),
+            return WrenchStamped(Header(0, Time(sec, nanosec), frame_id),
                 Wrench(Vector3(x, y, z), Vector3(x_2, y_2, z_2)))
         except _FAULTS:
             return _explain(data, WrenchStamped)

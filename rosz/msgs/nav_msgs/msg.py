@@ -133,7 +133,7 @@ class GetMapActionGoal(_Message):
             p = q + n2
             id_2 = data[q : p - 1].decode()
             if p + 1 > len(data): raise ValueError
-            return GetMapActionGoal(Header(Time(sec, nanosec), frame_id),
+            return GetMapActionGoal(Header(0, Time(sec, nanosec), frame_id),
                 GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal())
         except _FAULTS:
             return _explain(data, GetMapActionGoal)
@@ -255,7 +255,7 @@ class OccupancyGrid(_Message):
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+            return OccupancyGrid(Header(0, Time(sec, nanosec), frame_id),
                 MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2)
         except _FAULTS:
@@ -315,7 +315,7 @@ class GetMapResult(_Message):
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return GetMapResult(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+            return GetMapResult(OccupancyGrid(Header(0, Time(sec, nanosec), frame_id),
                 MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2))
         except _FAULTS:
@@ -417,9 +417,9 @@ class GetMapActionResult(_Message):
             p = q + n5
             data_2 = _array("b", data[q : p]) if n5 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return GetMapActionResult(Header(Time(sec, nanosec), frame_id),
+            return GetMapActionResult(Header(0, Time(sec, nanosec), frame_id),
                 GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text),
-                GetMapResult(OccupancyGrid(Header(Time(sec_3, nanosec_3), frame_id_2),
+                GetMapResult(OccupancyGrid(Header(0, Time(sec_3, nanosec_3), frame_id_2),
                 MapMetaData(Time(sec_4, nanosec_4), resolution, width, height,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2)))
         except _FAULTS:
@@ -518,7 +518,7 @@ class GetMapActionFeedback(_Message):
             p = q + n3
             text = data[q : p - 1].decode()
             if p + 1 > len(data): raise ValueError
-            return GetMapActionFeedback(Header(Time(sec, nanosec), frame_id),
+            return GetMapActionFeedback(Header(0, Time(sec, nanosec), frame_id),
                 GoalStatus(GoalID(Time(sec_2, nanosec_2), id_2), status, text), GetMapFeedback())
         except _FAULTS:
             return _explain(data, GetMapActionFeedback)
@@ -678,14 +678,14 @@ class GetMapAction(_Message):
             p = q + n10
             text_2 = data[q : p - 1].decode()
             if p + 1 > len(data): raise ValueError
-            return GetMapAction(GetMapActionGoal(Header(Time(sec, nanosec), frame_id),
+            return GetMapAction(GetMapActionGoal(Header(0, Time(sec, nanosec), frame_id),
                 GoalID(Time(sec_2, nanosec_2), id_2), GetMapGoal()),
-                GetMapActionResult(Header(Time(sec_3, nanosec_3), frame_id_2),
+                GetMapActionResult(Header(0, Time(sec_3, nanosec_3), frame_id_2),
                 GoalStatus(GoalID(Time(sec_4, nanosec_4), id_3), status, text),
-                GetMapResult(OccupancyGrid(Header(Time(sec_5, nanosec_5), frame_id_3),
+                GetMapResult(OccupancyGrid(Header(0, Time(sec_5, nanosec_5), frame_id_3),
                 MapMetaData(Time(sec_6, nanosec_6), resolution, width, height,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2))),
-                GetMapActionFeedback(Header(Time(sec_7, nanosec_7), frame_id_4),
+                GetMapActionFeedback(Header(0, Time(sec_7, nanosec_7), frame_id_4),
                 GoalStatus(GoalID(Time(sec_8, nanosec_8), id_4), status_2, text_2),
                 GetMapFeedback()))
         except _FAULTS:
@@ -749,7 +749,8 @@ class GridCells(_Message):
             p = q + n2 * 24
             cells = list(_starmap(Point, _i1(data[q : p])))
             if p > len(data): raise ValueError
-            return GridCells(Header(Time(sec, nanosec), frame_id), cell_width, cell_height, cells)
+            return GridCells(Header(0, Time(sec, nanosec), frame_id), cell_width, cell_height,
+                cells)
         except _FAULTS:
             return _explain(data, GridCells)
 
@@ -840,7 +841,7 @@ class Odometry(_Message):
             p = q + 288
             covariance_2 = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return Odometry(Header(Time(sec, nanosec), frame_id), child_frame_id,
+            return Odometry(Header(0, Time(sec, nanosec), frame_id), child_frame_id,
                 PoseWithCovariance(Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), covariance),
                 TwistWithCovariance(Twist(Vector3(x_3, y_3, z_3), Vector3(x_4, y_4, z_4)),
                 covariance_2))
@@ -914,9 +915,9 @@ class Path(_Message):
                 p = (p + 3 | 7) - 3
                 x, y, z, x_2, y_2, z_2, w = _u9(data, p)
                 p += 56
-                poses.append(PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                poses.append(PoseStamped(Header(0, Time(sec_2, nanosec_2), frame_id_2),
                     Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))))
             if p > len(data): raise ValueError
-            return Path(Header(Time(sec, nanosec), frame_id), poses)
+            return Path(Header(0, Time(sec, nanosec), frame_id), poses)
         except _FAULTS:
             return _explain(data, Path)

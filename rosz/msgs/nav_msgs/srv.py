@@ -128,7 +128,7 @@ class GetMapResponse(_Message):
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             if p > len(data): raise ValueError
-            return GetMapResponse(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+            return GetMapResponse(OccupancyGrid(Header(0, Time(sec, nanosec), frame_id),
                 MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2))
         except _FAULTS:
@@ -213,9 +213,9 @@ class GetPlanRequest(_Message):
             frame_id_2 = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
             x_3, y_3, z_3, x_4, y_4, z_4, w_2, tolerance = _u6(data, p)
-            return GetPlanRequest(PoseStamped(Header(Time(sec, nanosec), frame_id),
+            return GetPlanRequest(PoseStamped(Header(0, Time(sec, nanosec), frame_id),
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))),
-                PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                PoseStamped(Header(0, Time(sec_2, nanosec_2), frame_id_2),
                 Pose(Point(x_3, y_3, z_3), Quaternion(x_4, y_4, z_4, w_2))), tolerance)
         except _FAULTS:
             return _explain(data, GetPlanRequest)
@@ -283,10 +283,10 @@ class GetPlanResponse(_Message):
                 p = (p + 3 | 7) - 3
                 x, y, z, x_2, y_2, z_2, w = _u9(data, p)
                 p += 56
-                poses.append(PoseStamped(Header(Time(sec_2, nanosec_2), frame_id_2),
+                poses.append(PoseStamped(Header(0, Time(sec_2, nanosec_2), frame_id_2),
                     Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))))
             if p > len(data): raise ValueError
-            return GetPlanResponse(Path(Header(Time(sec, nanosec), frame_id), poses))
+            return GetPlanResponse(Path(Header(0, Time(sec, nanosec), frame_id), poses))
         except _FAULTS:
             return _explain(data, GetPlanResponse)
 
@@ -419,7 +419,7 @@ class LoadMapResponse(_Message):
             p = q + n2
             data_2 = _array("b", data[q : p]) if n2 < 8192 else _read_block("b", data, q, p)
             result = data[p]
-            return LoadMapResponse(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+            return LoadMapResponse(OccupancyGrid(Header(0, Time(sec, nanosec), frame_id),
                 MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2), result)
         except _FAULTS:
@@ -534,10 +534,10 @@ class SetMapRequest(_Message):
             p = q + 288
             covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return SetMapRequest(OccupancyGrid(Header(Time(sec, nanosec), frame_id),
+            return SetMapRequest(OccupancyGrid(Header(0, Time(sec, nanosec), frame_id),
                 MapMetaData(Time(sec_2, nanosec_2), resolution, width, height,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))), data_2),
-                PoseWithCovarianceStamped(Header(Time(sec_3, nanosec_3), frame_id_2),
+                PoseWithCovarianceStamped(Header(0, Time(sec_3, nanosec_3), frame_id_2),
                 PoseWithCovariance(Pose(Point(x_3, y_3, z_3), Quaternion(x_4, y_4, z_4, w_2)),
                 covariance)))
         except _FAULTS:

@@ -171,7 +171,7 @@ class Log(_Message):
                 topics = topics[:]
             else:
                 topics, p = _s1.take(data, p + 4)
-            return Log(Header(Time(sec, nanosec), frame_id), level, name, msg, file, function,
+            return Log(Header(0, Time(sec, nanosec), frame_id), level, name, msg, file, function,
                 line, topics)
         except _FAULTS:
             return _explain(data, Log)

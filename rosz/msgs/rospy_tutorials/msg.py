@@ -118,6 +118,6 @@ class HeaderString(_Message):
             p = q + n2
             data_2 = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return HeaderString(Header(Time(sec, nanosec), frame_id), data_2)
+            return HeaderString(Header(0, Time(sec, nanosec), frame_id), data_2)
         except _FAULTS:
             return _explain(data, HeaderString)

@@ -234,7 +234,7 @@ class BatteryState(_Message):
             p = q + n5
             serial_number = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return BatteryState(Header(Time(sec, nanosec), frame_id), voltage, temperature,
+            return BatteryState(Header(0, Time(sec, nanosec), frame_id), voltage, temperature,
                 current, charge, capacity, design_capacity, percentage, power_supply_status,
                 power_supply_health, power_supply_technology, present, cell_voltage,
                 cell_temperature, location, serial_number)
@@ -440,7 +440,7 @@ class CameraInfo(_Message):
             p = q + 96
             p_2 = _array("d", data[q : p])
             binning_x, binning_y, x_offset, y_offset, height_2, width_2, do_rectify = _u6(data, p)
-            return CameraInfo(Header(Time(sec, nanosec), frame_id), height, width,
+            return CameraInfo(Header(0, Time(sec, nanosec), frame_id), height, width,
                 distortion_model, d, k_2, r, p_2, binning_x, binning_y,
                 RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify))
         except _FAULTS:
@@ -554,7 +554,7 @@ class CompressedImage(_Message):
             p = q + n3
             data_2 = data[q : p]
             if p > len(data): raise ValueError
-            return CompressedImage(Header(Time(sec, nanosec), frame_id), format_2, data_2)
+            return CompressedImage(Header(0, Time(sec, nanosec), frame_id), format_2, data_2)
         except _FAULTS:
             return _explain(data, CompressedImage)
 
@@ -602,7 +602,7 @@ class FluidPressure(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             fluid_pressure, variance = _u8(data, p)
-            return FluidPressure(Header(Time(sec, nanosec), frame_id), fluid_pressure, variance)
+            return FluidPressure(Header(0, Time(sec, nanosec), frame_id), fluid_pressure, variance)
         except _FAULTS:
             return _explain(data, FluidPressure)
 
@@ -645,7 +645,7 @@ class Illuminance(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             illuminance, variance = _u8(data, p)
-            return Illuminance(Header(Time(sec, nanosec), frame_id), illuminance, variance)
+            return Illuminance(Header(0, Time(sec, nanosec), frame_id), illuminance, variance)
         except _FAULTS:
             return _explain(data, Illuminance)
 
@@ -717,7 +717,7 @@ class Image(_Message):
             p = q + n3
             data_2 = data[q : p]
             if p > len(data): raise ValueError
-            return Image(Header(Time(sec, nanosec), frame_id), height, width, encoding,
+            return Image(Header(0, Time(sec, nanosec), frame_id), height, width, encoding,
                 is_bigendian, step, data_2)
         except _FAULTS:
             return _explain(data, Image)
@@ -825,7 +825,7 @@ class Imu(_Message):
             p = q + 72
             linear_acceleration_covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return Imu(Header(Time(sec, nanosec), frame_id), Quaternion(x, y, z, w),
+            return Imu(Header(0, Time(sec, nanosec), frame_id), Quaternion(x, y, z, w),
                 orientation_covariance, Vector3(x_2, y_2, z_2), angular_velocity_covariance,
                 Vector3(x_3, y_3, z_3), linear_acceleration_covariance)
         except _FAULTS:
@@ -924,7 +924,7 @@ class JointState(_Message):
             p = q + n4 * 8
             effort = _array("d", data[q : p]) if n4 < 8192 else _read_block("d", data, q, p)
             if p > len(data): raise ValueError
-            return JointState(Header(Time(sec, nanosec), frame_id), name, position, velocity,
+            return JointState(Header(0, Time(sec, nanosec), frame_id), name, position, velocity,
                 effort)
         except _FAULTS:
             return _explain(data, JointState)
@@ -989,7 +989,7 @@ class Joy(_Message):
             p = q + n3 * 4
             buttons = _array("i", data[q : p]) if n3 < 8192 else _read_block("i", data, q, p)
             if p > len(data): raise ValueError
-            return Joy(Header(Time(sec, nanosec), frame_id), axes, buttons)
+            return Joy(Header(0, Time(sec, nanosec), frame_id), axes, buttons)
         except _FAULTS:
             return _explain(data, Joy)
 
@@ -1204,7 +1204,7 @@ class LaserScan(_Message):
             p = q + n3 * 4
             intensities = _array("f", data[q : p]) if n3 < 8192 else _read_block("f", data, q, p)
             if p > len(data): raise ValueError
-            return LaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max,
+            return LaserScan(Header(0, Time(sec, nanosec), frame_id), angle_min, angle_max,
                 angle_increment, time_increment, scan_time, range_min, range_max, ranges,
                 intensities)
         except _FAULTS:
@@ -1266,7 +1266,7 @@ class MagneticField(_Message):
             p = q + 72
             magnetic_field_covariance = _array("d", data[q : p])
             if p > len(data): raise ValueError
-            return MagneticField(Header(Time(sec, nanosec), frame_id), Vector3(x, y, z),
+            return MagneticField(Header(0, Time(sec, nanosec), frame_id), Vector3(x, y, z),
                 magnetic_field_covariance)
         except _FAULTS:
             return _explain(data, MagneticField)
@@ -1374,7 +1374,7 @@ class MultiDOFJointState(_Message):
                 Vector3(e_torque_x, e_torque_y, e_torque_z)) for e_force_x, e_force_y, e_force_z,
                 e_torque_x, e_torque_y, e_torque_z in _i3(data[q : p])]
             if p > len(data): raise ValueError
-            return MultiDOFJointState(Header(Time(sec, nanosec), frame_id), joint_names,
+            return MultiDOFJointState(Header(0, Time(sec, nanosec), frame_id), joint_names,
                 transforms, twist, wrench)
         except _FAULTS:
             return _explain(data, MultiDOFJointState)
@@ -1475,9 +1475,9 @@ class MultiEchoLaserScan(_Message):
                 echoes_2 = _array("f", data[q : p]) if n5 < 8192 else _read_block("f", data, q, p)
                 intensities.append(LaserEcho(echoes_2))
             if p > len(data): raise ValueError
-            return MultiEchoLaserScan(Header(Time(sec, nanosec), frame_id), angle_min, angle_max,
-                angle_increment, time_increment, scan_time, range_min, range_max, ranges,
-                intensities)
+            return MultiEchoLaserScan(Header(0, Time(sec, nanosec), frame_id), angle_min,
+                angle_max, angle_increment, time_increment, scan_time, range_min, range_max,
+                ranges, intensities)
         except _FAULTS:
             return _explain(data, MultiEchoLaserScan)
 
@@ -1624,8 +1624,9 @@ class NavSatFix(_Message):
             p = q + 72
             position_covariance = _array("d", data[q : p])
             position_covariance_type = data[p]
-            return NavSatFix(Header(Time(sec, nanosec), frame_id), NavSatStatus(status, service),
-                latitude, longitude, altitude, position_covariance, position_covariance_type)
+            return NavSatFix(Header(0, Time(sec, nanosec), frame_id),
+                NavSatStatus(status, service), latitude, longitude, altitude, position_covariance,
+                position_covariance_type)
         except _FAULTS:
             return _explain(data, NavSatFix)
 
@@ -1707,7 +1708,7 @@ class PointCloud(_Message):
                 values = _array("f", data[q : p]) if n5 < 8192 else _read_block("f", data, q, p)
                 channels.append(ChannelFloat32(name, values))
             if p > len(data): raise ValueError
-            return PointCloud(Header(Time(sec, nanosec), frame_id), points, channels)
+            return PointCloud(Header(0, Time(sec, nanosec), frame_id), points, channels)
         except _FAULTS:
             return _explain(data, PointCloud)
 
@@ -1867,7 +1868,7 @@ class PointCloud2(_Message):
             p = q + n4
             data_2 = data[q : p]
             (is_dense,) = _u18(data, p)
-            return PointCloud2(Header(Time(sec, nanosec), frame_id), height, width, fields,
+            return PointCloud2(Header(0, Time(sec, nanosec), frame_id), height, width, fields,
                 is_bigendian, point_step, row_step, data_2, is_dense)
         except _FAULTS:
             return _explain(data, PointCloud2)
@@ -1936,7 +1937,7 @@ class Range(_Message):
             radiation_type = data[p]
             p = p + 4 & -4
             field_of_view, min_range, max_range, range_2, variance = _u19(data, p)
-            return Range(Header(Time(sec, nanosec), frame_id), radiation_type, field_of_view,
+            return Range(Header(0, Time(sec, nanosec), frame_id), radiation_type, field_of_view,
                 min_range, max_range, range_2, variance)
         except _FAULTS:
             return _explain(data, Range)
@@ -1981,7 +1982,7 @@ class RelativeHumidity(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             relative_humidity, variance = _u8(data, p)
-            return RelativeHumidity(Header(Time(sec, nanosec), frame_id), relative_humidity,
+            return RelativeHumidity(Header(0, Time(sec, nanosec), frame_id), relative_humidity,
                 variance)
         except _FAULTS:
             return _explain(data, RelativeHumidity)
@@ -2025,7 +2026,7 @@ class Temperature(_Message):
             frame_id = data[16 : p - 1].decode()
             p = (p + 3 | 7) - 3
             temperature, variance = _u8(data, p)
-            return Temperature(Header(Time(sec, nanosec), frame_id), temperature, variance)
+            return Temperature(Header(0, Time(sec, nanosec), frame_id), temperature, variance)
         except _FAULTS:
             return _explain(data, Temperature)
 
@@ -2081,7 +2082,7 @@ class TimeReference(_Message):
             p = q + n2
             source = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return TimeReference(Header(Time(sec, nanosec), frame_id), Time(sec_2, nanosec_2),
+            return TimeReference(Header(0, Time(sec, nanosec), frame_id), Time(sec_2, nanosec_2),
                 source)
         except _FAULTS:
             return _explain(data, TimeReference)

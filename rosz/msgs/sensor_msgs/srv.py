@@ -112,7 +112,7 @@ class SetCameraInfoRequest(_Message):
             p = q + 96
             p_2 = _array("d", data[q : p])
             binning_x, binning_y, x_offset, y_offset, height_2, width_2, do_rectify = _u4(data, p)
-            return SetCameraInfoRequest(CameraInfo(Header(Time(sec, nanosec), frame_id), height,
+            return SetCameraInfoRequest(CameraInfo(Header(0, Time(sec, nanosec), frame_id), height,
                 width, distortion_model, d, k_2, r, p_2, binning_x, binning_y,
                 RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify)))
         except _FAULTS:

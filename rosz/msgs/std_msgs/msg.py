@@ -695,7 +695,7 @@ class Header(_Sequenced):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             if p > len(data): raise ValueError
-            return Header(builtin_interfaces_msg_Time(sec, nanosec), frame_id)
+            return Header(0, builtin_interfaces_msg_Time(sec, nanosec), frame_id)
         except _FAULTS:
             return _explain(data, Header)
 

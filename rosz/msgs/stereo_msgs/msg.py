@@ -126,8 +126,8 @@ class DisparityImage(_Message):
             p = p + 3 & -4
             (f_2, t, x_offset, y_offset, height_2, width_2, do_rectify, min_disparity,
                 max_disparity, delta_d) = _u5(data, p)
-            return DisparityImage(Header(Time(sec, nanosec), frame_id),
-                Image(Header(Time(sec_2, nanosec_2), frame_id_2), height, width, encoding,
+            return DisparityImage(Header(0, Time(sec, nanosec), frame_id),
+                Image(Header(0, Time(sec_2, nanosec_2), frame_id_2), height, width, encoding,
                 is_bigendian, step, data_2), f_2, t,
                 RegionOfInterest(x_offset, y_offset, height_2, width_2, do_rectify), min_disparity,
                 max_disparity, delta_d)

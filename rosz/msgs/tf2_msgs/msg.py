@@ -149,7 +149,7 @@ class TFMessage(_Message):
                 p = (p + 3 | 7) - 3
                 x, y, z, x_2, y_2, z_2, w = _u5(data, p)
                 p += 56
-                transforms.append(TransformStamped(Header(Time(sec, nanosec), frame_id),
+                transforms.append(TransformStamped(Header(0, Time(sec, nanosec), frame_id),
                     child_frame_id, Transform(Vector3(x, y, z), Quaternion(x_2, y_2, z_2, w))))
             if p > len(data): raise ValueError
             return TFMessage(transforms)

@@ -244,7 +244,7 @@ class JointTrajectory(_Message):
                 points.append(JointTrajectoryPoint(positions, velocities, accelerations, effort,
                     Duration(sec_2, nanosec_2)))
             if p > len(data): raise ValueError
-            return JointTrajectory(Header(Time(sec, nanosec), frame_id), joint_names, points)
+            return JointTrajectory(Header(0, Time(sec, nanosec), frame_id), joint_names, points)
         except _FAULTS:
             return _explain(data, JointTrajectory)
 
@@ -445,7 +445,7 @@ class MultiDOFJointTrajectory(_Message):
                 points.append(MultiDOFJointTrajectoryPoint(transforms, velocities, accelerations,
                     Duration(sec_2, nanosec_2)))
             if p > len(data): raise ValueError
-            return MultiDOFJointTrajectory(Header(Time(sec, nanosec), frame_id), joint_names,
+            return MultiDOFJointTrajectory(Header(0, Time(sec, nanosec), frame_id), joint_names,
                 points)
         except _FAULTS:
             return _explain(data, MultiDOFJointTrajectory)

@@ -167,7 +167,7 @@ class ImageMarker(_Message):
             p = q + n4 * 16
             outline_colors = list(_starmap(ColorRGBA, _i2(data[q : p])))
             if p > len(data): raise ValueError
-            return ImageMarker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action,
+            return ImageMarker(Header(0, Time(sec, nanosec), frame_id), ns, id_2, type_2, action,
                 Point(x, y, z), scale, ColorRGBA(r, g, b_2, a), filled,
                 ColorRGBA(r_2, g_2, b_3, a_2), Duration(sec_2, nanosec_2), points, outline_colors)
         except _FAULTS:
@@ -587,11 +587,11 @@ class Marker(_Message):
             p = q + n13
             data_3 = data[q : p]
             (mesh_use_embedded_materials,) = _u10(data, p)
-            return Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2, action,
+            return Marker(Header(0, Time(sec, nanosec), frame_id), ns, id_2, type_2, action,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), Vector3(x_3, y_3, z_3),
                 ColorRGBA(r, g, b_2, a), Duration(sec_2, nanosec_2), frame_locked, points, colors,
                 texture_resource,
-                CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2),
+                CompressedImage(Header(0, Time(sec_3, nanosec_3), frame_id_2), format_2, data_2),
                 uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
                 mesh_use_embedded_materials)
         except _FAULTS:
@@ -830,12 +830,12 @@ class InteractiveMarkerControl(_Message):
                 data_3 = data[q : p]
                 (mesh_use_embedded_materials,) = _u10(data, p)
                 p += 1
-                markers.append(Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2,
+                markers.append(Marker(Header(0, Time(sec, nanosec), frame_id), ns, id_2, type_2,
                     action, Pose(Point(x_2, y_2, z_2), Quaternion(x_3, y_3, z_3, w_2)),
                     Vector3(x_4, y_4, z_4), ColorRGBA(r, g, b_2, a), Duration(sec_2, nanosec_2),
                     frame_locked, points, colors, texture_resource,
-                    CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2),
-                    uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
+                    CompressedImage(Header(0, Time(sec_3, nanosec_3), frame_id_2), format_2,
+                    data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
                     mesh_use_embedded_materials))
             (independent_marker_orientation,) = _u10(data, p)
             p = p + 4 & -4
@@ -1129,11 +1129,11 @@ class InteractiveMarker(_Message):
                     data_3 = data[q : p]
                     (mesh_use_embedded_materials,) = _u10(data, p)
                     p += 1
-                    markers.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns, id_3,
+                    markers.append(Marker(Header(0, Time(sec_2, nanosec_2), frame_id_2), ns, id_3,
                         type_2, action, Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
                         Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
                         Duration(sec_3, nanosec_3), frame_locked, points, colors, texture_resource,
-                        CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
+                        CompressedImage(Header(0, Time(sec_4, nanosec_4), frame_id_3), format_2,
                         data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
                         mesh_use_embedded_materials))
                 (independent_marker_orientation,) = _u10(data, p)
@@ -1146,7 +1146,7 @@ class InteractiveMarker(_Message):
                     orientation_mode, interaction_mode, always_visible, markers,
                     independent_marker_orientation, description_2))
             if p > len(data): raise ValueError
-            return InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+            return InteractiveMarker(Header(0, Time(sec, nanosec), frame_id),
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
                 menu_entries, controls)
         except _FAULTS:
@@ -1262,7 +1262,7 @@ class InteractiveMarkerFeedback(_Message):
             p = (p + 4 | 7) - 3
             (x, y, z, x_2, y_2, z_2, w, menu_entry_id, x_3, y_3, z_3,
                 mouse_point_valid) = _u15(data, p)
-            return InteractiveMarkerFeedback(Header(Time(sec, nanosec), frame_id), client_id,
+            return InteractiveMarkerFeedback(Header(0, Time(sec, nanosec), frame_id), client_id,
                 marker_name, control_name, event_type,
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), menu_entry_id,
                 Point(x_3, y_3, z_3), mouse_point_valid)
@@ -1552,14 +1552,14 @@ class InteractiveMarkerInit(_Message):
                         data_3 = data[q : p]
                         (mesh_use_embedded_materials,) = _u10(data, p)
                         p += 1
-                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns,
+                        markers_2.append(Marker(Header(0, Time(sec_2, nanosec_2), frame_id_2), ns,
                             id_3, type_2, action,
                             Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
                             Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
                             Duration(sec_3, nanosec_3), frame_locked, points, colors,
                             texture_resource,
-                            CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
-                            data_2), uv_coordinates, text, mesh_resource,
+                            CompressedImage(Header(0, Time(sec_4, nanosec_4), frame_id_3),
+                            format_2, data_2), uv_coordinates, text, mesh_resource,
                             MeshFile(filename, data_3), mesh_use_embedded_materials))
                     (independent_marker_orientation,) = _u10(data, p)
                     p = p + 4 & -4
@@ -1570,7 +1570,7 @@ class InteractiveMarkerInit(_Message):
                     controls.append(InteractiveMarkerControl(name_2,
                         Quaternion(x_3, y_3, z_3, w_2), orientation_mode, interaction_mode,
                         always_visible, markers_2, independent_marker_orientation, description_2))
-                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+                markers.append(InteractiveMarker(Header(0, Time(sec, nanosec), frame_id),
                     Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
                     menu_entries, controls))
             if p > len(data): raise ValueError
@@ -1627,7 +1627,7 @@ class InteractiveMarkerPose(_Message):
             p = q + n2
             name = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return InteractiveMarkerPose(Header(Time(sec, nanosec), frame_id),
+            return InteractiveMarkerPose(Header(0, Time(sec, nanosec), frame_id),
                 Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name)
         except _FAULTS:
             return _explain(data, InteractiveMarkerPose)
@@ -1956,14 +1956,14 @@ class InteractiveMarkerUpdate(_Message):
                         data_3 = data[q : p]
                         (mesh_use_embedded_materials,) = _u10(data, p)
                         p += 1
-                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns,
+                        markers_2.append(Marker(Header(0, Time(sec_2, nanosec_2), frame_id_2), ns,
                             id_3, type_3, action,
                             Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
                             Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
                             Duration(sec_3, nanosec_3), frame_locked, points, colors,
                             texture_resource,
-                            CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
-                            data_2), uv_coordinates, text, mesh_resource,
+                            CompressedImage(Header(0, Time(sec_4, nanosec_4), frame_id_3),
+                            format_2, data_2), uv_coordinates, text, mesh_resource,
                             MeshFile(filename, data_3), mesh_use_embedded_materials))
                     (independent_marker_orientation,) = _u10(data, p)
                     p = p + 4 & -4
@@ -1974,7 +1974,7 @@ class InteractiveMarkerUpdate(_Message):
                     controls.append(InteractiveMarkerControl(name_2,
                         Quaternion(x_3, y_3, z_3, w_2), orientation_mode, interaction_mode,
                         always_visible, markers_2, independent_marker_orientation, description_2))
-                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+                markers.append(InteractiveMarker(Header(0, Time(sec, nanosec), frame_id),
                     Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
                     menu_entries, controls))
             p = p + 3 & -4
@@ -1992,7 +1992,7 @@ class InteractiveMarkerUpdate(_Message):
                 q = p + 60
                 p = q + n28
                 name_3 = data[q : p - 1].decode()
-                poses.append(InteractiveMarkerPose(Header(Time(sec_5, nanosec_5), frame_id_4),
+                poses.append(InteractiveMarkerPose(Header(0, Time(sec_5, nanosec_5), frame_id_4),
                     Pose(Point(x_7, y_7, z_7), Quaternion(x_8, y_8, z_8, w_4)), name_3))
             p = p + 3 & -4
             k, erases = _s1.read
@@ -2171,12 +2171,12 @@ class MarkerArray(_Message):
                 data_3 = data[q : p]
                 (mesh_use_embedded_materials,) = _u10(data, p)
                 p += 1
-                markers.append(Marker(Header(Time(sec, nanosec), frame_id), ns, id_2, type_2,
+                markers.append(Marker(Header(0, Time(sec, nanosec), frame_id), ns, id_2, type_2,
                     action, Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)),
                     Vector3(x_3, y_3, z_3), ColorRGBA(r, g, b_2, a), Duration(sec_2, nanosec_2),
                     frame_locked, points, colors, texture_resource,
-                    CompressedImage(Header(Time(sec_3, nanosec_3), frame_id_2), format_2, data_2),
-                    uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
+                    CompressedImage(Header(0, Time(sec_3, nanosec_3), frame_id_2), format_2,
+                    data_2), uv_coordinates, text, mesh_resource, MeshFile(filename, data_3),
                     mesh_use_embedded_materials))
             if p > len(data): raise ValueError
             return MarkerArray(markers)

@@ -364,14 +364,14 @@ class GetInteractiveMarkersResponse(_Message):
                         data_3 = data[q : p]
                         (mesh_use_embedded_materials,) = _u11(data, p)
                         p += 1
-                        markers_2.append(Marker(Header(Time(sec_2, nanosec_2), frame_id_2), ns,
+                        markers_2.append(Marker(Header(0, Time(sec_2, nanosec_2), frame_id_2), ns,
                             id_3, type_2, action,
                             Pose(Point(x_4, y_4, z_4), Quaternion(x_5, y_5, z_5, w_3)),
                             Vector3(x_6, y_6, z_6), ColorRGBA(r, g, b_2, a),
                             Duration(sec_3, nanosec_3), frame_locked, points, colors,
                             texture_resource,
-                            CompressedImage(Header(Time(sec_4, nanosec_4), frame_id_3), format_2,
-                            data_2), uv_coordinates, text, mesh_resource,
+                            CompressedImage(Header(0, Time(sec_4, nanosec_4), frame_id_3),
+                            format_2, data_2), uv_coordinates, text, mesh_resource,
                             MeshFile(filename, data_3), mesh_use_embedded_materials))
                     (independent_marker_orientation,) = _u11(data, p)
                     p = p + 4 & -4
@@ -382,7 +382,7 @@ class GetInteractiveMarkersResponse(_Message):
                     controls.append(InteractiveMarkerControl(name_2,
                         Quaternion(x_3, y_3, z_3, w_2), orientation_mode, interaction_mode,
                         always_visible, markers_2, independent_marker_orientation, description_2))
-                markers.append(InteractiveMarker(Header(Time(sec, nanosec), frame_id),
+                markers.append(InteractiveMarker(Header(0, Time(sec, nanosec), frame_id),
                     Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)), name, description, scale,
                     menu_entries, controls))
             if p > len(data): raise ValueError

@@ -47,7 +47,7 @@ class RoszCodec:
 
 
 def _build_rosz(cls: type[Message], plain: Plain) -> Message:
-    members = []
+    members: dict[str, Any] = {}
     for slot in slots(cls):
         member = plain[slot.name]
         if isinstance(slot.kind, type):
@@ -56,8 +56,8 @@ def _build_rosz(cls: type[Message], plain: Plain) -> Message:
                 member = _build_rosz(nested, member)
             else:
                 member = [_build_rosz(nested, one) for one in member]
-        members.append(member)
-    return cls(*members)
+        members[slot.name] = member
+    return cls(**members)
 
 
 class Rosz:
