@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import signal
 import time
@@ -206,3 +207,17 @@ def test_grandchildren_end_with_a_launch(launch: Start, demo: Path) -> None:
     run.send(signal.SIGHUP)
     assert run.exit_code() == 0
     eventually(lambda: not runs(pid), "end of the grandchild")
+
+
+def test_status_as_json_and_a_stop(launch: Start, network: Network, demo: Path) -> None:
+    run = launch(write(demo, '<node pkg="demo" type="talks" name="a" output="screen"/>'))
+    run.wait_for("talking")
+    eventually(lambda: started(run), "the launch's word of it")
+    (status,) = json.loads(rosz(network, "launch", "--status", "--json").stdout)
+    (node,) = status["nodes"]
+    assert (node["name"], node["state"], node["restarts"]) == ("/a", "running", 0)
+    assert node["pid"] == started(run)["a"]
+    assert node["memory"] > 0
+    assert rosz(network, "launch", "--stop", "/a").returncode == 0
+    assert run.exit_code() == 0
+    assert not runs(node["pid"])
