@@ -187,3 +187,21 @@ def test_a_router_that_is_not_ours(world: World) -> None:
     second = laptop.execute(sys.executable, "-c", ROUTER, "tcp/robot:7447")
     second.wait_for("started router")
     assert_soon("a plain Zenoh router on each machine", laptop)
+
+
+def test_a_launch_goes_on_without_the_other_machine(world: World) -> None:
+    """Its nodes are linked by a core of their own, which links them to the other machine."""
+    robot, laptop = world.hosts("robot", "laptop")
+    core(robot, "--listen", "tcp/0.0.0.0:7447")
+    talker(robot)
+    file = laptop.home / "pair.launch"
+    file.write_text(
+        '<launch><node name="pub" pkg="rostopic" type="rostopic" output="screen"'
+        ' args="pub -r 5 /own std_msgs/String local"/></launch>'
+    )
+    launch = laptop.rosz("launch", str(file), ROSZ_CONNECT="tcp/robot:7447")
+    launch.wait_for("process[pub-1]: started")
+    assert "local" in laptop.ask("topic", "echo", "-n", "1", "/own")
+    assert "data:" in laptop.ask("topic", "echo", "-n", "1", "/chatter")
+    robot.link.cut()
+    assert "local" in laptop.ask("topic", "echo", "-n", "1", "/own")

@@ -39,6 +39,9 @@ _END_SECONDS: Final = 2.0
 def wants_hub(nodes: int, environment: Environment, environ: Mapping[str, str]) -> bool:
     """Tell whether a launch is to start a core.
 
+    For many nodes, and for nodes linked to another machine: without one here all that they say to
+    each other would go by way of that machine, and end with the link.
+
     Not where the user has chosen a mode, or a way to open sessions, and not where somebody holds
     the rendezvous already.
 
@@ -47,8 +50,9 @@ def wants_hub(nodes: int, environment: Environment, environ: Mapping[str, str]) 
         environment: Settings.
         environ: Variables.
     """
+    dials = bool(nodes and environment.connect and not environment.listen)
     return (
-        nodes > MESH_LIMIT
+        (nodes > MESH_LIMIT or dials)
         and not environ.get(_MODE)
         and not environment.zenoh_config
         and not is_answered(environment.rendezvous)

@@ -34,8 +34,12 @@ def test_when_a_core_is_started(network: Net) -> None:
     assert not wants_hub(MANY, environment, {"ROSZ_MODE": "peer"})
     own = msgspec.structs.replace(environment, zenoh_config="own.json5")
     assert not wants_hub(MANY, own, {})
+    dialling = msgspec.structs.replace(environment, connect=("tcp/robot:7447",))
+    assert wants_hub(1, dialling, {})
+    assert not wants_hub(0, dialling, {})
     network.session()
     assert not wants_hub(MANY, environment, {})
+    assert not wants_hub(1, dialling, {})
 
 
 def test_it_is_up_when_it_is_there_and_gone_when_closed(hub: Hub, network: Net) -> None:
