@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -66,3 +68,23 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     done = rosz(tmp_path, "pkg", "create", "taken")
     assert done.returncode == 1
     assert done.stderr == f"rosz: '{tmp_path}/taken' exists already; choose another name\n"
+
+
+@pytest.mark.parametrize("dependencies", [(), ("std_msgs",), ("rospy",), ("roscpp", "std_msgs")])
+def test_a_bare_package_is_that_of_catkin(tmp_path: Path, dependencies: tuple[str, ...]) -> None:
+    def content() -> list[str]:
+        return sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*"))
+
+    done = rosz(tmp_path, "pkg", "create", "--bare", "bare", *dependencies)
+    made = content()
+    if not Path("/usr/bin/catkin_create_pkg").exists():
+        pytest.skip("no catkin_create_pkg to compare with (Debian: python3-catkin-pkg)")
+    shutil.rmtree(tmp_path / "bare")
+    real = subprocess.run(
+        ["/usr/bin/catkin_create_pkg", "bare", *dependencies],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout, made) == (real.stdout, content())

@@ -26,7 +26,10 @@ PACKAGES = Path(__file__).parent / "packages"
 _DEBIAN = "/usr/bin/python3"
 _GENPY = Path("/usr/lib/genpy")
 _PATIENCE = 25.0
-_NEEDED = "genpy, rospy, rosgraph_msgs, geometry_msgs, nav_msgs, sensor_msgs, diagnostic_msgs"
+_NEEDED = (
+    "genpy, rospy, rosgraph_msgs, std_srvs, geometry_msgs, nav_msgs, sensor_msgs, diagnostic_msgs,"
+    " roscpp.srv, numpy"
+)
 
 
 class Outcome(NamedTuple):
