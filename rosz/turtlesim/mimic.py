@@ -9,6 +9,7 @@ from __future__ import annotations
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node
+from rosz.node.loggers import serve_loggers
 
 __all__ = ("main",)
 
@@ -16,6 +17,7 @@ __all__ = ("main",)
 def main() -> None:
     """Mimic until told to end."""
     with Node("turtle_mimic") as node:
+        serve_loggers(node)
         output = f"{node.resolve('output')}/cmd_vel"
         commands = node.publisher(output, Twist, queue_size=1)
 

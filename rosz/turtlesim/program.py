@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rosz.node import Node
+from rosz.node.loggers import serve_loggers
 from rosz.turtlesim.simulator import Simulator
 from rosz.turtlesim.window import Window, WindowError
 
@@ -15,6 +16,7 @@ def main() -> None:
     The private parameter ``headless`` does without the window.
     """
     with Node("turtlesim") as node:
+        serve_loggers(node)
         node.context.cooperative = True
         simulator = Simulator(node)
         window = _window(node, simulator)

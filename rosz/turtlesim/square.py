@@ -12,6 +12,7 @@ from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node, TimerEvent
+from rosz.node.loggers import serve_loggers
 
 __all__ = ("Move", "Square", "main")
 
@@ -95,6 +96,7 @@ class Square:
 def main() -> None:
     """Clear the field, and draw until told to end."""
     with Node("draw_square") as node:
+        serve_loggers(node)
         square = Square()
         poses: list[Pose] = []
         commands = node.publisher("turtle1/cmd_vel", Twist, queue_size=1)

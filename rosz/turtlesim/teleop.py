@@ -11,6 +11,7 @@ import sys
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node
+from rosz.node.loggers import serve_loggers
 from rosz.turtlesim.keyboard import Keyboard
 
 __all__ = ("Teleop", "main")
@@ -93,6 +94,7 @@ class Teleop:
 def main() -> None:
     """Read keys until ``q``, Ctrl-C, or the end of what there is to read."""
     with Node("teleop_turtle") as node:
+        serve_loggers(node)
         teleop = Teleop(node)
         node.context.cooperative = True
         with Keyboard() as keyboard:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 from rosz import names
 from rosz.node import Node
+from rosz.node.loggers import serve_loggers
 from rosz.node.rosout import RosoutSink
 from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.core import signal_shutdown, wait_for_shutdown
 from rosz.ros1.rospy.exceptions import ROSException, ROSInitException
-from rosz.ros1.rospy.loggers import serve_loggers
 from rosz.ros1.rospy.logs import (
     DEBUG,
     ERROR,

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, NotFoundError, UsageError
-from rosz.node import Node
+
+if TYPE_CHECKING:
+    from rosz.node.node import Node
 
 __all__ = ("serve_loggers",)
 
 
 def serve_loggers(node: Node) -> None:
     """Offer ``~get_loggers`` and ``~set_logger_level``, on a thread: nobody waits for the types."""
-    threading.Thread(target=_serve, args=(node,), name="rosz-rospy-loggers", daemon=True).start()
+    threading.Thread(target=_serve, args=(node,), name="rosz-loggers", daemon=True).start()
 
 
 def _serve(node: Node) -> None:
