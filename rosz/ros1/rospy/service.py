@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from typing import Any
@@ -15,12 +16,15 @@ from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.msg import args_kwds_to_message, encode
 from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
 from rosz.ros1.rospy.state import has_node, state, when_ready
-from rosz.wire import Token, format_token, gid
+from rosz.wire import format_token, gid
 
 __all__ = ("Service", "ServiceException")
 
 _THREADS = 1000
 _BUFF_SIZE = 65536
+_CALLER_SHOWS_BY = 1.0
+"""Seconds in which the graph gets to know a client whose first request overtook the news of it."""
+_LOOK_AGAIN = 0.01
 
 ErrorHandler = Callable[[BaseException, Any, Any, Any], object]
 
@@ -129,16 +133,23 @@ class Service(ServiceEnd):
         Args:
             caller: Gid of the client.
         """
-        known: list[Token] = []
-        if self._service is not None:
-            known = self._service.node.context.graph.view().clients(self.resolved_name)
-        names = (token.node_name for token in known if gid(format_token(token)) == caller)
+        deadline = time.monotonic() + _CALLER_SHOWS_BY
+        while not (name := self._name_of(caller)) and time.monotonic() < deadline:
+            time.sleep(_LOOK_AGAIN)
         return {
-            "callerid": next(names, ""),
+            "callerid": name,
             "md5sum": self.service_class._md5sum,
             "service": self.resolved_name,
             "type": self.service_class._type,
         }
+
+    def _name_of(self, caller: bytes) -> str:
+        """Return the name of the node that a client belongs to; empty while it is not known."""
+        if self._service is None:
+            return ""
+        known = self._service.node.context.graph.view().clients(self.resolved_name)
+        names = (token.node_name for token in known if gid(format_token(token)) == caller)
+        return next(names, "")
 
     def answer(self, request: Any, caller: bytes) -> Any:
         """Return the response to a request.

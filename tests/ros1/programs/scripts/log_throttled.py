@@ -19,8 +19,8 @@ for number in (1, 1, 2, 2, 1):
     rospy.loginfo_throttle_identical(60, "identical %d" % number)
     rospy.logwarn_throttle_identical(60, "identical warning %d" % number)
     rospy.logerr_throttle_identical(60, "identical error")
-for number in range(4):
-    rospy.loginfo_throttle(0.2, "now and then")
-    rospy.sleep(0.15)
+for number in range(3):
+    rospy.loginfo_throttle(0.1, "now and then")
+    rospy.sleep(0.3)
 for number in range(2):
     rospy.loginfo_throttle(0, "always %d" % number)
