@@ -130,8 +130,8 @@ class _Handler:
     def _watch(self) -> None:
         while data := self._reader.recv(64):
             for number in data:
-                if number not in self._numbers:
-                    continue
+                if number not in self._numbers or signal.getsignal(number) is not self:
+                    continue  # the program's own business, perhaps since a moment ago
                 if self._echoes:
                     self._echoes -= 1
                     continue

@@ -9,6 +9,8 @@ import rospy
 
 def handler(number, frame):
     print("own handler", number, rospy.is_shutdown())
+    if "after" in sys.argv:
+        rospy.Timer(rospy.Duration(0.2), lambda event: rospy.signal_shutdown("timer"), oneshot=True)
 
 
 if "before" in sys.argv:
@@ -17,7 +19,6 @@ rospy.init_node("handling")
 rospy.on_shutdown(lambda: print("hook"))
 if "after" in sys.argv:
     signal.signal(signal.SIGINT, handler)
-    rospy.Timer(rospy.Duration(1), lambda event: rospy.signal_shutdown("timer"), oneshot=True)
 print("ready")
 rospy.spin()
 print("end")
