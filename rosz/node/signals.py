@@ -130,13 +130,16 @@ class _Handler:
     def _watch(self) -> None:
         while data := self._reader.recv(64):
             for number in data:
-                if number not in self._numbers or signal.getsignal(number) is not self:
+                if number not in self._numbers or not self._hears(number):
                     continue  # the program's own business, perhaps since a moment ago
                 if self._echoes:
                     self._echoes -= 1
                     continue
                 self._hear(number)
                 self._remind(number)
+
+    def _hears(self, number: int) -> bool:
+        return signal.getsignal(number) is self
 
     def _remind(self, number: int) -> None:
         """See to it that the main thread takes note."""
