@@ -7,6 +7,7 @@ ROS's own variables keep their meaning (``ROS_DOMAIN_ID``, ``ROS_NAMESPACE``, ``
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -45,6 +46,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         zenoh_config: ``ZENOH_SESSION_CONFIG_URI``, a Zenoh configuration file.
         zenoh_override: ``ZENOH_CONFIG_OVERRIDE``, ``path/to/key=json;…``.
         package_roots: Folders to look for packages in, first ones first.
+        completion: ``ROSZ_COMPLETION_TIMEOUT``: seconds that the TAB key waits at most; 0.5.
         console_format: ``ROSCONSOLE_FORMAT``.
         color: Whether terminals get colours; ``NO_COLOR`` says no.
         home: ``ROS_HOME`` or ``~/.ros``.
@@ -64,6 +66,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
     zenoh_config: str = ""
     zenoh_override: str = ""
     package_roots: tuple[Path, ...] = ()
+    completion: float = 0.5
     console_format: str = ""
     color: bool = True
     home: Path = Path(".ros")
@@ -98,6 +101,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
             zenoh_config=env.get("ZENOH_SESSION_CONFIG_URI", ""),
             zenoh_override=env.get("ZENOH_CONFIG_OVERRIDE", ""),
             package_roots=_package_roots(env, cwd or _working_folder()),
+            completion=_seconds("ROSZ_COMPLETION_TIMEOUT", env, 0.5),
             console_format=env.get("ROSCONSOLE_FORMAT", ""),
             color=not env.get("NO_COLOR"),
             home=home,
@@ -187,6 +191,17 @@ def _mode(text: str, *, dials: bool) -> Literal["peer", "client"]:
     if text in {"", "peer"}:
         return "peer"
     raise UsageError(f"ROSZ_MODE is '{text}'; expected 'peer' or 'client'")
+
+
+def _seconds(name: str, env: Mapping[str, str], default: float) -> float:
+    text = env.get(name, "")
+    try:
+        seconds = float(text) if text else default
+    except ValueError:
+        seconds = 0.0
+    if not 0 < seconds < math.inf:
+        raise UsageError(f"{name} is '{text}'; expected a number of seconds")
+    return seconds
 
 
 def _bytes(name: str, text: str) -> int:

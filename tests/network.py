@@ -209,6 +209,7 @@ class Network:
             "PYTHONWARNINGS": "error",
             "ROS_DOMAIN_ID": str(self.domain),
             "ROSZ_RENDEZVOUS": self.rendezvous,
+            "ROSZ_COMPLETION_TIMEOUT": f"{PATIENCE:g}",
             **changes,
         }
 

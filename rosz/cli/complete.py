@@ -17,9 +17,6 @@ from rosz.introspect.shells import COMMANDS
 
 __all__ = ("complete",)
 
-_PATIENCE = 0.5
-"""Seconds after which a person would rather have nothing."""
-
 _OPERATORS = frozenset(";&|()")
 _BREAKS = ":="
 """What bash takes for an end of a word, so that a candidate must begin behind it."""
@@ -33,8 +30,15 @@ def complete(argv: Sequence[str]) -> int:
     Args:
         argv: The shell, and the command line up to the cursor.
     """
+    from rosz.environment import Environment
+    from rosz.errors import RoszError
+
     shell, line = (*argv, "", "")[:2]
-    watchdog = threading.Timer(_PATIENCE, lambda: os._exit(0))
+    try:
+        patience = Environment.read().completion
+    except RoszError:  # a person is typing: this is no moment to complain
+        return 0
+    watchdog = threading.Timer(patience, lambda: os._exit(0))
     watchdog.daemon = True
     watchdog.start()
     words = split_line(line)

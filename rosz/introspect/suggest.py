@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ("Suggestions",)
 
-_OPEN_SECONDS = 0.15
-_ANSWER_SECONDS = 0.15
+_SHARE = 0.3
+"""Of the time that a person waits, what opening a session may take, and what an answer may."""
+
 _LAUNCH = ("*.launch", "*.launch.xml")
 
 
@@ -50,7 +51,7 @@ class Suggestions:
             yield None
             return
         try:
-            session = Session.open(SessionConfig.command(known, _OPEN_SECONDS))
+            session = Session.open(SessionConfig.command(known, _SHARE * known.completion))
         except RoszError:
             yield None
             return
@@ -134,7 +135,8 @@ class Suggestions:
         with self._session() as session:
             if session is None:
                 return []
-            client = ParamClient(session, self._environment.domain, timeout=_ANSWER_SECONDS)
+            timeout = _SHARE * self._environment.completion
+            client = ParamClient(session, self._environment.domain, timeout=timeout)
             return client.names()
 
     def message(self, type_name: str) -> list[str]:

@@ -69,7 +69,7 @@ class Shell:
             monkeypatch.delenv(name, raising=False)
         for name in ("ROS_PACKAGE_PATH", "ROSZ_PACKAGE_PATH", "ROS_HOME", "ROS_LOG_DIR"):
             monkeypatch.delenv(name, raising=False)
-        for name in ("HOME", "ROS_DOMAIN_ID", "ROSZ_RENDEZVOUS"):
+        for name in ("HOME", "ROS_DOMAIN_ID", "ROSZ_RENDEZVOUS", "ROSZ_COMPLETION_TIMEOUT"):
             monkeypatch.setenv(name, network.variables()[name])
         monkeypatch.chdir(network.folder)
 

@@ -93,7 +93,7 @@ def test_call(shell: Shell, values: list[str]) -> None:
 
 
 def test_call_without_arguments(shell: Shell) -> None:
-    assert shell("service", "call", "/robot/trigger").out == 'success: True\nmessage: "done"\n'
+    assert shell("service", "call", "/robot/trigger").lines == ["success: True", 'message: "done"']
 
 
 def test_call_tells_the_request(shell: Shell) -> None:
