@@ -39,6 +39,7 @@ ProcessListener = Callable[[ProcessToken, bool], None]
 """Gets a rosz node as a process, and whether it appeared (true) or went (false)."""
 
 _LOOK_TIMEOUT = 2.0
+_CLOSED_POLL = 0.1
 _log = logging.getLogger("rosz.graph")
 
 
@@ -68,7 +69,7 @@ class Graph:
         # In this order: once tokens are watched, Zenoh answers from what the watch has seen so far.
         for space in (tokens_key(domain), processes_key(domain)):
             for key in session.live_tokens(space, _LOOK_TIMEOUT):
-                self._events.put((key, True))
+                self._apply(key, alive=True)
         self._watches = [
             session.tokens(key, lambda key, alive: self._events.put((key, alive)))
             for key in (tokens_key(domain), processes_key(domain))
@@ -102,6 +103,7 @@ class Graph:
             *self._session.live_tokens(tokens_key(self.domain), timeout),
             *self._session.live_tokens(processes_key(self.domain), timeout),
         ]
+        self._catch_up(timeout)
         with self._changed:
             tokens, processes = dict(self._tokens), dict(self._processes)
         # Not for good: one that ended meanwhile may never be told to have gone.
@@ -273,11 +275,22 @@ class Graph:
 
     def _do(self, event: tuple[str, bool] | Callable[[], None]) -> None:
         if isinstance(event, tuple):
-            self._apply(*event)
+            self._apply(event[0], alive=event[1])
         else:
             event()
 
-    def _apply(self, key: str, alive: bool) -> None:
+    def _catch_up(self, timeout: float) -> None:
+        """Wait until what came so far is applied."""
+        if threading.current_thread() is self._thread:
+            return  # it is in a listener, which is told of things in their order
+        applied = threading.Event()
+        self._events.put(applied.set)
+        while not (self._closed or applied.wait(min(timeout, _CLOSED_POLL))):
+            timeout -= _CLOSED_POLL
+            if timeout <= 0:
+                return
+
+    def _apply(self, key: str, *, alive: bool) -> None:
         ours = key.startswith(OWN_SPACE)
         known: dict[str, Any] = self._processes if ours else self._tokens
         if alive == (key in known):

@@ -258,3 +258,15 @@ def test_two_nodes_of_one_name() -> None:
 def test_processes_are_in_the_order_of_their_start() -> None:
     processes = [ProcessToken(0, zid, 0, when, 1, "h", "/n") for zid, when in (("1", 9), ("2", 3))]
     assert [process.started for process in View([], processes).processes("/n")] == [3, 9]
+
+
+def test_what_was_there_first_is_known_at_once(network: Network) -> None:
+    """Neither the first view nor an asked-for one is behind what the network has told."""
+    host = network.context()
+    nodes = [network.node(f"n{number}", context=host) for number in range(100)]
+    names = {node.name for node in nodes}
+    for _ in range(5):
+        context = network.context()
+        assert names <= set(context.graph.view().nodes())
+        assert names <= set(context.graph.refresh().nodes())
+        context.close()
