@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -163,7 +164,9 @@ class Host:
 
     def kill(self) -> None:
         """End all that runs here at once, as a crash does; the system tells the other sides."""
+        deadline = time.monotonic() + PATIENCE
         while pids := self.namespace.pids():
+            assert time.monotonic() < deadline, f"{self.name} does not end: {self.processes()}"
             for pid in pids:
                 try:
                     os.kill(pid, signal.SIGKILL)

@@ -76,16 +76,18 @@ class Namespace:
         self.run("sh", "-c", 'printf %s "$1" >"$2"', "sh", text, file)
 
     def pids(self) -> list[int]:
-        """Return all processes inside but the holder, by their numbers outside."""
+        """Return all living processes inside but the holder, by their numbers outside."""
         mine = Path(f"/proc/{self.pid}/ns/pid").readlink()
         found = []
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit() and int(entry.name) != self.pid:
                 try:
                     same = (entry / "ns/pid").readlink() == mine
-                except OSError:  # it ended meanwhile, or is a zombie
+                    # What brought it here may be stopped, and takes no note of its end.
+                    dead = (entry / "stat").read_text().rpartition(") ")[2].startswith("Z")
+                except OSError:  # it ended meanwhile
                     continue
-                if same:
+                if same and not dead:
                     found.append(int(entry.name))
         return sorted(found)
 
