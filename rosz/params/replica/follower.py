@@ -74,7 +74,7 @@ class Follower(Reading):
 
     def _on_change(self, sample: Sample) -> None:
         payload, key = sample.payload, sample.key
-        self._worker.submit(lambda: self._take(payload, key))
+        self._worker.offer(lambda: self._take(payload, key))  # else comparing finds it
 
     def _take(self, payload: bytes, key: str) -> None:
         try:

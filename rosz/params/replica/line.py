@@ -161,13 +161,14 @@ class Line:
             return
         then = partial(self._acknowledge, sender, number)
         if len(payload) > _LARGE:
-            self._worker.submit(lambda: self._apply(payload, reach, then))
+            self._worker.offer(lambda: self._apply(payload, reach, then))
         elif self._state.note(payload, reach):
             then()
         elif self._state.take_soon(payload, reach):
             self._settle(then)
         else:
-            self._worker.submit(lambda: self._apply(payload, reach, then))
+            # What is turned away is not acknowledged, and so told once more.
+            self._worker.offer(lambda: self._apply(payload, reach, then))
 
     def _apply(self, payload: bytes, reach: Path, then: Callable[[], None]) -> None:
         self._state.take(payload, reach)
@@ -218,7 +219,9 @@ class Line:
             with query:
                 query.reply_error(str(error))
             return
-        self._worker.submit(lambda: self._apply(payload, reach, lambda: self._confirm(query)))
+        done = partial(self._confirm, query)
+        if not self._worker.offer(lambda: self._apply(payload, reach, done)):
+            query.close()
 
     def _confirm(self, query: Query) -> None:
         with query:

@@ -132,7 +132,9 @@ class Mirror:
         if _ONLY_OTHERS in query.parameters:
             query.close()
             return
-        self._worker.submit(lambda: self._answer(query))
+        if not self._worker.offer(lambda: self._answer(query)):
+            with query:
+                query.reply_error("too much is asked of this replica; ask again later")
 
     def _answer(self, query: Query) -> None:
         with query:

@@ -65,12 +65,14 @@ class Server:
     def serve(self, query: Query) -> None:
         """Take in a question."""
         payload = query.payload or b""
-        self._worker.submit(lambda: self._read(query, payload))
+        if not self._worker.offer(lambda: self._read(query, payload)):
+            self._reply(query, Answer("joining"))
 
     def serve_writes(self, query: Query) -> None:
         """Take in a write."""
         payload = query.payload or b""
-        self._worker.submit(lambda: self._begin_write(query, payload))
+        if not self._worker.offer(lambda: self._begin_write(query, payload)):
+            self._reply(query, Answer("joining"))
 
     def _read(self, query: Query, payload: bytes) -> None:
         try:

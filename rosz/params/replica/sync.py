@@ -106,7 +106,8 @@ class Synchroniser:
     def serve(self, query: Query) -> None:
         """Answer another replica."""
         payload = query.payload or b""
-        self.worker.submit(lambda: self._answer(query, payload))
+        if not self.worker.offer(lambda: self._answer(query, payload)):
+            query.close()
 
     def meet(self, member: Member) -> None:
         """Compare with a replica that has appeared, at a moment that not all choose alike."""

@@ -16,6 +16,8 @@ __all__ = ("Worker",)
 
 _log = logging.getLogger("rosz.params")
 _JOINED_BY = 2.0
+_MOST_WAITING = 2000
+"""Tasks that may wait before what the network asks is turned away."""
 
 Task = Callable[[], None]
 
@@ -38,6 +40,17 @@ class Worker:
     def submit(self, task: Task) -> None:
         """Have a task done as soon as those before it are."""
         self._queue.put((0.0, task))
+
+    def offer(self, task: Task) -> bool:
+        """Have a task done for somebody else, unless too many wait already.
+
+        Returns:
+            Whether it will be done.
+        """
+        if self._queue.qsize() >= _MOST_WAITING:
+            return False
+        self.submit(task)
+        return True
 
     def later(self, seconds: float, task: Task) -> None:
         """Have a task done after a while; what is still to come when it closes is left undone."""
