@@ -231,9 +231,7 @@ def test_a_subscriber_stops_while_a_publisher_runs(world: World, where: str) -> 
     heard = counted(other)
     stopped.send(signal.SIGSTOP)
     mean, worst, after = sent(fast, count)
-    eventually(
-        lambda: counted(other) - heard >= 0.99 * count / slack(), "all that was sent, at the other"
-    )
+    eventually(lambda: counted(other) - heard >= 0.99 * count, "all that was sent, at the other")
     grown = after - before
     print(
         f"subscriber stopped on the {where}: publish takes {mean * 1e6:.0f} us (before"
