@@ -12,9 +12,10 @@ The names here load what they need on first use, so that a command does not pay 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # that of typing, which takes longer to load than all that is needed here
 if TYPE_CHECKING:
+    from typing import Any
+
     from rosz.environment import Environment
     from rosz.errors import RoszError, ServiceError, WaitTimeout
     from rosz.node import Client, Context, MessageInfo, Node, Publisher, Service, Subscription

@@ -40,7 +40,6 @@ Texts are lower case, quote the offending value, say what was expected and what 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 
 __all__ = (
     "ClosedError",
@@ -88,6 +87,8 @@ def near_miss(word: str, known: Iterable[str]) -> str:
     Returns:
         ``"; did you mean 'x'?"``, or an empty text where nothing is close.
     """
+    from difflib import get_close_matches  # which takes its time, and mostly nothing is wrong
+
     close = get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f"; did you mean '{close[0]}'?" if close else ""
 

@@ -18,6 +18,7 @@ __all__ = (
     "canonical",
     "check",
     "check_base",
+    "check_resource",
     "is_global",
     "is_private",
     "is_valid",
@@ -68,6 +69,17 @@ def check_base(name: str) -> str:
         raise InvalidName(name, "it contains '/'; expected a base name without a namespace")
     check(name)
     raise InvalidName(name, "expected a letter first, then letters, digits or '_'")
+
+
+def check_resource(name: str) -> str:
+    """Return a resolved name if a topic or service can have it: any but the root.
+
+    Raises:
+        InvalidName: It is the root.
+    """
+    if name == "/":
+        raise InvalidName(name, "it is the root namespace; expected the name of something in it")
+    return name
 
 
 def is_global(name: str) -> bool:

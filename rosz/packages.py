@@ -70,9 +70,10 @@ class Package(msgspec.Struct, frozen=True):
             )
         known = self.executables()
         listing = f"; it has {', '.join(known[:8])}" if known else "; it has no executables"
+        scripts = [file.name for file in self._files() if file.suffix == ".py"]
+        hint = near_miss(name, known) or near_miss(name, scripts) or listing
         raise ExecutableNotFound(
-            f"package '{self.name}' ({self.path}) has no executable '{name}'"
-            f"{near_miss(name, known) or listing}"
+            f"package '{self.name}' ({self.path}) has no executable '{name}'{hint}"
         )
 
     def within(self, name: str) -> Path:

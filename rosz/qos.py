@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Literal
 
 import msgspec
+
+from rosz.errors import UsageError
 
 __all__ = (
     "CLOCK",
@@ -16,6 +19,7 @@ __all__ = (
     "SENSOR_DATA",
     "SERVICES",
     "QoS",
+    "for_queue",
 )
 
 FOREVER = 9223372036_854775807
@@ -63,3 +67,20 @@ SERVICES = QoS()
 PARAMETERS = QoS(depth=1000)
 CLOCK = QoS(depth=1, reliability="best_effort")
 ROSOUT = QoS(depth=1000, durability="transient_local", lifespan=10_000_000_000)
+
+
+def for_queue(size: int) -> QoS:
+    """Return the QoS for a queue of ROS 1, of so many samples; 0 means no limit there.
+
+    Raises:
+        UsageError: No queue has that size.
+    """
+    try:
+        size = operator.index(size)
+    except TypeError:
+        raise UsageError(f"queue_size is {size!r}: expected an int, 0 for no limit") from None
+    if size < 0:
+        raise UsageError(f"queue_size is {size}: expected 1 or more, or 0 for no limit")
+    if size == DEFAULT.depth:
+        return DEFAULT
+    return QoS(depth=size) if size else QoS(history="keep_all")

@@ -56,7 +56,10 @@ class Arguments(msgspec.Struct, frozen=True):
 
 
 def parse(argv: Sequence[str]) -> Arguments:
-    """Sort a command line without its program name."""
+    """Sort a command line without its program name.
+
+    One of ours that leads to nothing (``a:=``, ``__name:=``) counts for nothing, as in rospy.
+    """
     remaps: dict[str, str] = {}
     params: dict[str, str] = {}
     special: dict[str, str] = {}
@@ -66,6 +69,8 @@ def parse(argv: Sequence[str]) -> Arguments:
         left, right = left.strip(), right.strip()
         if not separator or not left:
             rest.append(argument)
+        elif not right:
+            continue
         elif left.startswith("__"):
             special[left] = right
         elif left.startswith("_"):

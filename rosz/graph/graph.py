@@ -40,6 +40,7 @@ ProcessListener = Callable[[ProcessToken, bool], None]
 
 _LOOK_TIMEOUT = 2.0
 _CLOSED_POLL = 0.1
+_LONGEST = threading.TIMEOUT_MAX / 2
 _log = logging.getLogger("rosz.graph")
 
 
@@ -77,6 +78,9 @@ class Graph:
 
     def view(self) -> View:
         """Return what is known at this moment."""
+        known = self._view  # replaced whole, so that reading it needs no lock
+        if known is not None:
+            return known
         with self._changed:
             if self._view is None:
                 self._view = View(self._tokens.values(), self._processes.values())
@@ -182,7 +186,7 @@ class Graph:
                 raise ClosedError(f"the wait for {what} ended: shutting down")
             if left <= 0:
                 raise WaitTimeout(what, timeout, hint)
-            wait(view, left)
+            wait(view, min(left, _LONGEST))
         return view
 
     def _sleep(self, seen: View, timeout: float) -> None:
@@ -340,7 +344,7 @@ class Graph:
             # What a listener tries while all is being shut down is no fault of its.
             if not self._closed:
                 _log.exception("a graph listener failed", exc_info=error)
-        except Exception:  # noqa: BLE001  # the callback boundary
+        except BaseException:  # noqa: BLE001  # the graph outlives what a listener raises
             _log.exception("a graph listener failed on %s", token)
 
     def disown(self) -> None:

@@ -29,10 +29,6 @@ class View:
         found = {(t.zid, t.node_id, t.node_name) for t in self.tokens}
         return sorted(name for _, _, name in found)
 
-    def sessions_of(self, node: str) -> list[tuple[str, int]]:
-        """Return session id and node number of every node of that full name."""
-        return sorted({(t.zid, t.node_id) for t in self.tokens if t.node_name == node})
-
     def processes(self, node: str | None = None) -> list[ProcessToken]:
         """Return the rosz nodes as processes, the oldest of each name first.
 

@@ -176,7 +176,10 @@ class _Filler:
                 self._refuse(path, kind, value)
         if isinstance(value, bool) or not hasattr(value, "__float__"):
             self._refuse(path, kind, value)
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            self._refuse(path, f"{kind} in its range", value)
 
     def _base64(self, value: str, path: str) -> bytes:
         try:

@@ -32,6 +32,7 @@ def numbers(value: Any, code: str, size: int = -1) -> array[Any] | memoryview:
     if found is None:
         if isinstance(value, str | bytes | bytearray | dict | set):
             raise TypeError(f"'{type(value).__name__}' is no sequence of numbers")
+        _refuse_once(value)
         plain = _flat(value.tolist()) if hasattr(value, "tolist") else list(value)
         found = array(code, plain)
         if code == "f":
@@ -72,6 +73,21 @@ def _flat(values: Any) -> list[Any]:
     return plain
 
 
+def _listed(value: Any) -> list[Any]:
+    """Return what a buffer of some other element type holds."""
+    try:
+        numbers: list[Any] = value.tolist()
+    except NotImplementedError as error:  # a memoryview of what only numpy reads
+        raise TypeError(str(error)) from None
+    return numbers
+
+
+def _refuse_once(value: Any) -> None:
+    """Object to what can be read but once: a message is encoded as often as it is wanted."""
+    if not hasattr(value, "__len__"):
+        raise TypeError(f"'{type(value).__name__}' is no sequence")
+
+
 def _refuse_overflow(found: array[float], given: list[Any]) -> None:
     """Object to float32 values that became infinite only by their conversion."""
     if inf in found or -inf in found:
@@ -96,12 +112,13 @@ def octets(value: Any, size: int = -1) -> bytes | memoryview:
         except TypeError:
             if isinstance(value, str | int | dict | set):
                 raise
+            _refuse_once(value)
             found = bytes(value)
         else:
             if view.format in _OCTET_FORMATS and view.c_contiguous:
                 found = view.cast("B") if view.nbytes else b""
             else:
-                found = bytes(_flat(view.tolist()))
+                found = bytes(_flat(_listed(value)))
     if len(found) != size >= 0:
         raise ValueError(f"expected {size} elements, got {len(found)}")
     return found
@@ -116,6 +133,7 @@ def flags(value: Any, size: int = -1) -> bytes:
     """
     if isinstance(value, str | dict | set):
         raise TypeError(f"'{type(value).__name__}' is no sequence of truth values")
+    _refuse_once(value)
     found = bytes(map(bool, value))
     if len(found) != size >= 0:
         raise ValueError(f"expected {size} elements, got {len(found)}")

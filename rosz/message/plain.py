@@ -158,12 +158,14 @@ class _Writer:
 
     def _by_number(self, kind: str, value: Any, path: str, error: Exception) -> bytes:
         """Find the number that is wrong in a sequence; take what one at a time is acceptable."""
-        if isinstance(value, str | bytes | bytearray | dict | set) or not hasattr(
-            value, "__iter__"
-        ):
+        if isinstance(value, str | bytes | bytearray | dict | set) or not hasattr(value, "__len__"):
+            self._refuse(path, f"a sequence of {kind}", value)
+        try:
+            given = list(value)
+        except (TypeError, NotImplementedError):  # numpy's array of no dimension, odd buffers
             self._refuse(path, f"a sequence of {kind}", value)
         packed = []
-        for index, number in enumerate(value):
+        for index, number in enumerate(given):
             try:
                 packed.append(struct.pack("<" + SCALAR_CODES[kind], _number(kind, number)))
             except _FAULTS as fault:

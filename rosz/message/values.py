@@ -29,6 +29,9 @@ __all__ = (
 
 _M = TypeVar("_M", bound=Message)
 
+_NO_YAML = (yaml.YAMLError, ValueError, AttributeError, RecursionError)
+"""What PyYAML raises: its own errors, and those of what it makes values with, such as dates."""
+
 Now: TypeAlias = "TimeValue | Callable[[], TimeValue]"
 """What ``now`` means: a time, or what gives the time of the moment."""
 
@@ -78,7 +81,7 @@ def from_json(cls: type[_M], text: str | bytes) -> _M:
     """
     try:
         value = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise EncodeError(cls._type, "", f"no JSON: {error}") from error
     return from_plain(cls, value)
 
@@ -91,7 +94,7 @@ def from_yaml(cls: type[_M], text: str, now: Now | None = None) -> _M:
     """
     try:
         value = yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    except _NO_YAML as error:
         reason = " ".join(str(error).split())
         raise EncodeError(cls._type, "", f"no YAML: {reason}") from error
     if value is not None and not isinstance(value, dict | list):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import threading
+import itertools
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from rosz.errors import (
 from rosz.node.endpoint import Endpoint
 from rosz.node.mismatch import mismatch
 from rosz.qos import QoS
+from rosz.session import Cancellation
 from rosz.wire import Kind, pack
 
 if TYPE_CHECKING:
@@ -25,9 +26,12 @@ if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.message import Service as ServiceType
     from rosz.node.node import Node
-    from rosz.session import Answers, Reply
+    from rosz.session import Reply
 
 __all__ = ("Client",)
+
+_LONGEST = 1e8
+"""Seconds, three years, that stand for "forever", which Zenoh has no word for."""
 
 _ATTEMPTS = 10
 _PAUSE = 0.02
@@ -51,12 +55,13 @@ class Client(Endpoint):
             node, Kind.CLIENT, name, service_type._type_name, service_type._type_hash, qos
         )
         self.service_type = service_type
-        self.timeout = timeout
-        self._sequence = 0
-        self._lock = threading.Lock()
-        self._calls: set[Answers] = set()
+        self.timeout = min(timeout, _LONGEST)
+        self._numbers = itertools.count(1)
+        self._cancel = Cancellation()
         self._known: tuple[View | None, bool] = None, False
-        self._asker = node.context.session.asker(self.key, timeout=timeout, target="all_complete")
+        self._asker = node.context.session.asker(
+            self.key, timeout=self.timeout, target="all_complete"
+        )
         self._declared.append(self._asker)
         self.announce()
 
@@ -89,10 +94,11 @@ class Client(Endpoint):
             WaitTimeout: There was no answer in time.
             ClosedError: The client or its context was closed meanwhile.
         """
-        limit = self.timeout if timeout is None else timeout
+        limit = self.timeout if timeout is None else min(timeout, _LONGEST)
         deadline = time.monotonic() + limit
         payload = self.service_type.Request._encode(request)
-        self._find_server(limit)
+        if not self._is_served():
+            self._find_server(limit)
         for _ in range(_ATTEMPTS):
             began = time.monotonic()
             reply = self._attempt(payload, deadline, limit)
@@ -110,12 +116,10 @@ class Client(Endpoint):
         left = deadline - time.monotonic()
         if left <= 0:
             raise self._late(limit)
-        with self._lock:
-            self.ensure_open("call")
-            self._sequence += 1
-            attachment = pack(self._sequence, time.time_ns(), self.gid)
+        self.ensure_open("call")
+        attachment = pack(next(self._numbers), time.time_ns(), self.gid)
         if abs(self._asker.timeout - left) < _SAME:
-            answers = self._asker.ask(payload, attachment)
+            answers = self._asker.ask(payload, attachment, self._cancel)
         else:
             answers = self.node.context.session.ask(
                 self.key,
@@ -123,15 +127,9 @@ class Client(Endpoint):
                 payload=payload,
                 attachment=attachment,
                 target="all_complete",
+                cancel=self._cancel,
             )
-        # Whoever closes the client cancels those that he finds there.
-        self._calls.add(answers)
-        if self.closed:
-            answers.cancel()
-        try:
-            first = answers.first()
-        finally:
-            self._calls.discard(answers)
+        first = answers.first()
         if first is None and self.closed:
             raise ClosedError(f"the call of '{self.name}' was cancelled: shutting down")
         return first
@@ -149,8 +147,12 @@ class Client(Endpoint):
         return response
 
     def _late(self, limit: float) -> WaitTimeout:
+        context = self.node.context
+        servers = [token.zid for token in context.graph.view().servers(self.name)]
+        stopped = context.session.why_silent(*servers)
+        hint = "the server is busy, stopped or out of reach"
         return WaitTimeout(
-            f"answer of service '{self.name}'", limit, "the server is busy, stopped or out of reach"
+            f"answer of service '{self.name}'", limit, f"{hint}; {stopped}" if stopped else hint
         )
 
     def _is_served(self) -> bool:
@@ -164,8 +166,6 @@ class Client(Endpoint):
 
     def _find_server(self, limit: float) -> None:
         """Make sure that somebody serves the name, waiting while the process is still joining."""
-        if self._is_served():
-            return
         self.ensure_open("call")
         context = self.node.context
         context.settled.wait(min(limit, _GRACE))
@@ -213,10 +213,4 @@ class Client(Endpoint):
             raise WaitTimeout(what, timeout, hint) from error
 
     def _finish(self) -> None:
-        for answers in self._calls.copy():
-            answers.cancel()
-
-    def disown(self, reason: str) -> None:
-        """Refuse everything from now on, touching neither threads nor links: after a fork."""
-        super().disown(reason)
-        self._lock = threading.Lock()
+        self._cancel.cancel()

@@ -9,7 +9,6 @@ import os
 import threading
 import weakref
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 from rosz import remap
@@ -21,8 +20,7 @@ from rosz.node.clock import Clock
 from rosz.node.inbox import Inbox
 from rosz.node.mismatch import MismatchWatch
 from rosz.session import Session, SessionConfig
-from rosz.session.presence import is_anybody_there
-from rosz.session.probe import is_answered
+from rosz.session.presence import is_anybody_awake
 from rosz.session.settle import Settling, serve_links
 
 if TYPE_CHECKING:
@@ -86,15 +84,15 @@ class Context:
             config.connect
             or config.listen
             or config.multicast
-            or is_answered(config.rendezvous)
-            or is_anybody_there(config.rendezvous)
+            or is_anybody_awake(config.rendezvous)
         )
-        self.session = Session.open(config)
-        self.graph = Graph(self.session, self.domain)
         self.clock = Clock()
         self._ids = itertools.count()
         self._hooks: list[Callable[[str], None]] = []
         self._lock = threading.RLock()
+        self._making = threading.RLock()
+        self._params: Replica | None = None
+        self._types: TypeStore | None = None
         self._stopping = threading.Event()
         self._flushed = threading.Event()
         self._stopped = threading.Event()
@@ -102,8 +100,19 @@ class Context:
         self.reason = ""
         self.cooperative = False
         self.forked = False
-        atexit.register(self.close)
         self._endpoints: weakref.WeakSet[Endpoint] = weakref.WeakSet()
+        self.session = Session.open(config)
+        try:
+            self._look_around(config, alone=alone)
+        except BaseException:  # Ctrl-C comes anywhere
+            self.session.close()
+            raise
+        atexit.register(self.close)
+        reference = weakref.ref(self)
+        os.register_at_fork(after_in_child=lambda: _disown(reference()))
+
+    def _look_around(self, config: SessionConfig, *, alone: bool) -> None:
+        self.graph = Graph(self.session, self.domain)
         self._mismatches = MismatchWatch(self.graph, self.session.zid)
         self.inbox = Inbox(self.session, self.domain)
         settling = Settling(
@@ -117,8 +126,6 @@ class Context:
         self.when_settled = settling.when_settled
         if config.mode == "peer":
             self._links = serve_links(self.session)
-        reference = weakref.ref(self)
-        os.register_at_fork(after_in_child=lambda: _disown(reference()))
 
     def next_id(self) -> int:
         """Return a number for a node or endpoint, unique within the session.
@@ -158,22 +165,46 @@ class Context:
             self._endpoints.discard(endpoint)
             self._mismatches.remove(endpoint)
 
-    @cached_property
+    @property
     def params(self) -> Replica:
-        """This process's replica of the parameter store, joined on first use."""
+        """This process's replica of the parameter store, joined on first use.
+
+        It is there until all shutdown hooks have run.
+
+        Raises:
+            ClosedError: The context is shut down, and has no replica.
+        """
+        if self._params is None:
+            with self._making:
+                if self._params is None:
+                    self._join_store()
+        if self._params is None:
+            raise ClosedError("the context is shut down: it has no parameters")
+        return self._params
+
+    def _join_store(self) -> None:
         from rosz.params.replica import Replica
 
+        self.check_open()
+        replica = Replica(self.session, self.domain, settled=self.settled)
         with self._lock:
-            replica = Replica(self.session, self.domain, settled=self.settled)
-            self.on_shutdown(lambda _: replica.close())
-            return replica
+            if not self._stopping.is_set():
+                self._params = replica
+                return
+        replica.close()
 
-    @cached_property
+    @property
     def types(self) -> TypeStore:
         """Message and service types by name."""
-        from rosz.typestore import TypeStore
+        if self._types is None:
+            from rosz.typestore import TypeStore
 
-        return TypeStore(package_index(self.environment), self.environment.home / "rosz")
+            with self._making:
+                if self._types is None:
+                    self._types = TypeStore(
+                        package_index(self.environment), self.environment.home / "rosz"
+                    )
+        return self._types
 
     @property
     def is_shutdown(self) -> bool:
@@ -227,14 +258,22 @@ class Context:
             hooks = self._hooks[::-1]
             self._hooks.clear()
         self.clock.close()
-        for hook in hooks:
-            try:
-                hook(reason)
-            except Exception:  # noqa: BLE001  # the callback boundary
-                _log.exception("a shutdown hook failed")
-        self._flushed.set()
         try:
-            self.graph.close()
+            for hook in hooks:
+                try:
+                    hook(reason)
+                except (Exception, SystemExit):  # noqa: BLE001  # the callback boundary
+                    _log.exception("a shutdown hook failed")
+        finally:  # also where Ctrl-C interrupts a hook
+            self._flushed.set()
+            self._disconnect()
+
+    def _disconnect(self) -> None:
+        try:
+            with self.session.parting():
+                if self._params is not None:
+                    self._params.close()
+                self.graph.close()
             self.session.close()
         finally:
             atexit.unregister(self.close)
@@ -246,15 +285,15 @@ class Context:
         self.forked = True
         self.reason = _FORKED
         self._lock = threading.RLock()
+        self._making = threading.RLock()
         self._stopping = self._flushed = self._stopped = threading.Event()
         self._stopping.set()
         self._closer = threading.current_thread()
         self._hooks = []
         self.session.disown(_FORKED)
         self.graph.disown()
-        replica = self.__dict__.get("params")  # where it has been used
-        if replica is not None:
-            replica.disown()
+        if self._params is not None:
+            self._params.disown()
         for endpoint in self._endpoints:
             endpoint.disown(_FORKED)
 

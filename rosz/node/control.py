@@ -11,6 +11,7 @@ import msgspec
 
 from rosz.errors import RoszError
 from rosz.node.endpoint import Withdrawal
+from rosz.session.starting import start
 from rosz.wire import ProcessToken, own_key
 
 if TYPE_CHECKING:
@@ -76,16 +77,18 @@ def attach(node: Node) -> None:
     began = time.monotonic()
 
     def arrived(query: Query) -> None:
-        threading.Thread(
-            target=_serve,
-            args=(node, key, query, began),
-            name=f"rosz-control{node.name}",
-            daemon=True,
-        ).start()
+        start(
+            threading.Thread(
+                target=_serve,
+                args=(node, key, query, began),
+                name=f"rosz-control{node.name}",
+                daemon=True,
+            )
+        )
 
     def appeared(other: ProcessToken, alive: bool) -> None:
         if alive and other.node == node.name and other != node.process:
-            threading.Thread(target=_contend, args=(node, other, began), daemon=True).start()
+            start(threading.Thread(target=_contend, args=(node, other, began), daemon=True))
 
     node.keep(context.session.queryable(key, arrived))
     node.keep(Withdrawal(context.graph.listen_to_processes(appeared)))
@@ -138,12 +141,17 @@ def _info(node: Node, age: float) -> NodeInfo:
         node.name,
         process.pid,
         process.host,
-        [sys.executable, *sys.argv],
+        [_sound(word) for word in (sys.executable, *sys.argv)],
         process.started,
         age,
         time.time_ns(),
         sorted({token.zid for token in node.context.graph.view().tokens}),
     )
+
+
+def _sound(word: str) -> str:
+    """Return a word of a command line, which may be no UTF-8, as a text that can be sent."""
+    return word.encode(errors="surrogateescape").decode(errors="replace")
 
 
 def _answer(node: Node, request: Request, age: float) -> tuple[Any, str]:

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Self
 
+from rosz import names
 from rosz.errors import ClosedError
 from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid
 
@@ -60,6 +61,7 @@ class Endpoint:
         closed: Whether it has been closed.
 
     Raises:
+        InvalidName: The name is that of the root.
         ClosedError: The node or its context is closed.
     """
 
@@ -71,7 +73,7 @@ class Endpoint:
         self.name = name
         self.qos = qos
         wire_hash = NO_HASH if context.environment.distro == "humble" else type_hash
-        self.key = endpoint_key(context.domain, name, type_name, wire_hash)
+        self.key = endpoint_key(context.domain, names.check_resource(name), type_name, wire_hash)
         self.token = Token(
             domain=context.domain,
             zid=context.session.zid,
@@ -89,7 +91,7 @@ class Endpoint:
         self.gid = gid(text)
         self._token_key = text
         self._declared: list[Closable] = []
-        self._closing = threading.Lock()
+        self._closing = threading.RLock()  # a signal handler may come in between
         self._why_closed = ""
         self.closed = False
 
@@ -153,7 +155,7 @@ class Endpoint:
             reason: What the refusals say.
         """
         self._why_closed = reason
-        self._closing = threading.Lock()
+        self._closing = threading.RLock()
         self.closed = True
 
     def _finish(self) -> None:

@@ -35,14 +35,15 @@ class Feed:
 
     Args:
         name: Of the topic, for errors.
-        depth: Newest so many samples are kept; all when not given.
+        depth: Newest so many samples are kept.
     """
 
-    def __init__(self, name: str, depth: int | None) -> None:
+    def __init__(self, name: str, depth: int) -> None:
         self._name = name
         self._ring: deque[tuple[Take, Sample | Reply]] = deque(maxlen=depth)
         self._bell = threading.Lock()
         self._bell.acquire()
+        self._turn = threading.RLock()
         self._loops: tuple[Callable[[], None], ...] = ()
         self.closed = False
 
@@ -72,11 +73,12 @@ class Feed:
         self._ring_bell()
 
     def _pop(self) -> Taken | None:
-        try:
-            take, sample = self._ring.popleft()
-        except IndexError:  # somebody else was faster
-            return None
-        return take(sample)
+        with self._turn:  # decoding numbers the samples, and drops those that come late
+            try:
+                take, sample = self._ring.popleft()
+            except IndexError:  # somebody else was faster
+                return None
+            return take(sample)
 
     def get(self, timeout: float) -> Any:
         """Return the oldest message, waiting for one.
@@ -99,7 +101,7 @@ class Feed:
             left = deadline - time.monotonic()
             if left <= 0:
                 raise WaitTimeout(f"message on '{self._name}'", timeout)
-            self._bell.acquire(timeout=left)
+            self._bell.acquire(timeout=min(left, _FOREVER))
 
     def __iter__(self) -> Iterator[Any]:
         """Yield messages until closed."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
+from rosz import names
 from rosz.errors import DecodeError, RoszError
 from rosz.node.channel import Channel, Taken
 from rosz.node.endpoint import Endpoint, Withdrawal
@@ -52,13 +53,13 @@ class GenericSubscription(Reader[Any]):
         self.qos = qos
         self.closed = False
         self._raw = raw
-        self._closing = threading.Lock()
+        self._closing = threading.RLock()  # a signal handler may come in between
         self._knowing = threading.Lock()
         self._channels: dict[tuple[str, str], Channel | None] = {}
         self._faces: dict[tuple[str, str], Endpoint] = {}
         self._declared: list[Closable] = []
         node.context.check_open()
-        key = endpoint_key(node.context.domain, topic, "*", "*")
+        key = endpoint_key(node.context.domain, names.check_resource(topic), "*", "*")
         self._declared.append(self._subscribe(key, self._take))
         self._declared.append(node.listen(self._follow))
 

@@ -75,7 +75,7 @@ class MismatchWatch:
         self._graph = graph
         self._zid = zid
         self._own: dict[str, dict[int, Endpoint]] = {}
-        self._told: set[tuple[int, str]] = set()
+        self._told: dict[int, set[str]] = {}
         graph.listen(self._changed)
 
     def add(self, endpoint: Endpoint) -> None:
@@ -91,6 +91,7 @@ class MismatchWatch:
             self._own[token.name] = rest
         else:
             self._own.pop(token.name, None)
+        self._told.pop(token.entity_id, None)
 
     def _changed(self, token: Token, alive: bool) -> None:
         own = self._own.get(token.name)
@@ -106,8 +107,8 @@ class MismatchWatch:
                 self._compare(endpoint, token)
 
     def _compare(self, endpoint: Endpoint, other: Token) -> None:
-        about = (endpoint.token.entity_id, other.node_name)
-        text = "" if about in self._told else mismatch(endpoint.token, other)
+        told = self._told.get(endpoint.token.entity_id, ())
+        text = "" if other.node_name in told else mismatch(endpoint.token, other)
         if text:
-            self._told.add(about)
+            self._told.setdefault(endpoint.token.entity_id, set()).add(other.node_name)
             endpoint.node.log.warning("%s", text)

@@ -5,18 +5,17 @@ from __future__ import annotations
 import os
 import socket
 import sys
-import threading
 import time
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 
 from rosz import names
-from rosz.errors import ClosedError, RoszError
 from rosz.node import control, signals, standard
 from rosz.node.client import Client
 from rosz.node.console import DEFAULT_FORMAT
 from rosz.node.context import Context
+from rosz.node.ending import Ending, Hook
 from rosz.node.endpoint import Withdrawal
 from rosz.node.generic import GenericSubscription
 from rosz.node.log import NodeLog
@@ -26,7 +25,7 @@ from rosz.node.ros2_services import Lookout
 from rosz.node.service import Service
 from rosz.node.subscription import Subscription
 from rosz.node.timer import Timer, TimerEvent
-from rosz.qos import DEFAULT, SERVICES, QoS
+from rosz.qos import SERVICES, QoS, for_queue
 from rosz.wire import Token
 
 if TYPE_CHECKING:
@@ -42,8 +41,6 @@ __all__ = ("Node",)
 M = TypeVar("M", bound="Message")
 P = TypeVar("P", bound="Closable")
 _SECOND = 1_000_000_000
-_ENDED_BY = 10.0
-"""Seconds that whoever ends a node a second time waits for the first, and its hooks, to be done."""
 
 
 class Node:
@@ -82,12 +79,7 @@ class Node:
             name = names.anonymous(name, socket.gethostname(), os.getpid(), time.time_ns())
         names.check_base(name)
         self.context = context or Context(argv=sys.argv[1:] if argv is None else argv)
-        self._closed = threading.Event()
-        self._ended = threading.Event()
-        self._ending: threading.Thread | None = None
-        self._lock = threading.RLock()
-        self._parts: list[Closable] = []
-        self._hooks: list[Callable[[str], None]] = []
+        self._params: Params | None = None
         try:
             self._begin(name, namespace)
         except BaseException:
@@ -116,6 +108,7 @@ class Node:
             console_format=environment.console_format or DEFAULT_FORMAT,
             color=environment.color,
         )
+        self._ending = Ending(self.name, self.log)
         self._withdraw = context.on_shutdown(self._end)
         try:
             standard.set_initial_params(self)
@@ -130,12 +123,18 @@ class Node:
             raise
         standard.open_rosout(self)
 
-    @cached_property
+    @property
     def params(self) -> Params:
-        """The parameter store as this node sees it; the process becomes a replica on first use."""
-        from rosz.params.api import Params
+        """The parameter store as this node sees it; the process becomes a replica on first use.
 
-        return Params(self.context.params, self.name, self.remaps)
+        Raises:
+            ClosedError: The context is shut down, and has no replica.
+        """
+        if self._params is None:
+            from rosz.params.api import Params
+
+            self._params = Params(self.context.params, self.name, self.remaps)
+        return self._params
 
     def resolve(self, name: str) -> str:
         """Return the global name that a name means here, remappings applied.
@@ -166,10 +165,11 @@ class Node:
 
         Raises:
             InvalidName: The name is not legal.
+            UsageError: The size of the queue means nothing.
             ClosedError: The node is closed.
         """
         if qos is None:
-            qos = QoS(depth=1, durability="transient_local") if latch else _queue(queue_size)
+            qos = QoS(depth=1, durability="transient_local") if latch else for_queue(queue_size)
         return self.keep(Publisher(self, self.resolve(topic), message_type, qos))
 
     @overload
@@ -222,9 +222,10 @@ class Node:
 
         Raises:
             InvalidName: The name is not legal.
+            UsageError: The size of the queue means nothing.
             ClosedError: The node is closed.
         """
-        name, qos = self.resolve(topic), qos or _queue(queue_size)
+        name, qos = self.resolve(topic), qos or for_queue(queue_size)
         if message_type is None:
             return self.keep(
                 GenericSubscription(self, name, callback, qos, raw=raw, with_info=with_info)
@@ -291,15 +292,17 @@ class Node:
             callback: Gets a `TimerEvent`, on a thread of the timer; what it raises is logged.
             oneshot: Whether to call it only once.
         """
-        return self.keep(
-            Timer(
-                round(period * _SECOND),
-                callback,
-                self.clock,
-                oneshot=oneshot,
-                on_error=self.log.report,
+        with self._ending.lock:  # so that one which ends at once is not forgotten before it is kept
+            return self.keep(
+                Timer(
+                    round(period * _SECOND),
+                    callback,
+                    self.clock,
+                    oneshot=oneshot,
+                    on_error=self.log.report,
+                    on_end=self.forget,
+                )
             )
-        )
 
     def rate(self, hz: float) -> Rate:
         """Return a pace-maker: iterate over it, or call its ``sleep``.
@@ -326,18 +329,20 @@ class Node:
     def spin(self) -> None:
         """Wait until the node is shut down; callbacks run on threads of their own meanwhile."""
         self.context.cooperative = True
-        self._closed.wait()
+        self._ending.begun.wait()
 
     @property
     def is_shutdown(self) -> bool:
         """Whether the node has been closed or its context shut down."""
         self.context.cooperative = True
-        return self._closed.is_set() or self.context.is_shutdown
+        return self._ending.begun.is_set() or self.context.is_shutdown
 
-    def on_shutdown(self, hook: Callable[[str], None]) -> None:
-        """Have a function called with the reason when the node ends, before its parts close."""
-        with self._lock:
-            self._hooks.append(hook)
+    def on_shutdown(self, hook: Hook) -> None:
+        """Have a function called with the reason when the node ends, before its parts close.
+
+        Where the end has begun already it is called at once, as in rospy.
+        """
+        self._ending.add_hook(hook)
 
     def listen(self, listener: Callable[[Token, bool], None]) -> Closable:
         """Follow the graph; see `rosz.graph.Graph.listen`."""
@@ -349,60 +354,35 @@ class Node:
         Raises:
             ClosedError: The node is closed; the part is, too, now.
         """
-        with self._lock:
-            if not self._closed.is_set():
-                self._parts.append(part)
-                return part
-        part.close()
-        raise ClosedError(f"node '{self.name}' is closed")
+        return self._ending.keep(part)
 
     def forget(self, part: Closable) -> None:
         """Take note that a part has been closed by itself."""
-        with self._lock:
-            if part in self._parts:
-                self._parts.remove(part)
+        self._ending.forget(part)
 
     def shutdown(self, reason: str = "") -> None:
         """End the node, and its context where it owns that; again is no error."""
-        self._end(reason)
-        if self._owns_context:
-            self.context.shutdown(reason)
+        try:
+            self._end(reason)
+        finally:  # also where Ctrl-C interrupts a hook
+            if self._owns_context:
+                self.context.shutdown(reason)
 
     def close(self) -> None:
         """End the node; the same as `shutdown` without a reason."""
         self.shutdown()
 
     def _end(self, reason: str) -> None:
-        if self.context.forked:
+        context = self.context
+        if context.forked:
             return
-        with self._lock:
-            begun = self._closed.is_set()
-            self._closed.set()
-            if not begun:
-                self._ending = threading.current_thread()
-            hooks, parts = self._hooks[::-1], self._parts[::-1]
-        if begun:
-            # Whoever comes second, often the main thread on its way out, must not outrun the first.
-            if threading.current_thread() is not self._ending:
-                self._ended.wait(_ENDED_BY)
-            return
-        try:
-            self._withdraw()
-            self.clock.close()
-            for hook in hooks:
-                try:
-                    hook(reason or self.context.reason)
-                except Exception:  # the callback boundary
-                    self.log.exception("a shutdown hook failed")
-            self.log.flush()
-            for part in parts:
-                try:
-                    part.close()
-                except RoszError:
-                    self.log.exception("a part of the node could not be closed")
-            self.log.close()
-        finally:
-            self._ended.set()
+        leaving = self._owns_context or context.is_shutdown
+        with context.session.parting() if leaving else nullcontext():
+            self._ending.come(reason or context.reason, self._stop)
+
+    def _stop(self) -> None:
+        self._withdraw()
+        self.clock.close()
 
     def __enter__(self) -> Self:
         return self
@@ -416,11 +396,4 @@ class Node:
         self.close()
 
     def __repr__(self) -> str:
-        return f"<Node {self.name}{' closed' if self._closed.is_set() else ''}>"
-
-
-def _queue(size: int) -> QoS:
-    """Return the QoS for a queue of ROS 1; 0 means no limit there."""
-    if size == DEFAULT.depth:
-        return DEFAULT
-    return QoS(depth=size) if size else QoS(history="keep_all")
+        return f"<Node {self.name}{' closed' if self._ending.begun.is_set() else ''}>"

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Generic, TypeVar
 
+from rosz.session.starting import start
+
 __all__ = ("Jobs", "Pool")
 
 J = TypeVar("J")
@@ -61,7 +63,7 @@ class Pool(Generic[J]):
         self._start()
 
     def _start(self) -> None:
-        threading.Thread(target=self._run, name=self._name, daemon=True).start()
+        start(threading.Thread(target=self._run, name=self._name, daemon=True))
 
     def _run(self) -> None:
         while (job := self._take()) is not None:

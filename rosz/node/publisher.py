@@ -22,6 +22,9 @@ __all__ = ("Publisher", "SubscriberLink")
 
 M = TypeVar("M", bound="Message")
 _HELD_SAMPLES = 1000
+_HEADER = 4
+"""Bytes of the header of CDR; who gets fewer may abort."""
+
 _UNNUMBERED = 0
 """Sequence number of what goes to one subscription alone, and leaves no gap for the others."""
 
@@ -64,7 +67,8 @@ class Publisher(Endpoint, Generic[M]):
         self.message_type = message_type
         self._encode: Callable[[Any], bytes] = message_type._encode
         self._sequence = 0
-        self._ordered = threading.Lock()
+        # A signal handler that publishes may interrupt this thread while it publishes.
+        self._ordered = threading.RLock()
         self._blocks = qos.reliable and qos.history == "keep_all"
         self._raw = node.context.session.publisher(
             self.key,
@@ -89,14 +93,30 @@ class Publisher(Endpoint, Generic[M]):
             message: Any = args[0]
         else:
             message = self._build(args, fields)
-        self.publish_raw(self._encode(message))
+        self._send(self._encode(message))
 
-    def publish_raw(self, payload: bytes) -> None:
-        """Send a message that is encoded already (CDR with its header of four bytes).
+    def publish_raw(self, payload: bytes | bytearray | memoryview) -> None:
+        """Send a message that is encoded already.
+
+        Args:
+            payload: CDR with its header of four bytes; whether it fits the type is not looked at.
 
         Raises:
+            EncodeError: It is no bytes, or fewer than the header has.
             ClosedError: The publisher is closed.
         """
+        if not isinstance(payload, bytes | bytearray | memoryview):
+            given = type(payload).__name__
+            raise EncodeError(self.message_type._type, "", f"expected bytes, got {given}")
+        # A copy, where others could change it while it waits; and what ROS 2 would choke on.
+        data = bytes(payload)
+        if len(data) < _HEADER:
+            raise EncodeError(
+                self.message_type._type, "", f"expected CDR with its header, got {len(data)} bytes"
+            )
+        self._send(data)
+
+    def _send(self, payload: bytes) -> None:
         with self._ordered:
             self._sequence = sequence = self._sequence + 1
             attachment = pack(sequence, time.time_ns(), self.gid)
@@ -200,7 +220,7 @@ class Publisher(Endpoint, Generic[M]):
                     connected(SubscriberLink(self, token))
                 elif not alive and disconnected is not None:
                     disconnected(token.node_name)
-            except Exception as error:  # noqa: BLE001  # the callback boundary
+            except BaseException as error:  # noqa: BLE001  # the thread outlives it
                 if not (self.closed and isinstance(error, ClosedError)):
                     self.node.log.report(f"connection callback of '{self.name}' failed", error)
 
@@ -217,5 +237,5 @@ class Publisher(Endpoint, Generic[M]):
     def disown(self, reason: str) -> None:
         """Refuse everything from now on, touching neither threads nor links: after a fork."""
         super().disown(reason)
-        self._ordered = threading.Lock()
+        self._ordered = threading.RLock()
         self._held = []

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosz.errors import ClosedError
 from rosz.node.feed import Feed, Take
+from rosz.session.starting import start
 
 if TYPE_CHECKING:
     from rosz.node.node import Node
@@ -22,6 +23,13 @@ if TYPE_CHECKING:
 __all__ = ("Reader",)
 
 M = TypeVar("M")
+
+_ALL = 1 << 17
+"""Samples that are kept when all are to be kept: a callback that hangs must not eat the memory."""
+
+_MOST = 1 << 20
+"""Samples that a queue holds at most: Zenoh sets aside 256 bytes for each at once, and ends the
+process where that much is not to be had."""
 
 
 class Reader(Generic[M]):
@@ -51,7 +59,7 @@ class Reader(Generic[M]):
         self._topic = name
         self._callback = callback
         self._with_info = with_info
-        self._depth = None if qos.history == "keep_all" else max(qos.depth, 1)
+        self._depth = _ALL if qos.history == "keep_all" else min(max(qos.depth, 1), _MOST)
         self._feed = Feed(name, self._depth)
         self._turn = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -62,7 +70,7 @@ class Reader(Generic[M]):
     ) -> Closable:
         """Declare the subscriber, and begin to dispatch if there is a callback."""
         session = self._owner.context.session
-        if self._callback is None or self._depth is None:
+        if self._callback is None:
             return session.subscriber(
                 key, lambda sample: self._put(take, sample), history=history, recover=recover
             )
@@ -84,7 +92,7 @@ class Reader(Generic[M]):
                         name=f"rosz-sub{self._topic}",
                         daemon=True,
                     )
-                    self._thread.start()
+                    start(self._thread)
 
     def _run(self, ring: Ring, take: Take) -> None:
         while not self._feed.closed:
@@ -107,7 +115,7 @@ class Reader(Generic[M]):
                     callback(*taken)
                 else:
                     callback(taken[0])
-        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+        except BaseException as error:  # noqa: BLE001  # the thread outlives what a callback raises
             ending = self._feed.closed or self._owner.context.is_shutdown
             # What a callback tries while its node is being shut down is no fault of its.
             if not (ending and isinstance(error, ClosedError)):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rosz.errors import ClosedError
 from rosz.node.endpoint import Withdrawal
+from rosz.session.starting import start
 from rosz.wire import Kind, Token
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class Lookout:
 
     def _start(self) -> None:
         name = f"rosz-ros2{self._node.name}"
-        threading.Thread(target=self._run, name=name, daemon=True).start()
+        start(threading.Thread(target=self._run, name=name, daemon=True))
 
     def _run(self) -> None:
         # A node of rosz says that it is one by another token, which may be a moment behind.

@@ -10,6 +10,7 @@ from queue import Empty, SimpleQueue
 from rosz.errors import ClosedError
 from rosz.node.clock import Clock
 from rosz.node.severity import severity
+from rosz.session.starting import start
 
 __all__ = ("PublishLine", "RosoutSink")
 
@@ -95,8 +96,8 @@ class RosoutSink(logging.Handler):
             target=self._run, args=(publish,), name=f"rosz-rosout {self._ros_name}", daemon=True
         )
         # Only one that has been started can be waited for, and `stop` may come at any moment.
-        thread.start()
-        self._thread = thread
+        if start(thread):
+            self._thread = thread
 
     def flush(self) -> None:
         """Wait, for a second at most, until all that was logged before is published.

@@ -102,7 +102,7 @@ class Service(Endpoint):
             raise
         except ServiceError as error:  # a refusal, which is no fault of the handler
             raise ServiceError(f"service cannot process request: {error}") from error
-        except (Exception, SystemExit) as error:
+        except BaseException as error:  # what it raises must not end a thread of the pool
             self.node.log.exception("handler of service '%s' failed", self.name)
             raise ServiceError(f"error processing request: {error}") from error
         try:

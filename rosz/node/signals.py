@@ -38,8 +38,10 @@ _REMINDERS = 20
 def install(context: Context) -> None:
     """Have signals shut a context down, where the program has not taken them itself.
 
-    Nothing happens outside the main thread, or for a signal that has another handler already. A
-    signal that finds all contexts shut down does what it would do without rosz.
+    Nothing happens outside the main thread, or for a signal that has another handler already. One
+    that is ignored has none: shells start what a script puts in the background so, and it is to end
+    by ``kill -INT`` nevertheless, as rospy's nodes do. A signal that finds all contexts shut down
+    does what it would do without rosz.
     """
     if threading.current_thread() is not threading.main_thread():
         return
@@ -48,7 +50,7 @@ def install(context: Context) -> None:
         if isinstance(present, _Handler):
             present.add(context)
             return
-    defaults = (signal.default_int_handler, signal.SIG_DFL)
+    defaults = (signal.default_int_handler, signal.SIG_DFL, signal.SIG_IGN)
     taken = [n for n, present in zip(_SIGNALS, handlers, strict=True) if present in defaults]
     if taken:
         handler = _Handler(taken)

@@ -7,7 +7,7 @@ import socket
 import threading
 from typing import TYPE_CHECKING
 
-from rosz.errors import ClosedError, UsageError
+from rosz.errors import ClosedError, UsageError, YamlError
 from rosz.qos import CLOCK, ROSOUT
 from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 
@@ -61,13 +61,15 @@ def set_initial_params(node: Node) -> None:
     """
     if not node.context.arguments.params:
         return
-    import yaml
+    from rosz.params.nodes import read_plain
 
     for name, text in node.context.arguments.params.items():
         try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise UsageError(f"argument '_{name}:={text}' is no YAML value: {error}") from error
+            value = next(read_plain(text, "<value>"), None)
+        except YamlError as error:
+            raise UsageError(
+                f"argument '_{name}:={text}' is no YAML value: {error.reason}"
+            ) from error
         if value is not None:
             node.params[f"~{name}"] = value
 
@@ -101,6 +103,11 @@ def open_rosout(node: Node) -> None:
     ).start()
 
 
+def _sent(text: str) -> str:
+    """Return a text with what no message can hold, such as bytes of a file's name, written out."""
+    return text.encode(errors="backslashreplace").decode().replace("\0", "\\x00")
+
+
 def _open_rosout(node: Node) -> None:
     from rosz.msgs.builtin_interfaces.msg import Time
     from rosz.msgs.rcl_interfaces.msg import Log
@@ -114,6 +121,6 @@ def _open_rosout(node: Node) -> None:
         level: int, name: str, message: str, file: str, function: str, line: int, stamp: int
     ) -> None:
         time = Time(*divmod(stamp, _SECOND))
-        rosout.publish(Log(time, level, name, message, file, function, line))
+        rosout.publish(Log(time, level, name, _sent(message), _sent(file), function, line))
 
     node.log.publish_to(publish)

@@ -64,7 +64,7 @@ class Timer:
         callback: Callable[[TimerEvent], object],
         clock: Clock,
         *,
-        on_error: Callable[[str, Exception], None],
+        on_error: Callable[[str, BaseException], None],
         oneshot: bool = False,
         reset: bool = False,
         name: str = "",
@@ -168,7 +168,7 @@ class Timer:
     def _call(self, event: TimerEvent) -> None:
         try:
             self._callback(event)
-        except Exception as error:  # noqa: BLE001  # the callback boundary
+        except BaseException as error:  # noqa: BLE001  # the timer outlives what it raises
             # What a callback tries on a node that is just shutting down is no fault of its.
             if not (isinstance(error, ClosedError) and self._clock.closed):
                 self._on_error(f"callback of timer '{self.name}' failed", error)

@@ -1,9 +1,11 @@
 """The network edge: sessions, and all that is declared on them. Nothing else imports zenoh."""
 
 from rosz.session import calls as calls  # waits at the exit
-from rosz.session.answers import Answers, Target
-from rosz.session.config import SessionConfig, keys_of, secured
+from rosz.session.answers import Answers, Cancellation, Target
+from rosz.session.config import SessionConfig, keys_of
 from rosz.session.declared import Asker, Closable, RawPublisher, Ring
+from rosz.session.endpoints import dialled, is_local, listening, secured
+from rosz.session.opening import places_of
 from rosz.session.samples import Query, Reply, Sample
 from rosz.session.session import Session
 from rosz.session.stamp import HybridClock, Stamp
@@ -11,6 +13,7 @@ from rosz.session.stamp import HybridClock, Stamp
 __all__ = (
     "Answers",
     "Asker",
+    "Cancellation",
     "Closable",
     "HybridClock",
     "Query",
@@ -22,6 +25,10 @@ __all__ = (
     "SessionConfig",
     "Stamp",
     "Target",
+    "dialled",
+    "is_local",
     "keys_of",
+    "listening",
+    "places_of",
     "secured",
 )

@@ -10,7 +10,7 @@ import zenoh
 from rosz.session.calls import ENDING
 from rosz.session.samples import Reply
 
-__all__ = ("Answers", "AskOptions", "Target")
+__all__ = ("Answers", "AskOptions", "Cancellation", "Target")
 
 Target = Literal["all", "all_complete", "best"]
 """Who is asked: all who may answer, those who have all there is, or the best of them."""
@@ -24,6 +24,22 @@ class AskOptions(TypedDict, total=False):
     parameters: str
     target: Target
     any_key: bool
+    cancel: Cancellation | None
+
+
+class Cancellation:
+    """Ends all questions that are asked with it, and refuses those to come.
+
+    Attributes:
+        token: Zenoh's.
+    """
+
+    def __init__(self) -> None:
+        self.token = zenoh.CancellationToken()
+
+    def cancel(self) -> None:
+        """Expect no more answers: who waits for some is done; from any thread, again no error."""
+        self.token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
 
 
 class Answers:
@@ -31,12 +47,10 @@ class Answers:
 
     Args:
         handler: Zenoh's channel of replies.
-        token: What cancels the question.
     """
 
-    def __init__(self, handler: Any, token: zenoh.CancellationToken) -> None:
+    def __init__(self, handler: Any) -> None:
         self._recv = handler.recv
-        self._token = token
 
     def __iter__(self) -> Iterator[Reply]:
         while (reply := self.first()) is not None:
@@ -50,7 +64,3 @@ class Answers:
             return Reply(self._recv())
         except zenoh.ZError:  # the channel is empty, and nothing more will come
             return None
-
-    def cancel(self) -> None:
-        """Expect no more answers: who iterates is done; from any thread, again is no error."""
-        self._token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it

@@ -1,7 +1,8 @@
 """Leaving no thread inside Zenoh behind at the end of the program.
 
 The runtime aborts a program that ends while a thread of Python is inside Zenoh. All sessions are
-closed by then, so whoever is still inside is on the way out, and is waited for.
+closed by then, so whoever is still inside is on the way out, and is waited for. To free a thing of
+Zenoh's is a call, too: so the last name of each is deleted in a function that is still under way.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import time
 from pathlib import Path
 from types import FrameType
 
-__all__ = ("ENDING", "wait_for_calls")
+__all__ = ("ENDING", "keep", "wait_for_calls")
 
 ENDING = threading.Event()
 """Set when the interpreter is about to end: whoever would wait inside Zenoh does not set out.
@@ -22,9 +23,15 @@ It has to be asked in the very function that calls Zenoh, so that either that fu
 under way, or it sees this.
 """
 
+_kept: list[object] = []
 _HERE = str(Path(__file__).parent)
 _POLL = 0.001
 _OUT_BY = 1.0
+
+
+def keep(thing: object) -> None:
+    """Keep a thing of Zenoh's from being freed by the thread that has it, at the end."""
+    _kept.append(thing)
 
 
 def wait_for_calls(timeout: float) -> bool:

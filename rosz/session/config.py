@@ -16,11 +16,12 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import UsageError
+from rosz.session.endpoints import dialled, is_local, listening, loopback, secured
 
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
 
-__all__ = ("SessionConfig", "keys_of", "secured", "zenoh_settings")
+__all__ = ("EPHEMERAL", "SessionConfig", "keys_of", "zenoh_settings")
 
 _RETRY_MS = 200
 _LEASE_MS = 60_000
@@ -39,7 +40,10 @@ _BATCHES = 8
 Measured: with eight of them two fifths more images of 1 MB come through, and as many in each run.
 """
 
-_EPHEMERAL = "tcp/127.0.0.1:0"
+EPHEMERAL = "tcp/127.0.0.1:0"
+"""Where a peer listens for those of its machine: at any port."""
+_AUTOCONNECT = {"router": ["router"], "peer": ["router", "peer"], "client": ["router"]}
+"""To whom each connects that it finds by multicast; Zenoh's own routers connect to nobody."""
 _EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
 """Who looks for others by multicast has to be reached by those it finds."""
 
@@ -79,6 +83,11 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
     def endpoints(self) -> list[str]:
         """All endpoints that opening a session involves, each once."""
         return list(dict.fromkeys((self.rendezvous, *self.connect, *self.listen)))
+
+    @property
+    def reaches_beyond(self) -> bool:
+        """Whether there may be links to other machines."""
+        return self.multicast or bool(self.config_file) or not all(map(is_local, self.endpoints))
 
     @classmethod
     def node(cls, env: Environment) -> SessionConfig:
@@ -134,19 +143,13 @@ def keys_of(env: Environment) -> KeyFolder | None:
 
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     """Return the Zenoh configuration, as nested dictionaries."""
-    connect = [config.rendezvous, *config.connect]
-    listen = list(config.listen)
-    if config.mode == "router":
-        connect = list(config.connect)
-        listen = [config.rendezvous, *listen]
-    elif config.mode == "peer":
-        held = [config.rendezvous] if config.hold_rendezvous else []
-        own = _EPHEMERAL_EVERYWHERE if config.multicast else _EPHEMERAL
-        listen = [*held, own, *listen]
+    connect = [*config.connect]
+    if config.mode != "router":
+        connect.insert(0, config.rendezvous)
     if config.keys is not None:
-        connect = [secured(endpoint) for endpoint in connect]
-        listen = [secured(endpoint) for endpoint in listen]
-    lease = _LEASE_MS if all(map(_is_local, (*connect, *listen))) else _LEASE_BEYOND_MS
+        connect = [dialled(endpoint) for endpoint in connect]
+    listen = _listen(config)
+    lease = _LEASE_MS if all(map(is_local, (*connect, *listen))) else _LEASE_BEYOND_MS
     must_listen = config.mode == "router"
     must_connect = config.must_connect or config.mode == "client"
     return {
@@ -169,7 +172,7 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             }
         },
         "scouting": {
-            "multicast": {"enabled": config.multicast},
+            "multicast": {"enabled": config.multicast, "autoconnect": _AUTOCONNECT},
             "gossip": {"enabled": True},
         },
         "timestamping": {"enabled": True},
@@ -181,11 +184,14 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     }
 
 
-def _is_local(endpoint: str) -> bool:
-    """Tell whether an endpoint stays on this machine."""
-    protocol, _, place = endpoint.partition("/")
-    host = place.partition("?")[0].partition("#")[0].rpartition(":")[0].strip("[]")
-    return protocol.startswith("unix") or host in {"localhost", "::1"} or host.startswith("127.")
+def _listen(config: SessionConfig) -> list[str]:
+    keys = config.keys is not None
+    places = config.listen
+    if config.mode == "router" or (config.mode == "peer" and config.hold_rendezvous):
+        places = listening(config.rendezvous, places, keys=keys)
+    if config.mode == "peer":
+        places = (*places, _EPHEMERAL_EVERYWHERE if config.multicast else EPHEMERAL)
+    return [secured(place) for place in places] if keys else [*places]
 
 
 def key_settings(config: SessionConfig) -> dict[str, Any]:
@@ -194,27 +200,10 @@ def key_settings(config: SessionConfig) -> dict[str, Any]:
         return {}
     from rosz.security import access_control
 
-    loopback = [name for _, name in socket.if_nameindex() if name.startswith("lo")]
     return {
         "transport/link/tls": _tls(config.keys),
-        "access_control": access_control(config.keys.rules, loopback),
+        "access_control": access_control(config.keys.rules, loopback()),
     }
-
-
-def secured(endpoint: str) -> str:
-    """Return what an endpoint is called where links beyond the machine need keys.
-
-    Raises:
-        UsageError: Its protocol knows none.
-    """
-    protocol, _, place = endpoint.partition("/")
-    if protocol in {"tls", "unixsock-stream"} or (protocol == "tcp" and _is_local(endpoint)):
-        return endpoint
-    if protocol == "tcp":
-        return f"tls/{place}"
-    raise UsageError(
-        f"'{endpoint}': with ROSZ_KEYS, links beyond this machine are tls; expected 'tls/{place}'"
-    )
 
 
 def overrides(text: str) -> Mapping[str, str]:

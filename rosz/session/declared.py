@@ -10,9 +10,10 @@ from typing import Any, Protocol
 import zenoh
 
 from rosz.errors import ClosedError, TransportError
-from rosz.session.answers import Answers
-from rosz.session.calls import ENDING
+from rosz.session.answers import Answers, Cancellation
+from rosz.session.calls import ENDING, keep
 from rosz.session.samples import Query, Sample
+from rosz.session.starting import start
 
 __all__ = (
     "Asker",
@@ -46,6 +47,8 @@ def mapped(what: str) -> Iterator[None]:
         text = str(error).partition(" at ")[0].strip()
         if "closed" in text.lower():
             raise ClosedError(f"cannot {what}: the session is closed") from error
+        if "cancelled" in text:
+            raise ClosedError(f"cannot {what}: it was cancelled") from error
         raise TransportError(f"cannot {what}: {text}") from error
 
 
@@ -71,10 +74,20 @@ class Declared:
         Nobody may be inside another method of it meanwhile.
         """
         entity, self._entity = self._entity, None
-        if entity is not None:
+        if entity is None:
+            return
+        if ENDING.is_set():
+            keep(entity)
+        else:
             # The session may end right now and take the declaration along.
             with suppress(ClosedError), mapped(f"undeclare {self._what}"):
                 entity.undeclare()
+        del entity
+
+    def __del__(self) -> None:
+        """Undeclare what nobody closed."""
+        if self._entity is not None:
+            self.close()
 
 
 class Pumped(Declared):
@@ -88,9 +101,12 @@ class Pumped(Declared):
 
     def __init__(self, what: str, entity: Any, deliver: Callable[[Any], None]) -> None:
         super().__init__(what, entity)
-        threading.Thread(
-            target=_pump, args=(entity.handler.recv, deliver), name=f"rosz {what}", daemon=True
-        ).start()
+        receive = entity.handler.recv
+        start(
+            threading.Thread(
+                target=_pump, args=(receive, deliver), name=f"rosz {what}", daemon=True
+            )
+        )
 
 
 def _pump(receive: Callable[[], Any], deliver: Callable[[Any], None]) -> None:
@@ -100,6 +116,7 @@ def _pump(receive: Callable[[], Any], deliver: Callable[[Any], None]) -> None:
         except zenoh.ZError:  # undeclared, or the session is closed
             return
         deliver(item)
+        del item
 
 
 class Ring(Declared):
@@ -142,21 +159,20 @@ class Asker(Declared):
         self._get = entity.get
         self.timeout = timeout
 
-    def ask(self, payload: bytes, attachment: bytes) -> Answers:
+    def ask(self, payload: bytes, attachment: bytes, cancel: Cancellation) -> Answers:
         """Ask, and have the answers to wait for; see `Session.ask`.
 
         Raises:
-            ClosedError: The session is closed.
+            ClosedError: The session is closed, or questions of this kind are cancelled.
         """
-        cancel = zenoh.CancellationToken()
         try:
             handler = self._get(
-                channel(), payload=payload, attachment=attachment, cancellation_token=cancel
+                channel(), payload=payload, attachment=attachment, cancellation_token=cancel.token
             )
         except zenoh.ZError:
             with mapped(f"ask '{self._key}'"):
                 raise
-        return Answers(handler, cancel)
+        return Answers(handler)
 
 
 class Questions(Declared):

@@ -33,7 +33,7 @@ def open_at(settings: zenoh.Config, rendezvous: str) -> Any:
         zenoh.ZError: The session cannot be opened.
     """
     raw: Any = zenoh.open(settings)
-    if rendezvous.startswith(_LOCAL) and rendezvous in settings.get_json("listen/endpoints"):
+    if rendezvous.startswith(_LOCAL) and _is_held(rendezvous, settings):
         for _ in range(_ATTEMPTS):
             if is_answered(rendezvous):
                 break
@@ -42,3 +42,9 @@ def open_at(settings: zenoh.Config, rendezvous: str) -> Any:
             time.sleep(_PAUSE * os.urandom(1)[0] / 256)
             raw = zenoh.open(settings)
     return raw
+
+
+def _is_held(rendezvous: str, settings: zenoh.Config) -> bool:
+    """Tell whether a configuration listens at the meeting point, be it by another name."""
+    places = settings.get_json("listen/endpoints")
+    return rendezvous in places or f":{rendezvous.rpartition(':')[2]}" in places

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import zenoh
 
-from rosz.session.config import secured
+from rosz.session.endpoints import dialled, is_local
 
 if TYPE_CHECKING:
+    from rosz.security import KeyFolder
     from rosz.session.config import SessionConfig
 
 __all__ = ("refusals", "tell_refusals")
@@ -19,20 +20,25 @@ _log = logging.getLogger("rosz.session")
 
 
 def refusals(config: SessionConfig) -> list[str]:
-    """Return the endpoints that no link leads to, each with the reason.
+    """Return the endpoints that no link leads to for want of keys, each with the reason.
 
-    Asks each of them, which takes seconds where nobody answers; without keys there is none to ask.
+    Asks each of them, which takes seconds where nobody answers.
     """
-    if config.keys is None:
-        return []
-    from rosz.security.handshake import refusal
+    places = list(dict.fromkeys((config.rendezvous, *config.connect)))
+    if config.keys is not None:
+        places = [dialled(endpoint) for endpoint in places]
+    reasons = {endpoint: _reason(endpoint, config.keys) for endpoint in places}
+    return [f"'{endpoint}': {reason}" for endpoint, reason in reasons.items() if reason]
 
-    found = []
-    for endpoint in map(secured, dict.fromkeys((config.rendezvous, *config.connect))):
-        reason = refusal(endpoint, config.keys) if endpoint.startswith("tls/") else ""
-        if reason:
-            found.append(f"'{endpoint}': {reason}")
-    return found
+
+def _reason(endpoint: str, keys: KeyFolder | None) -> str:
+    if is_local(endpoint) or not endpoint.startswith(("tcp/", "tls/")):
+        return ""
+    from rosz.security.handshake import refusal, wants_keys
+
+    if keys is not None:
+        return refusal(endpoint, keys)
+    return "it wants keys, and there are none here: set ROSZ_KEYS" if wants_keys(endpoint) else ""
 
 
 def tell_refusals(config: SessionConfig) -> None:
@@ -40,9 +46,7 @@ def tell_refusals(config: SessionConfig) -> None:
 
     Whom this end lets in is Zenoh's to decide, and told by Zenoh's own log.
     """
-    if config.keys is None:
-        return
-    if config.listen:
+    if config.keys is not None and config.listen:
         zenoh.init_log_from_env_or("zenoh_link_tls=warn")
     if config.connect and not config.must_connect and config.mode != "client":
         threading.Thread(target=_tell, args=(config,), name="rosz-refusals", daemon=True).start()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import zenoh
 
 from rosz.errors import TransportError
+from rosz.session.calls import ENDING, keep
+from rosz.session.ending import ClosedSession
 from rosz.session.stamp import Stamp
 
 if TYPE_CHECKING:
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ("Query", "Reply", "Sample", "stamp_of", "to_timestamp")
 
 _SECOND = 1_000_000_000
+_ANSWERED: Final = ClosedSession("the question is closed")
 
 
 def stamp_of(timestamp: zenoh.Timestamp | None) -> Stamp | None:
@@ -33,6 +36,11 @@ def to_timestamp(stamp: Stamp) -> zenoh.Timestamp:
     digits = stamp.id if len(stamp.id) % 2 == 0 else "0" + stamp.id
     # Zenoh prints an id as one number, and takes it as little-endian bytes.
     return zenoh.Timestamp(zenoh.NTP64(seconds, nanoseconds), bytes.fromhex(digits)[::-1])
+
+
+def _check_end() -> None:
+    if ENDING.is_set():
+        raise TransportError("cannot answer: the program ends")
 
 
 class Sample:
@@ -81,7 +89,7 @@ class Query:
     __slots__ = ("_raw",)
 
     def __init__(self, raw: zenoh.Query) -> None:
-        self._raw = raw
+        self._raw: Any = raw
 
     @property
     def key(self) -> str:
@@ -116,8 +124,9 @@ class Query:
         """Send one answer.
 
         Raises:
-            TransportError: The session is closed.
+            TransportError: The session is closed, or the program is about to end.
         """
+        _check_end()
         try:
             self._raw.reply(
                 key,
@@ -132,8 +141,9 @@ class Query:
         """Send an error as the answer.
 
         Raises:
-            TransportError: The session is closed.
+            TransportError: The session is closed, or the program is about to end.
         """
+        _check_end()
         try:
             self._raw.reply_err(text.encode())
         except zenoh.ZError as error:
@@ -141,7 +151,18 @@ class Query:
 
     def close(self) -> None:
         """Tell the asker that no more answers come; again is no error."""
-        self._raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
+        raw, self._raw = self._raw, _ANSWERED
+        if raw is _ANSWERED:
+            return
+        if ENDING.is_set():
+            keep(raw)
+        else:
+            raw.drop()
+        del raw
+
+    def __del__(self) -> None:
+        """Close what nobody closed."""
+        self.close()
 
     def __enter__(self) -> Self:
         return self
@@ -158,42 +179,39 @@ class Query:
 class Reply:
     """One answer that arrived; when not ``ok`` the payload is the text of the error."""
 
-    __slots__ = ("_raw", "ok")
+    __slots__ = ("_raw", "_sample", "ok")
 
     def __init__(self, raw: zenoh.Reply) -> None:
         self._raw = raw
-        self.ok = raw.ok is not None
+        self._sample = sample = raw.ok  # anew with every look
+        self.ok = sample is not None
 
     @property
     def key(self) -> str:
         """Key that the answer is for; empty for an error."""
-        sample = self._raw.ok
-        return "" if sample is None else str(sample.key_expr)
+        return "" if self._sample is None else str(self._sample.key_expr)
 
     @property
     def payload(self) -> bytes:
         """The answer, or the text of the error."""
-        result = self._raw.result
+        result = self._sample or self._raw.result
         return result.payload.to_bytes()
 
     @property
     def attachment(self) -> bytes | None:
         """What came beside the payload."""
-        sample = self._raw.ok
-        raw = None if sample is None else sample.attachment
+        raw = None if self._sample is None else self._sample.attachment
         return None if raw is None else raw.to_bytes()
 
     @property
     def stamp(self) -> Stamp | None:
         """When the value was written, by the network's clock."""
-        sample = self._raw.ok
-        return None if sample is None else stamp_of(sample.timestamp)
+        return None if self._sample is None else stamp_of(self._sample.timestamp)
 
     @property
     def deleted(self) -> bool:
         """Whether the answer is that the key was deleted."""
-        sample = self._raw.ok
-        return sample is not None and sample.kind == zenoh.SampleKind.DELETE
+        return self._sample is not None and self._sample.kind == zenoh.SampleKind.DELETE
 
     @property
     def replier(self) -> str | None:

@@ -3,7 +3,8 @@
 A peer hears of the other peers from the one it meets first, and connects to them in the background.
 What it publishes before that is done misses those it is not linked to yet. So it asks whom it
 meets for *their* links, and is settled once it has all of them itself. Those of other machines, to
-whom routers carry what it says, listen where it cannot reach them, and are left out.
+whom routers carry what it says, listen where it cannot reach them, and are left out; and so are
+those that are stopped, who answer nobody until they go on.
 """
 
 from __future__ import annotations
@@ -94,13 +95,13 @@ class Settling:
     def _settle(self) -> None:
         deadline = time.monotonic() + self._timeout
         while (left := deadline - time.monotonic()) > 0 and not self._stop.wait(_POLL):
-            if self._session.peers() and (
-                not self._mesh or self._neighbours(left) <= self._linked()
-            ):
+            if self._session.peers() and (not self._mesh or not self._missing(left)):
                 return
 
-    def _linked(self) -> set[str]:
-        return {self._session.zid, *self._session.peers()}
+    def _missing(self, timeout: float) -> set[str]:
+        """Return those that it could be linked to, and is not."""
+        missing = self._neighbours(timeout) - {self._session.zid, *self._session.peers()}
+        return missing - self._session.out_of_reach() if missing else missing
 
     def _neighbours(self, timeout: float) -> set[str]:
         """Return everybody that those who are linked to this session are linked to."""
@@ -125,18 +126,13 @@ def serve_links(session: Session) -> Closable:
     """Tell others whom a session is linked to."""
 
     def answer(query: Query) -> None:
-        # Zenoh forbids calls into the session on its own threads.
-        threading.Thread(target=_answer, args=(session, query), daemon=True).start()
+        with query:
+            try:
+                query.reply(_own_key(session), msgspec.msgpack.encode(session.peers()))
+            except RoszError:
+                return  # the session closed meanwhile; whoever asked sees that it is gone
 
     return session.queryable(_own_key(session), answer)
-
-
-def _answer(session: Session, query: Query) -> None:
-    with query:
-        try:
-            query.reply(_own_key(session), msgspec.msgpack.encode(session.peers()))
-        except RoszError:
-            return  # the session closed meanwhile; whoever asked sees that it is gone
 
 
 def _own_key(session: Session) -> str:

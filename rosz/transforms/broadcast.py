@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from copy import deepcopy
 from typing import Any
 
 from rosz.msgs.tf2_msgs.msg import TFMessage
@@ -48,5 +49,5 @@ class StaticTransformBroadcaster:
     def send(self, transform: Any) -> None:
         """Tell of a TransformStamped, or of several, and of all that were told before."""
         for one in _listed(transform):
-            self._told[one.child_frame_id] = one
+            self._told[one.child_frame_id] = deepcopy(one)  # the caller may fill it anew
         self._publisher.publish(TFMessage(list(self._told.values())))

@@ -1,0 +1,125 @@
+"""Knowing which processes of this machine are stopped, as by Ctrl-Z, and what to say of them.
+
+The kernel still accepts connections for one, and nothing ever answers; so whoever looks before it
+connects need not find out by waiting. What cannot be seen, as in another container, counts as
+running.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+__all__ = ("describe", "is_stopped", "listener", "namespace", "peer_of", "remedy")
+
+_PROC = Path("/proc")
+_STOPPED = frozenset("Tt")
+"""By a signal, and by a debugger."""
+_LISTENS = "0A"
+_CREDENTIALS = struct.Struct("3i")
+_SHOWN = 60
+
+
+def is_stopped(pid: int) -> bool:
+    """Tell whether a process of this machine is stopped; one that cannot be seen is not."""
+    try:
+        line = (_PROC / str(pid) / "stat").read_text()
+    except OSError:
+        return False
+    return line.rpartition(")")[2].split()[0] in _STOPPED
+
+
+@cache
+def namespace() -> str:
+    """Return what all have in common to whom a process id means the same; empty if unknown."""
+    try:
+        return str((_PROC / "self/ns/pid").stat().st_ino)
+    except OSError:  # another system than Linux
+        return ""
+
+
+def describe(pid: int) -> str:
+    """Return the command of a process as people know it, with its id."""
+    try:
+        words = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
+    except OSError:
+        words = []
+    words = [word for word in words if word]
+    if len(words) > 1 and "python" in Path(words[0]).name and not words[1].startswith("-"):
+        del words[0]
+    if not words:
+        return f"process {pid}"
+    line = " ".join((Path(words[0]).name, *words[1:])).replace("\n", " ")
+    return f"'{line if len(line) <= _SHOWN else line[: _SHOWN - 1] + '…'}' (pid {pid})"
+
+
+def remedy(pid: int) -> str:
+    """Return what to do about a process that is stopped."""
+    return (
+        f"let it go on with 'fg' in its terminal or 'kill -CONT {pid}', or end it with"
+        f" 'kill -9 {pid}'"
+    )
+
+
+def listener(endpoint: str, candidates: Iterable[int]) -> int | None:
+    """Return the process that listens at an endpoint of this machine, if it is one of some.
+
+    Args:
+        endpoint: Such as ``tcp/localhost:7447`` or ``unixsock-stream//run/z.sock``.
+        candidates: Ids of the processes that it may be.
+    """
+    protocol, _, address = endpoint.partition("#")[0].partition("/")
+    address = address.partition("?")[0]
+    if protocol == "unixsock-stream":
+        pid = _unix_listener(address)
+        return pid if pid in candidates else None
+    if protocol not in {"tcp", "tls"}:
+        return None
+    port = address.rpartition(":")[2]
+    wanted = set(_tcp_listeners(int(port))) if port.isdecimal() else set()
+    return next((pid for pid in candidates if not wanted.isdisjoint(_sockets(pid))), None)
+
+
+def _unix_listener(path: str) -> int:
+    """Return the process that listens at a unix socket; 0 if that is not known."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.setblocking(False)
+        if probe.connect_ex(path):
+            return 0
+        return peer_of(probe)
+
+
+def peer_of(connection: socket.socket) -> int:
+    """Return the process at the other end of a connected unix socket, or that listens there."""
+    told = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    pid: int = _CREDENTIALS.unpack(told)[0]
+    return pid
+
+
+def _tcp_listeners(port: int) -> Iterator[str]:
+    """Yield the sockets that listen at a port of this machine, as links of open files name them."""
+    for table in ("net/tcp", "net/tcp6"):
+        try:
+            lines = (_PROC / table).read_text().splitlines()[1:]
+        except OSError:
+            continue
+        for line in lines:
+            place, _, state, *rest = line.split()[1:]
+            if state == _LISTENS and int(place.rpartition(":")[2], 16) == port:
+                yield f"socket:[{rest[5]}]"
+
+
+def _sockets(pid: int) -> Iterator[str]:
+    """Yield the open files of a process, as far as they may be seen."""
+    try:
+        files = list((_PROC / str(pid) / "fd").iterdir())
+    except OSError:
+        return
+    for file in files:
+        try:
+            yield str(file.readlink())
+        except OSError:
+            continue
