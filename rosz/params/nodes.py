@@ -1,7 +1,8 @@
 """YAML text as nodes that know their place, composed without trusting its depth.
 
 PyYAML's own composer recurses in C over whatever is nested, so that a few thousand brackets end the
-process. This one takes the parser's events, which are flat, and refuses to go deep.
+process. This one takes the parser's events, which are flat, and refuses to go deep, and to let
+aliases unfold to a size out of all proportion.
 """
 
 from __future__ import annotations
@@ -14,13 +15,59 @@ import yaml
 from rosz.errors import YamlError
 from rosz.params.values import MAX_DEPTH, unsound_text
 
-__all__ = ("fault", "read_nodes")
+__all__ = ("SCALAR_FAULTS", "fault", "read_nodes", "read_plain", "shown_tag")
+
+SCALAR_FAULTS: Final = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+"""What PyYAML lets through when a tag is put on a scalar that does not fit it."""
+
+_MOST_REPEATED: Final = 100_000
+"""Values that aliases may add to a document; beyond it, the document is taken for an attack."""
+
+_SafeLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _PlainLoader(_SafeLoader):  # type: ignore[misc]  # either of two base classes
+    """PyYAML's safe loader, which says of every scalar that does not fit its tag where it is."""
+
+    def construct_object(self, node: Any, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except SCALAR_FAULTS as error:
+            if not isinstance(node, yaml.ScalarNode):
+                raise
+            reason = f"'{node.value}' is no {shown_tag(node)}: {error}"
+            raise yaml.constructor.ConstructorError(
+                problem=reason, problem_mark=node.start_mark
+            ) from error
 
 
 def fault(node: Any, reason: str, path: str) -> YamlError:
     """Return the error that names where a node, event or mark of PyYAML's stands."""
     mark = getattr(node, "start_mark", node)
     return YamlError(reason, path, mark.line + 1, mark.column + 1)
+
+
+def shown_tag(node: Any) -> str:
+    """Return the tag of a node in YAML's short form."""
+    return str(node.tag.replace("tag:yaml.org,2002:", "!!"))
+
+
+def read_plain(text: str, path: str) -> Iterator[Any]:
+    """Yield what each document of a text holds, by PyYAML's safe rules.
+
+    Args:
+        text: YAML.
+        path: Where it is from, for messages.
+
+    Raises:
+        YamlError: It is no YAML, is nested too deep, or a value does not fit its tag.
+    """
+    for loader, node in read_nodes(_PlainLoader, text, path):
+        try:
+            value = loader.construct_document(node)
+        except yaml.MarkedYAMLError as error:
+            raise fault(error.problem_mark or node, str(error.problem), path) from error
+        yield value
 
 
 def read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, Any]]:
@@ -32,7 +79,7 @@ def read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, A
         path: Where it is from, for messages.
 
     Raises:
-        YamlError: It is no YAML, or is nested too deep.
+        YamlError: It is no YAML, is nested too deep, or repeats too much by aliases.
     """
     reason = unsound_text(text)
     if reason:
@@ -55,27 +102,44 @@ def read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, A
         loader.dispose()
 
 
+class _Anchored:
+    """A node that aliases may repeat, with what each of them adds to the document."""
+
+    def __init__(self, node: Any) -> None:
+        self.node = node
+        self.size = self.height = 0  # until it is whole
+
+
 class _Composer:
     """Makes the nodes of one document."""
 
     def __init__(self, loader: Any, path: str) -> None:
         self._loader = loader
         self._path = path
-        self._anchors: dict[str, Any] = {}
+        self._anchors: dict[str, _Anchored] = {}
+        self._size = 0
+        self._deepest = 0
+        self._repeated = 0
 
     def compose(self, depth: int) -> Any:
         event = self._loader.get_event()
         if isinstance(event, yaml.AliasEvent):
-            if event.anchor not in self._anchors:
-                raise fault(event, f"the alias '*{event.anchor}' names no anchor", self._path)
-            return self._anchors[event.anchor]
-        if depth > MAX_DEPTH:
-            raise fault(event, f"it is nested more than {MAX_DEPTH} deep", self._path)
+            return self._repeat(event, depth)
+        self._count(event, depth, 1)
         node = self._empty(event)
-        if event.anchor:
-            if event.anchor in self._anchors:
-                raise fault(event, f"the anchor '&{event.anchor}' is taken", self._path)
-            self._anchors[event.anchor] = node
+        if not event.anchor:
+            self._fill(node, event, depth)
+            return node
+        if event.anchor in self._anchors:
+            raise fault(event, f"the anchor '&{event.anchor}' is taken", self._path)
+        anchored = self._anchors[event.anchor] = _Anchored(node)
+        size, deepest, self._deepest = self._size, self._deepest, depth
+        self._fill(node, event, depth)
+        anchored.size, anchored.height = self._size - size + 1, self._deepest - depth
+        self._deepest = max(deepest, self._deepest)
+        return node
+
+    def _fill(self, node: Any, event: Any, depth: int) -> None:
         if isinstance(event, yaml.SequenceStartEvent):
             while not self._loader.check_event(yaml.SequenceEndEvent):
                 node.value.append(self.compose(depth + 1))
@@ -84,7 +148,27 @@ class _Composer:
             while not self._loader.check_event(yaml.MappingEndEvent):
                 node.value.append((self.compose(depth + 1), self.compose(depth + 1)))
             self._loader.get_event()
-        return node
+
+    def _repeat(self, alias: Any, depth: int) -> Any:
+        anchored = self._anchors.get(alias.anchor)
+        if anchored is None:
+            raise fault(alias, f"the alias '*{alias.anchor}' names no anchor", self._path)
+        self._count(alias, depth + anchored.height, anchored.size)
+        self._repeated += anchored.size
+        if self._repeated > _MOST_REPEATED:
+            raise fault(
+                alias,
+                f"aliases repeat more than {_MOST_REPEATED} values: this looks like a YAML bomb; "
+                "write them out if it is not",
+                self._path,
+            )
+        return anchored.node
+
+    def _count(self, event: Any, depth: int, size: int) -> None:
+        self._size += size
+        self._deepest = max(self._deepest, depth)
+        if depth > MAX_DEPTH:
+            raise fault(event, f"it is nested more than {MAX_DEPTH} deep", self._path)
 
     def _empty(self, event: Any) -> Any:
         kind, content = _NODES[type(event)]

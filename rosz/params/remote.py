@@ -1,21 +1,26 @@
-"""The parameter store for those who are no replicas: they ask one."""
+"""The parameter store for those who are no replicas: they ask one.
+
+Who only reads loads nothing of a replica, which takes longer than to ask.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
 from rosz.params.keys import Keys, Member
 from rosz.params.merge import Change, condense, spread
 from rosz.params.paths import joined, split
-from rosz.params.replica import ACKNOWLEDGED_BY, Outcome, process_label
-from rosz.params.replica.follower import NOBODY, Follower
 from rosz.params.values import Value, normalise
 from rosz.params.wire import Answer, Batch, Question, decode, encode
 from rosz.params.writes import DELETED
 from rosz.session import Session, Stamp
+
+if TYPE_CHECKING:
+    from rosz.params.replica import Outcome
+    from rosz.params.replica.follower import Follower
 
 __all__ = ("ParamClient",)
 
@@ -42,7 +47,7 @@ class ParamClient:
         self._session = session
         self._domain = domain
         self._keys = Keys(domain, scoped=session.secured)
-        self._origin = origin or process_label()
+        self._origin = origin
         self._timeout = timeout
         self._members: list[Member] = []
         self._silent: dict[str, Member] = {}
@@ -141,6 +146,8 @@ class ParamClient:
             NoReplica: Nobody holds the store.
             WaitTimeout: Those who hold it do not answer.
         """
+        from rosz.params.replica import ACKNOWLEDGED_BY, Outcome, process_label
+
         batch = list(changes)
         if not batch:
             self._look()
@@ -148,7 +155,7 @@ class ParamClient:
         seen = self._ask(Question("stamp")).value
         self._session.clock.observe(Stamp(int(seen), ""))
         stamp = self._session.stamp()
-        message = Batch.of((stamp.time, stamp.id), self._origin, batch)
+        message = Batch.of((stamp.time, stamp.id), self._origin or process_label(), batch)
         patience = min(ACKNOWLEDGED_BY, self._timeout)
         answer = self._ask(Question("write", batch=message, timeout=patience), batch)
         return Outcome(stamp.time, tuple(answer.slow))
@@ -159,6 +166,8 @@ class ParamClient:
         Raises:
             NoReplica: Nobody holds the store.
         """
+        from rosz.params.replica.follower import Follower
+
         return Follower(self._session, self._domain, _TOKENS_BY)
 
     @property
@@ -170,6 +179,8 @@ class ParamClient:
         tokens = self._session.live_tokens(self._keys.tokens, _TOKENS_BY)
         self._members = sorted(self._keys.member(token) for token in tokens)
         if not self._members:
+            from rosz.params.replica.follower import NOBODY
+
             raise NoReplica(NOBODY)
         return self._members
 
@@ -184,7 +195,11 @@ class ParamClient:
         data = encode(question)
         patience = question.timeout + _PATIENCE
         while True:
-            for member in sorted(self._members or self._look(), key=self._was_silent):
+            stopped = self._session.out_of_reach()
+            for member in sorted(
+                self._members or self._look(),
+                key=lambda one: (one.zid in stopped, one.zid in self._silent),
+            ):
                 answer = self._ask_one(self._key(member, batch), member, data, patience)
                 if answer is not None and answer.status != "joining":
                     return _checked(question, answer)
@@ -209,9 +224,6 @@ class ParamClient:
         if replies:  # an error in place of an answer: the time is over; nothing at all: it is gone
             self._silent[member.zid] = member
         return None
-
-    def _was_silent(self, member: Member) -> bool:
-        return member.zid in self._silent
 
 
 def _checked(question: Question, answer: Answer) -> Answer:

@@ -17,24 +17,18 @@ import yaml
 
 from rosz.errors import ParamError, YamlError
 from rosz.params import angles
-from rosz.params.nodes import fault, read_nodes
-from rosz.params.values import MAX_DEPTH, Value, normalise, type_name
+from rosz.params.nodes import SCALAR_FAULTS, fault, read_nodes, shown_tag
+from rosz.params.values import Value, normalise, type_name
 
 __all__ = ("dump", "format_get", "inline", "load", "load_all", "load_documents", "pretty")
 
 _NAMESPACE_KEY: Final = "_ns"
-_MOST_REPEATED: Final = 100_000
-"""Values that aliases may add to a document; beyond it, the document is taken for an attack."""
-
 _MAP: Final = "tag:yaml.org,2002:map"
 _SEQ: Final = "tag:yaml.org,2002:seq"
 _BINARY: Final = "tag:yaml.org,2002:binary"
 _STR: Final = "tag:yaml.org,2002:str"
 _MERGE: Final = "tag:yaml.org,2002:merge"
 _VALUE: Final = "tag:yaml.org,2002:value"
-_SCALAR_FAULTS: Final = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
-"""What PyYAML lets through when a tag is put on a scalar that does not fit it."""
-
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -165,7 +159,7 @@ def _pretty_lines(tree: dict[str, Value], indent: str) -> Iterator[str]:
 def _read(text: str, path: str) -> Iterator[tuple[Value, int]]:
     """Yield the value of each document and the line, from 0, that it starts on."""
     for loader, node in read_nodes(_Loader, text, path):
-        yield _Builder(loader, path).build(node, 0), node.start_mark.line
+        yield _Builder(loader, path).build(node), node.start_mark.line
 
 
 class _Builder:
@@ -175,42 +169,24 @@ class _Builder:
         self._loader = loader
         self._path = path
         self._open: set[int] = set()
-        self._seen: set[int] = set()
-        self._repeated = 0
 
-    def build(self, node: Any, depth: int) -> Value:
+    def build(self, node: Any) -> Value:
         """Return the value of a node."""
         if node.tag == _STR and isinstance(node, yaml.ScalarNode) and node.value.isascii():
             return node.value
-        self._count(node)
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node)
         if id(node) in self._open:
             raise self._error(node, "it contains itself")
-        if depth > MAX_DEPTH:
-            raise self._error(node, f"it is nested more than {MAX_DEPTH} deep")
         self._open.add(id(node))
         if node.tag == _SEQ and isinstance(node, yaml.SequenceNode):
-            value: Value = [self.build(item, depth + 1) for item in node.value]
+            value: Value = [self.build(item) for item in node.value]
         elif node.tag == _MAP and isinstance(node, yaml.MappingNode):
-            value = self._mapping(node, depth)
+            value = self._mapping(node)
         else:
-            tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-            raise self._error(node, f"the tag '{tag}' means nothing for a parameter")
+            raise self._error(node, f"the tag '{shown_tag(node)}' means nothing for a parameter")
         self._open.discard(id(node))
         return value
-
-    def _count(self, node: Any) -> None:
-        if id(node) not in self._seen:
-            self._seen.add(id(node))
-            return
-        self._repeated += 1
-        if self._repeated > _MOST_REPEATED:
-            raise self._error(
-                node,
-                f"aliases repeat more than {_MOST_REPEATED} values: this looks like a YAML bomb; "
-                "write them out if it is not",
-            )
 
     def _scalar(self, node: Any) -> Value:
         try:
@@ -220,31 +196,31 @@ class _Builder:
             raise self._error(node, str(error.problem)) from error
         except ParamError as error:
             raise self._error(node, str(error)) from error
-        except _SCALAR_FAULTS as error:
-            tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-            raise self._error(node, f"'{node.value}' is no {tag}: {error}") from error
+        except SCALAR_FAULTS as error:
+            reason = f"'{node.value}' is no {shown_tag(node)}: {error}"
+            raise self._error(node, reason) from error
 
-    def _mapping(self, node: Any, depth: int) -> dict[str, Value]:
+    def _mapping(self, node: Any) -> dict[str, Value]:
         merged: dict[str, Value] = {}
         own: dict[str, Value] = {}
         for key_node, value_node in node.value:
             if key_node.tag == _MERGE:
-                self._merge(merged, value_node, depth)
+                self._merge(merged, value_node)
             else:
-                own[self._key(key_node, depth)] = self.build(value_node, depth + 1)
+                own[self._key(key_node)] = self.build(value_node)
         return {**merged, **own} if merged else own
 
-    def _merge(self, into: dict[str, Value], node: Any, depth: int) -> None:
+    def _merge(self, into: dict[str, Value], node: Any) -> None:
         parts = node.value[::-1] if isinstance(node, yaml.SequenceNode) else [node]
         for part in parts:
             if not isinstance(part, yaml.MappingNode):
                 raise self._error(part, "'<<' takes a mapping, or a list of mappings")
-            into.update(self.build(part, depth + 1))
+            into.update(self.build(part))
 
-    def _key(self, node: Any, depth: int) -> str:
+    def _key(self, node: Any) -> str:
         if node.tag == _VALUE:
             return str(node.value)
-        key = self.build(node, depth + 1)
+        key = self.build(node)
         if type(key) is not str:
             raise self._error(
                 node,

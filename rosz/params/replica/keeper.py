@@ -11,6 +11,7 @@ from typing import Final
 from rosz.params.keys import Member
 from rosz.params.replica.mirror import Mirror
 from rosz.params.replica.sync import Synchroniser
+from rosz.session.starting import start
 
 __all__ = ("Keeper",)
 
@@ -71,9 +72,8 @@ class Keeper:
         elif now >= self._reconcile_at and self._oldest():
             self._reconcile_at = now + _RECONCILE_EVERY
             # It waits for answers, which the worker must not.
-            threading.Thread(
-                target=self._mirror.reconcile, name="rosz-params-mirror", daemon=True
-            ).start()
+            target = self._mirror.reconcile
+            start(threading.Thread(target=target, name="rosz-params-mirror", daemon=True))
 
     def _oldest(self) -> bool:
         return all(self._own < other for other in self._sync.members.all())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Final
 
@@ -88,19 +88,20 @@ class Line:
             ClosedError: The session is closed.
             TransportError: The session cannot send.
         """
-        deadline = time.monotonic() + timeout
+        began = time.monotonic()
+        deadline = began + timeout
         pending = self.acks.open(members.zids if timeout > 0 else ())
         try:
             batch = Batch.of((stamp.time, stamp.id), origin, changes)
             data = seal(self._session.zid, pending.number, encode(batch))
             self._tell(changes, data)
-            if not pending.wait(min(_PATIENCE, timeout)):
+            if not pending.wait(min(_PATIENCE, timeout)) and not self._are_stopped(pending):
                 self._tell_again(pending, changes, data, deadline - time.monotonic())
                 pending.wait(deadline - time.monotonic())
         finally:
-            late = sorted(members.label(zid) for zid in self.acks.close(pending))
+            late = self._labels(self.acks.close(pending), members)
         if late:
-            _warn(changes, late, timeout)
+            _warn(changes, late, time.monotonic() - began)
         return tuple(late)
 
     def gone(self, zid: str) -> None:
@@ -123,6 +124,14 @@ class Line:
             self._session.put(key, data)
         else:
             self._change.put(data)
+
+    def _are_stopped(self, pending: Pending) -> bool:
+        """Tell whether all that a write waits for will get it when they go on, and not before."""
+        return self._session.out_of_reach().issuperset(pending.waiting.copy())
+
+    def _labels(self, late: Collection[str], members: Members) -> list[str]:
+        stopped = self._session.out_of_reach() if late else ()
+        return sorted(members.label(zid) + " (stopped)" * (zid in stopped) for zid in late)
 
     def _tell_again(
         self, pending: Pending, changes: list[Change], data: bytes, timeout: float
@@ -228,12 +237,12 @@ class Line:
             query.reply(query.key, b"")
 
 
-def _warn(changes: list[Change], late: list[str], timeout: float) -> None:
+def _warn(changes: list[Change], late: list[str], seconds: float) -> None:
     more = f" and {len(changes) - 1} more" if len(changes) > 1 else ""
     _log.warning(
-        "'%s'%s is written, but not yet known to %s, which did not answer within %g s",
+        "'%s'%s is written, but not yet known to %s, which did not answer within %.2g s",
         joined(changes[0][0]) if changes else "/",
         more,
         ", ".join(late),
-        timeout,
+        seconds,
     )

@@ -162,12 +162,19 @@ class Mirror:
 
 
 def _shown(value: Value, path: Path) -> Iterator[tuple[Path, Value]]:
-    """Yield what has a key of its own: all that is no dict, and dicts that are empty."""
-    if type(value) is not dict or (not value and path):
+    """Yield what has a key of its own: all that is no dict, and dicts that are empty.
+
+    So does a dict whose names no key could tell from others: that of ``b/c`` is one level deeper.
+    """
+    if type(value) is not dict or (not value and path) or not all(map(_is_part, value)):
         yield path, value
         return
     for key, item in value.items():
         yield from _shown(item, (*path, key))
+
+
+def _is_part(name: str) -> bool:
+    return bool(name) and "/" not in name
 
 
 def _leaves_above(root: Value, path: Path) -> Iterator[Path]:

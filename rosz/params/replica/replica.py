@@ -63,6 +63,8 @@ class Outcome(msgspec.Struct, frozen=True):
 def process_label() -> str:
     """Return what people call this process: its program, number and host."""
     program = PurePath(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
+    # The name of a file may be no UTF-8, but others are told of it.
+    program = program.encode(errors="surrogateescape").decode(errors="replace")
     return f"{program} (pid {os.getpid()} on {socket.gethostname()})"
 
 

@@ -204,11 +204,16 @@ class State:
         """
         if not self._lock.acquire(timeout=timeout):
             return False
-        if self._unread:
-            self._reading = True
-            while self._unread:
-                self._take(*self._unread.popleft())
+        try:
+            if self._unread:
+                self._reading = True
+                while self._unread:
+                    self._take(*self._unread.popleft())
+                self._reading = False
+        except BaseException:  # Ctrl-C comes anywhere
             self._reading = False
+            self._lock.release()
+            raise
         return True
 
     def leave(self) -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import logging
 import random
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Final
@@ -46,9 +46,14 @@ _TIMEOUT: Final = 5.0
 _PATIENCE: Final = 0.3
 """Seconds that a joining replica gives one other before it asks the next as well."""
 
-_JOINED_BY: Final = 5.0
+_JOINED_BY: Final = 30.0
+_TOLD_AFTER: Final = 5.0
+"""Seconds after which who joins in vain says so: a hundred that start at once take their time."""
 _SPREAD: Final = 0.05
 """Seconds over which replicas that find each other spread their questions, for each ten of them."""
+
+_MOST_MET: Final = 8
+"""Replicas to compare with of those that appear together, else many that start ask for ever."""
 
 
 class Synchroniser:
@@ -76,14 +81,16 @@ class Synchroniser:
         self.members = members
         self.worker = worker
         self.busy: set[str] = set()
+        self._met: set[str] = set()
 
     def join(self) -> None:
         """Get what the others have, from the first that has it and answers."""
         answers: SimpleQueue[bool] = SimpleQueue()
         asked: list[str] = []
         open_questions = 0
-        deadline = time.monotonic() + _JOINED_BY
-        while time.monotonic() < deadline:
+        began = time.monotonic()
+        told = False
+        while (passed := time.monotonic() - began) < _JOINED_BY:
             for member in self.members.all():
                 if member.zid not in asked:
                     asked.append(member.zid)
@@ -97,11 +104,19 @@ class Synchroniser:
                     break
                 open_questions -= 1
             except Empty:
-                continue
+                stopped = self.session.out_of_reach() >= self.members.zids
+                if stopped or (passed > _TOLD_AFTER and not told):
+                    told = True
+                    self._complain(asked, passed)
+                if stopped:
+                    break
         else:
-            labels = ", ".join(self.members.label(zid) for zid in asked)
-            _log.warning("no replica of the parameters answered in %g s: %s", _JOINED_BY, labels)
+            self._complain(asked, _JOINED_BY)
         self.ready = True
+
+    def _complain(self, asked: Iterable[str], seconds: float) -> None:
+        labels = ", ".join(self.members.label(zid) for zid in asked)
+        _log.warning("no replica of the parameters answered in %.2g s: %s", seconds, labels)
 
     def serve(self, query: Query) -> None:
         """Answer another replica."""
@@ -110,10 +125,12 @@ class Synchroniser:
             query.close()
 
     def meet(self, member: Member) -> None:
-        """Compare with a replica that has appeared, at a moment that not all choose alike."""
-        spread = _SPREAD * (1 + len(self.members.zids) / 10)
-        delay = random.uniform(0, spread)  # noqa: S311  # nothing secret
-        self.worker.later(delay, lambda: self._compare(member.zid))
+        """Compare with a replica that has appeared, at a moment that not all choose alike.
+
+        Of many that appear together, as behind a link that is back, some are enough: they have told
+        each other what they know. What is missing even so is found by comparing now and then.
+        """
+        self.worker.submit(lambda: self._meet(member.zid))
 
     def compare_with_one(self) -> None:
         """Compare with a replica chosen by chance."""
@@ -128,6 +145,18 @@ class Synchroniser:
         for zid in zids:
             self.worker.submit(partial(self._compare, zid, done))
         return len(zids)
+
+    def _meet(self, zid: str) -> None:
+        if not self._met:
+            spread = _SPREAD * (1 + len(self.members.zids) / 10)
+            delay = random.uniform(0, spread)  # noqa: S311  # nothing secret
+            self.worker.later(delay, self._compare_with_met)
+        self._met.add(zid)
+
+    def _compare_with_met(self) -> None:
+        met, self._met = sorted(self._met), set()
+        for zid in random.sample(met, min(len(met), _MOST_MET)):
+            self._compare(zid)
 
     def _compare(self, zid: str, done: Callable[[bool], object] = bool) -> None:
         if zid in self.busy:

@@ -122,10 +122,11 @@ class Watchers:
         if not self._watches:
             return
         with self._lock:
+            idle = not self._steps
             self._steps.append(_Step(old, new, tuple(writes)))
             if len(self._steps) > _BACKLOG:
                 self._steps = deque([_condensed(self._steps)])
-            if self._worker is not None:
+            if idle and self._worker is not None:
                 self._worker.submit(self._call)
 
     def close(self) -> None:
@@ -143,6 +144,8 @@ class Watchers:
                 return
             step = self._steps.popleft()
             watches = self._watches
+            if self._steps and self._worker is not None:
+                self._worker.submit(self._call)
         for watch in watches:
             for change in _seen_from(watch.path, step):
                 if watch in self._watches:
@@ -151,7 +154,7 @@ class Watchers:
     def _deliver(self, watch: Watch, change: Changed) -> None:
         try:
             watch.callback(change)
-        except Exception:  # noqa: BLE001  # a program's own code: it must not end the others' calls
+        except BaseException:  # noqa: BLE001  # a program's own code: it must not end the others' calls
             _log.exception("the callback that watches '%s' failed on '%s'", watch.name, change.name)
 
 
