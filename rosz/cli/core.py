@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import threading
 import uuid
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from rosz.cli.declare import App, Option
 from rosz.cli.group import print_lines, until_stopped
 from rosz.errors import UsageError
 
@@ -17,29 +17,27 @@ if TYPE_CHECKING:
 
 __all__ = ("app",)
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = App()
 
 
-@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+@app.command()
 def core_command(
     *,
     listen: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             metavar="ENDPOINT", help="Listen there as well, such as tcp/0.0.0.0:7447; repeatable."
         ),
     ] = None,
     connect: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="ENDPOINT", help="Connect to another machine, tcp/robot1:7447; repeatable."
-        ),
+        Option(metavar="ENDPOINT", help="Connect to another machine, tcp/robot1:7447; repeatable."),
     ] = None,
     keys: Annotated[
-        str, typer.Option(metavar="DIR", help="Keys that links beyond this machine need.")
+        str, Option(metavar="DIR", help="Keys that links beyond this machine need.")
     ] = "",
-    store: Annotated[str, typer.Option(metavar="FILE", help="Keep the parameters in a file.")] = "",
-    port: Annotated[str, typer.Option("-p", "--port", hidden=True)] = "",
+    store: Annotated[str, Option(metavar="FILE", help="Keep the parameters in a file.")] = "",
+    port: Annotated[str, Option("-p", "--port", hidden=True)] = "",
 ) -> None:
     """Hold the meeting point of this machine and a replica of the parameters, until stopped.
 
@@ -52,6 +50,7 @@ def core_command(
         )
     import msgspec
 
+    from rosz.cli.zenohlog import zenoh_log_bounded
     from rosz.environment import Environment
     from rosz.introspect.core import Core
 
@@ -59,7 +58,12 @@ def core_command(
     if keys:
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     file = Path(store).absolute() if store else None
-    with until_stopped() as ready, Core(environment, listen or (), connect or (), file) as core:
+    bounded = nullcontext() if environment.keys is None else zenoh_log_bounded()
+    with (
+        bounded,
+        until_stopped() as ready,
+        Core(environment, listen or (), connect or (), file) as core,
+    ):
         _introduce(core)
         lines = [f"listening on {endpoint}" for endpoint in core.endpoints]
         lines += [f"connecting to {endpoint}" for endpoint in core.connect]

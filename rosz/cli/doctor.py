@@ -6,8 +6,7 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from rosz.cli.declare import App, Option
 from rosz.cli.group import print_json
 from rosz.errors import UsageError
 
@@ -16,17 +15,17 @@ if TYPE_CHECKING:
 
 __all__ = ("app",)
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = App()
 _COLORS = {"error": "31", "warning": "33"}
 
 
-@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+@app.command()
 def doctor_command(
     *,
     wait: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Listen to samples for so long, at most.")
+        float, Option(metavar="SECONDS", help="Listen to samples for so long, at most.")
     ] = 1.0,
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
 ) -> int:
     """Name what is wrong on this machine and network, with what shows it and what to do.
 

@@ -7,24 +7,23 @@ import sys
 from pathlib import Path, PurePath
 from typing import Annotated
 
-import typer
-
+from rosz.cli.declare import App, Argument, Option
 from rosz.cli.group import print_json
 from rosz.errors import UsageError, near_miss
 
 __all__ = ("app",)
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = App()
 
 
-@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+@app.command()
 def env_command(
     shell: Annotated[
-        str, typer.Argument(metavar="[SHELL]", help="bash, zsh or fish; by SHELL when not given.")
+        str, Argument(metavar="[SHELL]", help="bash, zsh or fish; by SHELL when not given.")
     ] = "",
     *,
     json: Annotated[
-        bool, typer.Option("--json", help="Print the settings that rosz reads, as JSON.")
+        bool, Option("--json", help="Print the settings that rosz reads, as JSON.")
     ] = False,
 ) -> None:
     """Print what makes rostopic, roslaunch and the like mean rosz.

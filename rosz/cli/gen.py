@@ -5,32 +5,31 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from rosz.cli.declare import App, Argument, Option
 from rosz.cli.group import print_lines
 
 __all__ = ("app",)
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = App()
 
 
-@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+@app.command()
 def gen_command(
     packages: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             metavar="[PACKAGE]...", help="Names or folders; the one around this folder if none."
         ),
     ] = None,
     *,
     output: Annotated[
         str,
-        typer.Option(
+        Option(
             "-o", "--output", metavar="FOLDER", help="Where; src in the package when not given."
         ),
     ] = "",
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; exit code 1 if something is stale.")
+        bool, Option("--check", help="Write nothing; exit code 1 if something is stale.")
     ] = False,
 ) -> int:
     """Write Python modules for messages and services, for editors and type checkers.

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
 import msgspec
-import typer
-from typer.models import OptionInfo
 
+from rosz.cli.declare import App, Option
 from rosz.cli.main import COMMANDS
+from rosz.cli.reading import parameters
 from rosz.environment import Environment
 from rosz.introspect.suggest import Suggestions
 
@@ -243,26 +242,15 @@ def _positional(rest: list[str], options: list[_Option]) -> tuple[list[str], _Op
     return before, pending
 
 
-def _commands(app: typer.Typer) -> dict[str, Callable[..., Any]]:
+def _commands(app: App) -> dict[str, Callable[..., Any]]:
     """Return the functions of an app by the names that a person types."""
-    return {
-        command.name or "": command.callback
-        for command in app.registered_commands
-        if command.callback is not None and not command.hidden
-    }
+    return {name: command.function for name, command in app.commands.items()}
 
 
 def _options(callback: Callable[..., Any]) -> list[_Option]:
     """Return the options of a command by its function, those aside that are not shown."""
-    hints = get_type_hints(callback, include_extras=True)
-    found: list[_Option] = []
-    for name in inspect.signature(callback).parameters:
-        annotation = hints.get(name)
-        for extra in getattr(annotation, "__metadata__", ()):
-            if isinstance(extra, OptionInfo) and not extra.hidden:
-                # In an annotation, typer keeps the first spelling where a default would be.
-                declared = (extra.default, *(extra.param_decls or ()))
-                spelled = [d for d in declared if isinstance(d, str) and d.startswith("-")]
-                names = tuple(sorted(spelled, key=len)) or (f"--{name.replace('_', '-')}",)
-                found.append(_Option(names, bool not in (get_args(annotation)[0], None)))
-    return found
+    return [
+        _Option(tuple(sorted(one.mark.spelled(one.name), key=len)), one.kind is not bool)
+        for one in parameters(callback)
+        if isinstance(one.mark, Option) and not one.mark.hidden
+    ]

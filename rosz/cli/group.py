@@ -12,16 +12,16 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from rosz import names, remap
-from rosz.cli.light import LightGroup
+from rosz.cli.declare import App, Context
 from rosz.environment import Environment
 from rosz.introspect.reach import open_context, open_session
 
 if TYPE_CHECKING:
+    from types import FrameType
+
     from rosz.introspect.survey import Survey
-    from rosz.node import Context
+    from rosz.node import Context as NodeContext
     from rosz.session import Session
     from rosz.typestore import TypeStore
 
@@ -34,6 +34,8 @@ __all__ = (
     "until_stopped",
     "warn",
 )
+
+_LOOK_UP_SECONDS = 0.2
 
 
 class Call:
@@ -82,7 +84,7 @@ class Call:
         """
         return open_session(self.environment)
 
-    def context(self, *, lasting: bool = False) -> Context:
+    def context(self, *, lasting: bool = False) -> NodeContext:
         """Open the context of a node that publishes, subscribes or calls.
 
         Raises:
@@ -105,18 +107,9 @@ class Call:
         return survey
 
 
-def call_of(context: typer.Context) -> Call:
+def call_of(context: Context) -> Call:
     """Return the call that a command is part of."""
-    argv = context.find_object(tuple)
-    return Call(argv or ())
-
-
-class _Group(LightGroup):
-    """Takes remappings out of the arguments before anything else looks at them."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        ctx.obj = tuple(filter(_is_remapping, args))
-        return super().parse_args(ctx, [word for word in args if not _is_remapping(word)])
+    return Call(context.argv)
 
 
 def _is_remapping(word: str) -> bool:
@@ -124,21 +117,13 @@ def _is_remapping(word: str) -> bool:
     return bool(separator and left) and names.is_valid(left.lstrip("_") or "x")
 
 
-def new_group(text: str) -> typer.Typer:
+def new_group(text: str) -> App:
     """Return a group of commands.
 
     Args:
         text: What it is for.
     """
-    return typer.Typer(
-        cls=_Group,
-        context_settings={"help_option_names": ["-h", "--help"]},
-        help=text,
-        add_completion=False,
-        no_args_is_help=True,
-        rich_markup_mode=None,
-        pretty_exceptions_enable=False,
-    )
+    return App(text, remapped=_is_remapping)
 
 
 def print_lines(lines: Iterable[str]) -> None:
@@ -170,6 +155,10 @@ def until_stopped() -> Iterator[Callable[[], None]]:
     taken: list[signal.Signals] = []
 
     def take() -> None:
+        # A signal that comes right before Python begins to wait is not seen until the wait ends,
+        # unless another one interrupts that.
+        signal.signal(signal.SIGALRM, _look_up)
+        signal.setitimer(signal.ITIMER_REAL, _LOOK_UP_SECONDS, _LOOK_UP_SECONDS)
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is signal.SIG_DFL:
                 taken.append(number)
@@ -180,5 +169,9 @@ def until_stopped() -> Iterator[Callable[[], None]]:
     except KeyboardInterrupt:
         return
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
         for number in taken:
             signal.signal(number, signal.SIG_DFL)
+
+
+def _look_up(_number: int, _frame: FrameType | None) -> None: ...

@@ -7,30 +7,26 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from rosz.cli.declare import App, Argument, Option
 
 if TYPE_CHECKING:
     from rosz.security.review import Review
 
 __all__ = ("app",)
 
-app = typer.Typer(
-    add_completion=False,
-    no_args_is_help=True,
-    help="Make and check the keys that links between machines need (ROSZ_KEYS).",
-)
+app = App("Make and check the keys that links between machines need (ROSZ_KEYS).", panels=True)
 
 _Folder = Annotated[
-    str, typer.Option("--dir", "-d", metavar="DIR", help="Folder of all keys; ROSZ_KEYS, or here.")
+    str, Option("--dir", "-d", metavar="DIR", help="Folder of all keys; ROSZ_KEYS, or here.")
 ]
 
 
 @app.command("init")
 def init_keys(
-    folder: Annotated[str, typer.Argument(metavar="DIR")],
+    folder: Annotated[str, Argument(metavar="DIR")],
     *,
-    name: Annotated[str, typer.Option(help="What certificates call the authority.")] = "rosz",
-    days: Annotated[int, typer.Option(min=1, help="How long it is good for.")] = 3650,
+    name: Annotated[str, Option(help="What certificates call the authority.")] = "rosz",
+    days: Annotated[int, Option(min=1, help="How long it is good for.")] = 3650,
 ) -> None:
     """Make a folder of keys, with an authority that signs them."""
     from rosz.security.authority import Authority
@@ -45,13 +41,13 @@ def init_keys(
 
 @app.command("add")
 def add_keys(
-    names: Annotated[list[str], typer.Argument(metavar="HOST|USER...")],
+    names: Annotated[list[str], Argument(metavar="HOST|USER...")],
     *,
     address: Annotated[
         list[str] | None,
-        typer.Option(help="An address or further name that others reach the host at; repeatable."),
+        Option(help="An address or further name that others reach the host at; repeatable."),
     ] = None,
-    days: Annotated[int, typer.Option(min=1, help="How long they are good for.")] = 825,
+    days: Annotated[int, Option(min=1, help="How long they are good for.")] = 825,
     folder: _Folder = "",
 ) -> None:
     """Make keys for machines or people."""
@@ -69,7 +65,7 @@ def add_keys(
 @app.command("list")
 def list_keys(
     *,
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
     folder: _Folder = "",
 ) -> None:
     """List who has keys, until when, and what for."""
@@ -86,10 +82,10 @@ def list_keys(
 
 @app.command("check")
 def check_keys(
-    folder: Annotated[str, typer.Argument(metavar="[DIR]")] = "",
+    folder: Annotated[str, Argument(metavar="[DIR]")] = "",
     *,
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
-) -> None:
+    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
+) -> int:
     """Check certificates, access to key files, and rules; exit 1 if something is wrong."""
     from rosz.security.review import review
 
@@ -104,9 +100,10 @@ def check_keys(
             for who, allowed in place.allowed.items():
                 sys.stdout.writelines(f"  {who}: {line}\n" for line in allowed)
         sys.stdout.writelines(f"WRONG: {line}\n" for line in found.wrong)
-        sys.stdout.write(f"{len(found.holders)} holders of keys, {len(found.wrong)} wrong\n")
-    if found.wrong:
-        raise typer.Exit(1)
+        count = len(found.holders)
+        holders = "1 holder" if count == 1 else f"{count} holders"
+        sys.stdout.write(f"{holders} of keys, {len(found.wrong)} wrong\n")
+    return int(bool(found.wrong))
 
 
 def _folder(given: str) -> Path:

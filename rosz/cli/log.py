@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from rosz.cli.bounds import at_least
+from rosz.cli.declare import App, Argument, Option
 from rosz.cli.group import Call, print_json, print_lines, until_stopped, warn
 from rosz.errors import UsageError
 
@@ -21,41 +21,41 @@ if TYPE_CHECKING:
 
 __all__ = ("app",)
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = App()
 
 _TOOL = "rosconsole"
 _LEVEL_WORDS = 4
 _ROSOUT = "/rosout"
 
 
-@app.command(context_settings={"help_option_names": ["-h", "--help"]})
+@app.command()
 def log_command(
     words: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             metavar="[NODE]... | level NODE LOGGER LEVEL | levels NODE",
             help="Nodes or namespaces to follow; all when none is given.",
         ),
     ] = None,
     *,
     level: Annotated[
-        str, typer.Option("--level", "-l", metavar="LEVEL", help="The least level to show.")
+        str, Option("--level", "-l", metavar="LEVEL", help="The least level to show.")
     ] = "DEBUG",
     grep: Annotated[
-        str, typer.Option("--grep", metavar="PATTERN", help="Only texts that hold this.")
+        str, Option("--grep", metavar="PATTERN", help="Only texts that hold this.")
     ] = "",
     count: Annotated[
-        int | None, typer.Option("-n", metavar="COUNT", help="End after so many lines.")
+        int | None, Option("-n", metavar="COUNT", help="End after so many lines.")
     ] = None,
-    verbose: Annotated[
-        bool, typer.Option("-v", "--verbose", help="With places in the source.")
-    ] = False,
-    json: Annotated[bool, typer.Option("--json", help="As JSON, one line each.")] = False,
+    verbose: Annotated[bool, Option("-v", "--verbose", help="With places in the source.")] = False,
+    json: Annotated[bool, Option("--json", help="As JSON, one line each.")] = False,
 ) -> None:
     """Follow what nodes log; 'level' sets the level of a logger, 'levels' lists them.
 
     The levels are DEBUG, INFO, WARN, ERROR and FATAL; the logger of a node itself is 'rosout'.
     """
+    if count is not None:
+        at_least("-n", count, 1, "lines")
     call = Call(())
     words = words or []
     if words[:1] == ["level"]:

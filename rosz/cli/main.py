@@ -5,12 +5,18 @@ Data goes to stdout, talk to stderr. Exit code 0, 1 (it failed), 2 (wrong usage)
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from typing import TYPE_CHECKING, NoReturn
 
 from rosz.errors import RoszError, UsageError, near_miss
+
+if TYPE_CHECKING:
+    from rosz.cli.declare import App
 
 __all__ = ("COMMANDS", "main", "run")
 
@@ -34,16 +40,46 @@ COMMANDS = {
     "env": "print what to eval in a shell",
 }
 _INTERRUPTED = 130
+_GARBAGE = 10_000
+"""New objects after which Python looks for rings of them: loading modules makes many, and none."""
 
 
 def main() -> None:
     """Run the command line of this process, and exit with its code."""
+    gc.set_threshold(_GARBAGE)
+    _stand_in_for_closed_streams()
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()
     except BrokenPipeError:
         _forget_stdout()
-    sys.exit(code)
+    except OSError as error:
+        _forget_stdout()
+        code = code or _fail(f"cannot write to standard output: {error.strerror}", 1)
+    _leave(code)
+
+
+def _stand_in_for_closed_streams() -> None:
+    """Have somewhere to write to, and nothing to read, where the shell closed a stream (``>&-``).
+
+    The three are opened in the order of their numbers, so that no file, and no connection, gets
+    the number of one of them.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115  # for good, and pathlib takes long to load
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process, without the interpreter's taking itself apart where nobody needs that.
+
+    That takes longer than most commands, and frees what is freed with the process anyway.
+    """
+    threading = sys.modules.get("threading")
+    if threading is not None and not all(one.daemon for one in threading.enumerate()[1:]):
+        sys.exit(code)  # which waits for them
+    atexit._run_exitfuncs()  # noqa: SLF001  # the only way to what sys.exit would run
+    os._exit(code)
 
 
 def run(argv: Sequence[str]) -> int:
@@ -76,9 +112,7 @@ def _dispatch(argv: list[str]) -> int:
         sys.stdout.write(_overview())
         return 0 if argv else 2
     if argv[0] in {"-V", "--version", "version"}:
-        from importlib.metadata import version
-
-        sys.stdout.write(f"rosz {version('rosz')}\n")
+        sys.stdout.write(f"rosz {_version()}\n")
         return 0
     name = argv[0]
     if name == "complete":
@@ -92,20 +126,29 @@ def _dispatch(argv: list[str]) -> int:
     return _invoke(module.app, argv[1:], f"rosz {name}")
 
 
-def _invoke(app: object, argv: list[str], program: str) -> int:
+def _invoke(app: App, argv: list[str], program: str) -> int:
+    """Run a command, or have typer say why that cannot be, or what there is."""
+    from rosz.cli.reading import read
+
+    run_it = read(app, argv) if argv or not app.text else None
+    code = _ask_typer(app, argv, program) if run_it is None else run_it()
+    return code if isinstance(code, int) else 0
+
+
+def _ask_typer(app: App, argv: list[str], program: str) -> object:
     """Run a typer app without letting it exit the process or print tracebacks."""
     import typer
     from typer.exceptions import TyperException
 
-    from rosz.cli.light import make_light
+    from rosz.cli.typed import to_typer
 
-    assert isinstance(app, typer.Typer)  # noqa: S101  # every group module defines one
-    make_light(app)
-    if not argv and app.info.no_args_is_help is True:
-        app(args=["--help"], prog_name=program, standalone_mode=False)
+    context, words = app.sorted_out(argv)
+    typed = to_typer(app, context)
+    if app.text and not argv:
+        typed(args=["--help"], prog_name=program, standalone_mode=False)
         return 2
     try:
-        code = app(args=argv, prog_name=program, standalone_mode=False)
+        return typed(args=words, prog_name=program, standalone_mode=False)
     except typer.Abort:
         return _INTERRUPTED
     except SystemExit as error:
@@ -113,9 +156,18 @@ def _invoke(app: object, argv: list[str], program: str) -> int:
         raise BrokenPipeError from error
     except TyperException as error:
         format_message = getattr(error, "format_message", error.__str__)
-        text = f"{format_message().rstrip('.')}; see '{program} --help'"
+        text = format_message().rstrip(".")
+        text += f" See '{program} --help'" if text.endswith("?") else f"; see '{program} --help'"
         return _fail(text, getattr(error, "exit_code", 2))
-    return code if isinstance(code, int) else 0
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("rosz")
+    except PackageNotFoundError:
+        return "of unknown version: it is not installed, but runs from its sources"
 
 
 def _overview() -> str:

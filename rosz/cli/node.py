@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from typing import Annotated
 
-import typer
-
+from rosz.cli.bounds import at_least
+from rosz.cli.declare import Argument, Context, Option
 from rosz.cli.group import call_of, new_group, print_json, print_lines, until_stopped
 from rosz.errors import UsageError
 
@@ -15,16 +15,16 @@ __all__ = ("app",)
 app = new_group("List, inspect, ping and end nodes.")
 
 _TOOL = "rosnode"
-_Json = Annotated[bool, typer.Option("--json", help="As JSON.")]
+_Json = Annotated[bool, Option("--json", help="As JSON.")]
 
 
 @app.command("list")
 def list_command(
-    context: typer.Context,
-    namespace: Annotated[str, typer.Argument(metavar="[NAMESPACE]")] = "",
+    context: Context,
+    namespace: Annotated[str, Argument(metavar="[NAMESPACE]")] = "",
     *,
-    everything: Annotated[bool, typer.Option("-a", "--all", help="With where they are.")] = False,
-    places: Annotated[bool, typer.Option("-u", help="Only where they are.")] = False,
+    everything: Annotated[bool, Option("-a", "--all", help="With where they are.")] = False,
+    places: Annotated[bool, Option("-u", help="Only where they are.")] = False,
     json: _Json = False,
 ) -> None:
     """List nodes."""
@@ -45,11 +45,11 @@ def list_command(
 
 @app.command("info")
 def info_command(
-    context: typer.Context,
-    nodes: Annotated[list[str], typer.Argument(metavar="NODE...")],
+    context: Context,
+    nodes: Annotated[list[str], Argument(metavar="NODE...")],
     *,
     quiet: Annotated[
-        bool, typer.Option("-q", "--quiet", help="Do not ask the nodes themselves.")
+        bool, Option("-q", "--quiet", help="Do not ask the nodes themselves.")
     ] = False,
     json: _Json = False,
 ) -> None:
@@ -61,8 +61,8 @@ def info_command(
 
 @app.command("machine")
 def machine_command(
-    context: typer.Context,
-    machine: Annotated[str, typer.Argument(metavar="[MACHINE]")] = "",
+    context: Context,
+    machine: Annotated[str, Argument(metavar="[MACHINE]")] = "",
     *,
     json: _Json = False,
 ) -> None:
@@ -79,19 +79,19 @@ def machine_command(
 
 @app.command("ping")
 def ping_command(
-    context: typer.Context,
-    node: Annotated[str, typer.Argument(metavar="NODE")] = "",
+    context: Context,
+    node: Annotated[str, Argument(metavar="NODE")] = "",
     *,
-    everybody: Annotated[bool, typer.Option("-a", "--all", help="Ping all nodes once.")] = False,
+    everybody: Annotated[bool, Option("-a", "--all", help="Ping all nodes once.")] = False,
     count: Annotated[
-        int | None, typer.Option("-c", metavar="COUNT", help="Ping so often; for ever otherwise.")
+        int | None, Option("-c", metavar="COUNT", help="Ping so often; for ever otherwise.")
     ] = None,
 ) -> int:
     """Tell how long a node takes to answer; exit code 1 if it does not."""
     if everybody and (node or count is not None):
         raise UsageError("--all pings every node once: it takes no node and no -c")
-    if count is not None and count < 1:
-        raise UsageError(f"-c is {count}; expected at least 1")
+    if count is not None:
+        at_least("-c", count, 1, "pings")
     from rosz.cli.node_talk import ping, ping_all
 
     call = call_of(context)
@@ -108,10 +108,10 @@ def ping_command(
 
 @app.command("kill")
 def kill_command(
-    context: typer.Context,
-    nodes: Annotated[list[str] | None, typer.Argument(metavar="[NODE]...")] = None,
+    context: Context,
+    nodes: Annotated[list[str] | None, Argument(metavar="[NODE]...")] = None,
     *,
-    everybody: Annotated[bool, typer.Option("-a", "--all", help="End all nodes.")] = False,
+    everybody: Annotated[bool, Option("-a", "--all", help="End all nodes.")] = False,
 ) -> int:
     """Have nodes end, and wait until they are gone."""
     if everybody and nodes:

@@ -7,23 +7,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from rosz.cli.declare import App, Argument, Option
 
 if TYPE_CHECKING:
     from rosz.packages import PackageIndex
 
 __all__ = ("app",)
 
-app = typer.Typer(
-    add_completion=False, no_args_is_help=True, help="List, find, create and check packages."
-)
+app = App("List, find, create and check packages.", panels=True)
 
 
 @app.command("list")
 def list_packages(
     *,
-    names: Annotated[bool, typer.Option("--names", "-n", help="Only their names.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    names: Annotated[bool, Option("--names", "-n", help="Only their names.")] = False,
+    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
 ) -> None:
     """List all packages with their folders."""
     index = _index()
@@ -42,9 +40,9 @@ def list_packages(
 
 @app.command("find")
 def find_package(
-    name: Annotated[str, typer.Argument(metavar="PACKAGE")],
+    name: Annotated[str, Argument(metavar="PACKAGE")],
     *,
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
 ) -> None:
     """Print the folder of a package."""
     package = _index().find(name)
@@ -58,14 +56,14 @@ def find_package(
 
 @app.command("create")
 def create_package(
-    name: Annotated[str, typer.Argument(metavar="NAME")],
-    dependencies: Annotated[list[str] | None, typer.Argument(metavar="[DEPENDENCY]...")] = None,
+    name: Annotated[str, Argument(metavar="NAME")],
+    dependencies: Annotated[list[str] | None, Argument(metavar="[DEPENDENCY]...")] = None,
     *,
-    description: Annotated[str, typer.Option("--description", "-d", help="What it is.")] = "",
-    maintainer: Annotated[str, typer.Option("--maintainer", "-m", help="Who looks after it.")] = "",
-    license_name: Annotated[str, typer.Option("--license", "-l", help="Under what terms.")] = "",
+    description: Annotated[str, Option("--description", "-d", help="What it is.")] = "",
+    maintainer: Annotated[str, Option("--maintainer", "-m", help="Who looks after it.")] = "",
+    license_name: Annotated[str, Option("--license", "-l", help="Under what terms.")] = "",
     bare: Annotated[
-        bool, typer.Option("--bare", help="Without them: two files, as catkin_create_pkg does.")
+        bool, Option("--bare", help="Without them: two files, as catkin_create_pkg does.")
     ] = False,
 ) -> None:
     """Create a package in the present folder, with a message, a talker and a launch file."""
@@ -98,19 +96,19 @@ def _tell_of_bare(made: Sequence[Path], parent: Path) -> None:
     )
 
 
-@app.command("check", context_settings={"ignore_unknown_options": True})
+@app.command("check", tolerant=True)
 def check_command(
     words: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             metavar="[FOLDER|PACKAGE]...", help="The workspace around the present folder, if none."
         ),
     ] = None,
     *,
     setup: Annotated[
-        bool, typer.Option("--setup", help="Write devel/setup.bash and its kin, as catkin_make.")
+        bool, Option("--setup", help="Write devel/setup.bash and its kin, as catkin_make.")
     ] = False,
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
 ) -> int:
     """Check packages: manifest, definitions, launch files, .cfg files and scripts.
 

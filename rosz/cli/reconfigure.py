@@ -5,13 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+from rosz.cli.bounds import at_least, seconds
+from rosz.cli.declare import Argument, Context, Option, values_last
 from rosz.cli.group import call_of, new_group, print_json, print_lines, until_stopped, warn
-from rosz.cli.light import LightCommand
 from rosz.cli.reconfigure_show import flatten, show_change, show_description
 from rosz.errors import NotFoundError, UsageError, WaitTimeout, near_miss
 
@@ -27,42 +25,23 @@ _ANSWER_SECONDS = 10.0
 _SILENT_SECONDS = 1.0
 _FOR_EVER = 1e9
 
-_Json = Annotated[bool, typer.Option("--json", help="As JSON.")]
-_Server = Annotated[str, typer.Argument(metavar="NODE")]
-_File = Annotated[str, typer.Argument(metavar="FILE", help="- for the standard streams.")]
+_Json = Annotated[bool, Option("--json", help="As JSON.")]
+_Server = Annotated[str, Argument(metavar="NODE")]
+_File = Annotated[str, Argument(metavar="FILE", help="- for the standard streams.")]
 _Timeout = Annotated[
     float | None,
-    typer.Option(
+    Option(
         "-t",
         "--timeout",
         metavar="SECONDS",
         help="Wait so long for the node and its answer; else it must be there, and answer in 10.",
     ),
 ]
-_Wait = Annotated[bool, typer.Option("--wait", help="Wait until the node is there.")]
-
-
-class _SetCommand(LightCommand):
-    """Takes ``-1`` for a value and not for an option."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        options: list[str] = []
-        values: list[str] = []
-        words = iter(args)
-        for word in words:
-            if word == "--":
-                values += words
-            elif word in {"-t", "--timeout"}:
-                options += [word, *islice(words, 1)]
-            elif word.startswith("-") and word != "-" and not word[1:2].isdigit():
-                options.append(word)
-            else:
-                values.append(word)
-        return super().parse_args(ctx, [*options, "--", *values])
+_Wait = Annotated[bool, Option("--wait", help="Wait until the node is there.")]
 
 
 @app.command("list")
-def list_command(context: typer.Context, *, json: _Json = False) -> None:
+def list_command(context: Context, *, json: _Json = False) -> None:
     """List what can be configured, mostly nodes."""
     from rosz.reconfigure import find_servers
 
@@ -75,9 +54,9 @@ def list_command(context: typer.Context, *, json: _Json = False) -> None:
 
 @app.command("get")
 def get_command(
-    context: typer.Context,
+    context: Context,
     node: _Server,
-    setting: Annotated[str, typer.Argument(metavar="[SETTING]")] = "",
+    setting: Annotated[str, Argument(metavar="[SETTING]")] = "",
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
@@ -102,15 +81,13 @@ def get_command(
         print_lines([repr(in_groups(config, decode_description(pack_description(description))))])
 
 
-@app.command("set", cls=_SetCommand)
+@app.command("set", arrange=values_last(frozenset({"-t", "--timeout"})))
 def set_command(
-    context: typer.Context,
+    context: Context,
     node: _Server,
     words: Annotated[
         list[str],
-        typer.Argument(
-            metavar="SETTING VALUE | YAML", help="One setting, or a dictionary of several."
-        ),
+        Argument(metavar="SETTING VALUE | YAML", help="One setting, or a dictionary of several."),
     ],
     *,
     timeout: _Timeout = None,
@@ -133,7 +110,7 @@ def set_command(
 
 @app.command("set_from_parameters")
 def set_from_parameters_command(
-    context: typer.Context,
+    context: Context,
     node: _Server,
     *,
     timeout: _Timeout = None,
@@ -154,7 +131,7 @@ def set_from_parameters_command(
 
 @app.command("dump")
 def dump_command(
-    context: typer.Context,
+    context: Context,
     node: _Server,
     file: _File,
     *,
@@ -176,7 +153,7 @@ def dump_command(
 
 @app.command("load")
 def load_command(
-    context: typer.Context,
+    context: Context,
     node: _Server,
     file: _File,
     *,
@@ -197,9 +174,9 @@ def load_command(
 
 @app.command("describe")
 def describe_command(
-    context: typer.Context,
+    context: Context,
     node: _Server,
-    setting: Annotated[str, typer.Argument(metavar="[SETTING]")] = "",
+    setting: Annotated[str, Argument(metavar="[SETTING]")] = "",
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
@@ -213,19 +190,19 @@ def describe_command(
 
 @app.command("watch")
 def watch_command(
-    context: typer.Context,
+    context: Context,
     node: _Server,
     *,
     count: Annotated[
-        int | None, typer.Option("-n", metavar="COUNT", help="End after so many changes.")
+        int | None, Option("-n", metavar="COUNT", help="End after so many changes.")
     ] = None,
     timeout: _Timeout = None,
     wait: _Wait = False,
     json: _Json = False,
 ) -> None:
     """Print changes of a node's settings as they come."""
-    if count is not None and count < 1:
-        raise UsageError(f"-n is {count}; expected at least 1")
+    if count is not None:
+        at_least("-n", count, 1, "changes")
     from queue import SimpleQueue
 
     configs: SimpleQueue[Config] = SimpleQueue()
@@ -250,7 +227,7 @@ def watch_command(
 
 @contextmanager
 def _client(
-    context: typer.Context,
+    context: Context,
     name: str,
     timeout: float | None,
     *,
@@ -263,8 +240,8 @@ def _client(
         NotFoundError: It is not.
         WaitTimeout: It did not come in time.
     """
-    if timeout is not None and not timeout > 0:
-        raise UsageError(f"--timeout is {timeout:g}; expected seconds above 0")
+    if timeout is not None:
+        seconds("--timeout", timeout)
     from rosz.node import Node
     from rosz.reconfigure import Client, find_servers
 

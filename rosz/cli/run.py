@@ -5,44 +5,32 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
 
-import typer
-
+from rosz.cli.declare import App, Argument, Option
 from rosz.errors import LaunchError, UsageError
 
-__all__ = ("app", "run")
+__all__ = ("app",)
 
-app = typer.Typer(add_completion=False)
-
-
-def run(argv: Sequence[str]) -> int:
-    """Run ``rosz run`` with these arguments; returns only where it does not get to run anything.
-
-    Raises:
-        RoszError: It failed; `UsageError` for wrong usage.
-    """
-    code = app(args=list(argv), prog_name="rosz run", standalone_mode=False)
-    return code if isinstance(code, int) else 0
+app = App(panels=True)
 
 
 # What follows the package belongs to the program, options included.
-@app.command(context_settings={"allow_interspersed_args": False, "ignore_unknown_options": False})
+@app.command(interspersed=False)
 def command(
     words: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             metavar="PACKAGE EXECUTABLE [ARGS]...",
             help="What to run, and what to pass to it: name:=value, _param:=value, __name:=value …",
         ),
     ] = None,
     *,
     prefix: Annotated[
-        str, typer.Option("--prefix", "-p", help="Put a command before it, such as 'gdb --args'.")
+        str, Option("--prefix", "-p", help="Put a command before it, such as 'gdb --args'.")
     ] = "",
-    debug: Annotated[bool, typer.Option("--debug", "-d", help="Print what is run.")] = False,
+    debug: Annotated[bool, Option("--debug", "-d", help="Print what is run.")] = False,
 ) -> None:
     """Run an executable of a package.
 

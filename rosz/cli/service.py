@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
+from rosz.cli.bounds import seconds
+from rosz.cli.declare import Argument, Context, Option
 from rosz.cli.group import call_of, new_group, print_json, print_lines
-from rosz.errors import UsageError
 
 __all__ = ("app",)
 
 app = new_group("List and call services.")
 
 _TOOL = "rosservice"
-_Json = Annotated[bool, typer.Option("--json", help="As JSON.")]
-_ServiceName = Annotated[str, typer.Argument(metavar="SERVICE")]
+_Json = Annotated[bool, Option("--json", help="As JSON.")]
+_ServiceName = Annotated[str, Argument(metavar="SERVICE")]
 
 
 @app.command("list")
 def list_command(
-    context: typer.Context,
-    namespace: Annotated[str, typer.Argument(metavar="[NAMESPACE]")] = "",
+    context: Context,
+    namespace: Annotated[str, Argument(metavar="[NAMESPACE]")] = "",
     *,
-    nodes: Annotated[bool, typer.Option("-n", "--nodes", help="With the nodes.")] = False,
-    types: Annotated[bool, typer.Option("-t", "--types", help="With types.")] = False,
+    nodes: Annotated[bool, Option("-n", "--nodes", help="With the nodes.")] = False,
+    types: Annotated[bool, Option("-t", "--types", help="With types.")] = False,
     json: _Json = False,
 ) -> None:
     """List services."""
@@ -47,7 +46,7 @@ def list_command(
 
 
 @app.command("info")
-def info_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
+def info_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Tell who serves a service, of what type and with what arguments."""
     from rosz.introspect import services as library
     from rosz.introspect.fill import list_arguments
@@ -72,7 +71,7 @@ def info_command(context: typer.Context, service: _ServiceName, *, json: _Json =
 
 
 @app.command("type")
-def type_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
+def type_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the type of a service."""
     from rosz.introspect.services import server
     from rosz.introspect.survey import ros1_type
@@ -91,8 +90,8 @@ def _print_one(title: str, value: str, *, as_json: bool) -> None:
 
 @app.command("find")
 def find_command(
-    context: typer.Context,
-    type_name: Annotated[str, typer.Argument(metavar="TYPE")],
+    context: Context,
+    type_name: Annotated[str, Argument(metavar="TYPE")],
     *,
     json: _Json = False,
 ) -> None:
@@ -107,7 +106,7 @@ def find_command(
 
 
 @app.command("args")
-def args_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
+def args_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the arguments that a service takes."""
     from rosz.introspect.fill import list_arguments
     from rosz.introspect.services import server
@@ -122,7 +121,7 @@ def args_command(context: typer.Context, service: _ServiceName, *, json: _Json =
 
 
 @app.command("node")
-def node_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
+def node_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the node that serves a service."""
     from rosz.introspect.services import server
 
@@ -132,7 +131,7 @@ def node_command(context: typer.Context, service: _ServiceName, *, json: _Json =
 
 
 @app.command("uri")
-def uri_command(context: typer.Context, service: _ServiceName, *, json: _Json = False) -> None:
+def uri_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the key that a service is called by on Zenoh."""
     from rosz.introspect.services import server, uri
 
@@ -143,24 +142,24 @@ def uri_command(context: typer.Context, service: _ServiceName, *, json: _Json = 
 
 @app.command("call")
 def call_command(
-    context: typer.Context,
+    context: Context,
     service: _ServiceName,
     values: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[VALUE]...", help="YAML: one dictionary, or a value per field."),
+        Argument(metavar="[VALUE]...", help="YAML: one dictionary, or a value per field."),
     ] = None,
     *,
-    verbose: Annotated[bool, typer.Option("-v", help="Print the request too.")] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait for the service.")] = False,
+    verbose: Annotated[bool, Option("-v", help="Print the request too.")] = False,
+    wait: Annotated[bool, Option("--wait", help="Wait for the service.")] = False,
     timeout: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Wait for the answer at most so long.")
+        float, Option(metavar="SECONDS", help="Wait for the answer at most so long.")
     ] = 3600.0,
     json: _Json = False,
 ) -> None:
     """Call a service and print its answer."""
-    if not timeout > 0:
-        raise UsageError(f"--timeout is {timeout:g}; expected seconds above 0")
     from rosz.cli.service_call import CallOptions, call_service
 
-    options = CallOptions(verbose=verbose, wait=wait, timeout=timeout, as_json=json)
+    options = CallOptions(
+        verbose=verbose, wait=wait, timeout=seconds("--timeout", timeout), as_json=json
+    )
     call_service(call_of(context), service, values or (), options)

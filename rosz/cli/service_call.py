@@ -57,13 +57,18 @@ def call_service(call: Call, name: str, words: Sequence[str], options: CallOptio
     with until_stopped() as ready, call.context(lasting=options.wait) as context:
         ready()
         token = _find(context, call.resolve(name, _TOOL), wait=options.wait)
+        stopped = context.session.why_silent(token.zid)
+        if stopped:
+            warn(f"service [{token.name}] does not answer as long as {stopped}")
         service_type = context.types.service(token.type_name)
         request_type = service_type.Request
         calls: Iterable[list[Any]] = [arguments]
         if not arguments and request_type.__slots__:
             if sys.stdin.isatty():
                 raise UsageError(f"no values are given; they are: {list_arguments(request_type)}")
-            calls = (one if isinstance(one, list) else [one] for one in read_stream(sys.stdin))
+            calls = (
+                one if isinstance(one, list) else [one] for one in read_stream(sys.stdin.buffer)
+            )
         with (
             Node(_TOOL, anonymous=True, context=context) as node,
             node.client(token.name, service_type, timeout=options.timeout) as client,

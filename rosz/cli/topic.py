@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
+from rosz.cli.bounds import at_least
+from rosz.cli.declare import Argument, Context, Option
 from rosz.cli.group import call_of, new_group, print_json, print_lines
 from rosz.errors import UsageError
 
@@ -13,31 +13,31 @@ __all__ = ("app",)
 
 app = new_group("List, show, measure and publish topics.")
 
-_Json = Annotated[bool, typer.Option("--json", help="As JSON.")]
+_WIDEST = 1000
+
+_Json = Annotated[bool, Option("--json", help="As JSON.")]
 _Window = Annotated[
-    int | None, typer.Option("-w", "--window", metavar="COUNT", help="Messages to average over.")
+    int | None, Option("-w", "--window", metavar="COUNT", help="Messages to average over.")
 ]
 _Condition = Annotated[
     str,
-    typer.Option(
-        "--filter", metavar="EXPRESSION", help="Python; m is the message, topic its topic."
-    ),
+    Option("--filter", metavar="EXPRESSION", help="Python; m is the message, topic its topic."),
 ]
-_TopicName = Annotated[str, typer.Argument(metavar="TOPIC")]
+_TopicName = Annotated[str, Argument(metavar="TOPIC")]
 
 
 @app.command("list")
 def list_command(
-    context: typer.Context,
-    namespace: Annotated[str, typer.Argument(metavar="[NAMESPACE]")] = "",
+    context: Context,
+    namespace: Annotated[str, Argument(metavar="[NAMESPACE]")] = "",
     *,
     verbose: Annotated[
-        bool, typer.Option("-v", "--verbose", help="With types and numbers of ends.")
+        bool, Option("-v", "--verbose", help="With types and numbers of ends.")
     ] = False,
-    publishers: Annotated[bool, typer.Option("-p", help="Only what is published.")] = False,
-    subscribers: Annotated[bool, typer.Option("-s", help="Only what is subscribed to.")] = False,
-    types: Annotated[bool, typer.Option("-t", "--types", help="With types.")] = False,
-    host: Annotated[bool, typer.Option("--host", help="Grouped by host.")] = False,
+    publishers: Annotated[bool, Option("-p", help="Only what is published.")] = False,
+    subscribers: Annotated[bool, Option("-s", help="Only what is subscribed to.")] = False,
+    types: Annotated[bool, Option("-t", "--types", help="With types.")] = False,
+    host: Annotated[bool, Option("--host", help="Grouped by host.")] = False,
     json: _Json = False,
 ) -> None:
     """List topics."""
@@ -82,7 +82,7 @@ def list_command(
 
 
 @app.command("info")
-def info_command(context: typer.Context, topic: _TopicName, *, json: _Json = False) -> None:
+def info_command(context: Context, topic: _TopicName, *, json: _Json = False) -> None:
     """Tell the type of a topic, who publishes it and who subscribes to it."""
     from rosz.introspect import topics as library
 
@@ -105,8 +105,8 @@ def info_command(context: typer.Context, topic: _TopicName, *, json: _Json = Fal
 
 @app.command("type")
 def type_command(
-    context: typer.Context,
-    topic: Annotated[str, typer.Argument(metavar="TOPIC_OR_FIELD")],
+    context: Context,
+    topic: Annotated[str, Argument(metavar="TOPIC_OR_FIELD")],
     *,
     json: _Json = False,
 ) -> None:
@@ -127,8 +127,8 @@ def type_command(
 
 @app.command("find")
 def find_command(
-    context: typer.Context,
-    type_name: Annotated[str, typer.Argument(metavar="TYPE")],
+    context: Context,
+    type_name: Annotated[str, Argument(metavar="TYPE")],
     *,
     json: _Json = False,
 ) -> None:
@@ -144,27 +144,23 @@ def find_command(
 
 @app.command("echo")
 def echo_command(
-    context: typer.Context,
-    topic: Annotated[str, typer.Argument(metavar="TOPIC_OR_FIELD")],
+    context: Context,
+    topic: Annotated[str, Argument(metavar="TOPIC_OR_FIELD")],
     *,
     count: Annotated[
-        int | None, typer.Option("-n", metavar="COUNT", help="End after so many messages.")
+        int | None, Option("-n", metavar="COUNT", help="End after so many messages.")
     ] = None,
-    once: Annotated[bool, typer.Option("-1", "--once", help="End after one message.")] = False,
-    plot: Annotated[bool, typer.Option("-p", help="As numbers with commas, for plotting.")] = False,
+    once: Annotated[bool, Option("-1", "--once", help="End after one message.")] = False,
+    plot: Annotated[bool, Option("-p", help="As numbers with commas, for plotting.")] = False,
     width: Annotated[
-        int | None, typer.Option("-w", metavar="WIDTH", help="Fixed width of numbers.")
+        int | None, Option("-w", metavar="WIDTH", help="Fixed width of numbers.")
     ] = None,
     condition: _Condition = "",
-    nostr: Annotated[bool, typer.Option("--nostr", help="Leave out texts.")] = False,
-    noarr: Annotated[bool, typer.Option("--noarr", help="Leave out arrays.")] = False,
-    clear: Annotated[
-        bool, typer.Option("-c", "--clear", help="Clear the screen before each.")
-    ] = False,
-    offset: Annotated[
-        bool, typer.Option("--offset", help="Show times as seconds from now.")
-    ] = False,
-    raw: Annotated[bool, typer.Option("--raw", help="Show the bytes, not decoded.")] = False,
+    nostr: Annotated[bool, Option("--nostr", help="Leave out texts.")] = False,
+    noarr: Annotated[bool, Option("--noarr", help="Leave out arrays.")] = False,
+    clear: Annotated[bool, Option("-c", "--clear", help="Clear the screen before each.")] = False,
+    offset: Annotated[bool, Option("--offset", help="Show times as seconds from now.")] = False,
+    raw: Annotated[bool, Option("--raw", help="Show the bytes, not decoded.")] = False,
     json: _Json = False,
 ) -> None:
     """Print the messages of a topic."""
@@ -172,10 +168,10 @@ def echo_command(
     from rosz.introspect.echo import EchoOptions
     from rosz.introspect.expression import Filter
 
-    if width is not None and width < 2:  # noqa: PLR2004  # what ROS 1 demands
-        raise UsageError(f"-w is {width}; expected at least 2 characters")
-    if count is not None and count < 1:
-        raise UsageError(f"-n is {count}; expected at least 1 message")
+    if width is not None:
+        at_least("-w", width, 2, "characters", _WIDEST)
+    if count is not None:
+        at_least("-n", count, 1, "messages")
     options = EchoOptions(
         plot=plot,
         as_json=json,
@@ -195,13 +191,13 @@ def echo_command(
 
 @app.command("hz")
 def hz_command(
-    context: typer.Context,
-    topics: Annotated[list[str], typer.Argument(metavar="TOPIC...")],
+    context: Context,
+    topics: Annotated[list[str], Argument(metavar="TOPIC...")],
     *,
     window: _Window = None,
     condition: _Condition = "",
     wall_time: Annotated[
-        bool, typer.Option("--wall-time", help="Measure wall time, not simulated time.")
+        bool, Option("--wall-time", help="Measure wall time, not simulated time.")
     ] = False,
     json: _Json = False,
 ) -> None:
@@ -222,7 +218,7 @@ def hz_command(
 
 @app.command("bw")
 def bw_command(
-    context: typer.Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
+    context: Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
 ) -> None:
     """Print every second how many bytes come."""
     from rosz.cli.topic_follow import bw
@@ -232,7 +228,7 @@ def bw_command(
 
 @app.command("delay")
 def delay_command(
-    context: typer.Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
+    context: Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
 ) -> None:
     """Print every second how old messages are, by the stamp in their header."""
     from rosz.cli.topic_follow import delay
@@ -243,38 +239,36 @@ def delay_command(
 def _window(given: int | None) -> int | None:
     if given is None or given < 0:
         return None  # as for ROS 1's tools
-    if given < 2:  # noqa: PLR2004  # there is no time between fewer
-        raise UsageError(f"-w is {given}; expected at least 2 messages")
-    return given
+    return at_least("-w", given, 2, "messages")  # there is no time between fewer
 
 
 @app.command("pub")
 def pub_command(
-    context: typer.Context,
+    context: Context,
     topic: _TopicName,
-    type_name: Annotated[str, typer.Argument(metavar="TYPE")],
+    type_name: Annotated[str, Argument(metavar="TYPE")],
     values: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[VALUE]...", help="YAML: one dictionary, or a value per field."),
+        Argument(metavar="[VALUE]...", help="YAML: one dictionary, or a value per field."),
     ] = None,
     *,
     rate: Annotated[
-        float | None, typer.Option("-r", "--rate", metavar="HZ", help="Send so often.")
+        float | None, Option("-r", "--rate", metavar="HZ", help="Send so often.")
     ] = None,
-    once: Annotated[bool, typer.Option("-1", "--once", help="Send one message and end.")] = False,
+    once: Annotated[bool, Option("-1", "--once", help="Send one message and end.")] = False,
     latch: Annotated[
-        bool, typer.Option("-l", "--latch", help="Latch also with -f, -r and standard input.")
+        bool, Option("-l", "--latch", help="Latch also with -f, -r and standard input.")
     ] = False,
     file: Annotated[
-        str, typer.Option("-f", "--file", metavar="FILE", help="Read messages from a YAML file.")
+        str, Option("-f", "--file", metavar="FILE", help="Read messages from a YAML file.")
     ] = "",
-    verbose: Annotated[bool, typer.Option("-v", help="Print what is sent.")] = False,
+    verbose: Annotated[bool, Option("-v", help="Print what is sent.")] = False,
     substitute: Annotated[
         bool,
-        typer.Option("-s", "--substitute-keywords", help="Fill in now and auto for each message."),
+        Option("-s", "--substitute-keywords", help="Fill in now and auto for each message."),
     ] = False,
     use_rostime: Annotated[
-        bool, typer.Option("--use-rostime", help="Take now and auto from ROS time.")
+        bool, Option("--use-rostime", help="Take now and auto from ROS time.")
     ] = False,
 ) -> None:
     """Publish messages."""

@@ -61,6 +61,6 @@ def pub(
                 elif documents is not None:
                     sender.send_documents(documents, only_one=len(documents) == 1)
                 else:
-                    sender.send_documents(read_stream(sys.stdin))
+                    sender.send_documents(read_stream(sys.stdin.buffer))
             except EncodeError as error:
                 raise with_arguments(error, cls) from error

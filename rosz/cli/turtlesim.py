@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from rosz.cli.declare import Argument, Context, Option
 from rosz.cli.group import call_of, new_group
 from rosz.errors import UsageError
 
@@ -16,18 +15,13 @@ __all__ = ("app",)
 app = new_group("Look at turtlesims; 'rosz run turtlesim turtlesim_node' starts one.")
 
 
-@app.callback()
-def group() -> None:
-    """Take a picture of a running turtlesim."""
-
-
-@app.command()
+@app.command("snapshot")
 def snapshot(
-    context: typer.Context,
-    file: Annotated[str, typer.Argument(metavar="FILE.png", help="Where to; '-' is stdout.")],
+    context: Context,
+    file: Annotated[str, Argument(metavar="FILE.png", help="Where to; '-' is stdout.")],
     *,
     node: Annotated[
-        str, typer.Option("--node", metavar="NODE", help="Which one, if several are running.")
+        str, Option("--node", metavar="NODE", help="Which one, if several are running.")
     ] = "",
 ) -> None:
     """Save a picture of the field with its turtles."""

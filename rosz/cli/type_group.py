@@ -6,8 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from rosz.cli.declare import App, Argument, Option
 from rosz.cli.group import Call, new_group, print_json, print_lines
 from rosz.errors import UsageError
 
@@ -17,14 +16,14 @@ if TYPE_CHECKING:
 
 __all__ = ("new_type_group",)
 
-_Json = Annotated[bool, typer.Option("--json", help="As JSON.")]
-_Single = Annotated[bool, typer.Option("-s", help="On a single line.")]
+_Json = Annotated[bool, Option("--json", help="As JSON.")]
+_Single = Annotated[bool, Option("-s", help="On a single line.")]
 _TypeName = Annotated[
-    str, typer.Argument(metavar="[TYPE]", help="package/Name, or Name alone; else asked for.")
+    str, Argument(metavar="[TYPE]", help="package/Name, or Name alone; else asked for.")
 ]
 
 
-def new_type_group(kind: Kind, word: str) -> typer.Typer:
+def new_type_group(kind: Kind, word: str) -> App:
     """Return the commands that show definitions.
 
     Args:
@@ -59,7 +58,7 @@ class _Shelf:
         name: _TypeName = "",
         *,
         raw: Annotated[
-            bool, typer.Option("-r", "--raw", help="As it is written, comments included.")
+            bool, Option("-r", "--raw", help="As it is written, comments included.")
         ] = False,
         json: _Json = False,
     ) -> None:
@@ -100,7 +99,7 @@ class _Shelf:
 
     def package(
         self,
-        package: Annotated[str, typer.Argument(metavar="[PACKAGE]")] = "",
+        package: Annotated[str, Argument(metavar="[PACKAGE]")] = "",
         *,
         single: _Single = False,
         json: _Json = False,

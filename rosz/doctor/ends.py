@@ -11,6 +11,7 @@ from rosz.introspect.survey import Survey, ros1_type
 from rosz.wire import NO_HASH, Kind, Token
 
 __all__ = (
+    "check_clock",
     "check_duplicates",
     "check_hashes",
     "check_hashless",
@@ -22,8 +23,9 @@ __all__ = (
 
 _BOTH_SIDES = ((Kind.PUBLISHER, Kind.SUBSCRIPTION), (Kind.SERVICE, Kind.CLIENT))
 _HASH_SHOWN = 15
+_CLOCK = "/clock"
 # What a node offers whether or not anybody wants it.
-_OFFERED = frozenset({"/rosout", "/rosout_agg", "/parameter_events", "/clock", "/diagnostics"})
+_OFFERED = frozenset({"/rosout", "/rosout_agg", "/parameter_events", _CLOCK, "/diagnostics"})
 
 
 def _by_name(survey: Survey) -> Iterator[tuple[str, str, list[Token]]]:
@@ -145,6 +147,19 @@ def check_one_sided(survey: Survey) -> Iterator[Finding]:
             "nodes publish what nobody subscribes to",
             _alone(survey, unheard, unsaid),
             "nothing, if that is meant; else start who is missing, or correct the name",
+        )
+
+
+def check_clock(survey: Survey) -> Iterator[Finding]:
+    """Find nodes whose time stands still: they wait for a /clock that nobody publishes."""
+    ends = [end for end in survey.view.endpoints(*_BOTH_SIDES[0]) if end.name == _CLOCK]
+    if ends and all(end.kind is Kind.SUBSCRIPTION for end in ends):
+        yield error(
+            "no-clock",
+            "nodes live in simulated time and nobody publishes /clock: their time stands still",
+            sorted(_end(survey, end) for end in ends),
+            "start the simulator; or, to live in real time, run"
+            " 'rosz param set /use_sim_time false' and start them again",
         )
 
 

@@ -9,6 +9,7 @@ import msgspec
 
 from rosz.doctor.endpoints import check_connect, check_rendezvous, check_socket_files
 from rosz.doctor.ends import (
+    check_clock,
     check_duplicates,
     check_hashes,
     check_hashless,
@@ -22,6 +23,7 @@ from rosz.doctor.interview import check_answers, check_clocks, check_sight, inte
 from rosz.doctor.memory import LEAST_FREE, check_room, check_segments
 from rosz.doctor.network import check_domains, check_replicas, check_versions
 from rosz.doctor.stamps import check_stamps
+from rosz.doctor.stopped import check_stopped
 from rosz.environment import Environment, package_index
 from rosz.errors import TransportError
 from rosz.introspect.reach import open_session
@@ -61,7 +63,9 @@ def examine(examination: Examination) -> Iterator[Finding]:
     yield from check_segments(examination.memory)
     yield from check_socket_files(environment)
     yield from check_connect(environment)
-    held = list(check_rendezvous(environment))
+    stopped = list(check_stopped(environment))
+    yield from stopped
+    held = [] if stopped else list(check_rendezvous(environment))
     yield from held
     if held:
         return
@@ -91,6 +95,7 @@ def _examine_network(session: Session, examination: Examination) -> Iterator[Fin
     yield from check_types(survey)
     yield from check_hashes(survey)
     yield from check_packages(survey, _Hashes(environment).find, environment.distro)
+    yield from check_clock(survey)
     yield from check_one_sided(survey)
     answers = interview(session, environment.domain) if survey.processes else {}
     yield from check_answers(session, survey, answers)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import msgspec
 
 from rosz.doctor.finding import Finding, error
+from rosz.doctor.stopped import state
 from rosz.introspect.survey import Survey, place, take
 from rosz.node.control import NodeInfo, Request, control_key
 from rosz.session import Session
@@ -50,10 +51,14 @@ def interview(session: Session, domain: int) -> dict[_Node, Answer]:
         if not reply.ok:
             continue
         journey = time.monotonic_ns() - began
-        info = msgspec.msgpack.decode(reply.payload, type=NodeInfo)
-        zid, number = reply.key.split("/")[-2:]
+        try:
+            info = msgspec.msgpack.decode(reply.payload, type=NodeInfo)
+            zid, number = reply.key.split("/")[-2:]
+            node = zid, int(number)
+        except (msgspec.MsgspecError, ValueError):  # no answer of a node's
+            continue
         offset = info.now - asked - journey // 2 if info.now else 0
-        answers[zid, int(number)] = Answer(info, offset, journey // 2)
+        answers[node] = Answer(info, offset, journey // 2)
     return answers
 
 
@@ -70,7 +75,7 @@ def check_answers(
         yield error(
             "unreachable-node",
             f"{len(silent)} nodes are listed and do not answer",
-            sorted(_name(survey, node) for node in silent),
+            sorted(_name(survey, node) + _state(survey, node) for node in silent),
             "they hang, are stopped (Ctrl-Z: 'fg' lets them go on), or the link to their machine"
             " is broken: check it with ping, and end them with 'rosz node kill'",
         )
@@ -80,14 +85,15 @@ def check_sight(
     session: Session, survey: Survey, answers: dict[_Node, Answer]
 ) -> Iterator[Finding]:
     """Find nodes that do not see others which are there."""
-    if not _blind(survey, answers):
+    stopped = session.out_of_reach()
+    if not _blind(survey, answers, stopped):
         return
     time.sleep(_AGAIN)
     survey, answers = (
         take(session, survey.domain, processes=True),
         interview(session, survey.domain),
     )
-    blind = _blind(survey, answers)
+    blind = _blind(survey, answers, stopped)
     if not blind:
         return
     lines: list[str] = []
@@ -108,9 +114,9 @@ def check_sight(
     )
 
 
-def _blind(survey: Survey, answers: dict[_Node, Answer]) -> set[tuple[str, str]]:
-    """Return who does not see whom, by session."""
-    there = {zid for zid, _ in survey.processes}
+def _blind(survey: Survey, answers: dict[_Node, Answer], stopped: set[str]) -> set[tuple[str, str]]:
+    """Return who does not see whom, by session; those that are stopped are seen by no newcomer."""
+    there = {zid for zid, _ in survey.processes} - stopped
     sees = {zid: {zid, *answer.info.sees} for (zid, _), answer in answers.items() if zid in there}
     return {
         (zid, other)
@@ -153,6 +159,11 @@ def check_clocks(survey: Survey, answers: dict[_Node, Answer]) -> Iterator[Findi
 def _name(survey: Survey, node: _Node) -> str:
     process = survey.processes.get(node)
     return f"session {node[0]}" if process is None else f"{process.node} ({place(process)})"
+
+
+def _state(survey: Survey, node: _Node) -> str:
+    process = survey.processes.get(node)
+    return "" if process is None else state(process)
 
 
 def _names(survey: Survey, zid: str) -> str:

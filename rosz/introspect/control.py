@@ -34,7 +34,7 @@ def ask(
     Raises:
         NotFoundError: Nobody is there to be asked: it is no rosz node, or has just ended.
         WaitTimeout: It did not answer.
-        RoszError: It refuses; the text says why.
+        RoszError: It refuses, or its answer makes no sense; the text says why.
     """
     key = control_key(node.domain, node.zid, node.node_id)
     replies = session.get(key, payload=msgspec.msgpack.encode(request), timeout=timeout)
@@ -42,10 +42,17 @@ def ask(
         raise NotFoundError(f"node '{node.node_name}' takes no questions: it is no rosz node")
     reply = replies[0]
     if reply.ok:
-        return msgspec.msgpack.decode(reply.payload, type=answer)
+        try:
+            return msgspec.msgpack.decode(reply.payload, type=answer)
+        except msgspec.MsgspecError as error:
+            raise RoszError(
+                f"node '{node.node_name}' answers what makes no sense: {error}; is it of another"
+                " version of rosz?"
+            ) from error
     text = reply.payload.decode(errors="replace")
     if text == "Timeout":
-        raise WaitTimeout(f"answer of node '{node.node_name}'", timeout, "it hangs or is stopped")
+        why = session.why_silent(node.zid) or "it hangs or is stopped"
+        raise WaitTimeout(f"answer of node '{node.node_name}'", timeout, why)
     raise RoszError(text)
 
 

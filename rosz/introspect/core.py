@@ -8,14 +8,14 @@ that outlive all nodes, on disk also itself.
 from __future__ import annotations
 
 import re
-import socket
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.session import Session, SessionConfig, keys_of, secured
+from rosz.introspect.interfaces import Latecomers
+from rosz.session import Session, SessionConfig, is_local, keys_of, places_of
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -60,24 +60,22 @@ class Core:
     ) -> None:
         from rosz.params.replica import Replica
 
-        self.endpoints = _listening(environment.rendezvous, (*environment.listen, *listen))
-        self.connect = (*environment.connect, *connect)
+        listen = (*environment.listen, *listen)
+        if environment.multicast and all(map(is_local, listen)):
+            listen += _everywhere(environment.rendezvous)
         self.domain = environment.domain
         self.store = store
-        keys = keys_of(environment)
-        if keys is not None:
-            self.endpoints = tuple(secured(endpoint) for endpoint in self.endpoints)
-            self.connect = tuple(secured(endpoint) for endpoint in self.connect)
         config = SessionConfig(
             mode="router",
-            rendezvous=self.endpoints[0],
-            listen=self.endpoints[1:],
-            connect=self.connect,
+            rendezvous=environment.rendezvous,
+            listen=listen,
+            connect=(*environment.connect, *connect),
             multicast=environment.multicast,
-            keys=keys,
+            keys=keys_of(environment),
             config_file=environment.zenoh_config,
             override=environment.zenoh_override,
         )
+        self.endpoints, self.connect = places_of(config)
         keep = None
         if store is not None:
             from rosz.params.store import Store
@@ -89,15 +87,18 @@ class Core:
             if keep is not None:
                 keep.close()
             raise _explained(error, self.endpoints) from error
+        self._latecomers = Latecomers(config)
         try:
             self.params: Replica = Replica(self.session, self.domain, keep=keep)
         except BaseException:
+            self._latecomers.close()
             self.session.close()
             raise
 
     def close(self) -> None:
         """End both; again is no error."""
         self.params.close()
+        self._latecomers.close()
         self.session.close()
 
     def __enter__(self) -> Self:
@@ -112,26 +113,10 @@ class Core:
         self.close()
 
 
-def _listening(rendezvous: str, listen: Sequence[str]) -> tuple[str, ...]:
-    """Return where to listen so that the rendezvous is held at all addresses of its name.
-
-    ``tcp/0.0.0.0:7447`` holds ``127.0.0.1:7447`` already, and nobody can listen there twice; but
-    where ``localhost`` is ``::1`` as well, that has to be held too, or the next node would.
-    """
+def _everywhere(rendezvous: str) -> tuple[str, ...]:
+    """Return where whoever finds this core by multicast can reach it."""
     protocol, _, place = rendezvous.partition("/")
-    host, _, port = place.rpartition(":")
-    every = {f"tcp/0.0.0.0:{port}": "127.", f"tcp/[::]:{port}": ""}
-    held = [start for endpoint, start in every.items() if endpoint in listen]
-    if protocol != "tcp" or not held:
-        return tuple(dict.fromkeys((rendezvous, *listen)))
-    try:
-        found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
-    except (OSError, ValueError):  # Zenoh says better what is wrong with it
-        return (rendezvous, *listen)
-    addresses = dict.fromkeys(str(entry[4][0]) for entry in found)
-    rest = [address for address in addresses if not address.startswith(tuple(held))]
-    extra = [f"tcp/[{one}]:{port}" if ":" in one else f"tcp/{one}:{port}" for one in rest]
-    return tuple(dict.fromkeys((*listen, *extra)))
+    return (f"tcp/0.0.0.0:{place.rpartition(':')[2]}",) if protocol == "tcp" else ()
 
 
 def _explained(error: TransportError, endpoints: Sequence[str]) -> TransportError:

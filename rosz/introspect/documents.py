@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TextIO
-
-import yaml
+from typing import Any
 
 from rosz.errors import NotFoundError, UsageError, YamlError
+from rosz.params.nodes import read_plain
 
 __all__ = ("read_arguments", "read_file", "read_stream")
 
-_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_STREAM = "standard input"
+_FEW = 60
 
 
 def read_arguments(words: Sequence[str]) -> list[Any]:
@@ -21,15 +21,19 @@ def read_arguments(words: Sequence[str]) -> list[Any]:
     Raises:
         UsageError: One of them is no YAML.
     """
-    values: list[Any] = []
-    for number, word in enumerate(words, 1):
-        try:
-            values.append(yaml.load(word, _Loader) if word else "")  # noqa: S506  # a safe one
-        except yaml.YAMLError as error:
-            raise UsageError(
-                f"value {number}, '{word}', is no YAML: {_reason(error)[0]}"
-            ) from error
-    return values
+    return [_read_argument(word, number) for number, word in enumerate(words, 1)]
+
+
+def _read_argument(word: str, number: int) -> Any:
+    try:
+        found = list(read_plain(word, "<value>")) if word else [""]
+    except YamlError as error:
+        raise UsageError(f"value {number}, '{word:.{_FEW}}', is no YAML: {error.reason}") from error
+    if len(found) > 1:
+        raise UsageError(
+            f"value {number}, '{word:.{_FEW}}', is {len(found)} YAML documents; expected one"
+        )
+    return found[0] if found else None
 
 
 def read_file(path: Path) -> list[Any]:
@@ -40,19 +44,13 @@ def read_file(path: Path) -> list[Any]:
         YamlError: It is no YAML.
     """
     try:
-        text = path.read_text("utf-8")
+        data = path.read_bytes()
     except FileNotFoundError as error:
         raise NotFoundError(f"file '{path}' is not there") from error
-    except UnicodeDecodeError as error:
-        raise YamlError("not UTF-8", str(path), text_line(error), 1) from error
-    try:
-        return [one for one in yaml.load_all(text, _Loader) if one is not None]
-    except yaml.YAMLError as error:
-        reason, line, column = _reason(error)
-        raise YamlError(reason, str(path), line, column) from error
+    return list(_read(data, str(path)))
 
 
-def read_stream(lines: Iterable[str] | TextIO) -> Iterator[Any]:
+def read_stream(lines: Iterable[bytes]) -> Iterator[Any]:
     """Yield the documents of a stream as they end, each with a line of three dashes.
 
     What follows the last such line is taken for unfinished, and left out, as ROS 1's tools do.
@@ -60,30 +58,25 @@ def read_stream(lines: Iterable[str] | TextIO) -> Iterator[Any]:
     Raises:
         YamlError: A document is no YAML.
     """
-    begun: list[str] = []
+    begun: list[bytes] = []
     for number, line in enumerate(lines, 1):
-        if line.strip() != "---":
+        if line.strip() != b"---":
             begun.append(line)
             continue
+        before = number - len(begun) - 1
         try:
-            value = yaml.load("".join(begun), _Loader)  # noqa: S506  # a safe one
-        except yaml.YAMLError as error:
-            reason, at, column = _reason(error)
-            raise YamlError(
-                reason, "standard input", number - len(begun) + at - 1, column
-            ) from error
+            found = list(_read(b"".join(begun), _STREAM))
+        except YamlError as error:
+            raise YamlError(error.reason, _STREAM, before + error.line, error.column) from error
         begun.clear()
-        if value is not None:
-            yield value
+        yield from found
 
 
-def text_line(error: UnicodeDecodeError) -> int:
-    """Return the line, from 1, of what cannot be decoded."""
-    return error.object[: error.start].count(b"\n") + 1
-
-
-def _reason(error: yaml.YAMLError) -> tuple[str, int, int]:
-    """Return what is wrong in one line, and line and column from 1, 0 where unknown."""
-    mark = getattr(error, "problem_mark", None)
-    problem = getattr(error, "problem", None) or str(error).partition("\n")[0]
-    return (problem, mark.line + 1, mark.column + 1) if mark else (problem, 0, 0)
+def _read(data: bytes, path: str) -> Iterator[Any]:
+    """Yield the documents that are not empty."""
+    try:
+        text = data.decode()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise YamlError(f"byte {data[error.start]:#04x} is no UTF-8", path, line) from error
+    yield from (one for one in read_plain(text, path) if one is not None)

@@ -9,6 +9,8 @@ from rosz.errors import RoszError, UsageError
 
 __all__ = ("Filter",)
 
+_FEW = 100
+
 
 class Filter:
     """Tells whether a message is wanted.
@@ -26,9 +28,14 @@ class Filter:
             self._code = compile(ast.parse(text.strip(), "<filter>", "eval"), "<filter>", "eval")
         except SyntaxError as error:
             place = f" at column {error.offset}" if error.offset else ""
-            raise UsageError(
-                f"filter '{text}' is no Python expression: {error.msg}{place}"
-            ) from error
+            raise self._refused(f"{error.msg}{place}") from error
+        except ValueError as error:
+            raise self._refused(str(error)) from error
+        except (MemoryError, RecursionError) as error:
+            raise self._refused("it is nested too deep") from error
+
+    def _refused(self, reason: str) -> UsageError:
+        return UsageError(f"filter '{self.text:.{_FEW}}' is no Python expression: {reason}")
 
     def accepts(self, message: Any, topic: str = "") -> bool:
         """Tell whether a message is wanted.

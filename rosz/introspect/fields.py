@@ -107,6 +107,8 @@ def _parse_step(part: str, whole: str) -> Step:
         raise UsageError(
             f"'[{inside}]' in '{whole}' is no index; expected [3] or [start:stop:step]"
         )
+    if len(ends) == _MOST_SLICE_PARTS and ends[2] == 0:
+        raise UsageError(f"'[{inside}]' in '{whole}' goes nowhere; expected a step other than 0")
     return Step(name, slice(*ends))
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from rosz.environment import Environment
 from rosz.errors import TransportError
 from rosz.session import Session, SessionConfig
+from rosz.session.presence import is_anybody_awake, is_router_stopped, why_unanswered
 from rosz.session.probe import is_answered
 from rosz.session.settle import Settling
 
@@ -36,6 +37,7 @@ def open_session(environment: Environment) -> Session:
     Raises:
         TransportError: Nobody answers; the text says what to start.
     """
+    _check_awake(environment)
     if _may_answer(environment):
         try:
             return Session.open(SessionConfig.command(environment))
@@ -65,6 +67,7 @@ def open_context(
     """
     from rosz.node import Context
 
+    _check_awake(environment)
     if not lasting and _may_answer(environment):
         try:
             return Context(environment, argv, SessionConfig.command(environment))
@@ -80,6 +83,19 @@ def open_context(
     return context
 
 
+def _check_awake(environment: Environment) -> None:
+    """See that not all who are there are stopped.
+
+    Raises:
+        TransportError: They are.
+    """
+    beyond = environment.connect or environment.multicast or environment.zenoh_config
+    if not beyond and not is_anybody_awake(environment.rendezvous):
+        stopped = why_unanswered(environment.rendezvous)
+        if stopped:
+            raise TransportError(stopped)
+
+
 def _may_answer(environment: Environment) -> bool:
     """Tell whether it is worth the wait to try as a client."""
     return bool(
@@ -87,7 +103,7 @@ def _may_answer(environment: Environment) -> bool:
         or environment.multicast
         or environment.mode == "client"
         or environment.zenoh_config
-        or is_answered(environment.rendezvous)
+        or (is_answered(environment.rendezvous) and not is_router_stopped(environment.rendezvous))
     )
 
 
@@ -97,6 +113,9 @@ def _check_free(environment: Environment, error: TransportError) -> None:
     Raises:
         TransportError: Somebody listens there, and does not speak.
     """
+    stopped = why_unanswered(environment.rendezvous)
+    if stopped:
+        raise TransportError(stopped) from error
     if is_answered(environment.rendezvous):
         raise TransportError(
             f"what listens at {environment.rendezvous} does not answer: it is stopped, or it is no"
@@ -115,6 +134,9 @@ def _meet(session: Session, environment: Environment) -> None:
 
 
 def _nobody(environment: Environment) -> TransportError:
+    stopped = why_unanswered(environment.rendezvous)
+    if stopped:
+        return TransportError(stopped)
     where = ", ".join((environment.rendezvous, *environment.connect))
     return TransportError(
         f"nobody answers at {where}: start 'rosz core', a launch or a node, or set ROSZ_CONNECT to"

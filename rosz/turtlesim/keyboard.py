@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import select
+import signal
 import socket
 import sys
 import termios
@@ -15,6 +16,8 @@ __all__ = ("KeyDecoder", "Keyboard")
 
 _ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
 _ESCAPE = "\x1b"
+_SOON = 0.2
+"""Seconds until a program that goes on reads key by key again, at most."""
 
 
 class KeyDecoder:
@@ -52,7 +55,11 @@ class KeyDecoder:
 
 
 class Keyboard:
-    """Standard input, key by key; a terminal gets its settings back at the end of the ``with``."""
+    """Standard input, key by key; a terminal gets its settings back at the end of the ``with``.
+
+    A shell takes the settings back when it stops the program (Ctrl-Z), hence they are made anew
+    when it goes on. That needs the main thread, as signals do.
+    """
 
     def __init__(self) -> None:
         self._fd = sys.stdin.fileno()
@@ -61,14 +68,19 @@ class Keyboard:
 
     def __enter__(self) -> Self:
         if os.isatty(self._fd):
-            settings = termios.tcgetattr(self._fd)
             self._settings = termios.tcgetattr(self._fd)
-            settings[3] &= ~(termios.ICANON | termios.ECHO)
-            termios.tcsetattr(self._fd, termios.TCSANOW, settings)
+            self._by_key()
+            self._continued = signal.signal(signal.SIGCONT, lambda *_: self._by_key())
         return self
+
+    def _by_key(self) -> None:
+        settings = termios.tcgetattr(self._fd)
+        settings[3] &= ~(termios.ICANON | termios.ECHO)
+        termios.tcsetattr(self._fd, termios.TCSANOW, settings)
 
     def __exit__(self, *_: object) -> None:
         if self._settings is not None:
+            signal.signal(signal.SIGCONT, self._continued)
             termios.tcsetattr(self._fd, termios.TCSADRAIN, self._settings)
         self._wake.close()
         self._waker.close()
@@ -82,9 +94,12 @@ class Keyboard:
         """Yield keys until told to stop, or until there can be no more."""
         decoder = KeyDecoder()
         while True:
-            ready, _, _ = select.select([self._fd, self._wake], [], [])
+            # The system may hand the signal to another thread, which does not end the wait here.
+            ready, _, _ = select.select([self._fd, self._wake], [], [], _SOON)
             if self._wake in ready:
                 return
+            if not ready:
+                continue
             try:
                 data = os.read(self._fd, 256)
             except OSError:  # a terminal whose other side is gone
