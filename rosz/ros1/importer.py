@@ -32,14 +32,12 @@ __all__ = ("MODULES", "install", "package_path", "type_store", "uninstall")
 
 MODULES = (
     "actionlib",
-    "diagnostic_updater",
     "dynamic_reconfigure",
     "genmsg",
     "genpy",
     "message_filters",
     "rclpy",
     "rosgraph",
-    "roslaunch",
     "roslib",
     "rosmsg",
     "rosnode",
@@ -54,13 +52,14 @@ MODULES = (
     "tf2_geometry_msgs",
     "tf2_ros",
     "tf_conversions",
-    "tf_transformations",
 )
-"""ROS 1's Python modules; those that lie beside this one are importable under their own names."""
+"""ROS 1's Python modules, which lie beside this one."""
+
+_RENAMED = {"tf_transformations": "tf.transformations"}
+"""Names that ROS 2 has for what ROS 1 has under another one."""
 
 _KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
 _CFG = "cfg"
-_HERE = Path(__file__).parent
 
 
 def install(store: TypeStore | None = None, packages: PackageIndex | None = None) -> None:
@@ -181,11 +180,7 @@ class _First(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self.types = types
         self._shipped = shipped_packages()
-        self._modules = frozenset(
-            name
-            for name in MODULES
-            if (_HERE / name / "__init__.py").is_file() or (_HERE / f"{name}.py").is_file()
-        )
+        self._modules = frozenset((*MODULES, *_RENAMED))
 
     def find_spec(
         self,
@@ -203,7 +198,7 @@ class _First(MetaPathFinder):
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
         if root in self._modules:
-            return self._known(fullname, f"rosz.ros1.{fullname}")
+            return self._known(fullname, f"rosz.ros1.{_RENAMED.get(fullname, fullname)}")
         if root in self._shipped and not rest:
             return _same(fullname, lambda: import_module(f"rosz.msgs.{root}"))
         return None

@@ -6,6 +6,7 @@ made for another machine than this one. `SystemContext` is the outside of this p
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +18,9 @@ from rosz.errors import LaunchError
 from rosz.packages import PackageIndex
 
 __all__ = ("LaunchContext", "LaunchText", "SystemContext")
+
+_MOST_BYTES = 64 * 1024 * 1024
+"""More is no parameter and no launch file: what is read has no end, such as a device."""
 
 
 class LaunchText(msgspec.Struct, frozen=True):
@@ -102,7 +106,11 @@ class SystemContext:
         Raises:
             OSError: It cannot be read.
         """
-        return Path(self.cwd, path).read_bytes()
+        with Path(self.cwd, path).open("rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+        if len(data) > _MOST_BYTES:
+            raise OSError(errno.EFBIG, f"too large, expected at most {_MOST_BYTES} bytes", path)
+        return data
 
     def find(self, package: str) -> str:
         """Return the folder of a package.
@@ -134,13 +142,23 @@ class SystemContext:
 
         Raises:
             OSError: It cannot be started.
-            LaunchError: It ended with another code than 0.
+            LaunchError: It ended with another code than 0, or writes without end.
         """
         import subprocess
 
-        done = subprocess.run(
-            command, stdout=subprocess.PIPE, env=dict(self.environ), cwd=self.cwd, check=False
-        )
-        if done.returncode:
-            raise LaunchError(f"command '{' '.join(command)}' ended with code {done.returncode}")
-        return done.stdout
+        shown = " ".join(command)
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, env=dict(self.environ), cwd=self.cwd
+        ) as process:
+            try:
+                assert process.stdout is not None  # noqa: S101  # it is a pipe
+                data = process.stdout.read(_MOST_BYTES + 1)
+            except BaseException:
+                process.kill()
+                raise
+            if len(data) > _MOST_BYTES:
+                process.kill()
+                raise LaunchError(f"command '{shown}' writes more than {_MOST_BYTES} bytes")
+        if process.returncode:
+            raise LaunchError(f"command '{shown}' ended with code {process.returncode}")
+        return data

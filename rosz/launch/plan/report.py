@@ -28,15 +28,7 @@ def dump_params(plan: Plan) -> str:
     """Write all parameters as YAML (``--dump-params``), sorted, by full name."""
     import yaml
 
-    text: str = yaml.dump({param.name: param.value for param in plan.params}, Dumper=_dumper())
-    return text
-
-
-def _dumper() -> type:
-    """Return PyYAML's safe dumper in Python, which real roslaunch writes with."""
-    import yaml
-
-    return yaml.SafeDumper
+    return str(yaml.safe_dump({param.name: param.value for param in plan.params}))
 
 
 def list_nodes(plan: Plan) -> str:

@@ -13,6 +13,7 @@ from rosz.launch.run.network import GraphReadiness, Network
 from rosz.launch.run.parameters import ParamStore, core_params
 from rosz.launch.run.process import Readiness, Timeouts
 from rosz.launch.run.runner import Options, Runner
+from rosz.launch.run.stopping import interrupted_by_signals
 
 __all__ = (
     "Child",
@@ -32,6 +33,7 @@ __all__ = (
     "Timeouts",
     "Workplace",
     "core_params",
+    "interrupted_by_signals",
     "order",
     "run_command",
     "statuses",

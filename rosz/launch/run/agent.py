@@ -83,7 +83,7 @@ class Agent:
 
     def run(self) -> None:
         """Work until the launch, or the link to it, ends."""
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
             signal.signal(number, lambda *_: self._loop.post(self._end))
         self._outbox.send(Hello(PROTOCOL, rosz_version(), socket.gethostname()))
         self._loop.watch(self._requests.fd, self._heard)

@@ -35,9 +35,9 @@ class Console:
         """Print a line."""
         self._print(self._out, text, "", "INFO")
 
-    def show(self, sink: int, data: bytes) -> None:
+    def show(self, sink: int, text: str) -> None:
         """Print what nodes of another machine wrote, to standard output (1) or error (2)."""
-        self._put(self._out if sink == 1 else self._err, data.decode(errors="replace"))
+        self._put(self._out if sink == 1 else self._err, text)
 
     def strong(self, text: str) -> None:
         """Print a line that matters."""

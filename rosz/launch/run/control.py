@@ -19,7 +19,7 @@ from rosz.launch.run.loop import Loop, Timer
 from rosz.launch.run.process import Process
 from rosz.launch.run.summary import exit_reason
 from rosz.launch.run.supervisor import Supervisor
-from rosz.session import Closable, Query, Session
+from rosz.session import Closable, Query, Reply, Session
 from rosz.wire import own_key
 
 __all__ = ("LaunchStatus", "NodeStatus", "Order", "Panel", "order", "statuses")
@@ -209,6 +209,7 @@ def statuses(session: Session, domain: int) -> list[LaunchStatus]:
     """Return all running launches of a domain.
 
     Raises:
+        LaunchError: What a launch answers makes no sense.
         WaitTimeout: A launch is there but does not answer.
     """
     return [status for _, status in _running(session, domain)]
@@ -245,7 +246,7 @@ def _order(session: Session, key: str, asked: Order) -> None:
         raise LaunchError(f"the launch of '{asked.node}' ended without an answer")
     if not replies[0].ok:
         raise LaunchError(replies[0].payload.decode(errors="replace"))
-    status = msgspec.json.decode(replies[0].payload, type=LaunchStatus)
+    status = _read(replies[0])
     after = next(entry for entry in status.nodes if entry.name == asked.node)
     if asked.action == "restart" and after.state != "running":
         raise LaunchError(f"'{asked.node}' did not start again: {after.detail}")
@@ -257,11 +258,17 @@ def _running(session: Session, domain: int) -> list[tuple[str, LaunchStatus]]:
         payload=msgspec.json.encode(Order("status")),
         timeout=_STATUS_SECONDS,
     )
-    found = [
-        (reply.key, msgspec.json.decode(reply.payload, type=LaunchStatus))
-        for reply in replies
-        if reply.ok
-    ]
+    found = [(reply.key, _read(reply)) for reply in replies if reply.ok]
     if replies and not found:
         raise WaitTimeout("answer from a running launch", _STATUS_SECONDS)
     return sorted(found, key=lambda pair: (pair[1].host, pair[1].pid))
+
+
+def _read(reply: Reply) -> LaunchStatus:
+    try:
+        return msgspec.json.decode(reply.payload, type=LaunchStatus)
+    except msgspec.MsgspecError as error:
+        raise LaunchError(
+            f"what a launch answers at '{reply.key}' makes no sense: {error}; is it of another"
+            " version of rosz?"
+        ) from error

@@ -255,7 +255,10 @@ class LocalHost:
         try:
             Path(cwd).mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise LaunchError(f"cannot start in '{cwd}': {error.strerror}") from error
+            raise LaunchError(
+                f"cannot start in '{cwd}': {error.strerror}; set ROS_HOME to a folder that can be"
+                " written to"
+            ) from error
         return cwd
 
 

@@ -127,7 +127,12 @@ class Hub:
 
         def again() -> None:
             console.say("[core] restarting process")
-            self._process = self._start()
+            try:
+                self._process = self._start()
+            except OSError as error:
+                console.error(f"[core] cannot be started: {error.strerror}")
+                loop.later(_AGAIN_SECONDS, again)
+                return
             console.strong(f"process[core]: started with pid [{self.pid}]")
             loop.watch_exit(self.pid, ended)
 

@@ -21,6 +21,9 @@ __all__ = ("Loop", "Timer")
 
 Action = Callable[[], None]
 
+_LONGEST_WAIT = 3600.0
+"""Seconds of one wait: the system counts milliseconds in 32 bits, which timers may exceed."""
+
 
 class Timer:
     """A call that will be made once, unless cancelled.
@@ -118,7 +121,7 @@ class Loop:
     def step(self, timeout: float | None = None) -> None:
         """Do one round: wait for something, at most so many seconds, and call back."""
         if self._timers:
-            left = max(0.0, self._timers[0][0] - self.now())
+            left = min(max(0.0, self._timers[0][0] - self.now()), _LONGEST_WAIT)
             timeout = left if timeout is None else min(left, timeout)
         if self._posted:
             timeout = 0.0

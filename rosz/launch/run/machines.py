@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import socket
 from collections.abc import Mapping, Sequence
 from typing import Self
 
@@ -122,7 +123,9 @@ def meeting_places(environment: Environment) -> tuple[str, ...]:
         if protocol not in {"tcp", "tls"}:
             continue
         if host in _EVERYWHERE or host.startswith(_LOCAL):
-            places.append(f"{protocol}/:{port}")
+            # Keys are for a name, and seldom for an address.
+            names = [socket.gethostname()] if environment.keys is not None else []
+            places += [f"{protocol}/{name}:{port}" for name in (*names, "")]
         else:
             places.append(endpoint)
     places += [place for place in environment.connect if f"/{_LOCAL[1]}" not in place]

@@ -164,8 +164,11 @@ class Process:
     def _start(self) -> None:
         self._cancel_timers()
         job = Job(self.node, self.owner, self.label, again=self.starts > 0)
+        which = self.starts + 1
         try:
-            self.child = self.host.start(job, self._exited, self._confirmed)
+            self.child = self.host.start(
+                job, partial(self._exited, which), partial(self._confirmed, which)
+            )
         except RoszError as error:
             self._fail(error)
             return
@@ -174,15 +177,19 @@ class Process:
         self._again = False
         self.code = None
         self.tail = ()
-        self.starts += 1
+        self.starts = which
         self.began = self._loop.now()
         if not self.child.pending:
             self._listener.started(self)
 
-    def _confirmed(self, error: RoszError | None) -> None:
+    def _given_up(self, which: int) -> bool:
+        """Tell whether nobody waits any more for one of the processes that this was."""
+        return self.over or which != self.starts
+
+    def _confirmed(self, which: int, error: RoszError | None) -> None:
         """Take note of what another machine says to a start."""
-        if self.over:
-            return  # given up before
+        if self._given_up(which):
+            return
         if error is None:
             self._listener.started(self)
             return
@@ -201,9 +208,9 @@ class Process:
         self._listener.failed_to_start(self, error)
         self._listener.settled(self)
 
-    def _exited(self, code: int, tail: tuple[str, ...]) -> None:
-        if self.over:
-            return  # given up before
+    def _exited(self, which: int, code: int, tail: tuple[str, ...]) -> None:
+        if self._given_up(which):
+            return
         asked = self.state is State.STOPPING
         self.code = code
         self.tail = tail

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import itertools
 import os
 import subprocess
@@ -114,6 +115,9 @@ class RemoteHost:
         self._greeted = False
         self._closing = False
         self._decoder = msgspec.json.Decoder(Report)
+        # What comes is cut anywhere, also within a letter.
+        utf8 = codecs.getincrementaldecoder("utf-8")
+        self._texts = {sink: utf8("replace") for sink in (1, 2)}
         self._ssh = self._call()
         assert self._ssh.stdin is not None  # noqa: S101  # all three are pipes
         assert self._ssh.stdout is not None  # noqa: S101
@@ -212,7 +216,7 @@ class RemoteHost:
         elif isinstance(report, Notice):
             self._console.error(f"remote[{self._name}]: {report.text}")
         elif isinstance(report, Shown):
-            self._console.show(report.sink, report.data)
+            self._console.show(report.sink, self._texts[report.sink].decode(report.data))
         elif isinstance(report, Measured):
             waiting, self._measuring = self._measuring, []
             for done in waiting:

@@ -1,4 +1,7 @@
-"""What ends a launch from outside: Ctrl-C, SIGTERM, a closed terminal."""
+r"""What ends a launch from outside: Ctrl-C, SIGTERM, a closed terminal, and Ctrl-\ at once.
+
+None of them leaves a node running. Only SIGKILL does, of which a process does not hear.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,9 @@ from typing import Any
 from rosz.launch.run.console import Console
 from rosz.launch.run.loop import Loop
 
-__all__ = ("stopped_by_signals",)
+__all__ = ("interrupted_by_signals", "stopped_by_signals")
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 @contextmanager
@@ -23,6 +26,7 @@ def stopped_by_signals(
 ) -> Iterator[None]:
     """Have the first signal shut a launch down, and a second one kill what is left.
 
+    SIGQUIT does not ask: it kills what there is, first or not, since who sends it has no patience.
     A SIGHUP that is ignored stays so, as ``nohup`` means it. Outside the main thread nothing is
     installed.
 
@@ -30,7 +34,7 @@ def stopped_by_signals(
         loop: Where the two are called.
         console: Its log gets the stacks of all threads at the second signal.
         shutdown: Called at the first.
-        kill: Called at each further one.
+        kill: Called at each further one, and at SIGQUIT.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -38,15 +42,39 @@ def stopped_by_signals(
     seen = threading.Event()
 
     def handle(number: int, _frame: object) -> None:
-        if not seen.is_set():
-            seen.set()
+        again = " again" if seen.is_set() else ""
+        seen.set()
+        if not again and number != signal.SIGQUIT:
             loop.post(shutdown)
             return
         if console.log is not None:
-            console.note(f"{signal.Signals(number).name} again; the stacks of all threads:")
+            console.note(f"{signal.Signals(number).name}{again}; the stacks of all threads:")
             faulthandler.dump_traceback(console.log.fileno())
         loop.post(kill)
 
+    with _handled_by(handle):
+        yield
+
+
+@contextmanager
+def interrupted_by_signals() -> Iterator[None]:
+    """Have these signals raise `KeyboardInterrupt`, so that what has been started is ended.
+
+    For as long as `stopped_by_signals` does not say otherwise.
+    """
+
+    def handle(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with _handled_by(handle):
+        yield
+
+
+@contextmanager
+def _handled_by(handle: Callable[[int, Any], None]) -> Iterator[None]:
     before: dict[signal.Signals, Any] = {}
     for number in _SIGNALS:
         if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:

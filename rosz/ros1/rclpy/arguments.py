@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import yaml
 
 from rosz import remap
 from rosz.errors import NotFoundError, UsageError, YamlError
+from rosz.params.nodes import read_plain
 from rosz.remap import Arguments
 
 __all__ = ("RosArguments", "parse", "remove_ros_args")
@@ -124,19 +124,20 @@ def _remap(rule: str, remaps: dict[str, str], special: dict[str, str]) -> None:
 
 def _value(text: str, rule: str) -> Any:
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise UsageError(f"'{rule}' has no YAML value: {error}") from error
+        return next(read_plain(text, "<value>"), None)
+    except YamlError as error:
+        raise UsageError(f"'{rule}' has no YAML value: {error.reason}") from error
 
 
 def _read(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the nodes of a parameter file with their values; ``/**`` means all."""
     try:
-        tree = yaml.safe_load(Path(path).read_text("utf-8")) or {}
+        text = Path(path).read_text("utf-8")
     except OSError as error:
         raise NotFoundError(f"parameter file '{path}': {error.strerror}") from error
-    except yaml.YAMLError as error:
-        raise YamlError(str(error), path) from error
+    except UnicodeDecodeError as error:
+        raise YamlError("it is not UTF-8", path) from error
+    tree = next(read_plain(text, path), None) or {}
     yield from _nodes(tree, "", path)
 
 
@@ -145,6 +146,8 @@ def _nodes(tree: Any, name: str, path: str) -> Iterator[tuple[str, dict[str, Any
         raise YamlError(f"'{name}' has no 'ros__parameters'", path)
     for key, inner in tree.items():
         if key == "ros__parameters":
+            if not isinstance(inner, dict | None):
+                raise YamlError(f"'ros__parameters' of '{name}' is no dictionary", path)
             yield ("" if name in {"/**", "**"} else name), dict(_flat(inner or {}, ""))
         else:
             yield from _nodes(inner, f"{name.rstrip('/')}/{key}" if name else str(key), path)

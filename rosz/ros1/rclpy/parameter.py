@@ -10,6 +10,7 @@ from typing import Any
 from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
 from rosz.msgs.rcl_interfaces.msg import ParameterValue
+from rosz.params.nodes import read_plain
 
 __all__ = ("PARAMETER_SEPARATOR_STRING", "Parameter", "get_parameter_value")
 
@@ -172,6 +173,5 @@ def _is_empty(value: Any) -> bool:
 
 def get_parameter_value(string_value: str) -> ParameterValue:
     """Return what a text is as a parameter, by the rules of YAML."""
-    import yaml
-
-    return Parameter("", value=yaml.safe_load(string_value)).get_parameter_value()
+    value = next(read_plain(string_value, "<value>"), None)
+    return Parameter("", value=value).get_parameter_value()

@@ -28,7 +28,7 @@ class Timer:
         clock: Clock,
         group: CallbackGroup,
         wake: Callable[[], None],
-        report: Callable[[str, Exception], None],
+        report: Callable[[str, BaseException], None],
         autostart: bool = True,
     ) -> None:
         self.callback = callback

@@ -8,22 +8,29 @@ interpreter has no rosz, the module stays unknown.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import module_from_spec
 from pathlib import Path
-from types import ModuleType
+from types import FrameType, ModuleType
 
 __all__ = ()
+
+_NEEDED = sys.stdlib_module_names | {"msgspec", "rosz", "yaml", "zenoh"}
+"""What rosz is made of."""
 
 
 class _Last(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Have rosz look for a module, and for all others from now on."""
-        if path is not None:
+        """Have rosz look for a module, and for all others from now on.
+
+        Not for what rosz is made of: that tries modules of other systems as it loads (``_wmi``,
+        ``msvcrt``), and rosz cannot load with one of its parts half there.
+        """
+        if path is not None or not _NEEDED.isdisjoint(_loading()):
             return None
         sys.meta_path.remove(self)
         known = len(sys.meta_path)
@@ -35,6 +42,15 @@ class _Last(MetaPathFinder):
         added = [*sys.meta_path[: len(sys.meta_path) - known], *sys.meta_path[-1:]]
         found = (finder.find_spec(fullname, path, target) for finder in added)
         return next((spec for spec in found if spec is not None), None)
+
+
+def _loading() -> Iterator[str]:
+    """Yield the packages that this thread is in the middle of loading."""
+    frame: FrameType | None = sys._getframe()  # noqa: SLF001  # the public ways load modules
+    while frame is not None:
+        if frame.f_code.co_name == "<module>":
+            yield str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        frame = frame.f_back
 
 
 def _run_next() -> None:
