@@ -86,7 +86,7 @@ def _rule(name: str, flow: Flow, messages: Sequence[str], keys: Sequence[str]) -
         "permission": "allow",
         "flows": [flow],
         "messages": list(messages),
-        "key_exprs": list(keys),
+        "key_exprs": [_canonical(key) for key in keys],
     }
 
 
@@ -201,6 +201,17 @@ def _chunks(name: str) -> str:
 def _below(head: str, chunks: str) -> list[str]:
     """Return the keys of a place and of all below it."""
     return [f"{head}/{chunks}"] if chunks.endswith("**") else [f"{head}/{chunks}/**"]
+
+
+def _canonical(key: str) -> str:
+    """Return a key expression in the one form that Zenoh takes: ``**`` comes after each ``*``."""
+    chunks: list[str] = []
+    for chunk in key.split("/"):
+        if chunks[-1:] != ["**"] or chunk not in {"*", "**"}:
+            chunks.append(chunk)
+        elif chunk == "*":
+            chunks.insert(-1, chunk)
+    return "/".join(chunks)
 
 
 def _both() -> tuple[Flow, Flow]:

@@ -50,7 +50,7 @@ class Authority:
         self._key = _read_key(key)
 
     @classmethod
-    def create(cls, folder: Path, name: str = "rosz", days: int = _AUTHORITY_DAYS) -> Authority:
+    def create(cls, folder: Path, name: str = "rosz", days: float = _AUTHORITY_DAYS) -> Authority:
         """Make a new authority.
 
         Args:
@@ -73,7 +73,7 @@ class Authority:
         _write(home, key, certificate)
         return cls(folder)
 
-    def add(self, name: str, addresses: Sequence[str] = (), days: int = 825) -> Path:
+    def add(self, name: str, addresses: Sequence[str] = (), days: float = 825) -> Path:
         """Make keys for a machine or a person.
 
         Args:
@@ -112,7 +112,7 @@ class Authority:
 class _Draft:
     """A certificate that nobody has signed yet."""
 
-    def __init__(self, subject: Name, public: Any, days: int, places: Sequence[str] = ()) -> None:
+    def __init__(self, subject: Name, public: Any, days: float, places: Sequence[str] = ()) -> None:
         self._subject = subject
         self._public = public
         self._days = days
@@ -142,6 +142,10 @@ class _Draft:
             .not_valid_after(end)
             .add_extension(x509.BasicConstraints(authority, 0 if authority else None), True)
             .add_extension(usage, True)
+            .add_extension(x509.SubjectKeyIdentifier.from_public_key(self._public), False)
+            .add_extension(
+                x509.AuthorityKeyIdentifier.from_issuer_public_key(key.public_key()), False
+            )
         )
         if not authority:
             both = [
