@@ -87,6 +87,12 @@ def test_executables(tmp_path: Path) -> None:
         package.file("none.launch")
 
 
+def test_a_slip_in_the_name_of_what_is_not_executable_yet(tmp_path: Path) -> None:
+    make(tmp_path / "p", "p", plain="talker.py")
+    with pytest.raises(ExecutableNotFound, match=r"has no executable .* mean 'talker\.py'\?"):
+        PackageIndex([tmp_path]).find("p").executable("talkr.py")
+
+
 def test_an_install_space_keeps_executables_apart(tmp_path: Path) -> None:
     make(tmp_path / "share" / "p", "p")
     program = tmp_path / "lib" / "p" / "node"

@@ -9,10 +9,17 @@ from rosz.errors import InvalidName
 def test_every_kind() -> None:
     argv = ["--rate", "a:=b", "_gain:=2", "__name:=n", "__ns:=/x", "file.txt", "c:=", ":=d"]
     found = remap.parse(argv)
-    assert found.remaps == {"a": "b", "c": ""}
+    assert found.remaps == {"a": "b"}
     assert found.params == {"gain": "2"}
     assert found.special == {"__name": "n", "__ns": "/x"}
     assert found.rest == ("--rate", "file.txt", ":=d")
+
+
+def test_what_leads_to_nothing_counts_for_nothing() -> None:
+    """As in rospy: a launch file may well leave the value of a remapping empty."""
+    found = remap.parse(["chatter:=", "__name:=", "__ns:= ", "_gain:="])
+    assert found == remap.Arguments()
+    assert found.node_name("talker", "/robot") == "/robot/talker"
 
 
 def test_later_ones_win_and_values_may_hold_the_sign() -> None:

@@ -18,9 +18,13 @@ __all__ = ("Result", "Shell", "latch")
 _MAIN = "from rosz.cli.main import main; main()"
 
 
-class _Terminal(io.StringIO):
+class _Input(io.TextIOWrapper):
+    def __init__(self, text: str, *, terminal: bool) -> None:
+        super().__init__(io.BytesIO(text.encode()), "utf-8")
+        self._terminal = terminal
+
     def isatty(self) -> bool:
-        return True
+        return self._terminal
 
 
 class Result:
@@ -81,9 +85,7 @@ class Shell:
             stdin: What it reads.
             terminal: Whether a person types that.
         """
-        self._monkeypatch.setattr(
-            sys, "stdin", _Terminal(stdin) if terminal else io.StringIO(stdin)
-        )
+        self._monkeypatch.setattr(sys, "stdin", _Input(stdin, terminal=terminal))
         self._capsys.readouterr()
         code = run(words)
         out, err = self._capsys.readouterr()

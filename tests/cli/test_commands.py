@@ -7,9 +7,9 @@ import sys
 from importlib import import_module
 
 import pytest
-import typer
 from network import Network
 
+from rosz.cli.declare import App
 from rosz.cli.main import COMMANDS, run
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
@@ -17,7 +17,7 @@ from rosz.msgs.std_srvs.srv import Empty
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_its_module(name: str) -> None:
-    assert isinstance(import_module(f"rosz.cli.{name}").app, typer.Typer)
+    assert isinstance(import_module(f"rosz.cli.{name}").app, App)
 
 
 def test_the_overview_loads_nothing() -> None:
@@ -97,7 +97,7 @@ def test_a_command_loads_what_it_needs(network: Network, line: str, needs: set[s
     ("argv", "code", "text"),
     [
         (["parma"], 2, "'parma' is no command; did you mean 'param'?"),
-        (["param", "gte"], 2, "No such command 'gte'"),
+        (["param", "gte"], 2, "No such command 'gte'. Did you mean 'get'? See 'rosz param --help'"),
         (["param", "get"], 2, "Missing argument 'NAME'"),
     ],
 )

@@ -96,6 +96,17 @@ def test_other_scripts_load_nothing_of_rosz(network: Network) -> None:
     assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
+@pytest.mark.parametrize("name", ["platform", "subprocess", "msgspec"])
+def test_what_the_parts_of_rosz_can_do_without_loads_nothing(network: Network, name: str) -> None:
+    folder = network.folder / "odd"
+    folder.mkdir()
+    source = "try:\n    import of_another_system\nexcept ImportError:\n    half = True\n"
+    (folder / f"{name}.py").write_text(source)
+    line = f"import {name}, sys; print({name}.half, 'rosz' in sys.modules)"
+    done = evaluate(network, "bash", f'PYTHONPATH="odd:$PYTHONPATH" "$ROSZ_PYTHON" -c "{line}"')
+    assert (done.stdout, done.stderr) == ("True False\n", "")
+
+
 def test_a_module_that_nobody_has(network: Network) -> None:
     done = evaluate(network, "bash", '"$ROSZ_PYTHON" -c "import nothing_of_the_kind"')
     assert done.stderr.endswith("ModuleNotFoundError: No module named 'nothing_of_the_kind'\n")

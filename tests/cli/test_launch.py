@@ -183,6 +183,15 @@ def test_errors_of_nodes_are_lines(launch: Start, network: Network) -> None:
     assert run.wait_for("[rosz_tutorial/publisher.py]: ").endswith("did you mean 'rosz_tutorials'?")
 
 
+def test_a_home_that_cannot_be_made_is_told(launch: Start, network: Network) -> None:
+    (network.folder / "file").touch()
+    run = launch(EXAMPLE, ROS_HOME=str(network.folder / "file" / "ros"))
+    assert run.exit_code() == 1
+    assert run.wait_for("cannot start in ").endswith(
+        "; set ROS_HOME to a folder that can be written to"
+    )
+
+
 def test_a_package_just_created_runs(launch: Start, network: Network) -> None:
     made = subprocess.run(
         [*ROSZ, "pkg", "create", "mine"],

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from network import Network, eventually, repeats
 
+from rosz.session.probe import is_answered
+
 from .command import package
 from .launching import Start, runs, started
 
@@ -69,3 +71,18 @@ def test_twenty_stubborn_nodes_end_in_time(launch: Start, network: Network) -> N
     assert 1 <= time.monotonic() - begin < 10
     assert run.output.count("did not end when asked to, and was killed") == 20
     assert not any(map(runs, started(run).values()))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGQUIT])
+def test_a_launch_ended_as_its_core_comes_up_leaves_none(
+    launch: Start, network: Network, number: signal.Signals
+) -> None:
+    file = fleet(network.folder, TALKER, 26)
+    for _ in range(repeats(1, 20)):
+        run = launch(file)
+        eventually(lambda: is_answered(network.rendezvous), "the core", 30)
+        run.send(number)
+        assert run.exit_code(40) in {0, 130}
+        assert "Traceback" not in run.output
+        assert not is_answered(network.rendezvous)
+        assert not any(map(runs, started(run).values()))

@@ -104,6 +104,7 @@ def test_levels(shell: Shell) -> None:
         (["level", "/ns/busy"], 2, "rosz log level NODE LOGGER LEVEL"),
         (["levels"], 2, "rosz log levels NODE"),
         (["--level", "loud"], 2, "'loud' is no level"),
+        (["-n", "0"], 2, "-n is 0; expected at least 1 line"),
         (["--grep", "("], 2, "'(' is no regular expression"),
     ],
 )

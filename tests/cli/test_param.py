@@ -12,13 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from params.network import Network, until
 from params.ros1 import Ros1, available
 
 from rosz.cli.main import run
-from rosz.cli.param import _plain
+from rosz.cli.param_plain import plain, read_plain
 from rosz.params.replica import Replica
-from rosz.params.yaml import format_get, pretty
+from rosz.params.yaml import format_get, load, pretty
 
 from .command import ROSZ, environ
 
@@ -54,7 +56,7 @@ def replica(network: Network) -> Replica:
 @pytest.fixture
 def param(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
     def call(*words: str, stdin: str = "") -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8"))
         code = run(["param", *words])
         out, err = capsys.readouterr()
         return code, out, err
@@ -430,9 +432,9 @@ def test_a_writer_is_told_who_did_not_hear(
 ) -> None:
     from params.test_replica import Mute
 
-    from rosz.params import remote
+    from rosz.params import replica as package
 
-    monkeypatch.setattr(remote, "ACKNOWLEDGED_BY", 0.3)
+    monkeypatch.setattr(package, "ACKNOWLEDGED_BY", 0.3)
     replica = network.replica()
     Mute(network)
     until(lambda: len(replica.members()) == 1)
@@ -450,5 +452,29 @@ def test_a_writer_is_told_who_did_not_hear(
      "é", "a: b", "1e5", "e1", "nan", "inf", "NaN", 1.5, [1], {}],
 )  # fmt: skip
 def test_what_is_printed_without_yaml_is_as_with_it(value: Any) -> None:
-    assert _plain(value) in {"", format_get(value)}
-    assert _plain(value) in {"", pretty(value)}
+    assert plain(value) in {"", format_get(value)}
+    assert plain(value) in {"", pretty(value)}
+
+
+@pytest.mark.parametrize(
+    ("word", "value"), [("3", 3), ("-12", -12), ("0.50", 0.5), ("true", True), ("c3_po", "c3_po")]
+)
+def test_what_is_read_without_yaml(word: str, value: Any) -> None:
+    assert read_plain(word) == value
+    assert type(read_plain(word)) is type(value)
+
+
+@pytest.mark.parametrize(
+    "word",
+    ["", "010", "1_000", "1:30", "0x1f", "1e5", ".inf", ".5", "5.", "+1", "-0", "True", "null", "~",
+     "y", "No", "9" * 30, "deg(3)", "a b", "a:", "[1]", "é", "1.0.0", "3\n"],
+)  # fmt: skip
+def test_what_needs_yaml_is_left_to_it(word: str) -> None:
+    assert read_plain(word) is None
+
+
+@given(st.from_regex(r"[-0-9a-zA-Z_.]{1,8}", fullmatch=True))
+def test_no_word_means_something_else_in_yaml(word: str) -> None:
+    found = read_plain(word)
+    if found is not None:
+        assert (type(found), found) == (type(load(word)), load(word))

@@ -3,9 +3,10 @@ from __future__ import annotations
 import json
 import signal
 import time
+from pathlib import Path
 
 import pytest
-from network import Network, eventually
+from network import Network, Program, eventually
 from reconfigure.robots import Robot
 
 from rosz.reconfigure import Description, Server, Setting
@@ -286,11 +287,18 @@ def test_dynparam_waits_as_in_ros1(shell: Shell, network: Network) -> None:
     assert "no node with settings under '/late' within 0.2 s" in program.output
 
 
+def stopped(program: Program) -> bool:
+    """Tell whether no thread of a program runs any more, which a signal takes its time for."""
+    tasks = Path(f"/proc/{program.pid}/task").glob("*/stat")
+    return all(task.read_text().rpartition(")")[2].split()[0] == "T" for task in tasks)
+
+
 def test_a_stopped_node_does_not_block(shell: Shell, network: Network) -> None:
     program = network.program(SERVER)
     program.wait_for("ready")
     assert shell("reconfigure", "get", "late", "steps").out == "50\n"
     program.send(signal.SIGSTOP)
+    eventually(lambda: stopped(program), "all threads stopped")
     try:
         began = time.monotonic()
         assert shell("reconfigure", "get", "-t", "0.5", "late").code == 1

@@ -126,6 +126,7 @@ def test_call_of_what_fails(shell: Shell) -> None:
         (["1", "x"], 1, "expected int64, got str 'x'"),
         (["[1"], 2, "value 1, '[1', is no YAML"),
         (["--timeout", "0", "1", "2"], 2, "--timeout is 0"),
+        (["--timeout", "inf", "1", "2"], 2, "--timeout is inf; expected seconds above 0"),
     ],
 )
 def test_call_with_what_does_not_fit(shell: Shell, values: list[str], code: int, text: str) -> None:

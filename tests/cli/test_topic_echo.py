@@ -41,6 +41,9 @@ def test_an_index(shell: Shell, talker: Node) -> None:
     latch(talker, "/scan", LaserScan(ranges=[0.5, 1.5, 2.5]))
     assert shell("topic", "echo", "-1", "/scan/ranges[1]").out == "1.5\n---\n"
     assert shell("topic", "echo", "-1", "/scan/ranges[1:]").out == "[1.5, 2.5]\n---\n"
+    result = shell("topic", "echo", "-1", "/scan/ranges[0:2:0]")
+    assert result.code == 2
+    assert "expected a step other than 0" in result.err
 
 
 def test_plot_form(shell: Shell) -> None:
@@ -116,7 +119,17 @@ def test_another_definition_is_told(shell: Shell, talker: Node) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [["-w", "1"], ["-n", "0"], ["-n", "many"], ["--raw", "-p"], ["a", "b"], []]
+    "words",
+    [
+        ["-w", "1"],
+        ["-w", "9" * 20],
+        ["-n", "0"],
+        ["-n", "9" * 20],
+        ["-n", "many"],
+        ["--raw", "-p"],
+        ["a", "b"],
+        [],
+    ],
 )
 def test_wrong_usage(shell: Shell, words: list[str]) -> None:
     topic = ["/x"] if words and words != ["a", "b"] else []

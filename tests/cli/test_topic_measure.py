@@ -77,3 +77,10 @@ def test_delay_needs_a_header(shell: Shell) -> None:
 
 def test_a_window_of_one_measures_nothing(shell: Shell) -> None:
     assert shell("topic", "hz", "-w", "1", "/tick").code == 2
+
+
+@pytest.mark.parametrize("tool", ["hz", "bw", "delay"])
+def test_a_window_beyond_all_bounds(shell: Shell, tool: str) -> None:
+    result = shell("topic", tool, "-w", "9" * 20, "/tick")
+    assert (result.code, result.out) == (2, "")
+    assert "expected at most 1000000000 messages" in result.err

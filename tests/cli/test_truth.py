@@ -171,6 +171,18 @@ def test_ctrl_c_never_prints_a_traceback(network: Network, talker: Node, line: s
             network.close()
 
 
+def test_ctrl_c_while_it_starts_shows_nothing_of_ours(network: Network, talker: Node) -> None:
+    talker.params["/speed"] = 1
+    moments = repeats(25, 250)
+    for moment in range(moments):
+        program = network.run("-m", "rosz", "param", "list")
+        threading.Event().wait(0.1 * moment / moments)  # from Python's own start to the answer
+        program.send(signal.SIGINT)
+        program.exit_code()
+        for place in ("rosz/cli", "rosz/session", "rosz/errors", "zenoh", "msgspec"):
+            assert place not in program.output, program.output
+
+
 WRITING = [
     "--help",
     "topic --help",
@@ -180,7 +192,12 @@ WRITING = [
     "node info /talker",
     "service list",
     "param list",
+    "param get /",
+    "param dump",
+    "reconfigure list",
     "msg list",
+    "msg packages",
+    "srv list",
     "msg show std_msgs/String",
     "pkg list",
     "env bash",
@@ -208,6 +225,65 @@ def test_a_closed_pipe_ends_it_quietly(network: Network, talker: Node, line: str
     os.close(writing)
     assert done.stderr == ""
     assert done.returncode in {0, 1}  # the doctor's, where a warning ended it
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-", "2>&1 | true"])
+@pytest.mark.parametrize(
+    "line", ["topic list", "param get /speed", "bogus", "msg md5 std_msgs/Bool"]
+)
+def test_streams_that_are_closed_are_no_error(
+    network: Network, talker: Node, line: str, closed: str
+) -> None:
+    talker.params["/speed"] = 1
+    done = subprocess.run(
+        ["bash", "-c", f"{sys.executable} -m rosz {line} {closed}"],
+        env=network.variables(),
+        capture_output=True,
+        text=True,
+        timeout=40,
+        check=False,
+    )
+    if "|" not in closed:
+        assert done.returncode == (2 if line == "bogus" else 0)
+    assert "Traceback" not in done.stderr
+    assert "ignored" not in done.stderr
+
+
+def test_a_full_disk_is_told(network: Network, talker: Node) -> None:
+    talker.params["/speed"] = 1
+    with open("/dev/full", "w", encoding="utf-8") as full:  # noqa: PTH123  # it is no file
+        done = subprocess.run(
+            [sys.executable, "-m", "rosz", "param", "get", "/speed"],
+            env={**network.variables(), "PYTHONUNBUFFERED": ""},
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=40,
+            check=False,
+        )
+    assert done.returncode == 1
+    assert done.stderr == "rosz: cannot write to standard output: No space left on device\n"
+
+
+ENDING = """
+    import atexit, sys, threading
+    from rosz.cli import main
+    atexit.register(print, "at the exit")
+    if sys.argv.pop(1) == "busy":
+        threading.Timer(0.2, print, ["the thread"]).start()
+    main.main()
+    """
+
+
+@pytest.mark.parametrize(
+    ("state", "last"), [("idle", ["at the exit"]), ("busy", ["the thread", "at the exit"])]
+)
+def test_an_end_runs_what_is_to_be_run_at_the_exit(
+    network: Network, state: str, last: list[str]
+) -> None:
+    program = network.program(ENDING, state, "--help")
+    assert program.exit_code() == 0
+    assert program.lines[-len(last) :] == last
 
 
 def on_terminal(network: Network, *words: str, **variables: str) -> bytes:

@@ -6,6 +6,7 @@ import msgspec
 from network import Network
 
 from rosz.msgs.geometry_msgs.msg import Twist
+from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import Empty, SetBool
 from rosz.qos import DEFAULT
@@ -108,6 +109,17 @@ def test_who_waits_for_nobody(doctor: Doctor, network: Network) -> None:
     ]
     assert found["no-publisher"].evidence[0].endswith("is it meant for '/chatter'?")
     assert found["no-subscriber"].evidence[0].endswith("is it meant for '/chater'?")
+
+
+def test_time_that_stands_still(doctor: Doctor, network: Network) -> None:
+    simulator = network.node("simulator")
+    simulator.params["/use_sim_time"] = True
+    network.node("robot")
+    finding = doctor()["no-clock"]
+    assert finding.level == "error"
+    assert [line.split()[0] for line in finding.evidence] == ["/robot"]
+    simulator.publisher("/clock", Clock)
+    assert "no-clock" not in doctor()
 
 
 def test_nodes_of_one_name(doctor: Doctor, network: Network) -> None:

@@ -12,9 +12,11 @@ import pytest
 from network import Network, Program, eventually
 
 from rosz.msgs.std_msgs.msg import String
+from rosz.node.control import control_key
 from rosz.params.keys import Keys, Member
 from rosz.params.wire import SyncAnswer, encode
 from rosz.session import Query, Session
+from rosz.session.stopped import is_stopped
 from rosz.wire import endpoint_key, pack
 
 from .conftest import Doctor
@@ -48,6 +50,11 @@ def answering(network: Network, session: Session, key: str, payload: bytes) -> N
     )
 
 
+def stop(program: Program) -> None:
+    program.send(signal.SIGSTOP)
+    eventually(lambda: is_stopped(program.pid), "the program is stopped")
+
+
 def test_the_wrong_domain(doctor: Doctor, network: Network) -> None:
     network.node("talker").publisher("/chatter", String)
     finding = doctor(domain=7)["wrong-domain"]
@@ -69,14 +76,43 @@ def test_a_wrong_domain_beside_a_right_one(doctor: Doctor, network: Network) -> 
 def test_a_node_that_hangs(doctor: Doctor, network: Network) -> None:
     network.node("holder")
     program = start(network, "stopped")
-    program.send(signal.SIGSTOP)
+    stop(program)
     try:
         found = doctor()
     finally:
         program.send(signal.SIGCONT)
     assert found["unreachable-node"].level == "error"
     assert found["unreachable-node"].evidence[0].startswith("/stopped (")
+    assert found["unreachable-node"].evidence[0].endswith(f"pid {program.pid}): it is stopped")
+    assert found["stopped-process"].evidence[0].endswith(f"(pid {program.pid})")
+    assert f"'kill -CONT {program.pid}'" in found["stopped-process"].remedy
     assert found["replica-silent"].evidence[0].endswith(")")
+
+
+def test_answers_that_make_no_sense(doctor: Doctor, network: Network) -> None:
+    network.node("holder")
+    session = network.context().session
+    for number in ("99", "x"):
+        key = control_key(network.domain, session.zid, number)
+        answering(network, session, key, b"\xc1")
+    assert "unreachable-node" not in doctor()
+
+
+def test_who_holds_the_meeting_point_is_stopped(doctor: Doctor, network: Network) -> None:
+    program = start(network, "stopped")
+    stop(program)
+    try:
+        alone = doctor()
+        start(network, "newcomer")
+        found = doctor()
+    finally:
+        program.send(signal.SIGCONT)
+    assert list(alone) == ["stopped-process", "nobody-there"]
+    assert (
+        f"(pid {program.pid}), which holds the meeting point"
+        in (found["stopped-process"].evidence[0])
+    )
+    assert not {"rendezvous-held", "unreachable-peer", "nobody-there"} & set(found)
 
 
 def test_nodes_that_do_not_see_each_other(doctor: Doctor, network: Network) -> None:

@@ -55,7 +55,6 @@ def test_nodes_and_endpoints(network: Network, graph: Graph) -> None:
     assert view.services() == {"/lab/robot/reset": ["std_srvs/srv/Empty"]}
     (scan,) = view.publishers("/lab/scan")
     assert (scan.node_name, scan.zid) == ("/lab/robot", node.context.session.zid)
-    assert view.sessions_of("/lab/robot") == [(node.context.session.zid, node.node_id)]
     (process,) = view.processes("/lab/robot")
     assert process == node.process
 
@@ -93,18 +92,22 @@ def test_history_comes_first_and_ends_with_withdrawal(network: Network, graph: G
         assert told.get() == "/robot"
 
 
+@pytest.mark.parametrize("kind", [ValueError, SystemExit])
 def test_a_failing_listener_harms_nobody(
-    network: Network, graph: Graph, caplog: pytest.LogCaptureFixture
+    network: Network,
+    graph: Graph,
+    caplog: pytest.LogCaptureFixture,
+    kind: type[BaseException],
 ) -> None:
     def fail(token: Token, alive: bool) -> None:
-        raise ValueError(f"no {token.node_name} {alive}")
+        raise kind(f"no {token.node_name} {alive}")
 
     after: SimpleQueue[str] = SimpleQueue()
     graph.listen(fail)
     graph.listen(lambda token, _: after.put(token.node_name))
     network.node("robot")
     assert after.get(timeout=PATIENCE) == "/robot"
-    assert "ValueError: no /robot True" in caplog.text
+    assert f"{kind.__name__}: no /robot True" in caplog.text
 
 
 def test_a_listener_may_wait_for_the_graph(network: Network, graph: Graph) -> None:

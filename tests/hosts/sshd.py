@@ -34,6 +34,7 @@ def serve_ssh(host: Host) -> HostProgram:
     config.write_text(
         f"HostKey {key}\nAuthorizedKeysFile .ssh/authorized_keys\nUsePAM no\nPidFile none\n"
         "PermitRootLogin yes\nPasswordAuthentication no\nKbdInteractiveAuthentication no\n"
+        "Subsystem sftp internal-sftp\n"
     )
     server = host.execute(_SSHD, "-D", "-e", "-f", str(config))
     server.wait_for("Server listening on 0.0.0.0")

@@ -140,6 +140,28 @@ def test_multicast_when_asked_for(world: World) -> None:
     assert other.listening() == []
 
 
+def test_cores_find_each_other_by_multicast(world: World) -> None:
+    robot, laptop = world.hosts("robot", "laptop")
+    for host in (robot, laptop):
+        assert core(host, ROSZ_MULTICAST="1").lines[0] == f"listening on {LISTEN}"
+    talker(robot)
+    assert_soon("cores that find each other by multicast", laptop)
+    eventually(lambda: "/talker" in laptop.ask("node", "list"), "the graph on the other side")
+
+
+def test_a_core_listens_where_a_configuration_says(world: World) -> None:
+    (robot,) = world.hosts("robot")
+    file = robot.home / "zenoh.json5"
+    file.write_text('{mode: "router", listen: {endpoints: {router: ["tcp/127.0.0.1:7450"]}}}')
+    by_file = core(robot, ZENOH_SESSION_CONFIG_URI=str(file))
+    assert by_file.lines[0] == "listening on tcp/127.0.0.1:7450"
+    override = 'listen/endpoints=["tcp/0.0.0.0:7451"]'
+    overridden = core(robot, ZENOH_CONFIG_OVERRIDE=override)
+    assert overridden.lines[0] == "listening on tcp/0.0.0.0:7451"
+    rows = [row.split()[3] for row in robot.run("ss", "-Hlnt").splitlines()]
+    assert sorted(rows) == ["0.0.0.0:7451", "127.0.0.1:7450"]
+
+
 def test_one_of_two_interfaces_alive(world: World) -> None:
     base, robot = world.host("base", "cable", "wifi"), world.host("robot", "cable", "wifi")
     core(base, "--listen", LISTEN)

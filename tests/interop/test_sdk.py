@@ -164,6 +164,7 @@ def test_its_view_of_us(sdk: Partner, node: Node) -> None:
     eventually(
         lambda: {"/scan", "/cmd", "/rosout"} <= set(sdk("see")["topics"]), "our topics in its view"
     )
+    eventually(lambda: "/add" in sdk("see")["services"], "our service in its view")
     seen = sdk("see")
     assert seen["topics"]["/scan"] == ["sensor_msgs/msg/Image"]
     assert seen["topics"]["/cmd"] == ["geometry_msgs/msg/Twist"]

@@ -40,8 +40,37 @@ class Odd:
 
 
 odd: Any = Odd()
+big_endian: Any = np.arange(3, dtype=">i4")
 
 BAD: list[tuple[Message, str]] = [
+    (
+        std.Float64MultiArray(data=iter([1.0])),
+        "std_msgs/Float64MultiArray.data: expected a sequence of float64, got list_iterator",
+    ),
+    (
+        std.UInt8MultiArray(data=map(int, "12")),
+        "std_msgs/UInt8MultiArray.data: expected a sequence of uint8, got map",
+    ),
+    (
+        rcl.ParameterValue(bool_array_value=filter(None, [True])),
+        "bool_array_value: expected a sequence of bool, got filter",
+    ),
+    (
+        std.Int32MultiArray(data=np.array(5)),
+        "std_msgs/Int32MultiArray.data: expected a sequence of int32, got ndarray array(5)",
+    ),
+    (
+        std.UInt8MultiArray(data=np.array(5)),
+        "std_msgs/UInt8MultiArray.data: expected a sequence of uint8, got ndarray array(5)",
+    ),
+    (
+        std.UInt8MultiArray(data=np.array(["a"])),
+        "std_msgs/UInt8MultiArray.data[0]: expected uint8, got str",
+    ),
+    (
+        std.UInt8MultiArray(data=memoryview(big_endian)),
+        "std_msgs/UInt8MultiArray.data: expected a sequence of uint8, got memoryview",
+    ),
     (std.Float64(odd), "std_msgs/Float64.data: expected float64, got Odd <odd>"),
     (std.Float64("1"), "std_msgs/Float64.data: expected float64, got str '1'"),
     (std.Float64(None), "std_msgs/Float64.data: expected float64, got NoneType None"),
@@ -213,6 +242,7 @@ def with_member(message: Message, name: str, value: Any) -> Message:
 
 
 GOOD: list[tuple[Message, Message]] = [
+    (std.UInt8MultiArray(data=big_endian), std.UInt8MultiArray(data=b"\0\1\2")),
     (std.Float64(1), std.Float64(1.0)),
     (std.Float64(True), std.Float64(1.0)),
     (std.Float64(np.float32(0.5)), std.Float64(0.5)),

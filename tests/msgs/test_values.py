@@ -111,6 +111,14 @@ BAD: list[tuple[type[Message], str, str]] = [
     (Twist, "{linear: {y: a}}", "geometry_msgs/Twist.linear.y: expected float64, got str 'a'"),
     (Twist, "{linear: {y: true}}", "geometry_msgs/Twist.linear.y: expected float64, got bool True"),
     (Twist, "{a: [}", "geometry_msgs/Twist: no YAML: while parsing a flow node"),
+    (Float64, "data: " + "[" * 20_000, "std_msgs/Float64: no YAML: maximum recursion depth"),
+    (Float64, "2001-13-45", "std_msgs/Float64: no YAML: month must be in 1..12"),
+    (Float64, "!!timestamp x", "std_msgs/Float64: no YAML: "),
+    (
+        Float64,
+        "1" + "0" * 400,
+        "std_msgs/Float64.data: expected float64 in its range, got int 1000",
+    ),
     (
         Twist,
         "5",
@@ -143,7 +151,7 @@ BAD: list[tuple[type[Message], str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("cls", "text", "expected"), BAD)
+@pytest.mark.parametrize(("cls", "text", "expected"), BAD, ids=lambda value: str(value)[:40])
 def test_errors_name_the_field(cls: type[Message], text: str, expected: str) -> None:
     with pytest.raises(EncodeError) as caught:
         from_yaml(cls, text)
@@ -154,5 +162,6 @@ def test_no_json() -> None:
     with pytest.raises(EncodeError, match=r"std_msgs/String: no JSON: Expecting value: line 1"):
         from_json(String, "{'a'}"[2:])
     bad: Any = b"\xff"
-    with pytest.raises(EncodeError, match="no JSON"):
-        from_json(String, bad)
+    for text in (bad, "[" * 100_000):
+        with pytest.raises(EncodeError, match="no JSON"):
+            from_json(String, text)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import time
@@ -253,3 +254,11 @@ def test_calls_from_callbacks_of_every_kind(network: Network, server: Node) -> N
     }
     node.close()
     assert got.get(timeout=PATIENCE) == ("hook", 8)
+
+
+def test_who_waits_forever_waits(server: Node, caller: Node) -> None:
+    client = caller.client("add", AddTwoInts, timeout=math.inf)
+    server.service("add", AddTwoInts, lambda request: request.a + request.b)
+    client.wait_for_service(math.inf)
+    assert client(1, 2).sum == 3
+    assert client(3, 4, timeout=math.inf).sum == 7

@@ -15,6 +15,16 @@ from rosz.msgs.std_msgs.msg import String
 from rosz.node import Context, Node
 from rosz.qos import LATCHED
 
+AT_THE_END = """
+    import atexit
+    import rosz
+    from rosz.msgs.example_interfaces.srv import AddTwoInts
+
+    node = rosz.Node("polite", anonymous=True)
+    client = node.client("add", AddTwoInts)
+    client.wait_for_service()
+    atexit.register(lambda: print("sum", client(1, 2).sum))
+"""
 EVERYTHING = """
     import time
     began = time.monotonic()
@@ -109,3 +119,19 @@ def test_start_and_stop(network: Network, company: bool) -> None:
     eventually(lambda: threading.active_count() <= threads + 2, "threads ended")
     gc.collect()
     eventually(lambda: open_files() <= files + 8, "files closed")
+
+
+def test_a_call_at_the_exit(network: Network) -> None:
+    """No thread starts there any more with Python 3.12."""
+    network.node("server").service("add", AddTwoInts, lambda request: request.a + request.b)
+    program = network.program(AT_THE_END)
+    assert program.exit_code() == 0
+    assert program.lines == ["sum 3"]
+
+
+def test_programs_that_end_at_once(network: Network) -> None:
+    network.node("other").client("add", AddTwoInts)
+    for _ in range(repeats(5, 100)):
+        program = network.program("import rosz; rosz.Node('brief')")
+        assert program.exit_code() == 0
+        assert program.lines == []

@@ -12,6 +12,7 @@ from network import PATIENCE, Network, eventually
 from rosz.errors import ClosedError, EncodeError, InvalidName, WaitTimeout
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.std_msgs.msg import Int32, String, UInt8MultiArray
+from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import Node, SubscriberLink
 from rosz.qos import QoS
 
@@ -74,6 +75,40 @@ def test_what_does_not_fit(
     publisher = talker.publisher("count", Int32)
     with pytest.raises(EncodeError, match=text):
         publisher.publish(*args, **fields)
+
+
+@pytest.mark.parametrize("kind", [bytes, bytearray, memoryview])
+def test_any_bytes_may_be_sent_raw(talker: Node, listener: Node, kind: Any) -> None:
+    subscription = listener.subscription("chatter", String)
+    publisher = talker.publisher("chatter", String)
+    publisher.wait_for_subscribers()
+    publisher.publish_raw(kind(String("hello").to_cdr()))
+    assert subscription.get().data == "hello"
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        ("text", "std_msgs/String: expected bytes, got str"),
+        (None, "std_msgs/String: expected bytes, got NoneType"),
+        (b"", "std_msgs/String: expected CDR with its header, got 0 bytes"),
+    ],
+)
+def test_what_cannot_be_sent_raw(talker: Node, payload: Any, reason: str) -> None:
+    with pytest.raises(EncodeError, match=reason):
+        talker.publisher("chatter", String).publish_raw(payload)
+
+
+@pytest.mark.parametrize("name", ["/", ""])
+def test_the_root_is_no_topic(talker: Node, name: str) -> None:
+    for declare in (
+        lambda: talker.publisher(name, String),
+        lambda: talker.subscription(name, String),
+        lambda: talker.subscription(name),
+        lambda: talker.client(name, Empty),
+    ):
+        with pytest.raises(InvalidName, match="'/' is not a valid name: it is the root namespace"):
+            declare()
 
 
 def test_bad_topic(talker: Node) -> None:
@@ -150,6 +185,39 @@ def test_wait_ends_with_the_node(network: Network, talker: Node) -> None:
     assert "shutting down" in ended.get(timeout=PATIENCE)
 
 
+def test_a_signal_handler_may_publish(network: Network) -> None:
+    """It runs in the midst of whatever the main thread does, publishing included."""
+    heard: SimpleQueue[str] = SimpleQueue()
+    network.node("listener").subscription("chatter", String, lambda m: heard.put(m.data))
+    program = network.program(
+        """
+        import signal
+        import rosz
+        from rosz.msgs.std_msgs.msg import String
+
+        with rosz.Node("talker") as node:
+            publisher = node.publisher("chatter", String)
+            publisher.wait_for_subscribers()
+            calls = 0
+
+            def alarm(*_):
+                global calls
+                calls += 1
+                publisher.publish("alarm")
+
+            signal.signal(signal.SIGALRM, alarm)
+            signal.setitimer(signal.ITIMER_REAL, 0.0005, 0.0005)
+            while calls < 300:
+                publisher.publish("steady")
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        print("done")
+        """
+    )
+    program.wait_for("done")
+    assert program.exit_code() == 0
+    assert not heard.empty()
+
+
 class TestConnections:
     def test_come_and_go(self, network: Network, talker: Node, listener: Node) -> None:
         came: SimpleQueue[str] = SimpleQueue()
@@ -163,6 +231,19 @@ class TestConnections:
         assert came.get(timeout=PATIENCE) == "/late"
         early.close()
         assert went.get(timeout=PATIENCE) == "/listener"
+
+    def test_callback_that_raises_ends_no_others(self, talker: Node, listener: Node) -> None:
+        came: SimpleQueue[str] = SimpleQueue()
+        publisher = talker.publisher("chatter", String)
+
+        def refuse(link: SubscriberLink[String]) -> None:
+            came.put(link.node)
+            raise SystemExit("no")
+
+        publisher.on_connection(refuse)
+        for _ in range(2):
+            with listener.subscription("chatter", String):
+                assert came.get(timeout=PATIENCE) == "/listener"
 
     def test_first_message_for_one_alone(
         self, network: Network, talker: Node, listener: Node

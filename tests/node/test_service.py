@@ -76,7 +76,12 @@ def test_request_and_response(server: Node, caller: Node) -> None:
 
 @pytest.mark.parametrize(
     ("error", "text"),
-    [(ValueError("no such thing"), "no such thing"), (SystemExit(3), "3"), (KeyError("x"), "'x'")],
+    [
+        (ValueError("no such thing"), "no such thing"),
+        (SystemExit(3), "3"),
+        (KeyError("x"), "'x'"),
+        (KeyboardInterrupt("stop"), "stop"),
+    ],
 )
 def test_exception_arrives_and_is_logged(
     server: Node, caller: Node, capfd: pytest.CaptureFixture[str], error: BaseException, text: str
@@ -84,7 +89,7 @@ def test_exception_arrives_and_is_logged(
     def fail(_request: object) -> None:
         raise error
 
-    server.service("fail", Empty, fail)
+    server.service("fail", Empty, fail, threads=1)
     client = caller.client("fail", Empty)
     client.wait_for_service()
     for _ in range(2):

@@ -134,6 +134,27 @@ def test_second_signal_during_a_hook_that_hangs(network: Network) -> None:
     assert "in hang_here" in program.output
 
 
+def test_put_in_the_background_by_a_script(network: Network) -> None:
+    """A shell that is not interactive starts what it does not wait for deaf to Ctrl-C."""
+    program = network.program(
+        """
+        import signal
+
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        import rosz
+
+        node = rosz.Node("background")
+        node.timer(0.01, lambda _: print("ready", flush=True), oneshot=True)
+        node.spin()
+        print("done")
+        """
+    )
+    program.wait_for("ready")
+    program.send(signal.SIGINT)
+    assert program.exit_code() == 0, program.output
+    assert program.lines == ["ready", "done"]
+
+
 def test_own_handler_of_the_program_stays(network: Network) -> None:
     program = network.program(
         """

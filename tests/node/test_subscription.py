@@ -93,6 +93,10 @@ def test_newest_samples_are_kept(talker: Node, listener: Node, with_callback: bo
     if with_callback:
         assert [got.get(timeout=PATIENCE) for _ in range(3)] == [17, 18, 19]
     else:
+        waiting = subscription._feed._ring  # each subscription has a thread that fills its own
+        eventually(
+            lambda: waiting and Int32._decode(waiting[-1][1].payload).data == 19, "the last one"
+        )
         assert [subscription.get().data for _ in range(3)] == [17, 18, 19]
 
 
@@ -277,18 +281,20 @@ def test_exception_in_callback(
         got.put(message.data)
         if message.data == "exit":
             raise SystemExit(3)
+        if message.data == "stop":
+            raise GeneratorExit
         if message.data != "end":
             raise ValueError(f"cannot stand '{message.data}'")
 
     listener.subscription("chatter", String, callback)
     publisher = chatter(talker)
     publisher.wait_for_subscribers()
-    for text in ("one", "exit", "two", "end"):
+    for text in ("one", "exit", "stop", "two", "end"):
         publisher.publish(text)
         assert got.get(timeout=PATIENCE) == text
     listener.close()
     errors = capfd.readouterr().err
-    assert errors.count("callback of '/chatter' failed") == 3
+    assert errors.count("callback of '/chatter' failed") == 4
     assert "ValueError: cannot stand 'one'" in errors
 
 

@@ -19,7 +19,7 @@ class Bench:
     def __init__(self, start: int = START) -> None:
         self.clock = SimulatedClock(start)
         self.events: queue.Queue[TimerEvent] = queue.Queue()
-        self.errors: queue.Queue[tuple[str, Exception]] = queue.Queue()
+        self.errors: queue.Queue[tuple[str, BaseException]] = queue.Queue()
         self.ended: queue.Queue[Timer] = queue.Queue()
 
     def timer(self, *, oneshot: bool = False, reset: bool = False) -> Timer:
@@ -34,7 +34,7 @@ class Bench:
             on_end=self.ended.put,
         )
 
-    def report(self, text: str, error: Exception) -> None:
+    def report(self, text: str, error: BaseException) -> None:
         self.errors.put((text, error))
 
     def tick(self, time_ns: int) -> TimerEvent:
@@ -133,9 +133,12 @@ def test_timer_may_be_closed_and_joined_in_its_own_callback(bench: Bench) -> Non
     assert bench.errors.empty()
 
 
-def test_error_in_the_callback_is_reported_and_the_timer_goes_on(bench: Bench) -> None:
+@pytest.mark.parametrize("kind", [ValueError, SystemExit, KeyboardInterrupt])
+def test_error_in_the_callback_is_reported_and_the_timer_goes_on(
+    bench: Bench, kind: type[BaseException]
+) -> None:
     def fail(_: TimerEvent) -> None:
-        raise ValueError("no")
+        raise kind("no")
 
     Timer(SECOND, fail, bench.clock, on_error=bench.report, name="beat")
     for count in (1, 2):
@@ -143,7 +146,7 @@ def test_error_in_the_callback_is_reported_and_the_timer_goes_on(bench: Bench) -
         bench.clock.advance(START + count * SECOND)
         text, error = bench.errors.get(timeout=PATIENCE)
         assert text == "callback of timer 'beat' failed"
-        assert isinstance(error, ValueError)
+        assert isinstance(error, kind)
         assert error.__traceback__ is not None
 
 

@@ -142,7 +142,7 @@ def test_a_replica_that_was_stopped_catches_up(fleet: Fleet) -> None:
     one, other, stopped = fleet.start_many(3)
     stopped.stop()
     first = one.do("set", name="/first", value=1, timeout=0.5)
-    assert first["slow"] == [f"member {stopped.pid}"]
+    assert first["slow"] == [f"member {stopped.pid} (stopped)"]
     log = fleet.folder / "log"
     took = one.do("storm", prefix="/ns/x", count=300, log=str(log))
     assert took < 5, "only the first write waits for the one that is stopped"

@@ -153,3 +153,17 @@ def test_damaged_storages_are_survived(network: Network, caplog: pytest.LogCaptu
     replica = network.replica()
     assert replica.root == {"b": 1}
     assert caplog.text.count("a storage holds what is no parameter") == 2
+
+
+def test_a_storage_gives_back_names_that_are_no_parts_of_keys(network: Network) -> None:
+    storage = Storage(network.session())
+    network.keep(storage)
+    one = network.replica()
+    until(lambda: one._mirror.wanted)
+    value = {"a": {"": 1, "b": 2}, "c": {"d/e": 3, "f": 4}, "g": 5}
+    one.set("/v", value)
+    until(lambda: len(storage.held) == 3)
+    one._mirror.reconcile()
+    assert len(storage.held) == 3
+    one.close()
+    assert network.replica().get("/v") == value

@@ -347,3 +347,13 @@ def test_what_nobody_wrote_is_survived(network: Network, caplog: pytest.LogCaptu
     assert replica.root == {"a": 1}
     assert any("wrote what is no parameter" in record.message for record in caplog.records)
     assert not [record for record in caplog.records if record.levelno >= logging.ERROR]
+
+
+def test_a_program_with_a_name_that_is_no_utf_8(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", ["/home/file-\udcff.py"])
+    one, other = network.replica(), network.replica()
+    one.set("/a", 1)
+    assert other.get("/a") == 1
+    assert other.origin("/a").startswith("file-\ufffd.py (pid ")

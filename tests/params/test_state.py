@@ -136,3 +136,19 @@ def test_damaged_messages_change_nothing(caplog: pytest.LogCaptureFixture) -> No
             shared.note(data)
         assert shared.root == {}
     assert caplog.text.count("wrote what is no parameter") == 3  # kinds of damage
+
+
+def test_ctrl_c_while_messages_are_read_locks_nobody_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    shared = state()
+    assert shared.note(message("a", 1, 1))
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(shared, "_take", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            _ = shared.root
+    assert shared.enter(0)
+    shared.leave()
+    assert shared.root == {}

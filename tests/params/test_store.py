@@ -6,6 +6,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -40,10 +41,9 @@ def saved(path: Path, *batches: list[Write]) -> History:
 
 
 def loaded(path: Path) -> History:
-    store = Store(path)
     history = History()
-    history.apply(store.load())
-    store.close()
+    with closing(Store(path)) as store:
+        history.apply(store.load())
     return history
 
 

@@ -107,17 +107,41 @@ def test_callbacks_may_write_and_watch_and_end_their_watch(network: Network) -> 
     assert other.get("/b") == [1]
 
 
+@pytest.mark.parametrize("kind", [ValueError, SystemExit])
 def test_a_callback_that_fails_is_logged_and_harms_no_other(
-    network: Network, caplog: pytest.LogCaptureFixture
+    network: Network, caplog: pytest.LogCaptureFixture, kind: type[BaseException]
 ) -> None:
+    def fail(_: Changed) -> None:
+        raise kind("no")
+
     one = network.replica()
     heard: SimpleQueue[Changed] = SimpleQueue()
-    one.watch("/a", lambda change: change.missing)  # type: ignore[attr-defined]
+    one.watch("/a", fail)
     one.watch("/a", heard.put)
     with caplog.at_level(logging.ERROR, "rosz.params"):
         one.set("/a", 1)
         assert told(heard, 1) == [("/a", None, 1)]
     assert "the callback that watches '/a' failed on '/a'" in caplog.text
+
+
+def test_a_callback_that_hangs_piles_nothing_up(network: Network) -> None:
+    one = network.replica()
+    heard: SimpleQueue[Changed] = SimpleQueue()
+    go_on = threading.Event()
+
+    def hang(change: Changed) -> None:
+        heard.put(change)
+        go_on.wait(PATIENCE)
+
+    one.watch("/a", hang)
+    for number in range(100):
+        one.set("/a", number)
+    worker = one._state.watchers._worker
+    assert worker is not None
+    waiting = worker._queue.qsize()
+    go_on.set()
+    assert waiting <= 1
+    assert [heard.get(timeout=PATIENCE).new for _ in range(100)] == list(range(100))
 
 
 def test_a_closed_watch_hears_no_more(network: Network) -> None:

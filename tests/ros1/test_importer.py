@@ -98,6 +98,21 @@ def test_shipped_packages(tmp_path: Path) -> None:
     ]
 
 
+def test_modules_by_all_their_names(tmp_path: Path) -> None:
+    code = """
+        from importlib import import_module
+        from rosz.ros1.importer import MODULES, install
+        install()
+        for name in MODULES:
+            assert import_module(name) is import_module(f"rosz.ros1.{name}"), name
+        import tf.transformations, tf_transformations
+        from tf_transformations import quaternion_from_euler
+        assert tf_transformations is tf.transformations
+        assert tf_transformations.__spec__.name == "rosz.ros1.tf.transformations"
+        """
+    assert run(code, tmp_path) == ""
+
+
 def test_packages_on_the_path(tmp_path: Path, workspace: Path) -> None:
     code = """
         import rosz.ros1

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import datetime as dt
+import ssl
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,23 @@ def test_files_are_for_their_owner_alone(authority: Authority) -> None:
     assert (home / "key.pem").stat().st_mode & 0o777 == 0o600
     assert home.stat().st_mode & 0o777 == 0o700
     assert (authority.folder / "authority" / "key.pem").stat().st_mode & 0o777 == 0o600
+
+
+def test_the_strictest_take_them(authority: Authority) -> None:
+    """As Python's own clients are, from 3.13 on (RFC 5280, 4.2.1)."""
+    keys = KeyFolder.find(authority.add("robot"), "robot")
+    here = ssl.create_default_context(cafile=keys.authority)
+    here.verify_flags |= ssl.VERIFY_X509_STRICT
+    there = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    there.load_cert_chain(keys.certificate, keys.key)
+    up, down = ssl.MemoryBIO(), ssl.MemoryBIO()
+    client = here.wrap_bio(down, up, server_hostname="robot")
+    server = there.wrap_bio(up, down, server_side=True)
+    for end in (client, server):
+        with suppress(ssl.SSLWantReadError):
+            end.do_handshake()
+    client.do_handshake()
+    assert client.getpeercert()
 
 
 def test_found_by_host_name_or_directly(authority: Authority) -> None:

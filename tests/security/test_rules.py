@@ -1,9 +1,15 @@
 from __future__ import annotations
 
+import json
+
 import pytest
+import zenoh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rosz.errors import YamlError
 from rosz.security import Permit, access_control, read_rules
+from rosz.security.rules import NAME_VERBS
 
 
 def test_all_forms() -> None:
@@ -68,7 +74,7 @@ def test_what_rules_become() -> None:
     one = "a: {publish: [/arm/x], subscribe: ['/arm*/**'], call: [/go], set: ['/gains/**']}"
     assert "*/arm/x/*/*" in allowed(one, "ingress", "put")
     assert "*/arm/x/*/*" not in allowed(one, "egress", "put")
-    assert "*/arm$*/**/*/*" in allowed(one, "egress", "put")
+    assert "*/arm$*/*/*/**" in allowed(one, "egress", "put")
     assert "*/go/*/*" in allowed(one, "ingress", "query")
     assert "@rosz/*/change/gains/**" in allowed(one, "ingress", "put")
     assert "@rosz/*/change/**" not in allowed(one, "ingress", "put")
@@ -80,6 +86,43 @@ def test_who_may_set_but_a_part_cannot_tell_others_what_they_missed() -> None:
     sync = "@rosz/*/store/*/sync"
     assert sync not in allowed("a: {set: ['/gains/**']}", "ingress", "reply")
     assert sync in allowed("a: {set: ['/**']}", "ingress", "reply")
+
+
+@given(
+    st.lists(
+        st.lists(st.sampled_from(["*", "**", "a", "b*", "*c", "d*e*"]), min_size=1, max_size=5).map(
+            lambda chunks: "/" + "/".join(chunks)
+        ),
+        min_size=1,
+        max_size=3,
+    )
+)
+def test_zenoh_takes_whatever_rules_become(names: list[str]) -> None:
+    verbs = ", ".join(f"{verb}: {json.dumps(names)}" for verb in NAME_VERBS)
+    control = access_control(read_rules(f"a: {{{verbs}}}", "r"), ["lo"])
+    for rule in control["rules"]:
+        for key in rule["key_exprs"]:
+            zenoh.KeyExpr(key)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "topic", "within"),
+    [
+        ("/camera/**", "camera", True),
+        ("/camera/**", "camera/left/image", True),
+        ("/camera/**", "cameras", False),
+        ("/**", "odom", True),
+        ("/*/scan", "front/scan", True),
+        ("/*/scan", "front/low/scan", False),
+        ("/**/scan", "front/low/scan", True),
+        ("/arm*/**", "arm_2/joints", True),
+        ("/arm*/**", "leg/joints", False),
+    ],
+)
+def test_what_a_pattern_covers(pattern: str, topic: str, within: bool) -> None:
+    key = zenoh.KeyExpr(f"0/{topic}/std_msgs::msg::dds_::String_/RIHS01_00")
+    keys = allowed(f"a: {{publish: ['{pattern}']}}", "ingress", "put")
+    assert any(zenoh.KeyExpr(one).includes(key) for one in keys) == within
 
 
 def test_default_is_no() -> None:

@@ -7,7 +7,7 @@ import signal
 import pytest
 from network import Network
 
-from rosz.session.presence import is_anybody_there
+from rosz.session.presence import is_anybody_awake
 
 OLD = """
     import sys
@@ -26,13 +26,13 @@ NEW = """
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "ended"])
 def test_marks_end_with_their_process(network: Network, number: signal.Signals) -> None:
-    assert not is_anybody_there(network.rendezvous)
+    assert not is_anybody_awake(network.rendezvous)
     program = network.program(OLD, "a")
     program.wait_for("up")
-    assert is_anybody_there(network.rendezvous)
+    assert is_anybody_awake(network.rendezvous)
     program.send(number)
     program.exit_code()
-    assert not is_anybody_there(network.rendezvous)
+    assert not is_anybody_awake(network.rendezvous)
 
 
 def test_a_newcomer_right_after_the_death_of_the_first(network: Network) -> None:

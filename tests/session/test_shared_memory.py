@@ -70,7 +70,7 @@ def test_switch(network: Network, threshold: str, shared: bool) -> None:
 
 
 @pytest.mark.skipif(not can_unshare(), reason="needs Linux and the privilege to mount")
-@pytest.mark.parametrize("size", ["64k", "1m"])
-def test_full(network: Network, size: str) -> None:
-    """Where /dev/shm has no room, everything arrives on the ordinary way."""
+@pytest.mark.parametrize("size", ["64k", "1m", "64k,ro"], ids=["full", "nearly full", "read-only"])
+def test_no_room(network: Network, size: str) -> None:
+    """Where /dev/shm has no room, or takes nothing, everything arrives on the ordinary way."""
     assert exchanged(network, "100000", *SMALL, size)

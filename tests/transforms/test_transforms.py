@@ -223,6 +223,18 @@ def test_over_the_network(network: Network) -> None:
     listener.close()
 
 
+def test_a_static_transform_filled_anew_leaves_those_told_before(network: Network) -> None:
+    static = StaticTransformBroadcaster(network.node("robot"))
+    reused = transform("base", "laser", 1.0)
+    static.send(reused)
+    reused.child_frame_id, reused.transform.translation.x = "camera", 2.0
+    static.send(reused)
+    buffer = Buffer()
+    TransformListener(buffer, network.node("viewer"))
+    eventually(lambda: buffer.frames() == ["base", "camera", "laser"], "both for who comes late")
+    assert buffer.lookup("base", "laser")[0].translation[0] == 1.0
+
+
 def test_time_that_moves_back_clears(network: Network) -> None:
     robot = network.node("robot")
     robot.params.set("/use_sim_time", True)

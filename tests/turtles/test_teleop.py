@@ -79,6 +79,15 @@ class Terminal:
             self._text += os.read(self.keyboard, 4096).decode()
 
     @property
+    def settings(self) -> list[int | list[bytes | int]]:
+        """The settings of the terminal, as a shell takes and gives them."""
+        return termios.tcgetattr(self._side)
+
+    @settings.setter
+    def settings(self, settings: list[int | list[bytes | int]]) -> None:
+        termios.tcsetattr(self._side, termios.TCSANOW, settings)
+
+    @property
     def cooked(self) -> bool:
         """Whether the terminal takes whole lines and shows what is typed."""
         flags: int = termios.tcgetattr(self._side)[3]
@@ -143,6 +152,23 @@ def test_signals_end_it_and_the_terminal_is_as_before(
     terminal.process.send_signal(number)
     assert terminal.process.wait(PATIENCE) == 0
     assert terminal.cooked
+
+
+def test_stopped_and_continued_it_reads_keys_again(
+    network: Network, commands: SimpleQueue[Twist], terminals: list[Terminal]
+) -> None:
+    terminal = Terminal(network, "run", "turtlesim", "turtle_teleop_key")
+    terminals.append(terminal)
+    before = terminal.settings
+    terminal.expect(READY)
+    terminal.process.send_signal(signal.SIGSTOP)
+    os.waitpid(terminal.process.pid, os.WUNTRACED)
+    terminal.settings = before
+    terminal.process.send_signal(signal.SIGCONT)
+    while terminal.cooked:
+        assert terminal.process.poll() is None
+    terminal.press("\x1b[A")
+    assert speeds(commands) == (2.0, 0.0)
 
 
 def test_letters_turn_to_a_heading(

@@ -26,7 +26,10 @@ ROS1 = "ROS 1"
 AIM = "0.6"
 COMMANDS = {
     "param get /robot/name": f"{AIM}, and 130 ms",
+    "param list": "-",
+    "param set /robot/count 3": "-",
     "topic list": AIM,
+    "topic echo -n 1 /robot/pose": "-",
     "service list": AIM,
     "node list": AIM,
     "msg show std_msgs/Header": AIM,

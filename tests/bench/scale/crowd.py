@@ -1,168 +1,185 @@
-"""Many node processes on one machine, or on several made of namespaces."""
+"""Many nodes, each a process, that start at once on one machine or on several hosts."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import tempfile
+import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import IO, Self
+from tempfile import TemporaryDirectory
+from typing import Literal
 
 import msgspec
 
-__all__ = ("Crowd", "Sight")
+from .reports import Late, Reports, Trouble
+from .site import Site, sites
 
-_ROOT = Path(__file__).parents[3]
-_WORKER = Path(__file__).parent / "worker.py"
+__all__ = ("TOPOLOGIES", "Sight", "Topology", "measure")
+
+_WORKER = str(Path(__file__).with_name("worker.py"))
 _IDLE_SECONDS = 4.0
-_TICKS = os.sysconf("SC_CLK_TCK")
-_PAGE = os.sysconf("SC_PAGE_SIZE")
+_FIRST = "tcp/h0:7447"
+
+
+class Topology(msgspec.Struct, frozen=True):
+    """How the nodes are joined.
+
+    Attributes:
+        cores: Where cores are; those of other hosts are linked to that of the first.
+        mode: What the nodes are, by ``ROSZ_MODE``.
+    """
+
+    cores: Literal["none", "first", "each"]
+    mode: Literal["peer", "client"]
+
+    def core(self, site: int, count: int) -> Sequence[str] | None:
+        """Return the arguments of the core of a host out of so many, if it has one."""
+        if self.cores == "none" or (site and self.cores == "first"):
+            return None
+        if site:
+            return ("--connect", _FIRST)
+        return ("--listen", "tcp/0.0.0.0:7447") if count > 1 else ()
+
+    def variables(self, site: int, count: int) -> dict[str, str]:
+        """Return the environment of the nodes of a host out of so many."""
+        found: dict[str, str] = {"ROSZ_MODE": self.mode}
+        if count > 1 and self.cores == "none":
+            found["ROSZ_MULTICAST"] = "1"
+        if site and self.cores == "first":
+            found["ROSZ_CONNECT"] = _FIRST
+        return found
+
+
+TOPOLOGIES = {
+    "mesh": Topology("none", "peer"),
+    "star": Topology("first", "client"),
+    "cores": Topology("each", "peer"),
+    "stars": Topology("each", "client"),
+}
 
 
 class Sight(msgspec.Struct):
-    """What was measured of one crowd.
+    """What was measured of one crowd, not a number where it was not.
 
     Attributes:
-        mode: ``mesh`` or ``star``.
-        count: Nodes, each a process.
+        mode: Name of the topology.
+        count: Nodes.
         complete: Seconds from the first start until everybody sees everybody.
-        memory: Megabytes of a node, its share of what is shared among them counted in.
-        cpu: Percent of a core that an idle node takes.
-        traffic: Kilobytes over the loopback for each node, until all is complete.
+        busy: Seconds of a core that this takes for each node.
+        traffic: Kilobytes for each node over the links between the hosts, or over the loopback
+            of the only one, until all is complete.
+        memory: Megabytes for each node.
+        idle: Percent of a core that is taken for each node when nothing happens.
         set_ms: Milliseconds of a set that all acknowledge.
+        newcomer: Seconds from the start of one more node until it sees all and all have heard it.
+        trouble: Why there is no more.
+        late: Whether that is because it took too long.
     """
 
     mode: str
     count: int
-    complete: float
-    memory: float
-    cpu: float
-    traffic: float
-    set_ms: float
+    complete: float = math.nan
+    busy: float = math.nan
+    traffic: float = math.nan
+    memory: float = math.nan
+    idle: float = math.nan
+    set_ms: float = math.nan
+    newcomer: float = math.nan
+    trouble: str = ""
+    late: bool = False
 
 
-class Crowd:
-    """Nodes in a domain of their own.
+def measure(mode: str, count: int, hosts: int, timeout: float) -> Sight:
+    """Start a crowd on a network of its own, measure it and end it.
 
     Args:
-        mode: ``mesh``: peers, each linked to each; ``star``: clients of a core.
-        count: How many.
+        mode: One of `TOPOLOGIES`.
+        count: How many nodes.
+        hosts: Hosts that they are spread over; 0 for this machine as it is.
+        timeout: Seconds that each step may take.
     """
+    sight = Sight(mode, count)
+    with (
+        TemporaryDirectory(prefix="rosz-scale-") as folder,
+        closing(Reports(Path(folder))) as reports,
+        sites(hosts, Path(folder)) as places,
+    ):
+        crowd = _Crowd(TOPOLOGIES[mode], places, reports, timeout)
+        try:
+            crowd.measure(sight)
+        except Trouble as trouble:
+            sight.trouble, sight.late = str(trouble), isinstance(trouble, Late)
+    return sight
 
-    def __init__(self, mode: str, count: int) -> None:
-        self.mode = mode
-        self.count = count
-        self._folder = tempfile.TemporaryDirectory(prefix="rosz-")
-        self._env = {
-            **os.environ,
-            "HOME": self._folder.name,
-            "PYTHONPATH": str(_ROOT),
-            "ROSZ_RENDEZVOUS": f"unixsock-stream/{self._folder.name}/z",
-            "ROSZ_MODE": "client" if mode == "star" else "peer",
-        }
-        self._processes: list[subprocess.Popen[str]] = []
-        self._core: subprocess.Popen[str] | None = None
 
-    def measure(self, timeout: float) -> Sight | None:
-        """Start all and measure; nothing when they are not complete in time."""
-        if self.mode == "star":
-            self._core = self._start(("-m", "rosz", "core"))
-            while "started" not in _out(self._core).readline():
-                continue
-        before = _loopback_bytes()
+class _Crowd:
+    """The processes of a crowd; what its cores take is shared out among the nodes."""
+
+    def __init__(
+        self, topology: Topology, places: Sequence[Site], reports: Reports, timeout: float
+    ) -> None:
+        self._topology = topology
+        self._sites = places
+        self._reports = reports
+        self._timeout = timeout
+
+    def measure(self, sight: Sight) -> None:
+        """Start all and measure, as far as that goes.
+
+        Raises:
+            Trouble: It does not go on.
+        """
+        self._start_cores()
+        self._measure_start(sight)
+        self._measure_rest(sight)
+        self._measure_newcomer(sight)
+
+    def _start_cores(self) -> None:
+        for number, site in enumerate(self._sites):
+            words = self._topology.core(number, len(self._sites))
+            if words is not None:
+                self._start(f"core{number}", site, ("-m", "rosz", "core", *words), {})
+                self._wait("started", 1)
+
+    def _measure_start(self, sight: Sight) -> None:
+        sent, busy = self._total(Site.sent), self._total(Site.cpu)
         began = time.monotonic()
-        for number in range(self.count):
-            words = (str(_WORKER), str(number), str(self.count))
-            self._processes.append(self._start(words))
-        complete = self._complete(began + timeout)
-        if complete is None:
-            return None
-        traffic = (_loopback_bytes() - before) / self.count / 1e3
-        memory = sum(map(_memory, self._processes)) / self.count / 1e6
-        cpu = self._idle()
-        return Sight(
-            self.mode, self.count, complete - began, memory, cpu, traffic, self._set() * 1e3
-        )
+        for number in range(sight.count):
+            self._start_node(number, sight.count)
+        sight.complete = max(self._wait("complete", sight.count)) - began
+        sight.busy = (self._total(Site.cpu) - busy) / sight.count
+        sight.traffic = (self._total(Site.sent) - sent) / sight.count / 1e3
 
-    def _start(self, words: Sequence[str]) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [sys.executable, "-P", *words],
-            env=self._env,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-
-    def _complete(self, deadline: float) -> float | None:
-        """Return when the last of them saw all."""
-        latest = 0.0
-        for process in self._processes:
-            line = _read(process, deadline)
-            if not line.startswith("complete"):
-                return None
-            latest = max(latest, float(line.split()[1]))
-        return latest
-
-    def _idle(self) -> float:
-        before = sum(map(_cpu, self._processes))
+    def _measure_rest(self, sight: Sight) -> None:
+        sight.memory = self._total(Site.memory) / sight.count / 1e6
+        busy = self._total(Site.cpu)
         time.sleep(_IDLE_SECONDS)
-        used = sum(map(_cpu, self._processes)) - before
-        return used / _IDLE_SECONDS / self.count * 100
+        sight.idle = (self._total(Site.cpu) - busy) / _IDLE_SECONDS / sight.count * 100
+        self._reports.say("s0", "set")
+        (seconds,) = self._wait("set", 1)
+        sight.set_ms = seconds * 1e3
 
-    def _set(self) -> float:
-        process = self._processes[0]
-        assert process.stdin is not None
-        process.stdin.write("set\n")
-        process.stdin.flush()
-        return float(_out(process).readline().split()[1])
+    def _measure_newcomer(self, sight: Sight) -> None:
+        began = time.monotonic()
+        self._start_node(sight.count, sight.count + 1, "hail")
+        seen = [*self._wait("complete", 1), *self._wait("heard", sight.count)]
+        sight.newcomer = max(seen) - began
 
-    def __enter__(self) -> Self:
-        return self
+    def _start_node(self, number: int, count: int, *words: str) -> None:
+        place = number % len(self._sites)
+        variables = self._topology.variables(place, len(self._sites))
+        command = [_WORKER, str(number), str(count), *words]
+        self._start(f"s{number}", self._sites[place], command, variables)
 
-    def __exit__(self, *_exc: object) -> None:
-        for process in (*self._processes, self._core):
-            if process is not None:
-                process.kill()
-        for process in (*self._processes, self._core):
-            if process is not None:
-                process.wait()
-                for stream in (process.stdin, process.stdout):
-                    if stream is not None:
-                        stream.close()
-        self._folder.cleanup()
+    def _start(
+        self, name: str, site: Site, words: Sequence[str], variables: Mapping[str, str]
+    ) -> None:
+        with self._reports.errors(name).open("w") as errors:
+            self._reports.add(name, site.start(words, variables, self._reports.inlet, errors))
 
+    def _wait(self, word: str, count: int) -> list[float]:
+        return self._reports.wait_for(word, count, self._timeout)
 
-def _out(process: subprocess.Popen[str]) -> IO[str]:
-    assert process.stdout is not None
-    return process.stdout
-
-
-def _read(process: subprocess.Popen[str], deadline: float) -> str:
-    """Return a line that a process says, or nothing when the time is over."""
-    import select
-
-    left = max(0.0, deadline - time.monotonic())
-    ready, _, _ = select.select([_out(process)], [], [], left)
-    return _out(process).readline() if ready else ""
-
-
-def _memory(process: subprocess.Popen[str]) -> int:
-    """Return the bytes of a process, with its share of shared pages."""
-    rollup = Path(f"/proc/{process.pid}/smaps_rollup").read_text()
-    line = next(line for line in rollup.splitlines() if line.startswith("Pss:"))
-    return int(line.split()[1]) * 1024
-
-
-def _cpu(process: subprocess.Popen[str]) -> float:
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / _TICKS
-
-
-def _loopback_bytes() -> int:
-    rows = Path("/proc/net/dev").read_text().splitlines()
-    loopback = next(row for row in rows if row.strip().startswith("lo:"))
-    return int(loopback.split()[1])
+    def _total(self, figure: Callable[[Site], float]) -> float:
+        return sum(map(figure, self._sites))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rosz.errors import LaunchError, PackageNotFound
+from rosz.errors import LaunchError, LaunchFileError, PackageNotFound
 from rosz.launch.plan import SystemContext, plan
 from rosz.packages import PackageIndex
 
@@ -69,6 +69,19 @@ def test_commands_run_with_the_environment_given(tmp_path: Path) -> None:
         context.run(["sh", "-c", "exit 3"])
     with pytest.raises(FileNotFoundError):
         context.run(["/no/such/program"])
+
+
+def test_a_command_without_end_is_ended(tmp_path: Path) -> None:
+    with pytest.raises(LaunchError, match=r"command 'sh -c .*' writes more than 67108864 bytes"):
+        outside(tmp_path).run(["sh", "-c", "echo $$ > pid; exec yes"])
+    assert not Path("/proc", (tmp_path / "pid").read_text().strip()).exists()
+
+
+def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
+    text = '<launch><param name="a" textfile="/dev/zero"/></launch>'
+    (tmp_path / "a.launch").write_text(text)
+    with pytest.raises(LaunchFileError, match=r"a\.launch:1:35: '/dev/zero' .*: too large"):
+        plan(["a.launch"], {}, outside(tmp_path))
 
 
 def test_names_are_made_by_the_caller(tmp_path: Path) -> None:

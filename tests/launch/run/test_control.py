@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from rosz.errors import LaunchError, NotFoundError
 from rosz.launch.run import Network, order, statuses
-from rosz.session import Session, SessionConfig
+from rosz.session import Query, Session, SessionConfig
+from rosz.wire import own_key
 
 from .scene import Facts, MemoryStore, alive, launch, program, shell, wait_until
 
@@ -112,3 +114,18 @@ def test_a_launch_that_ends_answers_no_more(
         with pytest.raises(LaunchError, match="this launch is ending"):
             order(asker, DOMAIN, "restart", "/s")
         run.join()
+
+
+def test_an_answer_that_makes_no_sense(network: Network, asker: Session) -> None:
+    assert network.session is not None
+    key = own_key(DOMAIN, "launch", "1", network.session.zid)
+
+    def answer(query: Query) -> None:
+        with query:
+            query.reply(key, b"{}")
+
+    with (
+        closing(network.session.queryable(key, answer)),
+        pytest.raises(LaunchError, match=f"answers at '{key}' makes no sense: .*version"),
+    ):
+        statuses(asker, DOMAIN)

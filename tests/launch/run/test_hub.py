@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -68,6 +70,29 @@ def test_a_launch_keeps_it_up(hub: Hub, tmp_path: Path) -> None:
             wait_until(context.session.peers, "the link to it")
             assert run.stop() == 0
         assert alive(hub.pid)
+
+
+def test_a_core_that_cannot_be_started_again_ends_nothing(
+    hub: Hub, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = Hub._start
+    refusals = [BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")]
+
+    def refuse_once(self: Hub) -> subprocess.Popen[bytes]:
+        if refusals:
+            raise refusals.pop()
+        return start(self)
+
+    monkeypatch.setattr(Hub, "_start", refuse_once)
+    with Context(hub.environment) as context:
+        nodes = [shell("n", "exec sleep 600")]
+        with launch(tmp_path, *nodes, network=Network.of(context, hub)) as run:
+            run.pid("n-1")
+            os.kill(hub.pid, signal.SIGKILL)
+            run.err.wait_for("[core] cannot be started: Resource temporarily unavailable")
+            run.out.wait_for("process[core]: started", times=2)
+            assert alive(run.pid("n-1"))
+            assert run.stop() == 0
 
 
 def test_a_core_that_does_not_start_is_explained(

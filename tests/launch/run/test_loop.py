@@ -30,6 +30,16 @@ def test_timers_run_in_order_and_can_be_cancelled(loop: Loop) -> None:
     loop.close()
 
 
+@pytest.mark.parametrize("seconds", [1e8, 1e300, float("inf")])
+def test_a_timer_far_away_is_waited_for(loop: Loop, seconds: float) -> None:
+    loop.later(seconds, lambda: pytest.fail("too early"))
+    thread = threading.Timer(0.05, lambda: loop.post(loop.stop))
+    thread.start()
+    loop.run()
+    thread.join()
+    loop.close()
+
+
 def test_timers_of_one_moment_keep_their_order(loop: Loop) -> None:
     seen: list[int] = []
     for number in range(20):

@@ -59,8 +59,8 @@ SEEN = (
     r"\[broken-\d\] process has died",
     "quick a b c",
     r"\[crashing-\d\] process has died",
-    "^lasting",
-    "^stubborn",
+    r"(?:^|\x1b\[0m)lasting$",  # roslaunch ends some of its lines late
+    r"(?:^|\x1b\[0m)stubborn$",
 )
 
 REQUIRED = """

@@ -57,6 +57,32 @@ def test_a_second_signal_kills(tmp_path: Path) -> None:
     assert "most recent call first" in log.read_text()
 
 
+@pytest.mark.parametrize("asked_before", [False, True])
+def test_quitting_kills_at_once(tmp_path: Path, *, asked_before: bool) -> None:
+    with outside(tmp_path, STUBBORN, *SLEEPERS) as run:
+        run.expect(r"c-4\]: started with pid")
+        run.expect("up\n")
+        if asked_before:
+            run.process.send_signal(signal.SIGINT)
+            run.expect("killing on exit")
+        begin = time.monotonic()
+        run.process.send_signal(signal.SIGQUIT)
+        assert run.finish() == 0
+        assert time.monotonic() - begin < 8.0  # below the 15 s that a stubborn node is given
+    assert not any(map(alive, run.pids()))
+    (log,) = (tmp_path / "log/latest").glob("roslaunch-*.log")
+    assert "the stacks of all threads:\n" in log.read_text()
+
+
+def test_the_terminal_s_quit_key_leaves_no_node(tmp_path: Path) -> None:
+    prefix = ("setsid", "-c", "-w")
+    with outside(tmp_path, *SLEEPERS, terminal=True, prefix=prefix) as run:
+        run.expect(r"process\[c-3\]: started with pid \[\d+\]")
+        os.write(run._reading, b"\x1c")
+        assert run.finish() == 0
+    assert not any(map(alive, run.pids()))
+
+
 def test_a_closed_terminal_ends_all(tmp_path: Path) -> None:
     # setsid -c makes the terminal the controlling one, so that closing it hangs the launch up.
     with outside(tmp_path, *SLEEPERS, terminal=True, prefix=("setsid", "-c", "-w")) as run:

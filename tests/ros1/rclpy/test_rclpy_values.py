@@ -126,6 +126,8 @@ def test_classic_parameters_count_too() -> None:
         ("--ros-args -p a", "expected name:=value"),
         ("--ros-args -p", "is the last word"),
         ("--ros-args -p a:=[", "no YAML value"),
+        ("--ros-args -p a:=2020-13-45", "no YAML value: '2020-13-45' is no !!timestamp"),
+        (f"--ros-args -p a:={'[' * 20_000}", "nested more than 100 deep"),
     ],
 )
 def test_wrong_command_lines(words: str, text: str) -> None:
@@ -148,6 +150,7 @@ def test_parameter_files(tmp_path: Path) -> None:
     }
     with pytest.raises(NotFoundError, match="nowhere"):
         parse(["--ros-args", "--params-file", "/nowhere"])
-    file.write_text("a: 1")
-    with pytest.raises(YamlError, match="ros__parameters"):
-        parse(["--ros-args", "--params-file", str(file)])
+    for content in (b"a: 1", b"a: {ros__parameters: 1}", b"a: {ros__parameters: [}", b"\xff"):
+        file.write_bytes(content)
+        with pytest.raises(YamlError, match=r"ros__parameters|p\.yaml"):
+            parse(["--ros-args", "--params-file", str(file)])

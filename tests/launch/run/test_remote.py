@@ -1,0 +1,60 @@
+"""A launch's side of an agent, which a script stands in for."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from rosz.launch.plan.model import MachinePlan
+from rosz.launch.run.console import Console
+from rosz.launch.run.loop import Loop
+from rosz.launch.run.process import Timeouts
+from rosz.launch.run.protocol import PROTOCOL, Hello, Ready, Setup, Shown, rosz_version
+from rosz.launch.run.remote import RemoteHost
+
+from .scene import HERE
+
+SETUP = Setup(
+    run_id="1", tag="t", domain=0, meet=(), silence=30.0, timeouts=Timeouts(), prefixed=False
+)
+FAR = MachinePlan(
+    name="far",
+    address="far",
+    env_loader="",
+    ssh_port=22,
+    user="",
+    password="",
+    timeout=10.0,
+    assignable=True,
+    place=HERE,
+)
+
+
+def test_a_letter_that_comes_in_two_parts_is_shown_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = "größe\nend\n".encode()
+    said = [
+        Hello(PROTOCOL, rosz_version(), "far"),
+        Ready("tcp/far:7447"),
+        Shown(1, whole[:3]),
+        Shown(2, "ü\n".encode()),
+        Shown(1, whole[3:]),
+    ]
+    (tmp_path / "said").write_bytes(b"".join(msgspec.json.encode(one) + b"\n" for one in said))
+    script = tmp_path / "ssh"
+    script.write_text(f"#!/bin/sh\ncat {tmp_path}/said\ncat > {tmp_path}/heard\n")
+    script.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    out, err = io.StringIO(), io.StringIO()
+    loop = Loop()
+    host = RemoteHost(FAR, "far-0", loop, Console(out, err), SETUP)
+    while "end\n" not in out.getvalue():
+        loop.step(5.0)
+    host.close()
+    loop.close()
+    assert out.getvalue().endswith("größe\nend\n")
+    assert err.getvalue() == "ü\n"

@@ -1,0 +1,64 @@
+"""What rules say of serving and controlling, between hosts."""
+
+from __future__ import annotations
+
+import pytest
+from hosts.host import Host, HostProgram
+from hosts.world import World
+from network import eventually
+
+from rosz.security.authority import Authority
+
+SERVER = """
+    import sys, threading
+    import rosz
+    from rosz.msgs.std_srvs.srv import Trigger, TriggerResponse
+    with rosz.Node("server") as node:
+        for name in ("lamp", "door"):
+            node.service(name, Trigger, lambda request: TriggerResponse(success=True))
+        print("up", flush=True)
+        node.spin()
+"""
+
+
+@pytest.fixture
+def pair(world: World, authority: Authority) -> tuple[Host, Host]:
+    robot, laptop = world.hosts("robot", "laptop")
+    for host in (robot, laptop):
+        host.variables["ROSZ_KEYS"] = str(authority.add(host.name))
+    laptop.variables["ROSZ_CONNECT"] = "tcp/robot:7447"
+    return robot, laptop
+
+
+def start(pair: tuple[Host, Host], rules: str) -> HostProgram:
+    """Start a core with rules on the robot, and a node there."""
+    robot, _ = pair
+    (robot.home / "keys").symlink_to(robot.variables["ROSZ_KEYS"])
+    (robot.home / "keys/rules.yaml").write_text(rules)
+    robot.rosz("core", "--listen", "tcp/0.0.0.0:7447").wait_for("started core")
+    return robot.rosz("run", "rosz_tutorials", "publisher.py", "__name:=publisher")
+
+
+def test_who_may_serve(pair: tuple[Host, Host]) -> None:
+    robot, laptop = pair
+    start(pair, "laptop: {serve: [/lamp]}\n")
+    laptop.program(SERVER).wait_for("up")
+    assert "success: True" in robot.ask("service", "call", "/lamp")
+    listed = robot.ask("service", "list").split()
+    assert "/lamp" in listed
+    assert "/door" not in listed
+    refused = robot.rosz("service", "call", "/door")
+    assert refused.exit_code(30) == 1
+
+
+@pytest.mark.parametrize("control", [True, False])
+def test_who_may_end_nodes(pair: tuple[Host, Host], control: bool) -> None:
+    robot, laptop = pair
+    node = start(pair, f"laptop: {{subscribe: ['/**'], control: {str(control).lower()}}}\n")
+    eventually(lambda: laptop.ask("node", "list") == "/publisher", "the node")
+    killed = laptop.rosz("node", "kill", "/publisher")
+    assert killed.exit_code(30) == (0 if control else 1), killed.output
+    if control:
+        node.exit_code()
+    else:
+        assert robot.ask("node", "list") == "/publisher"
