@@ -253,8 +253,10 @@ def test_publishing_by_name(network: Network, robot: Node) -> None:
     program = network.program(
         """
         import rosz.ros1
-        import rostopic
+        import rospy, rostopic
         publisher, cls = rostopic.create_publisher("news", "std_msgs/String", latch=True)
+        while not publisher.get_num_connections():  # who comes later hears the last one only
+            rospy.sleep(0.01)
         try:
             rostopic.publish_message(publisher, cls, [{"date": 1}])
         except rostopic.ROSTopicException as error:
