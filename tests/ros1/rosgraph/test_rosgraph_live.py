@@ -188,7 +188,7 @@ def test_rosnode(network: Network, robot: Node) -> None:
     found = ask(
         network,
         """
-        import rosgraph, rosnode, socket
+        import rosgraph, rosnode, socket, time
         master = rosgraph.Master(rosnode.ID)
         address = rosnode.get_api_uri(master, "/robot")
         result = [
@@ -203,8 +203,10 @@ def test_rosnode(network: Network, robot: Node) -> None:
             rosnode.get_node_connection_info_description(address, master).splitlines()[0],
             tried(rosnode.get_node_connection_info_description, "x", master)[0],
             rosnode.kill_nodes(["/victim", "/nobody"]),
-            rosnode.rosnode_ping_all(),
         ]
+        while "/victim" in rosnode.get_node_names():
+            time.sleep(0.01)
+        result.append(rosnode.rosnode_ping_all())
         rosnode.rosnode_info("/robot")
         rosnode.rosnode_listnodes(list_all=True)
         rosnode.rosnode_cleanup()
