@@ -40,7 +40,7 @@ def at_least(option: str, value: int, fewest: int, what: str, most: int = _MOST)
         UsageError: It is fewer or more.
     """
     if value < fewest:
-        raise UsageError(f"{option} is {value}; expected at least {fewest} {what}")
+        raise UsageError(f"{option} is {value}; expected {fewest} or more {what}")
     if value > most:
         raise UsageError(f"{option} is {value}; expected at most {most} {what}")
     return value

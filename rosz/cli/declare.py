@@ -2,8 +2,8 @@
 
 A command is a function; annotations say which of its arguments are positional words and which are
 options, as typer has it. But typer takes longer to load than most commands take to run. So a sound
-command line is read by `rosz.cli.reading`, and typer gets the same declarations where help or an
-explanation of what is wrong is asked for (`rosz.cli.typed`).
+command line is read by `rosz.cli.reading`, help is written by `rosz.cli.help`, and typer gets the
+same declarations where what is wrong has to be explained (`rosz.cli.typed`).
 """
 
 from __future__ import annotations
@@ -116,21 +116,13 @@ class App:
     Args:
         text: What a group is for; empty for a lone command.
         remapped: Tells which words are remappings, wherever they stand.
-        panels: Whether help comes in panels, and only when asked for by ``--help``.
 
     Attributes:
         commands: By name; the lone one by none.
     """
 
-    def __init__(
-        self,
-        text: str = "",
-        *,
-        remapped: Callable[[str], bool] | None = None,
-        panels: bool = False,
-    ) -> None:
+    def __init__(self, text: str = "", *, remapped: Callable[[str], bool] | None = None) -> None:
         self.text = text
-        self.panels = panels
         self.commands: dict[str, Command] = {}
         self._remapped = remapped
 

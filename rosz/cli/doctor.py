@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli.declare import App, Option
-from rosz.cli.group import print_json
+from rosz.cli.group import print_json, takes_escapes
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def _show(findings: Iterable[Finding], examination: Examination) -> list[Finding
     """Print findings as they come, and return them."""
     from rosz.doctor import listed
 
-    colored = examination.environment.color and sys.stdout.isatty()
+    colored = examination.environment.color and takes_escapes(sys.stdout)
     found: list[Finding] = []
     for finding in findings:
         found.append(finding)

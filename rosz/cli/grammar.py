@@ -179,6 +179,8 @@ def candidates(words: list[str], word: str) -> list[str]:
     first, *rest = words
     if first != "rosz":
         return _nth(_HELPERS[first], rest, known, word)
+    if rest[:1] == ["help"]:
+        rest = rest[1:]
     if not rest:
         return [*COMMANDS, "--help", "--version"] if word.startswith("-") else list(COMMANDS)
     name, *rest = rest

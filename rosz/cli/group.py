@@ -6,11 +6,13 @@ that it can be a node of a launch file.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rosz import names, remap
 from rosz.cli.declare import App, Context
@@ -31,11 +33,14 @@ __all__ = (
     "new_group",
     "print_json",
     "print_lines",
+    "takes_escapes",
     "until_stopped",
     "warn",
+    "write_file",
 )
 
 _LOOK_UP_SECONDS = 0.2
+_SAME_WISH_SECONDS = 1.0
 
 
 class Call:
@@ -139,6 +144,26 @@ def print_json(value: Any) -> None:
     sys.stdout.write(msgspec.json.format(msgspec.json.encode(value, enc_hook=str)).decode() + "\n")
 
 
+def write_file(file: str, content: bytes) -> None:
+    """Write a file that was named on the command line.
+
+    Raises:
+        OSError: It cannot be written; it always names the file.
+    """
+    from pathlib import Path
+
+    try:
+        Path(file).write_bytes(content)
+    except OSError as error:
+        error.filename = error.filename or file
+        raise
+
+
+def takes_escapes(stream: TextIO) -> bool:
+    """Tell whether what reads a stream is a terminal with colours and a cursor to move."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
 def warn(text: str) -> None:
     """Tell something that is no data."""
     sys.stderr.write(f"WARNING: {text}\n")
@@ -150,9 +175,21 @@ def until_stopped() -> Iterator[Callable[[], None]]:
     """Let Ctrl-C, or a request to terminate, be the regular end of what goes on for ever.
 
     It gives a function to call when all is ready to go on: from then on they raise an exception
-    here. Before, they end the process at once: while modules load, an exception may get lost.
+    here, once: another would leave locks that are just being given back in neither state. Before,
+    they end the process at once, for while modules load an exception may get lost; and so does one
+    that comes when the end has been taking long.
     """
     taken: list[signal.Signals] = []
+    first: list[float] = []
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        if not first:
+            first.append(time.monotonic())
+            raise KeyboardInterrupt
+        # timeout(1) sends its signal twice, and a terminal Ctrl-C to all, who may pass it on.
+        if time.monotonic() - first[0] > _SAME_WISH_SECONDS:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
 
     def take() -> None:
         # A signal that comes right before Python begins to wait is not seen until the wait ends,
@@ -162,7 +199,7 @@ def until_stopped() -> Iterator[Callable[[], None]]:
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is signal.SIG_DFL:
                 taken.append(number)
-                signal.signal(number, signal.default_int_handler)
+                signal.signal(number, stop)
 
     try:
         yield take

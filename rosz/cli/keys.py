@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli.declare import App, Argument, Option
+from rosz.errors import UsageError
 
 if TYPE_CHECKING:
     from rosz.security.review import Review
 
 __all__ = ("app",)
 
-app = App("Make and check the keys that links between machines need (ROSZ_KEYS).", panels=True)
+app = App("Make and check the keys that links between machines need (ROSZ_KEYS).")
 
 _Folder = Annotated[
     str, Option("--dir", "-d", metavar="DIR", help="Folder of all keys; ROSZ_KEYS, or here.")
@@ -25,12 +26,16 @@ _Folder = Annotated[
 def init_keys(
     folder: Annotated[str, Argument(metavar="DIR")],
     *,
-    name: Annotated[str, Option(help="What certificates call the authority.")] = "rosz",
-    days: Annotated[int, Option(min=1, help="How long it is good for.")] = 3650,
+    name: Annotated[
+        str, Option(metavar="NAME", help="What certificates call the authority.")
+    ] = "rosz",
+    days: Annotated[int, Option(min=1, metavar="DAYS", help="How long it is good for.")] = 3650,
 ) -> None:
     """Make a folder of keys, with an authority that signs them."""
+    from rosz.cli.bounds import at_least
     from rosz.security.authority import Authority
 
+    at_least("--days", days, 1, "days")
     authority = Authority.create(Path(folder).absolute(), name, days)
     sys.stdout.write(
         f"made the authority in {authority.folder}\n"
@@ -45,18 +50,22 @@ def add_keys(
     *,
     address: Annotated[
         list[str] | None,
-        Option(help="An address or further name that others reach the host at; repeatable."),
+        Option(
+            metavar="ADDRESS",
+            help="An address or further name that others reach the host at; repeatable.",
+        ),
     ] = None,
-    days: Annotated[int, Option(min=1, help="How long they are good for.")] = 825,
+    days: Annotated[int, Option(min=1, metavar="DAYS", help="How long they are good for.")] = 825,
     folder: _Folder = "",
 ) -> None:
     """Make keys for machines or people."""
-    from rosz.errors import UsageError
+    from rosz.cli.bounds import at_least
     from rosz.security.authority import Authority
 
+    at_least("--days", days, 1, "days")
     if address and len(names) > 1:
         raise UsageError("--address is of one host; expected a single HOST with it")
-    authority = Authority(_folder(folder))
+    authority = Authority(_folder(folder, f"add {' '.join(names)} --dir"))
     for name in names:
         made = authority.add(name, address or (), days)
         sys.stdout.write(f"made {made}; copy it to {name}, and set ROSZ_KEYS to the copy there\n")
@@ -71,7 +80,7 @@ def list_keys(
     """List who has keys, until when, and what for."""
     from rosz.security.review import review
 
-    found = review(_folder(folder))
+    found = review(_folder(folder, "list --dir"))
     if json:
         _print_json(found)
         return
@@ -89,7 +98,7 @@ def check_keys(
     """Check certificates, access to key files, and rules; exit 1 if something is wrong."""
     from rosz.security.review import review
 
-    found = review(_folder(folder))
+    found = review(_folder(folder, "check"))
     if json:
         _print_json(found)
     else:
@@ -106,8 +115,29 @@ def check_keys(
     return int(bool(found.wrong))
 
 
-def _folder(given: str) -> Path:
-    return Path(given or os.environ.get("ROSZ_KEYS") or ".").expanduser().absolute()
+def _folder(given: str, command: str) -> Path:
+    """Return the folder of keys that is meant.
+
+    Args:
+        given: On the command line.
+        command: What takes a folder at its end.
+
+    Raises:
+        UsageError: None is given, and the keys are not here but in a folder beside.
+    """
+    named = given or os.environ.get("ROSZ_KEYS")
+    here = Path.cwd()
+    if not named and not _has_keys(here) and _has_keys(here / "keys"):
+        raise UsageError(
+            f"no keys in '{here}', but in './keys': 'rosz keys {command} keys', or set ROSZ_KEYS"
+        )
+    return Path(named or here).expanduser().absolute()
+
+
+def _has_keys(folder: Path) -> bool:
+    from rosz.security.folder import CERTIFICATE
+
+    return (folder / CERTIFICATE).is_file() or any(folder.glob(f"*/{CERTIFICATE}"))
 
 
 def _print_json(found: Review) -> None:

@@ -13,7 +13,7 @@ from rosz.errors import UsageError
 
 __all__ = ("app",)
 
-app = App(panels=True)
+app = App()
 
 
 @app.command()
@@ -58,10 +58,10 @@ def command(
         str, Option(metavar="FILE", help="Write the process id of the launch to a file.")
     ] = "",
     nodes: Annotated[bool, Option("--nodes", help="List the nodes.")] = False,
-    args: Annotated[str, Option(metavar="NODE", help="Print what starts a node.")] = "",
+    args: Annotated[str | None, Option(metavar="NODE", help="Print what starts a node.")] = None,
     find_node: Annotated[
-        str, Option(metavar="NODE", help="Print the file that a node is in.")
-    ] = "",
+        str | None, Option(metavar="NODE", help="Print the file that a node is in.")
+    ] = None,
     files: Annotated[bool, Option("--files", help="List the files.")] = False,
     ros_args: Annotated[
         bool, Option("--ros-args", help="List the args that the file takes.")
@@ -74,9 +74,11 @@ def command(
     ] = False,
     status: Annotated[bool, Option("--status", help="List the nodes of running launches.")] = False,
     restart: Annotated[
-        str, Option(metavar="NODE", help="Have a running launch restart a node.")
-    ] = "",
-    stop: Annotated[str, Option(metavar="NODE", help="Have a running launch end a node.")] = "",
+        str | None, Option(metavar="NODE", help="Have a running launch restart a node.")
+    ] = None,
+    stop: Annotated[
+        str | None, Option(metavar="NODE", help="Have a running launch end a node.")
+    ] = None,
     json: Annotated[bool, Option("--json", help="With --status: as JSON.")] = False,
     machine: Annotated[
         list[str] | None,
@@ -109,10 +111,13 @@ def command(
 
         serve()
         return 0
+    _check_named(args=args, find_node=find_node, restart=restart, stop=stop)
     if status or restart or stop:
         from rosz.cli.launch_control import control
 
-        return control(words or (), status=status, restart=restart, stop=stop, as_json=json)
+        return control(
+            words or (), status=status, restart=restart or "", stop=stop or "", as_json=json
+        )
     question = _question(
         nodes=nodes,
         args=args,
@@ -151,7 +156,14 @@ def command(
     return job.run(options, wait=wait)
 
 
-def _question(**asked: str | bool) -> tuple[str, str] | None:
+def _check_named(**nodes: str | None) -> None:
+    """See that options for a node name one: a script's empty variable must not start a launch."""
+    for option, node in nodes.items():
+        if node == "":
+            raise UsageError(f"--{option.replace('_', '-')} is ''; expected the name of a node")
+
+
+def _question(**asked: str | bool | None) -> tuple[str, str] | None:
     """Return which of roslaunch's questions is asked, and about which node."""
     chosen = [(name, str(value)) for name, value in asked.items() if value]
     if len(chosen) > 1:

@@ -51,7 +51,7 @@ def _first(words: Sequence[str], packages: PackageIndex) -> tuple[str, Sequence[
                 raise
     if is_file:
         return name, words[1:]
-    if Path(name).is_dir() and "/" in name:
+    if Path(name).is_dir() and ("/" in name or name not in packages.names()):
         raise NotFoundError(f"'{name}' is a folder; name a launch file in it")
     raise NotFoundError(f"launch file '{name}' is not there{_hint(name, packages)}")
 
@@ -63,8 +63,10 @@ def _hint(name: str, packages: PackageIndex) -> str:
     if Path("launch", name).is_file():
         return f"; did you mean 'launch/{name}'?"
     if name in packages.names():
-        own = sorted(file.name for file in packages.find(name).path.glob("launch/*.launch"))
-        which = f", such as {', '.join(own[:_LISTED])}" if own else ""
+        own = sorted({file.name for file in packages.find(name).path.rglob("*.launch")})
+        if not own:
+            return f"; '{name}' is a package, and has no launch files"
+        which = f", such as {', '.join(own[:_LISTED])}"
         return f"; '{name}' is a package: name one of its launch files as well{which}"
     holders = [
         package.name

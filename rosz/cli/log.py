@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli.bounds import at_least
 from rosz.cli.declare import App, Argument, Option
-from rosz.cli.group import Call, print_json, print_lines, until_stopped, warn
+from rosz.cli.group import (
+    Call,
+    print_json,
+    print_lines,
+    takes_escapes,
+    until_stopped,
+    warn,
+)
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
@@ -113,7 +120,7 @@ def _follow(
     from rosz.msgs.rcl_interfaces.msg import Log
     from rosz.node import Node
 
-    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    color = takes_escapes(sys.stdout) and not os.environ.get("NO_COLOR")
     left = count
     with (
         until_stopped() as ready,

@@ -101,15 +101,34 @@ def run(argv: Sequence[str]) -> int:
         _forget_stdout()
         return 0
     except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        return _fail(f"{place}{error.strerror or error}", 1)
+        return _fail(_of_system(error), 1)
     except KeyboardInterrupt:
         return _INTERRUPTED
 
 
+def _of_system(error: OSError) -> str:
+    """Return what to say of the system's refusal, which often tells no place."""
+    if error.filename:
+        return f"{error.filename}: {error.strerror}"
+    try:
+        sys.stdout.flush()  # what could not be written is still there, and refused again
+    except OSError as again:
+        _forget_stdout()
+        return f"cannot write to standard output: {again.strerror}"
+    try:
+        os.getcwd()  # noqa: PTH109  # pathlib takes long to load
+    except FileNotFoundError:
+        return "the working folder has been deleted: change to another one with 'cd'"
+    return error.strerror or str(error)
+
+
 def _dispatch(argv: list[str]) -> int:
-    if not argv or argv[0] in {"-h", "--help", "help"}:
-        sys.stdout.write(_overview())
+    if argv[:1] == ["help"]:
+        argv = [*argv[1:], "--help"]
+    if not argv or argv[0] in {"-h", "--help"}:
+        from rosz.cli.help import overview
+
+        sys.stdout.write(overview(COMMANDS))
         return 0 if argv else 2
     if argv[0] in {"-V", "--version", "version"}:
         sys.stdout.write(f"rosz {_version()}\n")
@@ -127,10 +146,17 @@ def _dispatch(argv: list[str]) -> int:
 
 
 def _invoke(app: App, argv: list[str], program: str) -> int:
-    """Run a command, or have typer say why that cannot be, or what there is."""
+    """Run a command, or tell what there is, or have typer say why the line is none."""
     from rosz.cli.reading import read
 
     run_it = read(app, argv) if argv or not app.text else None
+    if run_it is None:
+        from rosz.cli.help import asked_for
+
+        text = asked_for(app, argv, program)
+        if text:
+            sys.stdout.write(text)
+            return 0 if argv else 2
     code = _ask_typer(app, argv, program) if run_it is None else run_it()
     return code if isinstance(code, int) else 0
 
@@ -143,22 +169,26 @@ def _ask_typer(app: App, argv: list[str], program: str) -> object:
     from rosz.cli.typed import to_typer
 
     context, words = app.sorted_out(argv)
-    typed = to_typer(app, context)
-    if app.text and not argv:
-        typed(args=["--help"], prog_name=program, standalone_mode=False)
-        return 2
     try:
-        return typed(args=words, prog_name=program, standalone_mode=False)
+        return to_typer(app, context)(args=words, prog_name=program, standalone_mode=False)
     except typer.Abort:
         return _INTERRUPTED
     except SystemExit as error:
         # The only case in which typer does so here: nobody reads the output any more.
         raise BrokenPipeError from error
     except TyperException as error:
-        format_message = getattr(error, "format_message", error.__str__)
-        text = format_message().rstrip(".")
-        text += f" See '{program} --help'" if text.endswith("?") else f"; see '{program} --help'"
-        return _fail(text, getattr(error, "exit_code", 2))
+        if app.text and words and words[0] in app.commands:
+            program += f" {words[0]}"
+        text = getattr(error, "format_message", error.__str__)()
+        return _fail(_in_our_words(text, program), getattr(error, "exit_code", 2))
+
+
+def _in_our_words(text: str, program: str) -> str:
+    """Return what typer says of a line, as all else here is said."""
+    text = text[:1].lower() + text[1:].rstrip(".").replace(". Did you mean", "; did you mean")
+    if text.startswith("no such option: -") and text[-1:].isdigit():
+        text += "; a negative value goes behind '--'"
+    return text if text.endswith("?") else f"{text}; see '{program} --help'"
 
 
 def _version() -> str:
@@ -168,14 +198,6 @@ def _version() -> str:
         return version("rosz")
     except PackageNotFoundError:
         return "of unknown version: it is not installed, but runs from its sources"
-
-
-def _overview() -> str:
-    width = max(map(len, COMMANDS))
-    lines = [f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()]
-    return "\n".join(
-        ["usage: rosz COMMAND [ARGUMENTS]", "", *lines, "", "rosz COMMAND --help tells more.", ""]
-    )
 
 
 def _fail(what: object, code: int) -> int:

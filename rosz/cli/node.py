@@ -98,8 +98,9 @@ def ping_command(
     if everybody:
         return ping_all(call)
     if not node:
-        names = "\n".join(call.survey().view.nodes())
-        raise UsageError(f"no node is given; there are:\n{names}")
+        names = call.survey().view.nodes()
+        there = "there are:\n" + "\n".join(names) if names else "none is running"
+        raise UsageError(f"no node is given; {there}")
     with until_stopped() as ready:
         ready()
         return ping(call, node, count)

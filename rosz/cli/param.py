@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from rosz import names, remap
 from rosz.cli.bounds import at_least
 from rosz.cli.declare import App, Argument, Context, Option, values_last
-from rosz.cli.group import print_json, print_lines, until_stopped
+from rosz.cli.group import print_json, print_lines, until_stopped, write_file
 from rosz.cli.param_plain import plain
 from rosz.cli.param_show import (
     as_yaml,
@@ -149,8 +149,6 @@ def dump_command(
     json: _Json = False,
 ) -> int:
     """Write parameters to a file as YAML."""
-    from pathlib import Path
-
     from rosz.params.yaml import dump
 
     with _client(context) as (client, resolve):
@@ -168,7 +166,7 @@ def dump_command(
         from rosz.cli.param_files import check_target
 
         check_target(file)
-        Path(file).write_text(dump(value), encoding="utf-8")
+        write_file(file, dump(value).encode())
     return 0
 
 

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli.declare import App, Argument, Option
+from rosz.errors import NotFoundError
 
 if TYPE_CHECKING:
-    from rosz.packages import PackageIndex
+    from rosz.packages import Package, PackageIndex
 
 __all__ = ("app",)
 
-app = App("List, find, create and check packages.", panels=True)
+app = App("List, find, create and check packages.")
 
 
 @app.command("list")
@@ -40,12 +41,14 @@ def list_packages(
 
 @app.command("find")
 def find_package(
-    name: Annotated[str, Argument(metavar="PACKAGE")],
+    name: Annotated[
+        str, Argument(metavar="[PACKAGE]", help="The workspace is meant if none is named.")
+    ] = "",
     *,
     json: Annotated[bool, Option("--json", help="As JSON.")] = False,
 ) -> None:
     """Print the folder of a package."""
-    package = _index().find(name)
+    package = _index().find(name) if name else _workspace()
     if json:
         from rosz.cli.group import print_json
 
@@ -59,9 +62,15 @@ def create_package(
     name: Annotated[str, Argument(metavar="NAME")],
     dependencies: Annotated[list[str] | None, Argument(metavar="[DEPENDENCY]...")] = None,
     *,
-    description: Annotated[str, Option("--description", "-d", help="What it is.")] = "",
-    maintainer: Annotated[str, Option("--maintainer", "-m", help="Who looks after it.")] = "",
-    license_name: Annotated[str, Option("--license", "-l", help="Under what terms.")] = "",
+    description: Annotated[
+        str, Option("--description", "-d", metavar="TEXT", help="What it is.")
+    ] = "",
+    maintainer: Annotated[
+        str, Option("--maintainer", "-m", metavar="NAME", help="Who looks after it.")
+    ] = "",
+    license_name: Annotated[
+        str, Option("--license", "-l", metavar="NAME", help="Under what terms.")
+    ] = "",
     bare: Annotated[
         bool, Option("--bare", help="Without them: two files, as catkin_create_pkg does.")
     ] = False,
@@ -126,6 +135,24 @@ def check_command(
 _BUILT_IN = frozenset(
     {"catkin", "message_generation", "message_runtime", "roslib", "rospy", "roscpp"}
 )
+
+
+def _workspace() -> Package:
+    """Return the first place that packages are looked for in, as ``roscd`` alone goes there.
+
+    Raises:
+        NotFoundError: There is none but what is installed.
+    """
+    from rosz.environment import Environment
+    from rosz.packages import Package
+
+    for root in Environment.read().package_roots:
+        path = root.parent if root.name == "src" else root
+        return Package(path.name, path)
+    raise NotFoundError(
+        "no workspace: ROSZ_PACKAGE_PATH is not set, and no folder 'src' or package.xml is here or"
+        " above"
+    )
 
 
 def _index() -> PackageIndex:

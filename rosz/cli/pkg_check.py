@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from rosz.cli.group import print_json
+from rosz.cli.group import print_json, takes_escapes
 from rosz.environment import Environment, package_index
 from rosz.errors import NotFoundError
 from rosz.introspect.shells import SHELLS, Shell
@@ -78,7 +78,8 @@ def _meant(words: Sequence[str], cwd: Path) -> list[str]:
 
 def _show(done: Iterable[Checked], count: int, cwd: Path, *, colored: bool) -> list[Checked]:
     """Print what is wrong, package by package, and a summary."""
-    terminal = sys.stderr.isatty()
+    terminal = takes_escapes(sys.stderr)
+    colored = colored and takes_escapes(sys.stdout)
     checked: list[Checked] = []
     for each in done:
         checked.append(each)
@@ -88,7 +89,7 @@ def _show(done: Iterable[Checked], count: int, cwd: Path, *, colored: bool) -> l
         if each.problems and terminal:
             sys.stderr.write("\r\033[K")
         for problem in each.problems:
-            sys.stdout.write(_line(problem, cwd, colored=colored and sys.stdout.isatty()))
+            sys.stdout.write(_line(problem, cwd, colored=colored))
         sys.stdout.flush()
     if terminal:
         sys.stderr.write("\r\033[K")

@@ -6,13 +6,13 @@ options run together) is left to typer, which knows what to do with it or what t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from rosz.cli.declare import App, Argument, Command, Context, Option
 
-__all__ = ("Parameter", "parameters", "read")
+__all__ = ("Parameter", "options", "parameters", "read")
 
 _END = "--"
 
@@ -30,9 +30,10 @@ class Parameter:
         mark: What it is on the command line; None for a context.
         many: Whether it takes several values.
         required: Whether it has to be given.
+        default: What it is when it is not given.
     """
 
-    __slots__ = ("kind", "many", "mark", "name", "required")
+    __slots__ = ("default", "kind", "many", "mark", "name", "required")
 
     def __init__(
         self,
@@ -42,7 +43,9 @@ class Parameter:
         *,
         many: bool,
         required: bool,
+        default: Any = None,
     ) -> None:
+        self.default = default
         self.name = name
         self.kind = kind
         self.mark = mark
@@ -78,19 +81,37 @@ def parameters(function: Callable[..., Any]) -> list[Parameter]:
     code: Any = getattr(function, "__code__")  # noqa: B009  # which a Callable need not have
     names = code.co_varnames[: code.co_argcount]
     given = getattr(function, "__defaults__") or ()  # noqa: B009
-    optional = {*names[len(names) - len(given) :], *(getattr(function, "__kwdefaults__") or ())}  # noqa: B009
+    defaults: dict[str, Any] = dict(zip(names[len(names) - len(given) :], given, strict=True))
+    defaults |= getattr(function, "__kwdefaults__") or {}  # noqa: B009
     hints = get_type_hints(function, include_extras=True)
     hints.pop("return", None)
-    return [_parameter(name, hint, required=name not in optional) for name, hint in hints.items()]
+    return [_parameter(name, hint, defaults) for name, hint in hints.items()]
 
 
-def _parameter(name: str, hint: Any, *, required: bool) -> Parameter:
+def options(function: Callable[..., Any]) -> dict[str, Parameter]:
+    """Return the options of a command's function by all their spellings."""
+    return {
+        spelling: one
+        for one in parameters(function)
+        if isinstance(one.mark, Option)
+        for spelling in one.mark.spelled(one.name)
+    }
+
+
+def _parameter(name: str, hint: Any, defaults: Mapping[str, Any]) -> Parameter:
     mark = next(iter(getattr(hint, "__metadata__", ())), None)
     kind = hint if mark is None else hint.__origin__
     if get_origin(kind) in {Union, UnionType}:
         (kind,) = (one for one in get_args(kind) if one is not NoneType)
     many = get_origin(kind) is list
-    return Parameter(name, get_args(kind)[0] if many else kind, mark, many=many, required=required)
+    return Parameter(
+        name,
+        get_args(kind)[0] if many else kind,
+        mark,
+        many=many,
+        required=name not in defaults,
+        default=defaults.get(name),
+    )
 
 
 class _Line:
@@ -102,14 +123,11 @@ class _Line:
 
     def __init__(self, command: Command) -> None:
         self._interspersed = command.interspersed
-        self._options: dict[str, Parameter] = {}
-        self._arguments: list[Parameter] = []
+        self._options = options(command.function)
+        self._arguments = [
+            one for one in parameters(command.function) if isinstance(one.mark, Argument)
+        ]
         self._values: dict[str, Any] = {}
-        for one in parameters(command.function):
-            if isinstance(one.mark, Option):
-                self._options.update(dict.fromkeys(one.mark.spelled(one.name), one))
-            elif one.mark is not None:
-                self._arguments.append(one)
 
     def values(self, words: Iterable[str]) -> dict[str, Any]:
         """Return the values by the names of their arguments; what is not given is left out."""

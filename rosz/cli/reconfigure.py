@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli.bounds import at_least, seconds
 from rosz.cli.declare import Argument, Context, Option, values_last
-from rosz.cli.group import call_of, new_group, print_json, print_lines, until_stopped, warn
+from rosz.cli.group import (
+    call_of,
+    new_group,
+    print_json,
+    print_lines,
+    until_stopped,
+    warn,
+    write_file,
+)
 from rosz.cli.reconfigure_show import flatten, show_change, show_description
 from rosz.errors import NotFoundError, UsageError, WaitTimeout, near_miss
 
@@ -139,8 +147,6 @@ def dump_command(
     wait: _Wait = False,
 ) -> None:
     """Write all settings of a node to a YAML file."""
-    from pathlib import Path
-
     from rosz.reconfigure import dump
 
     with _client(context, node, timeout, wait=wait) as client:
@@ -148,7 +154,7 @@ def dump_command(
     if file == "-":
         sys.stdout.write(text)
     else:
-        Path(file).write_text(text, encoding="utf-8")
+        write_file(file, text.encode())
 
 
 @app.command("load")

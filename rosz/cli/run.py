@@ -13,7 +13,7 @@ from rosz.errors import LaunchError, UsageError
 
 __all__ = ("app",)
 
-app = App(panels=True)
+app = App()
 
 
 # What follows the package belongs to the program, options included.
@@ -28,7 +28,13 @@ def command(
     ] = None,
     *,
     prefix: Annotated[
-        str, Option("--prefix", "-p", help="Put a command before it, such as 'gdb --args'.")
+        str,
+        Option(
+            "--prefix",
+            "-p",
+            metavar="COMMAND",
+            help="Put a command before it, such as 'gdb --args'.",
+        ),
     ] = "",
     debug: Annotated[bool, Option("--debug", "-d", help="Print what is run.")] = False,
 ) -> None:
@@ -65,5 +71,6 @@ def _become(argv: tuple[str, ...], environ: dict[str, str]) -> NoReturn:
         if error.errno == errno.ENOEXEC:
             hint = "; if it is a script, its first line must name what runs it, as '#!/bin/sh' does"
         elif error.errno == errno.ENOENT:
-            hint = "; is what its first line names installed?"
+            there = Path(argv[0]).is_file()
+            hint = f"; is {'what its first line names' if there else 'it'} installed?"
         raise LaunchError(f"cannot run '{argv[0]}': {error.strerror}{hint}") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from rosz.cli.bounds import seconds
-from rosz.cli.declare import Argument, Context, Option
+from rosz.cli.declare import Argument, Context, Option, values_last
 from rosz.cli.group import call_of, new_group, print_json, print_lines
 
 __all__ = ("app",)
@@ -140,7 +140,7 @@ def uri_command(context: Context, service: _ServiceName, *, json: _Json = False)
     _print_one("uri", uri(token), as_json=json)
 
 
-@app.command("call")
+@app.command("call", arrange=values_last(frozenset({"--timeout"})))
 def call_command(
     context: Context,
     service: _ServiceName,

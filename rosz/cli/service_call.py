@@ -67,7 +67,8 @@ def call_service(call: Call, name: str, words: Sequence[str], options: CallOptio
             if sys.stdin.isatty():
                 raise UsageError(f"no values are given; they are: {list_arguments(request_type)}")
             calls = (
-                one if isinstance(one, list) else [one] for one in read_stream(sys.stdin.buffer)
+                one if isinstance(one, list) else [one]
+                for one in read_stream(sys.stdin.buffer, warn)
             )
         with (
             Node(_TOOL, anonymous=True, context=context) as node,

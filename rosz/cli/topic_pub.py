@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from rosz.cli.group import Call, print_lines, until_stopped
+from rosz.cli.group import Call, print_lines, until_stopped, warn
 from rosz.errors import EncodeError, UsageError
 from rosz.introspect.documents import read_arguments, read_file, read_stream
 from rosz.introspect.fill import list_arguments, with_arguments
@@ -61,6 +61,6 @@ def pub(
                 elif documents is not None:
                     sender.send_documents(documents, only_one=len(documents) == 1)
                 else:
-                    sender.send_documents(read_stream(sys.stdin.buffer))
+                    sender.send_documents(read_stream(sys.stdin.buffer, warn))
             except EncodeError as error:
                 raise with_arguments(error, cls) from error

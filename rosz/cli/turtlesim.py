@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from rosz.cli.declare import Argument, Context, Option
-from rosz.cli.group import call_of, new_group
+from rosz.cli.group import call_of, new_group, write_file
 from rosz.errors import UsageError
 
 __all__ = ("app",)
@@ -35,4 +35,4 @@ def snapshot(
     if file == "-":
         sys.stdout.buffer.write(picture.png)
     else:
-        Path(file).write_bytes(picture.png)
+        write_file(file, picture.png)

@@ -104,7 +104,7 @@ class _Shelf:
         single: _Single = False,
         json: _Json = False,
     ) -> None:
-        names = Call(()).types.names(self._kind, _asked(package))
+        names = Call(()).types.names(self._kind, _asked(package, "package"))
         _print(names, single=single, as_json=json)
 
     def packages(self, *, single: _Single = False, json: _Json = False) -> None:
@@ -123,11 +123,11 @@ def _short(name: str) -> str:
     return f"{package}/{base}"
 
 
-def _asked(word: str) -> str:
+def _asked(word: str, what: str = "type") -> str:
     """Return a word of the command line, or of standard input where there is none, as ROS 1."""
     if word:
         return word
     for line in sys.stdin:
         if line.strip():
             return line.strip()
-    raise UsageError("no type is given")
+    raise UsageError(f"no {what} is given")

@@ -1,4 +1,4 @@
-"""The commands as typer has them, which prints help and explains what is wrong with a line."""
+"""The commands as typer has them, which explains what is wrong with a line."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from rosz.cli.light import make_light
 
 __all__ = ("to_typer",)
 
-_HELP = {"help_option_names": ["-h", "--help"]}
-
 
 def to_typer(app: App, context: Context) -> typer.Typer:
     """Return the same commands as an app of typer's.
@@ -23,27 +21,26 @@ def to_typer(app: App, context: Context) -> typer.Typer:
         app: The commands.
         context: What those get that ask for it.
     """
-    plain: dict[str, Any] = (
-        {} if app.panels else {"rich_markup_mode": None, "pretty_exceptions_enable": False}
+    made = typer.Typer(
+        add_completion=False,
+        add_help_option=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
     )
-    if app.text:
-        plain |= {"help": app.text, "no_args_is_help": True}
-        plain |= {} if app.panels else {"context_settings": _HELP}
-    made = typer.Typer(add_completion=False, **plain)
     if app.text:
         made.callback()(_nothing)  # without one, typer takes a group of one command for no group
     for name, command in app.commands.items():
         made.command(
             name or None,
-            help=command.help,
-            context_settings=_settings(command, lone=not app.text, panels=app.panels),
+            add_help_option=False,
+            context_settings=_settings(command),
         )(_plain(command.function, context))
     make_light(made)
     return made
 
 
-def _settings(command: Command, *, lone: bool, panels: bool) -> dict[str, Any]:
-    settings: dict[str, Any] = dict(_HELP) if lone and not panels else {}
+def _settings(command: Command) -> dict[str, Any]:
+    settings: dict[str, Any] = {}
     if not command.interspersed:
         settings["allow_interspersed_args"] = False
     if command.tolerant:
@@ -77,9 +74,7 @@ def _plain(function: Callable[..., Any], context: Context) -> Callable[..., Any]
 def _in_words_of_typer(hint: Any) -> Any:
     (mark,) = hint.__metadata__
     if isinstance(mark, Argument):
-        return Annotated[hint.__origin__, typer.Argument(metavar=mark.metavar, help=mark.help)]
+        return Annotated[hint.__origin__, typer.Argument(metavar=mark.metavar)]
     assert isinstance(mark, Option)  # noqa: S101  # there is no third
-    option = typer.Option(
-        *mark.names, metavar=mark.metavar, help=mark.help, hidden=mark.hidden, min=mark.min
-    )
+    option = typer.Option(*mark.names, metavar=mark.metavar, hidden=mark.hidden, min=mark.min)
     return Annotated[hint.__origin__, option]

@@ -58,9 +58,10 @@ def check_segments(folder: Path = SEGMENTS, born: float = _BORN) -> Iterator[Fin
                 if path.stat().st_ctime < time.time() - born and _is_unused(path):
                     left.append(f"{path}, {path.stat().st_size} bytes")
     if left:
+        count = "1 segment" if len(left) == 1 else f"{len(left)} segments"
         yield warning(
             "stale-lock",
-            f"{len(left)} segments of shared memory are left of processes that died",
+            f"{count} of shared memory left by processes that died",
             left,
             "they go when the next rosz process of their owner starts; or remove them by hand",
         )

@@ -2,7 +2,8 @@
 
 Zenoh's thread only queues what it sees. One thread of the graph applies it, wakes waiters and runs
 listeners. A listener that waits for the graph applies what comes meanwhile itself, so it may call
-anything; but all others wait for it, so what takes long belongs on another thread.
+anything; but all listeners are told of that only when it returns, so that each is told of things in
+their order, and what takes long belongs on another thread.
 """
 
 from __future__ import annotations
@@ -11,12 +12,15 @@ import itertools
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, DecodeError, WaitTimeout, near_miss
 from rosz.graph.view import View
+from rosz.session.waiting import patience
 from rosz.wire import (
     OWN_SPACE,
     ProcessToken,
@@ -38,9 +42,11 @@ GraphListener = Callable[[Token, bool], None]
 ProcessListener = Callable[[ProcessToken, bool], None]
 """Gets a rosz node as a process, and whether it appeared (true) or went (false)."""
 
+_Telling = Callable[[], object]
+"""What is done when all that came before has been told."""
+
 _LOOK_TIMEOUT = 2.0
 _CLOSED_POLL = 0.1
-_LONGEST = threading.TIMEOUT_MAX / 2
 _log = logging.getLogger("rosz.graph")
 
 
@@ -63,7 +69,10 @@ class Graph:
         self._listeners: dict[int, GraphListener] = {}
         self._process_listeners: dict[int, ProcessListener] = {}
         self._complained: set[str] = set()
-        self._events: SimpleQueue[tuple[str, bool] | Callable[[], None] | None] = SimpleQueue()
+        self._events: SimpleQueue[tuple[str, bool] | Callable[[], _Telling | None] | None]
+        self._events = SimpleQueue()
+        self._untold: deque[_Telling] = deque()
+        self._telling = False
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="rosz-graph", daemon=True)
         self._thread.start()
@@ -102,7 +111,9 @@ class Graph:
         Raises:
             ClosedError: The session is closed.
             WaitTimeout: No end of answers.
+            UsageError: The timeout is no number.
         """
+        timeout = patience(timeout)
         asked = [
             *self._session.live_tokens(tokens_key(self.domain), timeout),
             *self._session.live_tokens(processes_key(self.domain), timeout),
@@ -127,14 +138,7 @@ class Graph:
         Returns:
             A function that ends it.
         """
-        number = next(self._numbers)
-
-        def begin() -> None:
-            self._listeners[number] = listener
-            for token in list(self._tokens.values()) if history else ():
-                self._tell(self._listeners, number, token, alive=True)
-
-        return self._enlist(begin, self._listeners, number)
+        return self._enlist(self._listeners, listener, self._tokens if history else {})
 
     def listen_to_processes(self, listener: ProcessListener) -> Callable[[], None]:
         """Have rosz nodes told as they come and go, those that are alive first.
@@ -145,20 +149,23 @@ class Graph:
         Returns:
             A function that ends it.
         """
-        number = next(self._numbers)
-
-        def begin() -> None:
-            self._process_listeners[number] = listener
-            for process in list(self._processes.values()):
-                self._tell(self._process_listeners, number, process, alive=True)
-
-        return self._enlist(begin, self._process_listeners, number)
+        return self._enlist(self._process_listeners, listener, self._processes)
 
     def _enlist(
-        self, begin: Callable[[], None], listeners: dict[int, Any], number: int
+        self,
+        listeners: dict[int, Any],
+        listener: Callable[[Any, bool], None],
+        known: dict[str, Any],
     ) -> Callable[[], None]:
-        self._events.put(begin)
-        return lambda: self._events.put(lambda: listeners.pop(number, None) and None)
+        number = next(self._numbers)
+
+        def begin(alive: list[Any]) -> None:
+            listeners[number] = listener
+            for token in alive:
+                self._tell(listeners, number, token, alive=True)
+
+        self._events.put(lambda: partial(begin, list(known.values())))
+        return lambda: self._events.put(lambda: partial(listeners.pop, number, None))
 
     def wait_for(
         self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
@@ -177,8 +184,9 @@ class Graph:
         Raises:
             WaitTimeout: It did not become so in time.
             ClosedError: The graph was closed meanwhile.
+            UsageError: The timeout is no number.
         """
-        deadline = time.monotonic() + timeout
+        deadline = time.monotonic() + patience(timeout)
         wait = self._apply_next if threading.current_thread() is self._thread else self._sleep
         while not condition(view := self.view()):
             left = deadline - time.monotonic()
@@ -186,7 +194,7 @@ class Graph:
                 raise ClosedError(f"the wait for {what} ended: shutting down")
             if left <= 0:
                 raise WaitTimeout(what, timeout, hint)
-            wait(view, min(left, _LONGEST))
+            wait(view, left)
         return view
 
     def _sleep(self, seen: View, timeout: float) -> None:
@@ -277,11 +285,18 @@ class Graph:
         while (event := self._events.get()) is not None:
             self._do(event)
 
-    def _do(self, event: tuple[str, bool] | Callable[[], None]) -> None:
-        if isinstance(event, tuple):
-            self._apply(event[0], alive=event[1])
-        else:
-            event()
+    def _do(self, event: tuple[str, bool] | Callable[[], _Telling | None]) -> None:
+        """Take an event in, and tell of it unless a listener is being told of another one."""
+        telling = self._apply(event[0], alive=event[1]) if isinstance(event, tuple) else event()
+        if telling is None:
+            return
+        self._untold.append(telling)
+        if self._telling:
+            return
+        self._telling = True
+        while self._untold:
+            self._untold.popleft()()
+        self._telling = False
 
     def _catch_up(self, timeout: float) -> None:
         """Wait until what came so far is applied."""
@@ -294,14 +309,15 @@ class Graph:
             if timeout <= 0:
                 return
 
-    def _apply(self, key: str, *, alive: bool) -> None:
+    def _apply(self, key: str, *, alive: bool) -> _Telling | None:
+        """Take note of a token that appeared or went, and return what tells of it if it is news."""
         ours = key.startswith(OWN_SPACE)
         known: dict[str, Any] = self._processes if ours else self._tokens
         if alive == (key in known):
-            return
+            return None
         token = self._parse(key) if alive else known[key]
         if token is None:
-            return
+            return None
         with self._changed:
             if alive:
                 known[key] = token
@@ -309,7 +325,13 @@ class Graph:
                 del known[key]
             self._view = None
             self._changed.notify_all()
-        listeners: dict[int, Any] = self._process_listeners if ours else self._listeners
+        return partial(
+            self._tell_all, self._process_listeners if ours else self._listeners, token, alive
+        )
+
+    def _tell_all(
+        self, listeners: dict[int, Any], token: Token | ProcessToken, alive: bool
+    ) -> None:
         for number in list(listeners):
             self._tell(listeners, number, token, alive=alive)
 

@@ -100,7 +100,8 @@ class Catalog:
             return self._message(base)
         except TypeNotFound as error:
             written = field.type.written
-            hint = "" if "/" in written else near_miss(written.lower(), PRIMITIVES)
+            told = "/" in written or str(error).endswith("?")
+            hint = "" if told else near_miss(written.lower(), PRIMITIVES)
             raise DefinitionError(
                 f"type '{written}' of field '{field.name}': {error}{hint}",
                 spec.path,

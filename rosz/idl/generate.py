@@ -79,9 +79,9 @@ class Folders:
             made = self._of_action(folder, base) if kind == "msg" and self._actions else None
             if made is not None:
                 return made
-            known = self.names(package, kind)
+            known = [one.rpartition("/")[2] for one in self.names(package, kind)]
             raise TypeNotFound(
-                name, f"'{folder / kind}' has no '{base}.{kind}'{near_miss(name, known)}"
+                name, f"'{folder / kind}' has no '{base}.{kind}'{near_miss(base, known)}"
             )
         return read_definition(file)
 

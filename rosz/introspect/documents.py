@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +50,14 @@ def read_file(path: Path) -> list[Any]:
     return list(_read(data, str(path)))
 
 
-def read_stream(lines: Iterable[bytes]) -> Iterator[Any]:
+def read_stream(lines: Iterable[bytes], tell: Callable[[str], None]) -> Iterator[Any]:
     """Yield the documents of a stream as they end, each with a line of three dashes.
 
     What follows the last such line is taken for unfinished, and left out, as ROS 1's tools do.
+
+    Args:
+        lines: The stream.
+        tell: Is called with what to say of a document that is left out.
 
     Raises:
         YamlError: A document is no YAML.
@@ -70,6 +74,8 @@ def read_stream(lines: Iterable[bytes]) -> Iterator[Any]:
             raise YamlError(error.reason, _STREAM, before + error.line, error.column) from error
         begun.clear()
         yield from found
+    if b"".join(begun).strip():
+        tell(f"{_STREAM} ends without a line '---': what comes after the last one is left out")
 
 
 def _read(data: bytes, path: str) -> Iterator[Any]:

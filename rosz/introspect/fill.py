@@ -37,7 +37,9 @@ def list_arguments(cls: type[Any]) -> str:
 
 
 def with_arguments(error: EncodeError, cls: type[Any]) -> EncodeError:
-    """Return an error that also says what values a message is made of."""
+    """Return an error that also says what values a message is made of, if it does not yet."""
+    if not error.field and list_arguments(cls) == " ".join(cls.__slots__):
+        return error  # it is about these very names
     between = " " if error.reason.endswith("?") else "; "
     reason = f"{error.reason}{between}the values are: [{list_arguments(cls)}]"
     return EncodeError(error.type_name, error.field, reason)

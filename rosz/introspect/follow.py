@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rosz import names
-from rosz.errors import DefinitionError, NotFoundError
+from rosz.errors import DefinitionError, InvalidName, NotFoundError
 from rosz.introspect.fields import Target, find_target
 from rosz.introspect.survey import ros1_type
 from rosz.message import Message
@@ -31,6 +31,8 @@ def resolve_field(name: str, resolve: Callable[[str], str]) -> str:
         InvalidName: It is not legal.
     """
     head, bracket, tail = name.partition("[")
+    if not head:
+        raise InvalidName(name, "it is empty; expected the name of a topic")
     return resolve(names.check(head)) + bracket + tail
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from rosz.errors import UsageError
+from rosz.errors import NotFoundError, PackageNotFound, TypeNotFound, UsageError
 from rosz.idl.generate import shipped_sources, stale, write
 from rosz.idl.module import MARKER
-from rosz.packages import MANIFEST, PackageIndex
-from rosz.typestore import TypeStore
+from rosz.packages import MANIFEST, Package, PackageIndex
+from rosz.typestore import TypeStore, shipped_packages
 
 __all__ = ("Generator",)
 
@@ -41,8 +41,7 @@ class Generator:
 
         Raises:
             DefinitionError: A definition is not well-formed.
-            PackageNotFound: There is no such package.
-            TypeNotFound: A package has no definitions.
+            NotFoundError: There is no such package, or it has no definitions.
             UsageError: No package is given, and the working folder is in none.
         """
         found = self._sources(words)
@@ -74,8 +73,8 @@ class Generator:
             folder = (self._cwd / word).resolve()
             given = [folder] if (folder / MANIFEST).is_file() else []
             index = PackageIndex([*given, *self._index.roots])
-            package = PackageIndex(given).packages()[0] if given else index.find(word)
-            sources = TypeStore(index).sources([package.name])
+            package = PackageIndex(given).packages()[0] if given else _find(index, word, folder)
+            sources = _sources(index, package.name)
             if self._output is None:
                 yield package.path / "src" / package.name, sources[package.name]
             else:
@@ -86,6 +85,28 @@ class Generator:
             if (folder / MANIFEST).is_file():
                 return str(folder)
         raise UsageError("no package is given, and this folder is in none: rosz gen PACKAGE")
+
+
+def _find(index: PackageIndex, name: str, folder: Path) -> Package:
+    """Return a package by its name; a folder or file of that name may have been meant."""
+    try:
+        return index.find(name)
+    except PackageNotFound as error:
+        if not folder.exists():
+            raise
+        raise NotFoundError(
+            f"'{folder}' is no package: it has no {MANIFEST}; 'rosz pkg create NAME' makes one"
+        ) from error
+
+
+def _sources(index: PackageIndex, name: str) -> dict[str, dict[str, str]]:
+    """Return the sources of a package and of what it depends on."""
+    try:
+        return TypeStore(index).sources([name])
+    except TypeNotFound as error:
+        hint = f"; rosz brings 'rosz.msgs.{name}'" if name in shipped_packages() else ""
+        text = f"package '{name}' has no types of its own that modules could be made of{hint}"
+        raise NotFoundError(text) from error
 
 
 def _check_ours(file: Path) -> None:

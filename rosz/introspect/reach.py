@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.session import Session, SessionConfig
+from rosz.session import Session, SessionConfig, places_of
 from rosz.session.presence import is_anybody_awake, is_router_stopped, why_unanswered
 from rosz.session.probe import is_answered
 from rosz.session.settle import Settling
@@ -111,8 +111,9 @@ def _check_free(environment: Environment, error: TransportError) -> None:
     """See that a failure to connect is not one of something that holds the rendezvous.
 
     Raises:
-        TransportError: Somebody listens there, and does not speak.
+        TransportError: Somebody listens there, and does not speak; or a setting is refused.
     """
+    places_of(SessionConfig.command(environment))
     stopped = why_unanswered(environment.rendezvous)
     if stopped:
         raise TransportError(stopped) from error

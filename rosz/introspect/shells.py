@@ -43,9 +43,8 @@ case ":${{PYTHONPATH-}}:" in
 esac
 unalias roscd 2>/dev/null
 roscd() {{
-  [ -n "$1" ] || {{ echo "usage: roscd PACKAGE[/FOLDER]" >&2; return 2; }}
   local package="${{1%%/*}}" folder
-  folder="$(rospack find "$package")" && cd "$folder${{1#"$package"}}"
+  folder="$("$ROSZ_PYTHON" -P -m rosz pkg find "$package")" && cd "$folder${{1#"$package"}}"
 }}
 """
 
@@ -82,9 +81,8 @@ set -gx ROSZ_PYTHON {python}
 contains {folder} $PATH; or set -gx PATH {folder} $PATH
 contains {modules} $PYTHONPATH; or set -gx --path PYTHONPATH $PYTHONPATH {modules}
 function roscd
-    test -n "$argv[1]"; or begin; echo "usage: roscd PACKAGE[/FOLDER]" >&2; return 2; end
-    set -l parts (string split -m 1 / $argv[1])
-    set -l folder (rospack find $parts[1]); and cd $folder/$parts[2]
+    set -l parts (string split -m 1 / "$argv[1]")
+    set -l folder ($ROSZ_PYTHON -P -m rosz pkg find "$parts[1]"); and cd "$folder/$parts[2]"
 end
 function __rosz_complete
     $ROSZ_PYTHON -P -m rosz complete fish (commandline -cp | string collect) 2>/dev/null

@@ -87,13 +87,11 @@ class _Filler:
         if issubclass(cls, Sequenced) and count == len(fields) + 1:
             return [_SEQ, *fields]  # as ROS 1 counts
         if count != len(fields):
-            names = ", ".join(shown_name(slot) for slot in fields) or "none"
-            raise EncodeError(
-                self._type,
-                path,
-                f"expected {len(fields)} values for the fields of {cls._type} ({names}),"
-                f" got {count}",
-            )
+            names = ", ".join(shown_name(slot) for slot in fields)
+            values = {0: "no values", 1: "1 value"}.get(len(fields), f"{len(fields)} values")
+            owner = f"of {cls._type} " if path else ""
+            what = f"{values} for the fields {owner}({names})" if fields else values
+            raise EncodeError(self._type, path, f"expected {what}, got {count}")
         return fields
 
     def _slot(self, cls: type[Message], name: Any, path: str) -> Slot:
@@ -108,7 +106,8 @@ class _Filler:
         if isinstance(alias, property) and name.lower() in known:  # CameraInfo.K
             return known[name.lower()]
         fields = near_miss(str(name), known) or f"; it has {', '.join(known) or 'no fields'}"
-        raise EncodeError(self._type, path, f"{cls._type} has no field '{name}'{fields}")
+        owner = cls._type if path else "it"
+        raise EncodeError(self._type, path, f"{owner} has no field '{name}'{fields}")
 
     def _value(self, slot: Slot, value: Any, path: str, owner: Message) -> Any:
         if slot.shape == "one":

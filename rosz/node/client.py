@@ -19,6 +19,7 @@ from rosz.node.endpoint import Endpoint
 from rosz.node.mismatch import mismatch
 from rosz.qos import QoS
 from rosz.session import Cancellation
+from rosz.session.waiting import patience
 from rosz.wire import Kind, pack
 
 if TYPE_CHECKING:
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
     from rosz.session import Reply
 
 __all__ = ("Client",)
-
-_LONGEST = 1e8
-"""Seconds, three years, that stand for "forever", which Zenoh has no word for."""
 
 _ATTEMPTS = 10
 _PAUSE = 0.02
@@ -55,7 +53,7 @@ class Client(Endpoint):
             node, Kind.CLIENT, name, service_type._type_name, service_type._type_hash, qos
         )
         self.service_type = service_type
-        self.timeout = min(timeout, _LONGEST)
+        self.timeout = patience(timeout)
         self._numbers = itertools.count(1)
         self._cancel = Cancellation()
         self._known: tuple[View | None, bool] = None, False
@@ -93,8 +91,9 @@ class Client(Endpoint):
                 servers, all of which are asked, the first answer counts.
             WaitTimeout: There was no answer in time.
             ClosedError: The client or its context was closed meanwhile.
+            UsageError: The timeout is no number.
         """
-        limit = self.timeout if timeout is None else min(timeout, _LONGEST)
+        limit = self.timeout if timeout is None else patience(timeout)
         deadline = time.monotonic() + limit
         payload = self.service_type.Request._encode(request)
         if not self._is_served():
@@ -194,6 +193,7 @@ class Client(Endpoint):
         Raises:
             WaitTimeout: Nobody did in time.
             ClosedError: The client is closed, or the context was shut down meanwhile.
+            UsageError: The timeout is no number.
         """
         self.ensure_open("wait for")
         graph = self.node.context.graph

@@ -12,6 +12,7 @@ safe from a signal handler too.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -19,10 +20,24 @@ from collections.abc import Callable
 import msgspec
 
 from rosz.errors import TimeMovedBackwards, UsageError
+from rosz.session.waiting import LONGEST
 
-__all__ = ("Clock", "TimeJump")
+__all__ = ("Clock", "TimeJump", "nanoseconds")
 
-_LONGEST_WAIT_S = threading.TIMEOUT_MAX / 2
+
+def nanoseconds(seconds: float, what: str) -> int:
+    """Return seconds as nanoseconds.
+
+    Args:
+        seconds: Of any sign.
+        what: What lasts so long, for the error.
+
+    Raises:
+        UsageError: It is no number, or infinite.
+    """
+    if not math.isfinite(seconds):
+        raise UsageError(f"{what} is '{seconds}' s: expected a finite number")
+    return round(seconds * 1e9)
 
 
 class TimeJump(msgspec.Struct, frozen=True):
@@ -63,7 +78,7 @@ class _Sleeper:
 class _Source:
     """The time that a clock and its branches share."""
 
-    __slots__ = ("advancing", "now", "observers", "simulated", "sleepers")
+    __slots__ = ("advancing", "heard", "now", "observers", "simulated", "sleepers")
 
     def __init__(self) -> None:
         self.now = 0
@@ -71,6 +86,7 @@ class _Source:
         self.sleepers: set[_Sleeper] = set()
         self.observers: list[tuple[Callable[[TimeJump], None], int | None]] = []
         self.advancing = threading.Lock()
+        self.heard: tuple[bytes, int] = b"", 0
 
     def wake(self, sleeper: _Sleeper, now: int) -> None:
         """End a sleep, unless somebody else just did."""
@@ -134,11 +150,17 @@ class Clock:
         """
         self._source.simulated = True
 
-    def advance(self, time_ns: int) -> None:
+    def advance(self, time_ns: int, *, teller: bytes = b"", number: int = 0) -> None:
         """Set ROS time, and wake who waited for it.
+
+        Each node of a context hears ``/clock`` on a thread of its own, and one that lags behind the
+        others must not set time back. So who tells the time numbers what it says, from 1, and what
+        the same one said before the last thing heard of it is left out.
 
         Args:
             time_ns: Nanoseconds; may be earlier than before, as when a simulation starts over.
+            teller: Who tells it.
+            number: Of what it says; 0 where it does not count.
 
         Raises:
             UsageError: Time is not simulated, or `time_ns` is negative.
@@ -150,6 +172,10 @@ class Clock:
         if time_ns < 0:
             raise UsageError(f"ROS time cannot be '{time_ns}' ns: expected 0 or more")
         with source.advancing:
+            last_teller, last = source.heard
+            if teller == last_teller and 0 < number <= last:
+                return
+            source.heard = teller, number
             before, source.now = source.now, time_ns
             for sleeper in list(source.sleepers):
                 if sleeper.is_due(time_ns):
@@ -248,7 +274,7 @@ class Clock:
                 left = (end - time.monotonic_ns()) / 1e9
                 if left <= 0:
                     return True
-                sleeper.lock.acquire(timeout=min(left, _LONGEST_WAIT_S))
+                sleeper.lock.acquire(timeout=min(left, LONGEST))
         finally:
             sleepers.discard(sleeper)
         return False

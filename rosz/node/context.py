@@ -22,6 +22,7 @@ from rosz.node.mismatch import MismatchWatch
 from rosz.session import Session, SessionConfig
 from rosz.session.presence import is_anybody_awake
 from rosz.session.settle import Settling, serve_links
+from rosz.session.waiting import patience
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -108,8 +109,7 @@ class Context:
             self.session.close()
             raise
         atexit.register(self.close)
-        reference = weakref.ref(self)
-        os.register_at_fork(after_in_child=lambda: _disown(reference()))
+        _contexts.add(self)
 
     def _look_around(self, config: SessionConfig, *, alone: bool) -> None:
         self.graph = Graph(self.session, self.domain)
@@ -305,9 +305,12 @@ class Context:
 
         Returns:
             Whether it has.
+
+        Raises:
+            UsageError: The timeout is no number.
         """
         self.cooperative = self.cooperative or threading.current_thread() is threading.main_thread()
-        return self._stopping.wait(timeout)
+        return self._stopping.wait(None if timeout is None else patience(timeout))
 
     def close(self) -> None:
         """Shut down; the same as `shutdown` without a reason."""
@@ -325,8 +328,15 @@ class Context:
         self.close()
 
 
-def _disown(context: Context | None) -> None:
+_contexts: weakref.WeakSet[Context] = weakref.WeakSet()
+"""Those of this process. What is registered for a fork stays so, and would add up for each."""
+
+
+def _disown_all() -> None:
     """Take a forked child's hands off what belongs to its parent."""
-    if context is not None:
+    for context in list(_contexts):
         signals.release()
         context.disown()
+
+
+os.register_at_fork(after_in_child=_disown_all)

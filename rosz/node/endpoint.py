@@ -6,8 +6,10 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Self
 
+import msgspec
+
 from rosz import names
-from rosz.errors import ClosedError
+from rosz.errors import ClosedError, UsageError
 from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid
 
 if TYPE_CHECKING:
@@ -17,7 +19,13 @@ if TYPE_CHECKING:
     from rosz.qos import QoS
     from rosz.session import Closable
 
-__all__ = ("OPPOSITE", "Endpoint", "Withdrawal")
+__all__ = ("OPPOSITE", "Endpoint", "Withdrawal", "definite")
+
+_SYSTEM_DEPTH = 42
+"""Samples that rmw keeps where that is left to the system."""
+
+_DEEPEST = (1 << 63) - 1
+"""Samples beyond which others cannot count."""
 
 OPPOSITE = {
     Kind.PUBLISHER: Kind.SUBSCRIPTION,
@@ -26,6 +34,18 @@ OPPOSITE = {
     Kind.CLIENT: Kind.SERVICE,
 }
 """What each kind of endpoint talks with."""
+
+
+def definite(qos: QoS) -> QoS:
+    """Return a quality of service with a depth that all others can count to.
+
+    Raises:
+        UsageError: The depth is below 0, which leaves it to the system.
+    """
+    if qos.depth < 0:
+        raise UsageError(f"depth is {qos.depth}: expected 1 or more, or 0 for the system's choice")
+    depth = min(qos.depth or _SYSTEM_DEPTH, _DEEPEST)
+    return qos if depth == qos.depth else msgspec.structs.replace(qos, depth=depth)
 
 
 class Withdrawal:
@@ -62,6 +82,7 @@ class Endpoint:
 
     Raises:
         InvalidName: The name is that of the root.
+        UsageError: The depth of the queue means nothing.
         ClosedError: The node or its context is closed.
     """
 
@@ -71,7 +92,7 @@ class Endpoint:
         context = node.context
         self.node = node
         self.name = name
-        self.qos = qos
+        self.qos = qos = definite(qos)
         wire_hash = NO_HASH if context.environment.distro == "humble" else type_hash
         self.key = endpoint_key(context.domain, names.check_resource(name), type_name, wire_hash)
         self.token = Token(
@@ -109,8 +130,17 @@ class Endpoint:
         self._declared.append(context.session.token(self._token_key))
 
     def also_close(self, part: Closable) -> None:
-        """Have something closed together with the endpoint."""
-        self._declared.append(part)
+        """Have something closed together with the endpoint.
+
+        Raises:
+            ClosedError: It is closed; the part is, too, now.
+        """
+        with self._closing:
+            if not self.closed:
+                self._declared.append(part)
+                return
+        part.close()
+        self.ensure_open("declare more on")
 
     def matches(self, token: Token) -> bool:
         """Tell whether this endpoint and another one reach each other."""
@@ -140,13 +170,15 @@ class Endpoint:
             if self.closed:
                 return
             self.closed = True
-        self._finish()
-        context = self.node.context
-        context.remove_endpoint(self)
-        if not context.session.closed:
-            for declared in reversed(self._declared):
-                declared.close()
-        self.node.forget(self)
+        try:
+            self._finish()
+        finally:  # also where Ctrl-C interrupts it
+            context = self.node.context
+            context.remove_endpoint(self)
+            if not context.session.closed:
+                for declared in reversed(self._declared):
+                    declared.close()
+            self.node.forget(self)
 
     def disown(self, reason: str) -> None:
         """Refuse everything from now on, touching neither threads nor links: after a fork.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.node.channel import Taken
+from rosz.session.waiting import LONGEST, patience
 
 if TYPE_CHECKING:
     from rosz.session import Reply, Sample
@@ -22,8 +23,6 @@ Take = Callable[[Any], "Taken | None"]
 
 Handler = Callable[[Take, Any], None]
 """Gets a sample with what decodes it, and must not raise."""
-
-_FOREVER = threading.TIMEOUT_MAX / 2
 
 
 class Feed:
@@ -86,8 +85,9 @@ class Feed:
         Raises:
             WaitTimeout: None came in time.
             ClosedError: The feed was closed meanwhile.
+            UsageError: The timeout is no number.
         """
-        deadline = time.monotonic() + timeout
+        deadline = time.monotonic() + patience(timeout)
         while True:
             while self._ring and not self.closed:
                 taken = self._pop()
@@ -101,13 +101,13 @@ class Feed:
             left = deadline - time.monotonic()
             if left <= 0:
                 raise WaitTimeout(f"message on '{self._name}'", timeout)
-            self._bell.acquire(timeout=min(left, _FOREVER))
+            self._bell.acquire(timeout=left)
 
     def __iter__(self) -> Iterator[Any]:
         """Yield messages until closed."""
         while True:
             try:
-                message = self.get(_FOREVER)
+                message = self.get(LONGEST)
             except ClosedError:
                 return
             yield message
@@ -120,9 +120,10 @@ class Feed:
         arrived = asyncio.Event()
 
         def wake() -> None:
-            # Between two samples the loop may have ended, and its program with it.
-            with suppress(RuntimeError):
+            try:
                 loop.call_soon_threadsafe(arrived.set)
+            except RuntimeError:  # the loop has ended, and nobody comes back for more
+                self._forget(wake)
 
         self._loops = (*self._loops, wake)
         try:
@@ -135,7 +136,10 @@ class Feed:
                 if not self.closed:
                     await arrived.wait()
         finally:
-            self._loops = tuple(other for other in self._loops if other is not wake)
+            self._forget(wake)
+
+    def _forget(self, wake: Callable[[], None]) -> None:
+        self._loops = tuple(other for other in self._loops if other is not wake)
 
     def close(self) -> None:
         """End all waits on it; again is no error."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 from rosz import names
 from rosz.errors import DecodeError, RoszError
 from rosz.node.channel import Channel, Taken
-from rosz.node.endpoint import Endpoint, Withdrawal
+from rosz.node.endpoint import Endpoint, Withdrawal, definite
 from rosz.node.history import ask_for_history
 from rosz.node.reader import Reader
 from rosz.qos import QoS
@@ -47,14 +47,16 @@ class GenericSubscription(Reader[Any]):
         raw: bool = False,
         with_info: bool = False,
     ) -> None:
+        qos = definite(qos)
         super().__init__(node, topic, callback, qos, with_info=with_info)
         self.node = node
         self.name = topic
         self.qos = qos
         self.closed = False
         self._raw = raw
-        self._closing = threading.RLock()  # a signal handler may come in between
-        self._knowing = threading.Lock()
+        # A signal handler may come in between.
+        self._closing = threading.RLock()
+        self._knowing = threading.RLock()
         self._channels: dict[tuple[str, str], Channel | None] = {}
         self._faces: dict[tuple[str, str], Endpoint] = {}
         self._declared: list[Closable] = []

@@ -35,7 +35,7 @@ class Inbox:
     def __init__(self, session: Session, domain: int) -> None:
         self._session = session
         self._key = own_key(domain, _SPACE, session.zid)
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a signal handler may subscribe in between
         self._declared: Closable | None = None
         self._owners: dict[str, Callable[[Sample], None]] = {}
 

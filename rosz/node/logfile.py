@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
+import os
 import stat
 from collections.abc import Callable
 from contextlib import suppress
 from io import FileIO
-from os import fstat
 from pathlib import Path
 
 from rosz.node.sink import Sink
@@ -34,7 +34,8 @@ class FileSink(Sink):
 
     The file, and its folder, are made with the first record. Each record is handed to the system
     at once, so that a killed process has logged all. While the file cannot be written, records are
-    lost, which is told once; the next record tries anew.
+    lost, which is told once; the next record tries anew. Where another process put the file aside,
+    or somebody removed it, the next record goes to a new one.
 
     Args:
         path: The file. What is no regular file, such as ``/dev/null``, is never put aside.
@@ -58,6 +59,7 @@ class FileSink(Sink):
         self._backups = backups
         self._file: FileIO | None = None
         self._size = 0
+        self._identity = (0, 0)
         self._regular = True
         self._torn = False
         self._told = False
@@ -91,7 +93,7 @@ class FileSink(Sink):
                 )
 
     def _append(self, data: bytes) -> None:
-        file = self._file or self._open()
+        file = self._current() or self._open()
         if self._regular and self._size and self._size + len(data) > self._max_bytes:
             self._close_file()
             self._put_aside()
@@ -100,16 +102,27 @@ class FileSink(Sink):
         while data:
             self._torn = True
             written = file.write(data)
-            self._size += written
             data = data[written:]
         self._torn = False
+
+    def _current(self) -> FileIO | None:
+        """Return the open file, unless its name has become that of another, or of none."""
+        if self._file is not None and self._regular:
+            with suppress(FileNotFoundError):
+                status = self.path.stat()
+                self._size = status.st_size
+                if (status.st_dev, status.st_ino) == self._identity:
+                    return self._file
+            self._close_file()
+        return self._file
 
     def _open(self) -> FileIO:
         with suppress(FileExistsError):  # a file is in the way, which opening tells better
             self.path.parent.mkdir(parents=True, exist_ok=True)
         self._file = FileIO(self.path, "a")
-        status = fstat(self._file.fileno())
+        status = os.fstat(self._file.fileno())
         self._size = status.st_size
+        self._identity = (status.st_dev, status.st_ino)
         self._regular = stat.S_ISREG(status.st_mode)
         return self._file
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import FrameType, TracebackType
 from typing import TypedDict, Unpack, cast
 
-from rosz.node.clock import Clock
+from rosz.node.clock import Clock, nanoseconds
 from rosz.node.throttle import Site, Throttle
 
 __all__ = ("LogOptions", "LoggerTree", "NodeLogger")
@@ -161,7 +161,8 @@ class NodeLogger(logging.Logger):
         super()._log(level, msg, args, exc_info, extra, stack_info, stacklevel)
 
     def _elapsed(self, site: Site, seconds: float) -> bool:
-        return self._throttle.elapsed(site, self.manager.clock.steady(), int(seconds * 1e9))
+        period = nanoseconds(seconds, "throttle")
+        return self._throttle.elapsed(site, self.manager.clock.steady(), period)
 
 
 class LoggerTree(logging.Manager):

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 from rosz import names
 from rosz.node import control, signals, standard
 from rosz.node.client import Client
-from rosz.node.console import DEFAULT_FORMAT
+from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
 from rosz.node.ending import Ending, Hook
 from rosz.node.endpoint import Withdrawal
 from rosz.node.generic import GenericSubscription
-from rosz.node.log import NodeLog
 from rosz.node.publisher import Publisher
 from rosz.node.rate import Rate
 from rosz.node.ros2_services import Lookout
@@ -40,7 +39,6 @@ __all__ = ("Node",)
 
 M = TypeVar("M", bound="Message")
 P = TypeVar("P", bound="Closable")
-_SECOND = 1_000_000_000
 
 
 class Node:
@@ -98,16 +96,8 @@ class Node:
         self.base_name = names.basename(self.name)
         self.remaps = arguments.resolved_remaps(self.name)
         self.node_id = context.next_id()
-        environment = context.environment
         self.clock = context.clock.branch()
-        self.log = NodeLog(
-            self.name,
-            clock=self.clock,
-            log_dir=environment.log_dir,
-            file_name=arguments.special.get("__log", ""),
-            console_format=environment.console_format or DEFAULT_FORMAT,
-            color=environment.color,
-        )
+        self.log = standard.log_of(self)
         self._ending = Ending(self.name, self.log)
         self._withdraw = context.on_shutdown(self._end)
         try:
@@ -256,6 +246,7 @@ class Node:
 
         Raises:
             InvalidName: The name is not legal.
+            UsageError: There are to be no threads.
             ClosedError: The node is closed.
         """
         return self.keep(Service(self, self.resolve(name), service_type, handler, qos, threads))
@@ -278,6 +269,7 @@ class Node:
 
         Raises:
             InvalidName: The name is not legal.
+            UsageError: The timeout is no number.
             ClosedError: The node is closed.
         """
         return self.keep(Client(self, self.resolve(name), service_type, qos, timeout))
@@ -291,11 +283,14 @@ class Node:
             period: Seconds, in ROS time.
             callback: Gets a `TimerEvent`, on a thread of the timer; what it raises is logged.
             oneshot: Whether to call it only once.
+
+        Raises:
+            UsageError: The period is no number above 0.
         """
         with self._ending.lock:  # so that one which ends at once is not forgotten before it is kept
             return self.keep(
                 Timer(
-                    round(period * _SECOND),
+                    nanoseconds(period, "timer period"),
                     callback,
                     self.clock,
                     oneshot=oneshot,
@@ -309,6 +304,9 @@ class Node:
 
         Args:
             hz: Times per second, in ROS time.
+
+        Raises:
+            UsageError: `hz` is not above 0, or beyond nanoseconds.
         """
         self.context.cooperative = True
         return Rate(hz, self.clock)
@@ -322,9 +320,12 @@ class Node:
 
         Returns:
             Whether the time was slept through; false when the node was shut down meanwhile.
+
+        Raises:
+            UsageError: It is no number, or infinite.
         """
         self.context.cooperative = True
-        return self.clock.sleep(round(seconds * _SECOND))
+        return self.clock.sleep(nanoseconds(seconds, "a sleep"))
 
     def spin(self) -> None:
         """Wait until the node is shut down; callbacks run on threads of their own meanwhile."""

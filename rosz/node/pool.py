@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from queue import SimpleQueue
 from typing import Generic, TypeVar
 
@@ -41,7 +42,8 @@ class Pool(Generic[J]):
     """At most ``size`` daemon threads that take jobs from somewhere, and work on them in order.
 
     Who sets out with a job sees to it that somebody else waits for the next. So who brings jobs
-    need not know of threads. Threads are started as they are needed, and stay until the end.
+    need not know of threads. Threads are started as they are needed, as far as the system has any,
+    and stay until the end.
 
     Args:
         size: Most threads at one time.
@@ -62,8 +64,8 @@ class Pool(Generic[J]):
         self._idle = 1
         self._start()
 
-    def _start(self) -> None:
-        start(threading.Thread(target=self._run, name=self._name, daemon=True))
+    def _start(self) -> bool:
+        return start(threading.Thread(target=self._run, name=self._name, daemon=True))
 
     def _run(self) -> None:
         while (job := self._take()) is not None:
@@ -82,4 +84,10 @@ class Pool(Generic[J]):
                 return
             self._threads += 1
             self._idle += 1
-        self._start()
+        started = False
+        with suppress(RuntimeError):  # no more threads: the next job waits for one of these
+            started = self._start()
+        if not started:
+            with self._lock:
+                self._threads -= 1
+                self._idle -= 1

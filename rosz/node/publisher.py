@@ -64,6 +64,7 @@ class Publisher(Endpoint, Generic[M]):
         super().__init__(
             node, Kind.PUBLISHER, topic, message_type._type_name, message_type._type_hash, qos
         )
+        qos = self.qos
         self.message_type = message_type
         self._encode: Callable[[Any], bytes] = message_type._encode
         self._sequence = 0
@@ -190,6 +191,7 @@ class Publisher(Endpoint, Generic[M]):
         Raises:
             WaitTimeout: There were fewer when the time was over.
             ClosedError: The context was shut down meanwhile.
+            UsageError: The timeout is no number.
         """
         self.node.context.graph.wait_for(
             lambda view: sum(map(self.matches, view.subscriptions(self.name))) >= count,
@@ -209,7 +211,11 @@ class Publisher(Endpoint, Generic[M]):
         Args:
             connected: Gets the link, whose ``publish`` reaches that subscription alone.
             disconnected: Gets the full name of the node.
+
+        Raises:
+            ClosedError: The publisher is closed.
         """
+        self.ensure_open("follow the links of")
 
         def tell(change: tuple[Token, bool]) -> None:
             token, alive = change
@@ -231,8 +237,8 @@ class Publisher(Endpoint, Generic[M]):
             if self.matches(token):
                 changes.put((token, alive))
 
-        self._declared.append(Withdrawal(changes.close))
-        self._declared.append(self.node.listen(changed))
+        self.also_close(Withdrawal(changes.close))
+        self.also_close(self.node.listen(changed))
 
     def disown(self, reason: str) -> None:
         """Refuse everything from now on, touching neither threads nor links: after a fork."""

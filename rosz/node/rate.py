@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
@@ -75,7 +76,7 @@ class Rate:
     """
 
     def __init__(self, hz: float, clock: Clock, *, reset: bool = False) -> None:
-        if not 0 < hz <= _HIGHEST_HZ:
+        if not 0 < hz <= _HIGHEST_HZ or math.isinf(1e9 / hz):
             raise UsageError(f"rate is '{hz}' Hz: expected above 0 and at most {_HIGHEST_HZ}")
         self._clock = clock
         self._reset = reset

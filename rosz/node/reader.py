@@ -59,7 +59,7 @@ class Reader(Generic[M]):
         self._topic = name
         self._callback = callback
         self._with_info = with_info
-        self._depth = _ALL if qos.history == "keep_all" else min(max(qos.depth, 1), _MOST)
+        self._depth = _ALL if qos.history == "keep_all" else min(qos.depth, _MOST)
         self._feed = Feed(name, self._depth)
         self._turn = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -130,6 +130,7 @@ class Reader(Generic[M]):
         Raises:
             WaitTimeout: None came in time.
             ClosedError: The subscription was closed meanwhile.
+            UsageError: The timeout is no number.
         """
         message: M = self._feed.get(timeout)
         return message

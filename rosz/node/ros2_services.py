@@ -7,6 +7,7 @@ them. Until then they cost nothing, and stand in nobody's list of services.
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from rosz.errors import ClosedError
@@ -22,6 +23,8 @@ __all__ = ("Lookout",)
 _PACKAGES = ("rcl_interfaces/srv/", "type_description_interfaces/srv/")
 _KNOWN_BY = 0.15
 """Seconds by which a node of rosz is known to be one; who looks for services waits longer."""
+_GONE_BY = 0.05
+"""Seconds by which all tokens of one that ends are gone."""
 
 
 class Lookout:
@@ -34,10 +37,11 @@ class Lookout:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._lock = threading.Lock()
-        self._seen = {node.context.session.zid}
+        self._own = node.context.session.zid
+        self._tokens: Counter[str] = Counter()
         self._suspects: set[str] = set()
         self._stop = threading.Event()
-        self._found = False
+        self._wanted = False
         self._withdrawal = Withdrawal(node.context.graph.listen(self._changed))
 
     def close(self) -> None:
@@ -47,13 +51,16 @@ class Lookout:
 
     def _changed(self, token: Token, alive: bool) -> None:
         """Take note of a token; on the thread of the graph, once for every token there is."""
+        self._tokens[token.zid] += 1 if alive else -1
+        count = self._tokens[token.zid]
+        if not count:
+            del self._tokens[token.zid]
         if not alive:
             return
         if token.kind is Kind.CLIENT and self._is_wanted(token):
-            self._found = True
+            self._wanted = True
             self._start()
-        elif token.zid not in self._seen:
-            self._seen.add(token.zid)
+        elif count == 1 and token.zid != self._own:
             with self._lock:
                 idle = not self._suspects
                 self._suspects.add(token.zid)
@@ -70,17 +77,25 @@ class Lookout:
 
     def _run(self) -> None:
         # A node of rosz says that it is one by another token, which may be a moment behind.
-        while not self._found and not self._stop.wait(_KNOWN_BY):
+        while not self._wanted and not self._stop.wait(_KNOWN_BY):
             with self._lock:
                 suspects, self._suspects = self._suspects, set()
             if not suspects:
                 return
-            view = self._node.context.graph.view()
-            self._found = any(
-                token.zid in suspects and not view.is_rosz(token.zid) for token in view.tokens
-            )
+            # The last tokens of one that ends may go in any order, too.
+            if (
+                self._is_foreign(suspects)
+                and not self._stop.wait(_GONE_BY)
+                and self._is_foreign(suspects)
+            ):
+                break
         if not self._stop.is_set():
             self._declare()
+
+    def _is_foreign(self, suspects: set[str]) -> bool:
+        """Tell whether one of some sessions that are alive is not of rosz."""
+        view = self._node.context.graph.view()
+        return any(t.zid in suspects and not view.is_rosz(t.zid) for t in view.tokens)
 
     def _declare(self) -> None:
         from rosz.node.ros2_bundle import Bundle

@@ -6,7 +6,14 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rosz.errors import DecodeError, EncodeError, RoszError, ServiceError, TransportError
+from rosz.errors import (
+    DecodeError,
+    EncodeError,
+    RoszError,
+    ServiceError,
+    TransportError,
+    UsageError,
+)
 from rosz.node.endpoint import Endpoint
 from rosz.node.pool import Pool
 from rosz.qos import QoS
@@ -53,7 +60,13 @@ class Service(Endpoint):
         self.announce()
 
     def _open(self, threads: int) -> None:
-        """Take questions in from now on."""
+        """Take questions in from now on.
+
+        Raises:
+            UsageError: That many threads would answer nobody.
+        """
+        if not isinstance(threads, int) or threads < 1:
+            raise UsageError(f"threads is {threads!r}: expected 1 or more")
         questions = self.node.context.session.questions(self.key, complete=True)
         self._declared.append(questions)
         Pool(threads, f"rosz-srv{self.name}", questions.take, self.serve)

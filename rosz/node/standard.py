@@ -1,4 +1,4 @@
-"""What every node has without being asked: its tokens, its first parameters, /rosout, /clock."""
+"""What every node has without being asked: a log, tokens, first parameters, /rosout, /clock."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ import threading
 from typing import TYPE_CHECKING
 
 from rosz.errors import ClosedError, UsageError, YamlError
+from rosz.node.console import DEFAULT_FORMAT
+from rosz.node.log import NodeLog
 from rosz.qos import CLOCK, ROSOUT
 from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 
 if TYPE_CHECKING:
+    from rosz.node.channel import MessageInfo
     from rosz.node.node import Node
 
 __all__ = (
     "announce",
     "follow_clock",
+    "log_of",
     "open_rosout",
     "process_of",
     "set_initial_params",
@@ -40,6 +44,19 @@ def process_of(node: Node) -> ProcessToken:
     )
 
 
+def log_of(node: Node) -> NodeLog:
+    """Return a node's log, by the environment and the command line."""
+    environment = node.context.environment
+    return NodeLog(
+        node.name,
+        clock=node.clock,
+        log_dir=environment.log_dir,
+        file_name=node.context.arguments.special.get("__log", ""),
+        console_format=environment.console_format or DEFAULT_FORMAT,
+        color=environment.color,
+    )
+
+
 def announce(node: Node) -> None:
     """Make a node known, to ROS 2 by its token and to rosz by that of its process."""
     session = node.context.session
@@ -47,7 +64,8 @@ def announce(node: Node) -> None:
     token = Token(
         node.context.domain, session.zid, number, number, Kind.NODE, namespace, node.base_name
     )
-    for key in (format_token(token), format_process(node.process)):
+    # Last to go what tells that it is of rosz: one that is not is offered ROS 2's services.
+    for key in (format_process(node.process), format_token(token)):
         node.keep(session.token(key))
 
 
@@ -90,10 +108,11 @@ def simulate(node: Node) -> None:
     clock = node.context.clock
     clock.enable_simulation()
 
-    def tick(message: Clock) -> None:
-        clock.advance(message.clock.sec * _SECOND + message.clock.nanosec)
+    def tick(message: Clock, info: MessageInfo) -> None:
+        now = message.clock.sec * _SECOND + message.clock.nanosec
+        clock.advance(now, teller=info.gid, number=info.sequence)
 
-    node.subscription("/clock", Clock, tick, qos=CLOCK)
+    node.subscription("/clock", Clock, tick, qos=CLOCK, with_info=True)
 
 
 def open_rosout(node: Node) -> None:

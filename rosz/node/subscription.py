@@ -44,6 +44,7 @@ class Subscription(Reader[M], Endpoint):
         Endpoint.__init__(
             self, node, Kind.SUBSCRIPTION, topic, type_name, message_type._type_hash, qos
         )
+        qos = self.qos
         Reader.__init__(self, node, topic, callback, qos, with_info=with_info)
         self.message_type = message_type
         self._channel = Channel(

@@ -12,6 +12,7 @@ import msgspec
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock
 from rosz.node.rate import Pace
+from rosz.session.waiting import patience
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -107,10 +108,13 @@ class Timer:
 
         Returns:
             Whether it has; False at once in its own callback.
+
+        Raises:
+            UsageError: The timeout is no number.
         """
         if threading.current_thread() is self._thread:
             return False
-        self._thread.join(timeout)
+        self._thread.join(None if timeout is None else patience(timeout))
         return not self._thread.is_alive()
 
     def __enter__(self) -> Self:

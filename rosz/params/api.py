@@ -78,7 +78,7 @@ class Params:
             if default is not MISSING:
                 return default
             raise not_found(self._replica.root, path)
-        if type is not None:
+        if type is not None and value.__class__ is not type:
             full = joined(path)
             value = convert(value, type, full, self._replica.origin(full))
         return copy(value)

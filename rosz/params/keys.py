@@ -7,6 +7,7 @@ Under ``@rosz/<domain>/``::
     ack/<zid>                    to the writer of that session: I have applied it
     store/<zid>/write[/<path>]   a write, told to one replica that seems to have missed it
     store/<zid>/sync             asked of one replica: what differs between us
+    store/<zid>/tell[/<path>]    writes, told to one replica that was found to lack them
     store/<zid>/ask              asked of one replica: to read for somebody who is none
     store/<zid>/set[/<path>]     asked of one replica: to write for somebody who is none
     replica/<zid>/<start>/<who>  liveliness token of a replica
@@ -109,11 +110,17 @@ class Keys:
         Raises:
             DecodeError: It is no such key.
         """
+        if key != base and not key.startswith(f"{base}/"):
+            raise DecodeError("parameter key", 0, f"'{key}', expected '{base}/**'")
         return from_key(key[len(base) + 1 :])
 
     def sync(self, zid: str) -> str:
         """Return the key on which a replica compares itself with others."""
         return own_key(self._domain, "store", zid, "sync")
+
+    def tell(self, zid: str) -> str:
+        """Return the key on which a replica is told writes that it was found to lack."""
+        return own_key(self._domain, "store", zid, "tell")
 
     def ask(self, zid: str) -> str:
         """Return the key on which a replica serves those who are none."""

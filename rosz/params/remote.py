@@ -17,6 +17,7 @@ from rosz.params.values import Value, normalise
 from rosz.params.wire import Answer, Batch, Question, decode, encode
 from rosz.params.writes import DELETED
 from rosz.session import Session, Stamp
+from rosz.session.waiting import patience
 
 if TYPE_CHECKING:
     from rosz.params.replica import Outcome
@@ -39,6 +40,9 @@ class ParamClient:
         domain: The ROS domain.
         origin: Who writes, for people; this process when not given.
         timeout: Seconds for each call.
+
+    Raises:
+        UsageError: The timeout is no number.
     """
 
     def __init__(
@@ -48,7 +52,7 @@ class ParamClient:
         self._domain = domain
         self._keys = Keys(domain, scoped=session.secured)
         self._origin = origin
-        self._timeout = timeout
+        self._timeout = patience(timeout)
         self._members: list[Member] = []
         self._silent: dict[str, Member] = {}
 

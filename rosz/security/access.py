@@ -101,6 +101,8 @@ def _grants(permit: Permit) -> Iterator[_Grant]:
         yield from _reading()
     yield from _setting(permit.set)
     if permit.control:
+        # A newer process of a node's name ends the older one.
+        yield "ingress", _TOKEN, [f"{_OWN}/node/**"]
         yield "ingress", _ASK, [f"{_OWN}/control/**", f"{_OWN}/launch/**"]
         yield "egress", _ANSWER, [f"{_OWN}/control/**", f"{_OWN}/launch/**"]
     if EVERYTHING in permit.publish:
@@ -113,10 +115,10 @@ def _presence() -> Iterator[_Grant]:
 
     Looking is free, for what there is to see is given out token by token.
     """
-    nodes = [f"{SPACE}/*/*/*/*/{Kind.NODE.value}/**", f"{_OWN}/node/**"]
+    yield "egress", _TOKEN, [f"{_OWN}/node/**"]
     for flow in _both():
         yield flow, _LOOK, _ANY_KEY
-        yield flow, _TOKEN, nodes
+        yield flow, _TOKEN, [f"{SPACE}/*/*/*/*/{Kind.NODE.value}/**"]
         yield flow, (*_ASK, *_ANSWER), [f"{OWN_SPACE}/links/**"]
 
 
@@ -169,11 +171,14 @@ def _setting(names: Sequence[str]) -> Iterator[_Grant]:
     yield "ingress", _DATA, [key for at in places for key in _below(f"{_OWN}/change", at)]
     writes = [key for at in places for key in _below(f"{_OWN}/store/*/write", at)]
     sets = [key for at in places for key in _below(f"{_OWN}/store/*/set", at)]
-    yield "ingress", _ASK, writes + sets
+    tells = [key for at in places for key in _below(f"{_OWN}/store/*/tell", at)]
+    yield "ingress", _ASK, writes + sets + tells
     if EVERYTHING in names:
-        # Only whom all is believed may tell others what they have missed.
-        yield "ingress", _ANSWER, [f"{_OWN}/store/*/sync", f"{_OWN}/param/**"]
-        yield "egress", _ASK, [f"{_OWN}/store/*/sync", f"{_OWN}/param/**"]
+        # Only whom all is believed may be asked what others have missed.
+        yield "ingress", _ANSWER, [f"{_OWN}/store/*/{verb}" for verb in ("sync", "tell/**")]
+        yield "egress", _ASK, [f"{_OWN}/store/*/{verb}" for verb in ("sync", "tell/**")]
+        yield "ingress", _ANSWER, [f"{_OWN}/param/**"]
+        yield "egress", _ASK, [f"{_OWN}/param/**"]
 
 
 def _data(names: Sequence[str]) -> list[str]:

@@ -10,7 +10,6 @@ import datetime as dt
 import ipaddress
 import os
 import re
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +25,8 @@ __all__ = ("Authority", "read_certificate")
 
 _HOME = "authority"
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?")
+_LONGEST_NAME = 64
+"""Characters of a common name in a certificate (RFC 5280, appendix A.1)."""
 _AUTHORITY_DAYS = 3650
 _CLOCKS_DIFFER = dt.timedelta(hours=1)
 
@@ -87,9 +88,10 @@ class Authority:
         Raises:
             UsageError: The name is none, or has keys already, which are not touched.
         """
-        if not _NAME.fullmatch(name) or name == _HOME:
+        if not _NAME.fullmatch(name) or name == _HOME or len(name) > _LONGEST_NAME:
             raise UsageError(
-                f"'{name}' is no name for a holder of keys; expected letters, digits, '.', '_', '-'"
+                f"'{name}' is no name for a holder of keys; expected at most {_LONGEST_NAME}"
+                " letters, digits, '.', '_', '-'"
             )
         folder = self.folder / name
         if folder.exists():
@@ -100,7 +102,7 @@ class Authority:
         draft = _Draft(_subject(name), key.public_key(), days, [name, *addresses])
         certificate = draft.sign(self.certificate.subject, self._key, authority=False)
         _write(folder, key, certificate)
-        shutil.copyfile(self.folder / _HOME / CERTIFICATE, folder / AUTHORITY)
+        _create(folder / AUTHORITY, (self.folder / _HOME / CERTIFICATE).read_bytes())
         return folder
 
     def holders(self) -> list[Path]:
@@ -123,7 +125,7 @@ class _Draft:
         from cryptography.hazmat.primitives import hashes
 
         now = dt.datetime.now(dt.UTC)
-        end = now + dt.timedelta(days=self._days)
+        end = _end(now, self._days)
         usage = x509.KeyUsage(
             digital_signature=not authority,
             content_commitment=False,
@@ -191,9 +193,18 @@ def _new_key() -> EllipticCurvePrivateKey:
     return ec.generate_private_key(ec.SECP256R1())
 
 
+def _end(now: dt.datetime, days: float) -> dt.datetime:
+    try:
+        return now + dt.timedelta(days=days)
+    except OverflowError as error:
+        raise UsageError(f"{days:g} days from now is no date; expected fewer") from error
+
+
 def _subject(name: str) -> Name:
     from cryptography import x509
 
+    if len(name) > _LONGEST_NAME:
+        raise UsageError(f"'{name}' is too long for a name, expected {_LONGEST_NAME} characters")
     return x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
 
 
@@ -213,11 +224,15 @@ def _write(folder: Path, key: EllipticCurvePrivateKey, certificate: Certificate)
 
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     secret = key.private_bytes(form.Encoding.PEM, form.PrivateFormat.PKCS8, form.NoEncryption())
-    # Nobody may read it at any moment, and none that is there is overwritten.
-    handle = os.open(folder / KEY, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(handle, "wb") as file:
-        file.write(secret)
-    (folder / CERTIFICATE).write_bytes(certificate.public_bytes(form.Encoding.PEM))
+    _create(folder / KEY, secret)
+    _create(folder / CERTIFICATE, certificate.public_bytes(form.Encoding.PEM))
+
+
+def _create(file: Path, data: bytes) -> None:
+    """Write a file that nobody else may read at any moment, and overwrite none."""
+    handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "wb") as opened:
+        opened.write(data)
 
 
 def _cryptography() -> Any:

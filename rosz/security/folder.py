@@ -50,7 +50,7 @@ class KeyFolder(msgspec.Struct, frozen=True):
             host: Name of this machine.
 
         Raises:
-            UsageError: There are none, or others may read the key.
+            UsageError: There are none, others may read the key, or write what is believed.
             YamlError: The rules are no rules.
         """
         own = next((one for one in (folder, folder / host) if (one / KEY).is_file()), None)
@@ -63,6 +63,7 @@ class KeyFolder(msgspec.Struct, frozen=True):
             if not (own / name).is_file():
                 raise UsageError(f"'{own}' has a key but no '{name}'; copy the whole folder")
         check_private(own / KEY)
+        check_trusted(own / AUTHORITY)
         return cls(own, _rules(own, folder))
 
     @property
@@ -95,13 +96,36 @@ def check_private(key: Path) -> None:
         )
 
 
+def check_trusted(file: Path) -> None:
+    """Refuse a file by which others could say who is let in, and what each may do.
+
+    Raises:
+        UsageError: They can write it.
+    """
+    mode = stat.S_IMODE(os.stat(file).st_mode)  # noqa: PTH116  # of the file that a link leads to
+    if mode & 0o002:
+        raise UsageError(
+            f"anybody may write '{file}' (mode {mode:04o}): see that it says what it should, then"
+            f" 'chmod 600 {file}'"
+        )
+
+
 def _rules(*folders: Path) -> Rules | None:
-    for folder in folders:
-        file = folder / RULES
-        try:
-            return read_rules(file.read_text(encoding="utf-8"), str(file))
-        except FileNotFoundError:
-            continue
-        except (OSError, UnicodeDecodeError) as error:
-            raise UsageError(f"cannot read '{file}': {error}") from error
-    return None
+    found = next((one / RULES for one in folders if os.path.lexists(one / RULES)), None)
+    return load_rules(found) if found is not None else None
+
+
+def load_rules(file: Path) -> Rules:
+    """Read a file of rules.
+
+    Raises:
+        UsageError: It cannot be read, or anybody may write it.
+        YamlError: It holds no rules.
+    """
+    try:
+        check_trusted(file)
+        if not file.is_file():  # a pipe would be waited for
+            raise UsageError(f"'{file}' is no regular file")
+        return read_rules(file.read_text(encoding="utf-8"), str(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"cannot read '{file}': {error}") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,16 @@ import msgspec
 
 from rosz.errors import RoszError, UsageError
 from rosz.security.authority import read_certificate
-from rosz.security.folder import AUTHORITY, CERTIFICATE, KEY, RULES, check_private
-from rosz.security.rules import ANYBODY, NAME_VERBS, Permit, Rules, read_rules
+from rosz.security.folder import (
+    AUTHORITY,
+    CERTIFICATE,
+    KEY,
+    RULES,
+    check_private,
+    check_trusted,
+    load_rules,
+)
+from rosz.security.rules import ANYBODY, NAME_VERBS, Permit, Rules
 
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate
@@ -86,7 +95,7 @@ def review(folder: Path, now: dt.datetime | None = None) -> Review:
         except RoszError as error:
             found.wrong.append(str(error))
     for file in [folder / RULES, *(home / RULES for home in homes if home != folder)]:
-        if file.is_file():
+        if os.path.lexists(file):
             _look_at_rules(file, found, complete=not one)
     return found
 
@@ -113,6 +122,7 @@ def _check_signature(home: Path, certificate: Certificate) -> None:
     from cryptography.exceptions import InvalidSignature
 
     try:
+        check_trusted(home / AUTHORITY)
         certificate.verify_directly_issued_by(read_certificate(home / AUTHORITY))
     except (InvalidSignature, ValueError) as error:
         raise UsageError(f"'{home / CERTIFICATE}' is not signed by '{home / AUTHORITY}'") from error
@@ -122,8 +132,8 @@ def _check_signature(home: Path, certificate: Certificate) -> None:
 
 def _look_at_rules(file: Path, found: Review, *, complete: bool) -> None:
     try:
-        rules = read_rules(file.read_text(encoding="utf-8"), str(file))
-    except (RoszError, OSError, UnicodeDecodeError) as error:
+        rules = load_rules(file)
+    except RoszError as error:
         found.wrong.append(str(error))
         return
     found.rules.append(RuleFile(str(file), _in_words(rules)))

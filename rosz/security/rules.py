@@ -46,7 +46,8 @@ class Permit(msgspec.Struct, frozen=True, kw_only=True):
         serve: Services it may serve.
         set: Parameters it may set and delete.
         get: Whether it may read parameters, which are one store: all of them or none.
-        control: Whether it may ping and end nodes, set log levels, and ask about launches.
+        control: Whether it may ping and end nodes, also by newer ones of their names, set log
+            levels, and ask about launches.
     """
 
     publish: tuple[str, ...] = ()
@@ -97,6 +98,8 @@ def read_rules(text: str, file: str) -> Rules:
         raise YamlError(error.problem or "no YAML", file, line, column) from error
     except yaml.YAMLError as error:
         raise YamlError(str(error), file, 1, 1) from error
+    except RecursionError as error:
+        raise YamlError("nested too deep; rules are names, verbs and patterns", file) from error
     if top is None:
         return Rules({})
     reader = _Reader(file)

@@ -19,7 +19,7 @@ def advanced_publisher(raw: Any, key: str, cache: int, **qos: Any) -> Any:
         raw: Zenoh's session.
         key: Key expression.
         cache: Samples kept.
-        qos: Zenoh's ``congestion_control``, ``reliability`` and ``express``.
+        qos: Zenoh's ``congestion_control`` and ``reliability``.
     """
     # Both arguments have to be given.
     heartbeat = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_SECONDS)

@@ -12,6 +12,7 @@ from rosz.session.answers import Answers, AskOptions, Cancellation, Target
 from rosz.session.declared import Asker, channel, mapped
 from rosz.session.samples import Reply
 from rosz.session.starting import start
+from rosz.session.waiting import patience
 
 __all__ = ("Asking",)
 
@@ -55,6 +56,7 @@ class Asking:
         Raises:
             ClosedError: The session is closed, or it is cancelled already.
             TransportError: The key is malformed.
+            UsageError: The timeout is no number.
         """
         with mapped(f"ask '{key}'"):
             handler = self._raw.get(
@@ -63,7 +65,7 @@ class Asking:
                 target=_TARGETS[target],
                 consolidation=zenoh.ConsolidationMode.NONE,
                 accept_replies=zenoh.ReplyKeyExpr.ANY if any_key else None,
-                timeout=timeout,
+                timeout=patience(timeout),
                 payload=payload,
                 attachment=attachment,
                 cancellation_token=None if cancel is None else cancel.token,
@@ -82,7 +84,7 @@ class Asking:
                 key,
                 target=_TARGETS[target],
                 consolidation=zenoh.ConsolidationMode.NONE,
-                timeout=timeout,
+                timeout=patience(timeout),
             )
         return Asker(key, entity, timeout)
 
@@ -137,5 +139,5 @@ class Asking:
             TransportError: The key is malformed.
         """
         with mapped(f"look for tokens '{key}'"):
-            handler = self._raw.liveliness().get(key, channel(), timeout=timeout)
+            handler = self._raw.liveliness().get(key, channel(), timeout=patience(timeout))
         return sorted({reply.key for reply in Answers(handler) if reply.ok})

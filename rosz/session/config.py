@@ -8,6 +8,7 @@ multicast is off unless asked for.
 
 from __future__ import annotations
 
+import secrets
 import socket
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,7 +22,7 @@ from rosz.session.endpoints import dialled, is_local, listening, loopback, secur
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
 
-__all__ = ("EPHEMERAL", "SessionConfig", "keys_of", "zenoh_settings")
+__all__ = ("EPHEMERAL", "SessionConfig", "keys_of", "new_id", "zenoh_settings")
 
 _RETRY_MS = 200
 _LEASE_MS = 60_000
@@ -29,8 +30,11 @@ _LEASE_MS = 60_000
 _LEASE_BEYOND_MS = 8_000
 """The same beyond the machine. A link that was cut is opened anew when this is over; TCP by itself
 tries again ever more rarely, so that after a minute's cut it may rest for another one."""
-_OPEN_MS = 3_000
-"""After which an attempt to open a link gives way to the next one."""
+_LOCAL_LINKS = {"open_timeout": 86_400_000, "accept_timeout": 60_000}
+"""How long either end tries to open a link. Where many start at once answers take long, and one
+that is stopped answers when it goes on; Zenoh tries those that it heard of only once."""
+_OPEN_BEYOND_MS = 3_000
+"""The same beyond the machine, where what the network swallowed gives way to the next attempt."""
 _ROUTER_BY = 10.0
 """Seconds that a node waits for its router, which may have been started just before it."""
 
@@ -44,6 +48,13 @@ EPHEMERAL = "tcp/127.0.0.1:0"
 """Where a peer listens for those of its machine: at any port."""
 _AUTOCONNECT = {"router": ["router"], "peer": ["router", "peer"], "client": ["router"]}
 """To whom each connects that it finds by multicast; Zenoh's own routers connect to nobody."""
+_ONE_DIALS = {"autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}}}
+"""Of two that hear of each other, that with the greater id connects. If both do, their links get in
+each other's way, and of eighty that start at once some never are linked."""
+_GREATEST = "fffff"
+"""How ids end of sessions that stay on the machine: who reaches beyond may not reach them, so it is
+they who connect. Zenoh compares ends first."""
+_ID_BYTES = 13
 _EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
 """Who looks for others by multicast has to be reached by those it finds."""
 
@@ -87,7 +98,8 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def reaches_beyond(self) -> bool:
         """Whether there may be links to other machines."""
-        return self.multicast or bool(self.config_file) or not all(map(is_local, self.endpoints))
+        told = bool(self.config_file) or "endpoints" in self.override
+        return self.multicast or told or not all(map(is_local, self.endpoints))
 
     @classmethod
     def node(cls, env: Environment) -> SessionConfig:
@@ -141,6 +153,13 @@ def keys_of(env: Environment) -> KeyFolder | None:
     return KeyFolder.find(env.keys, socket.gethostname())
 
 
+def new_id(config: SessionConfig) -> str:
+    """Return an id for a session, if it matters how that compares; empty for any."""
+    if config.mode != "peer" or config.reaches_beyond:
+        return ""
+    return f"1{secrets.token_hex(_ID_BYTES)}{_GREATEST}"  # no id begins with 0
+
+
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     """Return the Zenoh configuration, as nested dictionaries."""
     connect = [*config.connect]
@@ -149,7 +168,7 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     if config.keys is not None:
         connect = [dialled(endpoint) for endpoint in connect]
     listen = _listen(config)
-    lease = _LEASE_MS if all(map(is_local, (*connect, *listen))) else _LEASE_BEYOND_MS
+    local = not config.reaches_beyond
     must_listen = config.mode == "router"
     must_connect = config.must_connect or config.mode == "client"
     return {
@@ -173,13 +192,13 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
         },
         "scouting": {
             "multicast": {"enabled": config.multicast, "autoconnect": _AUTOCONNECT},
-            "gossip": {"enabled": True},
+            "gossip": {"enabled": True} | (_ONE_DIALS if local else {}),
         },
         "timestamping": {"enabled": True},
         "transport": {
             "shared_memory": _shared_memory(config.shared_memory),
-            "unicast": {"open_timeout": _OPEN_MS},
-            "link": {"tx": {"lease": lease, "keep_alive": 4}},
+            "unicast": _LOCAL_LINKS if local else {"open_timeout": _OPEN_BEYOND_MS},
+            "link": {"tx": {"lease": _LEASE_MS if local else _LEASE_BEYOND_MS, "keep_alive": 4}},
         },
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -29,6 +30,8 @@ __all__ = (
 
 _CHANNEL = 1 << 20
 """Items that a channel holds: more than ever come before a thread of ours gets its turn."""
+
+_log = logging.getLogger("rosz.session")
 
 
 class Closable(Protocol):
@@ -96,7 +99,7 @@ class Pumped(Declared):
     Args:
         what: Name for errors.
         entity: What was declared.
-        deliver: Gets each item, on the thread.
+        deliver: Gets each item, on the thread; what it raises is logged.
     """
 
     def __init__(self, what: str, entity: Any, deliver: Callable[[Any], None]) -> None:
@@ -104,18 +107,21 @@ class Pumped(Declared):
         receive = entity.handler.recv
         start(
             threading.Thread(
-                target=_pump, args=(receive, deliver), name=f"rosz {what}", daemon=True
+                target=_pump, args=(what, receive, deliver), name=f"rosz {what}", daemon=True
             )
         )
 
 
-def _pump(receive: Callable[[], Any], deliver: Callable[[Any], None]) -> None:
+def _pump(what: str, receive: Callable[[], Any], deliver: Callable[[Any], None]) -> None:
     while not ENDING.is_set():
         try:
             item = receive()
         except zenoh.ZError:  # undeclared, or the session is closed
             return
-        deliver(item)
+        try:
+            deliver(item)
+        except Exception:  # noqa: BLE001  # the callback boundary: the next item may fare better
+            _log.exception("the callback of the %s failed", what)
         del item
 
 

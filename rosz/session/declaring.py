@@ -39,7 +39,6 @@ class Declaring:
         reliable: bool = True,
         block: bool = False,
         cache: int = 0,
-        express: bool = False,
     ) -> RawPublisher:
         """Declare a publisher.
 
@@ -48,7 +47,6 @@ class Declaring:
             reliable: Which kind of link to prefer.
             block: Whether a full link makes ``put`` wait instead of dropping the sample.
             cache: Samples kept for late joiners (transient local); 0 for none.
-            express: Whether to send each sample at once rather than in batches.
 
         Raises:
             ClosedError: The session is closed.
@@ -59,7 +57,7 @@ class Declaring:
         with mapped(f"publish on '{key}'"):
             if not cache:
                 plain = self._raw.declare_publisher(
-                    key, congestion_control=congestion, reliability=reliability, express=express
+                    key, congestion_control=congestion, reliability=reliability
                 )
                 return RawPublisher(key, plain)
             keeping = advanced_publisher(
@@ -68,7 +66,6 @@ class Declaring:
                 cache,
                 congestion_control=congestion,
                 reliability=reliability,
-                express=express,
             )
             return RawPublisher(key, keeping)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from typing import Any
 
 import zenoh
@@ -21,18 +22,19 @@ _PAUSE = 0.02
 _LOCAL = ("tcp/127.", "tcp/localhost:", "tcp/[::1]:", "unixsock-stream/")
 
 
-def open_at(settings: zenoh.Config, rendezvous: str) -> Any:
+def open_at(settings: zenoh.Config, rendezvous: str, opened: Callable[[], Any]) -> Any:
     """Open a session, and see to it that somebody then listens at the meeting point.
 
     Args:
         settings: The configuration.
         rendezvous: Endpoint of the meeting point. One of another machine is left to itself, and
             so is one that the configuration does not listen at.
+        opened: Opens a session by the configuration, with an id that none had before.
 
     Raises:
         zenoh.ZError: The session cannot be opened.
     """
-    raw: Any = zenoh.open(settings)
+    raw: Any = opened()
     if rendezvous.startswith(_LOCAL) and _is_held(rendezvous, settings):
         for _ in range(_ATTEMPTS):
             if is_answered(rendezvous):
@@ -40,7 +42,7 @@ def open_at(settings: zenoh.Config, rendezvous: str) -> Any:
             raw.close()
             # Who was refused together must not come back together.
             time.sleep(_PAUSE * os.urandom(1)[0] / 256)
-            raw = zenoh.open(settings)
+            raw = opened()
     return raw
 
 

@@ -13,7 +13,14 @@ import msgspec
 import zenoh
 
 from rosz.errors import TransportError
-from rosz.session.config import EPHEMERAL, SessionConfig, key_settings, overrides, zenoh_settings
+from rosz.session.config import (
+    EPHEMERAL,
+    SessionConfig,
+    key_settings,
+    new_id,
+    overrides,
+    zenoh_settings,
+)
 from rosz.session.declared import mapped
 from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
@@ -56,12 +63,18 @@ def open_raw(config: SessionConfig, presence: Presence | None = None) -> Any:
     try:
         with mapped(f"open a session ({_places(config)})"), _receivers(config.mode):
             if config.mode == "peer" and config.hold_rendezvous:
-                return open_at(settings, config.rendezvous)
-            return zenoh.open(settings)
+                return open_at(settings, config.rendezvous, lambda: _open(settings, config))
+            return _open(settings, config)
     except TransportError as error:
         if _NOBODY not in str(error):
             raise
         raise _nobody(config) from error
+
+
+def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
+    if "id" not in overrides(config.override) and (zid := new_id(config)):
+        settings.insert_json5("id", json.dumps(zid))
+    return zenoh.open(settings)
 
 
 def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -212,9 +212,3 @@ class Reply:
     def deleted(self) -> bool:
         """Whether the answer is that the key was deleted."""
         return self._sample is not None and self._sample.kind == zenoh.SampleKind.DELETE
-
-    @property
-    def replier(self) -> str | None:
-        """Session that answered, where known."""
-        source = self._raw.replier_id
-        return None if source is None else str(source.zid)

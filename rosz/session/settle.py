@@ -65,7 +65,7 @@ class Settling:
         self._stop = stop
         self._mesh = mesh
         self._asked = f"{_SPACE}/{'*' if everywhere else place()}/*"
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a signal handler may ask in between
         self._waiting: list[Callable[[], None]] = []
         if timeout:
             threading.Thread(target=self._run, name="rosz-settle", daemon=True).start()
@@ -89,7 +89,8 @@ class Settling:
         finally:
             with self._lock:
                 self.settled.set()
-            for callback in self._waiting:
+                waiting, self._waiting = self._waiting, []
+            for callback in waiting:
                 _attempt(callback)
 
     def _settle(self) -> None:

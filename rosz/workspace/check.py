@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -16,7 +16,7 @@ from rosz.workspace.configs import check_configs
 from rosz.workspace.definitions import check_definitions
 from rosz.workspace.launches import check_launches
 from rosz.workspace.manifest import check_manifest
-from rosz.workspace.problem import Problem, error
+from rosz.workspace.problem import REMEDY, Problem, error
 from rosz.workspace.scripts import check_cmake, check_scripts
 
 __all__ = ("Checked", "check")
@@ -62,7 +62,17 @@ def check(
             if not problems or all(one.level == "warning" for one in problems):
                 problems += check_configs(folder, variables)
         name = folder.name if package is None else package.name
-        yield Checked(name, str(folder), sorted(set(problems)))
+        yield Checked(name, str(folder), sorted(set(_each_remedy_once(problems))))
+
+
+def _each_remedy_once(problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Leave out what is mended by a command that has been told: a script that many nodes start."""
+    told: set[str] = set()
+    for problem in problems:
+        _, _, command = problem.text.partition(REMEDY)
+        if not command or command not in told:
+            yield problem
+        told.add(command)
 
 
 def _package(folder: Path) -> Package | None:

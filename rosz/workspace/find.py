@@ -40,6 +40,8 @@ def _folders(words: Sequence[str], cwd: Path, index: PackageIndex) -> Iterator[P
             yield from crawl(root)
     for word in words:
         path = cwd / word
+        if path.is_file():
+            raise NotFoundError(f"'{word}' is a file; expected a package or a folder")
         if path.is_dir():
             inside = path / "src" if (path / "src").is_dir() else path
             yield from crawl(path if (path / MANIFEST).is_file() else inside)

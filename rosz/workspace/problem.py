@@ -9,7 +9,10 @@ import msgspec
 
 from rosz.errors import SourceError
 
-__all__ = ("Problem", "error", "from_error", "warning")
+__all__ = ("REMEDY", "Problem", "error", "from_error", "warning")
+
+REMEDY = "; run: "
+"""What stands before the command that mends a problem."""
 
 
 class Problem(msgspec.Struct, frozen=True, order=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from importlib import import_module
@@ -97,8 +98,8 @@ def test_a_command_loads_what_it_needs(network: Network, line: str, needs: set[s
     ("argv", "code", "text"),
     [
         (["parma"], 2, "'parma' is no command; did you mean 'param'?"),
-        (["param", "gte"], 2, "No such command 'gte'. Did you mean 'get'? See 'rosz param --help'"),
-        (["param", "get"], 2, "Missing argument 'NAME'"),
+        (["param", "gte"], 2, "rosz: no such command 'gte'; did you mean 'get'?\n"),
+        (["param", "get"], 2, "rosz: missing argument 'NAME'; see 'rosz param get --help'\n"),
     ],
 )
 def test_wrong_usage(
@@ -119,3 +120,98 @@ def test_a_meaningless_setting_is_one_line(
     assert capsys.readouterr().err == (
         "rosz: ROS_DOMAIN_ID is 'many'; expected a number from 0 to 232\n"
     )
+
+
+def test_a_deleted_working_folder_is_told(network: Network) -> None:
+    (network.folder / "gone").mkdir()
+    line = f'cd gone && rmdir ../gone && "{sys.executable}" -P -m rosz pkg check'
+    done = subprocess.run(
+        ["sh", "-c", line],
+        cwd=network.folder,
+        env=network.variables(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    expected = "rosz: the working folder has been deleted: change to another one with 'cd'\n"
+    assert (done.returncode, done.stderr) == (1, expected)
+
+
+def test_a_full_disk_is_told_of_the_file(network: Network) -> None:
+    node = network.node()
+    node.params.set("/a", 1)
+    line = [sys.executable, "-P", "-m", "rosz", "param", "dump"]
+    variables = {k: v for k, v in network.variables().items() if k != "PYTHONUNBUFFERED"}
+    done = subprocess.run(
+        [*line, "/dev/full"], env=variables, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (1, "rosz: /dev/full: No space left on device\n")
+    with open("/dev/full", "w") as full:  # noqa: PTH123  # a device, written to by a child
+        done = subprocess.run(line, env=variables, stdout=full, stderr=-1, text=True, check=False)
+    expected = "rosz: cannot write to standard output: No space left on device\n"
+    assert (done.returncode, done.stderr) == (1, expected)
+
+
+STOPPED_TWICE = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+from rosz.cli import group
+group._SAME_WISH_SECONDS = float(sys.argv[1])
+with group.until_stopped() as ready:
+    ready()
+    try:
+        signal.raise_signal(signal.SIGTERM)
+    except KeyboardInterrupt:
+        print("stopping", flush=True)
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            print("twice", flush=True)
+print("stopped", flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "code", "out"),
+    [("-1", -signal.SIGINT, "stopping\n"), ("60", 0, "stopping\nstopped\n")],
+)
+def test_a_second_signal_is_the_same_wish_or_ends_at_once(
+    seconds: str, code: int, out: str
+) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", STOPPED_TWICE, seconds],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (code, out, "")
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "reason"),
+    [
+        ("ROSZ_CONNECT", "bogus", "of the form <protocol>/<address>"),
+        ("ZENOH_SESSION_CONFIG_URI", "/nonexistent.json5", "No such file"),
+    ],
+)
+def test_a_refused_setting_is_told_beside_a_live_node(
+    network: Network, variable: str, value: str, reason: str
+) -> None:
+    network.node()
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "rosz", "topic", "list"],
+        env=network.variables(**{variable: value}),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("rosz: cannot read the Zenoh configuration: ")
+    assert reason in done.stderr
+
+
+def test_a_topic_without_a_name(network: Network, capsys: pytest.CaptureFixture[str]) -> None:
+    del network
+    assert run(["topic", "type", ""]) == 1
+    expected = "rosz: '' is not a valid name: it is empty; expected the name of a topic\n"
+    assert capsys.readouterr().err == expected

@@ -61,6 +61,8 @@ def ask(shell: Shell, capsys: pytest.CaptureFixture[str]) -> Ask:
         ("rostopic ec", ["echo"]),
         ("rosz topic ec", ["echo"]),
         ("rosz doc", ["doctor"]),
+        ("rosz help doc", ["doctor"]),
+        ("rosz help topic ec", ["echo"]),
         ("rostopic echo /tur", ["/turtle1/cmd_vel"]),
         ("rostopic echo -n 1 /tur", ["/turtle1/cmd_vel"]),
         ("rostopic echo -p /tur", ["/turtle1/cmd_vel"]),

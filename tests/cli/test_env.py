@@ -126,6 +126,7 @@ def test_a_sitecustomize_of_the_user_runs_as_well(network: Network) -> None:
         "rosls",
         "rosls nope",
         "rospack",
+        "rospack find",
         "rospack find nope",
         "rosed std_msgs",
     ],
@@ -134,7 +135,25 @@ def test_what_goes_wrong_is_told(network: Network, line: str) -> None:
     done = evaluate(network, "bash", line)
     assert done.returncode in {1, 2}
     assert not done.stdout
-    assert "usage: " in done.stderr or "package 'nope' not found" in done.stderr
+    reasons = "usage: ", "package 'nope' not found", "rosz: no workspace: "
+    assert any(reason in done.stderr for reason in reasons)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_roscd_alone_goes_to_the_workspace(network: Network, shell: str) -> None:
+    below = network.folder / "ws" / "src" / "demo" / "msg"
+    below.mkdir(parents=True)
+    done = evaluate(network, shell, f"cd {below}", "roscd", "pwd")
+    assert (done.stdout, done.stderr) == (f"{network.folder}/ws\n", "")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_roscd_goes_to_a_package(network: Network, shell: str) -> None:
+    folder = network.folder / "src" / "demo"
+    folder.mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>demo</name></package>")
+    done = evaluate(network, shell, "roscd demo", "pwd")
+    assert (done.stdout, done.stderr) == (f"{folder}\n", "")
 
 
 def test_rosed_opens_the_file(network: Network) -> None:

@@ -98,7 +98,11 @@ def test_a_package_without_definitions(shell: Shell, package: Path) -> None:
     (package.parent / "bare" / "package.xml").write_text("<package><name>bare</name></package>")
     result = shell("gen", "bare")
     assert result.code == 1
-    assert "package 'bare' has no types of its own" in result.err
+    told = "rosz: package 'bare' has no types of its own that modules could be made of"
+    assert result.err == f"{told}\n"
+    result = shell("gen", "std_msgs")
+    told = told.replace("bare", "std_msgs")
+    assert (result.code, result.err) == (1, f"{told}; rosz brings 'rosz.msgs.std_msgs'\n")
 
 
 @pytest.mark.usefixtures("package")
@@ -113,3 +117,12 @@ def test_a_definition_that_is_wrong_is_told_with_its_place(shell: Shell, package
     result = shell("gen", "counting")
     assert result.code == 1
     assert f"{package / 'msg' / 'Num.msg'}:1:1" in result.err
+
+
+@pytest.mark.parametrize("name", ["empty", "file"])
+def test_a_folder_or_file_that_is_no_package(shell: Shell, name: str) -> None:
+    (shell.network.folder / "empty").mkdir()
+    (shell.network.folder / "file").touch()
+    done = shell("gen", str(shell.network.folder / name))
+    assert done.code == 1
+    assert f"'{shell.network.folder / name}' is no package: it has no package.xml; " in done.err

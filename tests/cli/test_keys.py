@@ -49,3 +49,20 @@ def test_mistakes(tmp_path: Path) -> None:
     two = rosz(tmp_path, "keys", "add", "a", "b", "--address", "10.0.0.1", "--dir", str(tmp_path))
     assert two.returncode == 2
     assert "--address is of one host" in two.stderr
+
+
+def test_keys_in_a_folder_beside_are_proposed(tmp_path: Path) -> None:
+    rosz(tmp_path, "keys", "init", "keys")
+    for words, meant in (
+        (["list"], "rosz keys list --dir keys"),
+        (["check"], "rosz keys check keys"),
+        (["add", "robot"], "rosz keys add robot --dir keys"),
+    ):
+        done = rosz(tmp_path, "keys", *words)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr == (
+            f"rosz: no keys in '{tmp_path}', but in './keys': '{meant}', or set ROSZ_KEYS\n"
+        )
+        assert rosz(tmp_path, *meant.split()[1:]).returncode == 0
+    done = rosz(tmp_path, "keys", "list", variables={"ROSZ_KEYS": str(tmp_path / "none")})
+    assert f"no keys in '{tmp_path}/none': " in done.stderr

@@ -80,6 +80,8 @@ ERRORS = {
         1,
         "'demo' is a package: name one of its launch files as well, such as demo.launch\n",
     ),
+    ("rosz_tutorials",): (1, "'rosz_tutorials' is a package, and has no launch files\n"),
+    ("src",): (1, "rosz: 'src' is a folder; name a launch file in it\n"),
     ("src/demo",): (1, "rosz: 'src/demo' is a folder; name a launch file in it\n"),
     ("dem", "demo.launch"): (1, "rosz: package 'dem' not found"),
     ("demo", "dem.launch"): (1, "has no file 'dem.launch'; did you mean 'demo.launch'?\n"),
@@ -90,8 +92,8 @@ ERRORS = {
     ("--nodes", "--files", "x"): (2, "rosz: --nodes, --files: only one of them can be answered"),
     ("-p", "11312", "x"): (2, "rosz: there is no master, and so no port: 'rosz core'"),
     ("--sigint-timeout", "0", "demo", "demo.launch", "topic:=a"): (2, "--sigint-timeout is 0; e"),
-    ("--sigterm-timeout", "x"): (2, "rosz: Invalid value for '--sigterm-timeout'"),
-    ("--nope",): (2, "rosz: No such option: --nope"),
+    ("--sigterm-timeout", "x"): (2, "rosz: invalid value for '--sigterm-timeout'"),
+    ("--nope",): (2, "rosz: no such option: --nope"),
     ("--status", "x"): (2, "rosz: --status, --restart and --stop stand alone"),
     ("--status", "--stop", "/x"): (2, "rosz: --status, --restart and --stop stand alone"),
     ("--args", "/a/talkr", "demo", "demo.launch", "topic:=a"): (1, "did you mean '/a/talker'?\n"),
@@ -126,3 +128,10 @@ def test_help(tmp_path: Path) -> None:
     assert done.returncode == 0
     for option in ("--screen", "--required", "--dump-params", "--sigint-timeout", "--restart"):
         assert option in done.stdout
+
+
+@pytest.mark.parametrize("option", ["--args", "--find-node", "--restart", "--stop"])
+def test_a_node_without_a_name_starts_nothing(workspace: Path, option: str) -> None:
+    done = rosz(workspace, "launch", "demo", "demo.launch", "topic:=x", option, "")
+    expected = f"rosz: {option} is ''; expected the name of a node\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", expected)

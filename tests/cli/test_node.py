@@ -212,3 +212,10 @@ def test_kill_of_an_unknown_node_kills_none(shell: Shell) -> None:
 
 def test_cleanup_has_nothing_to_do(shell: Shell) -> None:
     assert "nothing to clean up" in shell("node", "cleanup").out
+
+
+def test_ping_without_a_node_where_none_runs(shell: Shell) -> None:
+    with shell.network.session():
+        result = shell("node", "ping")
+    assert (result.code, result.out) == (2, "")
+    assert result.err == "rosz: no node is given; none is running\n"

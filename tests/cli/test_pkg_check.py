@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
+import subprocess
 from pathlib import Path
 
 import pytest
 from network import Network
 
-from .command import rosz
+from .command import ROSZ, environ, rosz
 from .test_env import evaluate
 
 
@@ -71,3 +74,26 @@ def test_the_course_of_a_course(network: Network, shell: str) -> None:
     assert "int64 data\nstring name\n" in out
     assert 'name: "tick"\n---\n' in out
     assert "killed" in out
+
+
+@pytest.mark.parametrize(("kind", "escapes"), [("xterm", True), ("dumb", False)])
+def test_a_dumb_terminal_gets_no_escapes(tmp_path: Path, kind: str, *, escapes: bool) -> None:
+    (tmp_path / "src").mkdir()
+    rosz(tmp_path / "src", "pkg", "create", "demo")
+    (tmp_path / "src/demo/msg/Odd.msg").write_text("int3 x\n")
+    ours, theirs = pty.openpty()
+    done = subprocess.run(
+        [*ROSZ, "pkg", "check"],
+        cwd=tmp_path,
+        env=environ(tmp_path, TERM=kind),
+        stdin=subprocess.DEVNULL,
+        stdout=theirs,
+        stderr=theirs,
+        check=False,
+    )
+    written = os.read(ours, 65536).decode()
+    for end in (ours, theirs):
+        os.close(end)
+    assert done.returncode == 1
+    assert "Odd.msg:1:1: " in written
+    assert ("\033[" in written) == escapes

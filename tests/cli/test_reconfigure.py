@@ -122,13 +122,13 @@ def test_groups_are_set_by_name(shell: Shell, robot: Robot) -> None:
         (["set", "robot", "gain", "x"], 1, "'gain' cannot be 'x': expected a number"),
         (["set", "robot", "[1]"], 1, "<value>: [1]: expected a dictionary of names to values"),
         (["set", "robot", "a", "b", "c"], 2, "3 words behind the node; expected a setting and"),
-        (["set", "robot"], 2, "Missing argument"),
+        (["set", "robot"], 2, "missing argument"),
         (["describe", "robot", "gian"], 1, "there is no setting 'gian'; did you mean 'gain'?"),
         (["load", "robot", "no.yaml"], 1, "no.yaml: No such file or directory"),
         (["set_from_parameters", "robot"], 1, "no parameters are set under '/dynparam_"),
         (["get", "-t", "0", "robot"], 2, "--timeout is 0; expected seconds above 0"),
         (["get", "-t", "0.1", "robt"], 1, "no node with settings under '/robt' within 0.1 s; did"),
-        (["watch", "robot", "-n", "0"], 2, "-n is 0; expected at least 1"),
+        (["watch", "robot", "-n", "0"], 2, "-n is 0; expected 1 or more"),
     ],
 )
 def test_what_goes_wrong(shell: Shell, words: list[str], code: int, text: str) -> None:

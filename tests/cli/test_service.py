@@ -121,8 +121,9 @@ def test_call_of_what_fails(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("values", "code", "text"),
     [
-        (["1"], 1, "the values are: [a b]"),
-        (["{c: 1}"], 1, "has no field 'c'"),
+        (["1"], 1, "AddTwoIntsRequest: expected 2 values for the fields (a, b), got 1\n"),
+        (["{c: 1}"], 1, "AddTwoIntsRequest: it has no field 'c'; it has a, b\n"),
+        (["-x"], 2, "no such option: -x; see 'rosz service call --help'\n"),
         (["1", "x"], 1, "expected int64, got str 'x'"),
         (["[1"], 2, "value 1, '[1', is no YAML"),
         (["--timeout", "0", "1", "2"], 2, "--timeout is 0"),
@@ -154,3 +155,10 @@ def test_call_gives_up_in_time(shell: Shell, server: Node) -> None:
     result = shell("service", "call", "--timeout", "0.2", "/slow")
     assert result.code == 1
     assert "no answer of service '/slow' within 0.2 s" in result.err
+
+
+@pytest.mark.parametrize(
+    "words", [["-1", "-2"], ["--", "-1", "-2"], ["-1", "-2", "--timeout", "9"]]
+)
+def test_negative_values_are_no_options(shell: Shell, words: list[str]) -> None:
+    assert shell("service", "call", "/add", *words).lines == ["sum: -3"]

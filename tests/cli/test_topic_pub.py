@@ -131,3 +131,17 @@ def test_no_values_on_a_terminal(shell: Shell) -> None:
     result = shell("topic", "pub", "/x", "std_msgs/Int8", terminal=True)
     assert result.code == 2
     assert "no values are given; they are: data" in result.err
+
+
+def test_a_negative_value_without_two_dashes(shell: Shell) -> None:
+    result = shell("topic", "pub", "/x", "std_msgs/Float64", "-2")
+    told = (
+        "rosz: no such option: -2; a negative value goes behind '--'; see 'rosz topic pub --help'\n"
+    )
+    assert (result.code, result.out, result.err) == (2, "", told)
+
+
+def test_an_unfinished_document_is_told(shell: Shell) -> None:
+    result = shell("topic", "pub", "/x", "std_msgs/Float64", stdin="data: 1\n")
+    assert (result.code, result.out) == (0, "")
+    assert result.err.startswith("WARNING: standard input ends without a line '---': ")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 
@@ -64,6 +65,17 @@ def test_what_is_not_there(argv: list[str], text: str, capsys: pytest.CaptureFix
     written = capsys.readouterr()
     assert text in written.err
     assert written.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("verb", "what"), [("show", "type"), ("md5", "type"), ("package", "package")]
+)
+def test_nothing_asked(
+    verb: str, what: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    assert run(["msg", verb]) == 2
+    assert capsys.readouterr().err == f"rosz: no {what} is given\n"
 
 
 @pytest.mark.parametrize("kind", ["Bool", "String", "Float64", "ColorRGBA", "Empty"])

@@ -88,7 +88,11 @@ def test_segments_of_dead_processes(network: Network) -> None:
     segment.write_bytes(bytes(4))
     (finding,) = check_segments(network.folder, born=-1)
     assert (finding.name, finding.level) == ("stale-lock", "warning")
+    assert finding.text == "1 segment of shared memory left by processes that died"
     assert finding.evidence == (f"{segment}, 4 bytes",)
+    (network.folder / "2.zenoh").write_bytes(b"")
+    (finding,) = check_segments(network.folder, born=-1)
+    assert finding.text.startswith("2 segments of ")
 
 
 def test_segments_in_use_are_none(network: Network) -> None:

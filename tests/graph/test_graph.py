@@ -5,6 +5,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from queue import SimpleQueue
+from typing import Any
 
 import pytest
 from network import PATIENCE, Network, eventually
@@ -122,6 +123,34 @@ def test_a_listener_may_wait_for_the_graph(network: Network, graph: Graph) -> No
     network.node("robot").publisher("scan", String)
     network.node("second")
     assert seen.get(timeout=PATIENCE) == "both"
+
+
+def test_order_holds_where_another_listener_waits(network: Network, graph: Graph) -> None:
+    waiting = threading.Event()
+    told: SimpleQueue[bool] = SimpleQueue()
+
+    def wait(token: Token, alive: bool) -> None:
+        if token.name == "/scan" and alive:
+            waiting.set()
+            graph.wait_for(lambda view: not view.publishers("/scan"), PATIENCE, "end of '/scan'")
+            late.append(graph.listen(listen_late))
+
+    def listen(token: Token, alive: bool) -> None:
+        if token.name == "/scan":
+            told.put(alive)
+
+    def listen_late(token: Token, alive: bool) -> None:
+        late.append((token.name, alive))
+
+    late: list[Any] = []
+    graph.listen(wait)
+    graph.listen(listen)
+    publisher = network.node("robot").publisher("scan", String)
+    assert waiting.wait(PATIENCE)
+    publisher.close()
+    assert [told.get(timeout=PATIENCE) for _ in range(2)] == [True, False]
+    eventually(lambda: ("/rosout", True) in late, "what is there is told to who comes late")
+    assert ("/scan", True) not in late
 
 
 def test_killed_process_is_gone_at_once(network: Network, graph: Graph) -> None:

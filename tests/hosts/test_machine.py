@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -35,6 +36,11 @@ class Scene(NamedTuple):
         return self.laptop.rosz("launch", *options, str(file))
 
 
+def resident(host: Host, pid: str) -> int:
+    """Return the kilobytes of memory that a process of a host has."""
+    return int(host.run("ps", "-o", "rss=", "-p", pid))
+
+
 def nodes_on(host: Host) -> list[str]:
     """Return what a launch has started on a host and not ended."""
     return [line for line in host.processes() if not SERVANTS.search(line)]
@@ -63,6 +69,7 @@ def scene(world: World) -> Scene:
         stubborn='trap "" INT TERM; echo still here; setsid sleep 1000 & while :; do sleep 1; done',
         show='echo "domain $ROS_DOMAIN_ID connect $ROSZ_CONNECT load $LOADED greet $GREET $*"',
         fail='echo "going down" >&2; exit 7',
+        flood='exec yes "all of it, and no end in sight"',
         talk='for i in $(seq 20000); do echo "line $i of many, all of which arrive"; done',
     )
     return Scene(laptop, robot)
@@ -186,6 +193,34 @@ def test_ctrl_c_ends_what_will_not_end(scene: Scene) -> None:
     assert run.exit_code() == 0, run.output
     assert "[stubborn-1] escalating to SIGKILL" in run.output
     assert nodes_on(scene.robot) == []
+
+
+def test_nobody_reads_what_comes_from_there(scene: Scene) -> None:
+    """A screen that takes nothing holds up neither the end of nodes nor memory."""
+    nodes = '<node pkg="tools" type="flood.sh" name="flood" machine="far" output="screen"/>'
+    (scene.laptop.home / "test.launch").write_text(
+        f'<launch><machine name="far" address="robot"/>{nodes}</launch>'
+    )
+    python, file = sys.executable, scene.laptop.home / "test.launch"
+    options = "--sigint-timeout 0.5 --sigterm-timeout 0.5"
+    command = f"{python} -m rosz launch {options} {file} | exec sleep 1000"
+    scene.laptop.execute("bash", "-c", command)
+    launch = f"-m rosz launch {options}"
+    eventually(lambda: any("no end in sight" in line for line in nodes_on(scene.robot)), "the node")
+    (pid,) = scene.laptop.run("pgrep", "-f", "--", f"^{python} {launch}").split()
+
+    memory = [resident(scene.laptop, pid)]
+
+    def still() -> bool:
+        """Tell whether it takes in no more."""
+        memory.append(resident(scene.laptop, pid))
+        return len(memory) > 40 and memory[-1] == memory[-40]
+
+    eventually(still, "an end of what it takes in", 30)
+    assert memory[-1] - memory[0] < 50_000
+    scene.laptop.run("kill", "-INT", pid)
+    eventually(lambda: nodes_on(scene.robot) == [], "the end of the node there", 30)
+    eventually(lambda: not any(launch in line for line in nodes_on(scene.laptop)), "its end", 30)
 
 
 @pytest.mark.parametrize("again", range(repeats(1, 10)))

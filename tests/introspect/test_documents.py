@@ -64,7 +64,7 @@ def test_a_file_that_cannot_be_read(content: bytes, place: str, tmp_path: Path) 
 
 def test_a_stream_tells_the_line_of_the_whole() -> None:
     stream = io.BytesIO("a: é\n---\n\n---\nb: 1\nc: [\n---\n".encode())
-    found = read_stream(stream)
+    found = read_stream(stream, pytest.fail)
     assert next(found) == {"a": "é"}
     with pytest.raises(YamlError) as caught:
         next(found)
@@ -73,4 +73,13 @@ def test_a_stream_tells_the_line_of_the_whole() -> None:
 
 def test_a_stream_of_other_bytes() -> None:
     with pytest.raises(YamlError, match=r"standard input:2: byte 0xff is no UTF-8"):
-        list(read_stream(io.BytesIO(b"a: 1\n\xff\n---\n")))
+        list(read_stream(io.BytesIO(b"a: 1\n\xff\n---\n"), pytest.fail))
+
+
+@pytest.mark.parametrize(("end", "said"), [("", 0), ("\n\n", 0), ("b: 2\n", 1), ("---\nb: 2", 1)])
+def test_a_document_that_does_not_end_is_told(end: str, said: int) -> None:
+    told: list[str] = []
+    stream = io.BytesIO(f"a: 1\n---\n{end}".encode())
+    assert list(read_stream(stream, told.append)) == [{"a": 1}]
+    left_out = "standard input ends without a line '---': what comes after the last one is left out"
+    assert told == [left_out] * said

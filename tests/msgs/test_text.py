@@ -132,7 +132,7 @@ BAD_FILLS: list[tuple[str, Any, str]] = [
     (
         "std_msgs/String",
         ["a", "b"],
-        "expected 1 values for the fields of std_msgs/String (data), got 2",
+        "expected 1 value for the fields (data), got 2",
     ),
     ("geometry_msgs/Twist", [[1.0, 2.0, 3.0]], "(linear, angular), got 1"),
     ("geometry_msgs/Twist", [[1.0, 2.0], [0.0, 0.0, 0.0]], "Twist.linear: expected 3 values"),

@@ -122,7 +122,7 @@ BAD: list[tuple[type[Message], str, str]] = [
     (
         Twist,
         "5",
-        "expected 2 values for the fields of geometry_msgs/Twist (linear, angular), got 1",
+        "expected 2 values for the fields (linear, angular), got 1",
     ),
     (Point, "{x: }", "geometry_msgs/Point.x: expected float64, got nothing"),
     (String, "5", "std_msgs/String.data: expected string (quote it: \"'5'\"), got int 5"),

@@ -334,6 +334,20 @@ def test_all_observers_are_called_though_one_fails() -> None:
     assert jumps == [TimeJump(START, 1)]
 
 
+def test_what_one_said_before_is_no_jump_back() -> None:
+    """Several nodes of a context hear the same `/clock`, each in its own time."""
+    clock = SimulatedClock(0)
+    jumps: list[TimeJump] = []
+    clock.on_jump(jumps.append)
+    clock.advance(START, teller=b"gazebo", number=1)
+    clock.advance(START + 2, teller=b"gazebo", number=3)
+    clock.advance(START + 1, teller=b"gazebo", number=2)
+    assert (clock.now(), jumps) == (START + 2, [])
+    clock.advance(START, teller=b"gazebo", number=4)
+    clock.advance(START - 1, teller=b"another", number=1)
+    assert jumps == [TimeJump(START + 2, START), TimeJump(START, START - 1)]
+
+
 def test_observer_may_use_the_clock() -> None:
     clock = SimulatedClock()
     seen: list[int] = []

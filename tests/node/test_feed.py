@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 import math
 import threading
 from contextlib import suppress
@@ -34,6 +35,25 @@ def test_samples_are_decoded_in_their_order_whoever_takes_them(network: Network)
     for thread in threads:
         thread.join()
     assert decoded == [1, 2]
+
+
+def test_a_loop_that_was_closed_is_woken_no_more() -> None:
+    feed = Feed("/chatter", 1)
+    loop = asyncio.new_event_loop()
+
+    async def collect() -> None:
+        async for _ in feed:
+            pass
+
+    task = loop.create_task(collect())
+    loop.run_until_complete(asyncio.sleep(0))
+    waiting = [len(feed._loops)]
+    loop.close()
+    feed.put(lambda sample: (sample, None), 1)  # type: ignore[arg-type]
+    waiting.append(len(feed._loops))
+    assert waiting == [1, 0]
+    task.get_coro().close()
+    task._log_destroy_pending = False  # type: ignore[attr-defined]
 
 
 def test_who_waits_forever_waits() -> None:

@@ -89,6 +89,15 @@ def test_what_it_is_told(network: Network) -> None:
     assert "start the child first, or use the 'spawn' method of multiprocessing" in told
 
 
+def test_contexts_do_not_add_up(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is registered for a fork can never be taken back."""
+    registered: list[object] = []
+    monkeypatch.setattr(os, "register_at_fork", lambda **after: registered.append(after))
+    for _ in range(2):
+        network.context().close()
+    assert registered == []
+
+
 def test_multiprocessing(network: Network) -> None:
     """A child that does not touch rosz computes and ends as ever; so does one that is spawned."""
     program = network.program(

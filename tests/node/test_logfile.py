@@ -138,6 +138,30 @@ def test_folder_that_is_removed_and_made_anew(bench: Bench) -> None:
     assert bench.lines() == ["two"]
 
 
+def test_file_that_others_put_aside_or_remove(bench: Bench) -> None:
+    """So do two nodes of one name, and whoever tidies up."""
+    other = Bench(bench.path)
+    bench.write("first")
+    for number in range(40):
+        other.write(f"{number:099}")
+    bench.write("second")
+    assert bench.lines()[-1] == "second"
+    assert all(path.stat().st_size <= 1000 for path in bench.path.parent.iterdir())
+    bench.path.unlink()
+    bench.write("third")
+    assert bench.lines() == ["third"]
+    other.sink.close()
+
+
+def test_bound_holds_for_all_who_write_together(bench: Bench) -> None:
+    other = Bench(bench.path)
+    for number in range(10):
+        for sink in (bench, other):
+            sink.write(f"{number:099}")
+    assert [len(bench.lines(suffix)) for suffix in ("", ".1")] == [10, 10]
+    other.sink.close()
+
+
 def test_full_disk(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     class FullDisk(FileIO):
         """Takes three bytes, then no more."""

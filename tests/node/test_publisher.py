@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from network import PATIENCE, Network, eventually
 
-from rosz.errors import ClosedError, EncodeError, InvalidName, WaitTimeout
+from rosz.errors import ClosedError, EncodeError, InvalidName, UsageError, WaitTimeout
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.std_msgs.msg import Int32, String, UInt8MultiArray
-from rosz.msgs.std_srvs.srv import Empty
+from rosz.msgs.std_srvs.srv import Empty, Trigger
 from rosz.node import Node, SubscriberLink
+from rosz.node.endpoint import Withdrawal
 from rosz.qos import QoS
 
 
@@ -123,6 +124,58 @@ def test_closed(talker: Node) -> None:
     with pytest.raises(ClosedError, match="the publisher is closed"):
         publisher.publish("hello")
     assert repr(publisher) == "<Publisher /chatter [std_msgs/msg/String] closed>"
+
+
+def test_closed_follows_nobody(talker: Node) -> None:
+    publisher = talker.publisher("chatter", String)
+    publisher.close()
+    threads = threading.active_count()
+    with pytest.raises(ClosedError, match="cannot follow the links of '/chatter'"):
+        publisher.on_connection(print)
+    assert threading.active_count() <= threads
+
+
+def test_interrupted_while_it_closes(talker: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    publisher = talker.publisher("chatter", String)
+    graph = talker.context.graph
+    graph.wait_for_topic("/chatter", PATIENCE)
+
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(publisher, "_finish", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        publisher.close()
+    graph.wait_for(lambda view: not view.publishers("/chatter"), PATIENCE, "end of '/chatter'")
+
+
+def test_what_comes_to_a_closed_one_is_closed(talker: Node) -> None:
+    publisher = talker.publisher("chatter", String)
+    publisher.close()
+    withdrawn: list[bool] = []
+    with pytest.raises(ClosedError, match="cannot declare more on '/chatter'"):
+        publisher.also_close(Withdrawal(lambda: withdrawn.append(True)))
+    assert withdrawn == [True]
+
+
+def test_no_queue_is_less_than_empty(talker: Node) -> None:
+    qos = QoS(depth=-1)
+    for declare in (
+        lambda: talker.publisher("chatter", String, qos=qos),
+        lambda: talker.subscription("chatter", String, qos=qos),
+        lambda: talker.subscription("chatter", qos=qos),
+        lambda: talker.client("call", Trigger, qos=qos),
+    ):
+        with pytest.raises(UsageError, match="depth is -1: expected 1 or more"):
+            declare()
+
+
+@pytest.mark.parametrize("depth", [0, 1 << 80])
+def test_depth_beyond_counting_is_latched_too(talker: Node, listener: Node, depth: int) -> None:
+    """0 leaves it to the system."""
+    qos = QoS(depth=depth, durability="transient_local")
+    talker.publisher("chatter", String, qos=qos).publish("kept")
+    assert listener.subscription("chatter", String, qos=qos).get(PATIENCE).data == "kept"
 
 
 def test_as_context_manager(talker: Node) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from network import PATIENCE, Network, eventually
 
-from rosz.errors import EncodeError, ServiceError
+from rosz.errors import EncodeError, ServiceError, UsageError
 from rosz.msgs.example_interfaces.srv import AddTwoInts, AddTwoIntsRequest, AddTwoIntsResponse
 from rosz.msgs.std_srvs.srv import Empty, EmptyRequest, SetBool, SetBoolResponse
 from rosz.node import Node
@@ -111,8 +111,10 @@ def test_a_refusal_arrives_and_is_not_logged(
         raise ServiceError("not now")
 
     server.service("work", Empty, refuse)
+    client = caller.client("work", Empty)
+    client.wait_for_service()
     with pytest.raises(ServiceError, match=r"with an error: .*request: not now$"):
-        caller.client("work", Empty).call(EmptyRequest())
+        client.call(EmptyRequest())
     server.close()
     assert "not now" not in capfd.readouterr().err
 
@@ -199,6 +201,12 @@ def test_closed_in_its_own_handler(server: Node, caller: Node) -> None:
     client = caller.client("once", AddTwoInts)
     client.wait_for_service()
     assert client(0, 0).sum == 1
+
+
+@pytest.mark.parametrize("threads", [0, -1, 2.5])
+def test_no_such_number_of_threads(server: Node, threads: Any) -> None:
+    with pytest.raises(UsageError, match=f"threads is {threads}: expected 1 or more"):
+        server.service("add", AddTwoInts, lambda _: 0, threads=threads)
 
 
 def test_threads_end_with_the_service(server: Node) -> None:

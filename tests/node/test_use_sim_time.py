@@ -12,6 +12,7 @@ from rosz.errors import TimeMovedBackwards
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.node import Node, Publisher
+from rosz.node.clock import TimeJump
 
 SECOND = 1_000_000_000
 
@@ -105,6 +106,19 @@ def test_jump_back(network: Network, simulator: Simulator, node: Node) -> None:
     simulator.set(node, 3)
     assert raised.get(timeout=PATIENCE)
     assert node.now() == 3 * SECOND
+
+
+def test_nodes_of_one_process_do_not_set_time_back(network: Network, simulator: Simulator) -> None:
+    context = network.context()
+    nodes = [network.node(f"part{number}", context=context) for number in range(4)]
+    jumps: list[TimeJump] = []
+    context.clock.on_jump(jumps.append)
+    for number in range(3000):
+        simulator.tick(100 + number / 1000)
+    simulator.set(nodes[0], 200)
+    nodes[0].close()
+    simulator.set(nodes[1], 300)
+    assert jumps == []
 
 
 def test_end_without_a_tick(network: Network, node: Node) -> None:

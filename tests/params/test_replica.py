@@ -3,12 +3,14 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Collection
 
 import pytest
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
 from rosz.params.keys import Keys, Member
 from rosz.params.replica import Replica
+from rosz.params.replica.acks import Pending
 from rosz.session import HybridClock, Stamp
 
 from .network import Network, until
@@ -40,6 +42,25 @@ def test_a_set_that_returned_is_seen_by_all(network: Network) -> None:
         writer = replicas[number % 4]
         assert writer.set("/count", number).slow == ()
         assert [replica.get("/count") for replica in replicas] == [number] * 4
+
+
+def test_nobody_waits_for_one_that_ends_as_it_is_counted(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = network.replicas(2)
+    count = first._line.acks.open
+
+    def too_late(zids: Collection[str]) -> Pending:
+        second.close()
+        until(lambda: first.members() == [] and not first._members.zids)
+        first._line.gone(second.zid)
+        return count(zids)
+
+    monkeypatch.setattr(first._line.acks, "open", too_late)
+    begun = time.monotonic()
+    assert first.set("/a", 1, timeout=10).slow == ()
+    assert time.monotonic() - begun < 5
+    assert not first._line.acks._lagging
 
 
 def test_a_newcomer_has_everything(network: Network) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from rosz.errors import ParamError
 from rosz.params.replica.state import State
 from rosz.params.wire import Batch, encode, seal
 from rosz.params.writes import Write
@@ -112,9 +113,20 @@ def test_who_follows_is_served_at_once() -> None:
 
 def test_taking_does_not_wait_for_others() -> None:
     shared = state()
-    shared.enter()
+    entered, release = threading.Event(), threading.Event()
+
+    def work() -> None:
+        shared.enter()
+        entered.set()
+        assert release.wait(10)
+        shared.leave()
+
+    other = threading.Thread(target=work)
+    other.start()
+    assert entered.wait(10)
     assert not shared.take_soon(message("a", 1, 1))
-    shared.leave()
+    release.set()
+    other.join()
     assert shared.take_soon(message("a", 1, 1))
     assert shared.root == {"a": 1}
 
@@ -152,3 +164,29 @@ def test_ctrl_c_while_messages_are_read_locks_nobody_out(monkeypatch: pytest.Mon
     assert shared.enter(0)
     shared.leave()
     assert shared.root == {}
+
+
+def test_a_signal_handler_in_the_midst_of_work_reads_what_was_and_is_refused_the_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shared = state()
+    shared.write([(("a",), 1)], "me")
+    apply = shared._history.apply
+    seen: list[Any] = []
+
+    def interrupted(writes: list[Write]) -> list[Write]:
+        shared.note(message("b", 1, 1))
+        seen.append(shared.root)
+        for refused in (shared.digest, lambda: shared.write([(("a",), 3)], "handler")):
+            with pytest.raises(ParamError, match="have it start a thread"):
+                refused()
+        return apply(writes)
+
+    monkeypatch.setattr(shared._history, "apply", interrupted)
+    writer = threading.Thread(target=lambda: shared.write([(("a",), 2)], "me"), daemon=True)
+    writer.start()
+    writer.join(10)
+    assert not writer.is_alive(), "the handler waits for the thread that it interrupted"
+    monkeypatch.undo()
+    assert seen == [{"a": 1}]
+    assert shared.root == {"a": 2, "b": 1}

@@ -6,6 +6,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import threading
 from contextlib import closing
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from hypothesis import given
 
 from rosz.errors import StoreError
 from rosz.params.history import History
+from rosz.params.replica.saver import Saver
 from rosz.params.store import Store
 from rosz.params.writes import Write, delete, put
 
@@ -213,6 +215,80 @@ def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) ->
     assert newer.time > 0
     again.close()
     assert loaded(path).root == {"a": 1, "late": 5}
+
+
+class Disk:
+    """Keeps writes, unless it is full."""
+
+    def __init__(self, *, full: bool = False) -> None:
+        self.full = full
+        self.kept: list[Write] = []
+
+    def load(self) -> list[Write]:
+        return []
+
+    def save(self, writes: list[Write]) -> None:
+        if self.full:
+            raise StoreError("no space left")
+        self.kept += writes
+
+    def replace(self, writes: list[Write]) -> None:
+        self.kept = writes
+
+    def close(self) -> None:
+        self.full = True
+
+
+def held(saver: Saver) -> threading.Event:
+    """Have a saver wait, so that what comes is there at once when it goes on."""
+    go_on = threading.Event()
+
+    def wait() -> None:
+        assert go_on.wait(10)
+
+    saver._worker.submit(wait)
+    return go_on
+
+
+def test_what_comes_right_before_the_end_is_saved() -> None:
+    disk = Disk()
+    saver = Saver(disk)
+    go_on = held(saver)
+    saver.take([put(("n",), (1, "c"), 1)])
+    end = threading.Thread(target=saver.close)
+    end.start()
+    until(lambda: saver._worker._closed)
+    go_on.set()
+    end.join()
+    assert [write.path for write in disk.kept] == [("n",)]
+
+
+def test_tidying_up_makes_nobody_wait() -> None:
+    disk = Disk()
+    saver = Saver(disk)
+    go_on, safe = held(saver), threading.Event()
+    saver.when_safe(safe.set)
+    saver.trim(list)
+    go_on.set()
+    assert safe.wait(10)
+    saver.close()
+
+
+def test_a_disk_that_is_full_for_long_costs_no_memory() -> None:
+    disk = Disk(full=True)
+    saver = Saver(disk)
+    for number in range(1, 101):
+        saver.take([put(("n",), (number, "c"), number), put(("m",), (number, "c"), 0)])
+    until(lambda: not saver._worker.pending and bool(saver._unsaved))
+    until(lambda: len(saver._unsaved) == 2)
+    disk.full = False
+    saver.take([put(("late",), (101, "c"), 1)])
+    saver.close()
+    assert [(write.path, write.time) for write in disk.kept] == [
+        (("n",), 100),
+        (("m",), 100),
+        (("late",), 101),
+    ]
 
 
 def loaded_while_open(path: Path) -> dict[str, object]:

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import datetime as dt
+import os
 import ssl
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from cli.command import rosz
 
 from rosz.errors import UsageError, YamlError
 from rosz.security import KeyFolder
@@ -16,7 +18,8 @@ from rosz.session import secured
 
 def test_files_are_for_their_owner_alone(authority: Authority) -> None:
     home = authority.add("robot")
-    assert (home / "key.pem").stat().st_mode & 0o777 == 0o600
+    for name in ("key", "certificate", "authority"):
+        assert (home / f"{name}.pem").stat().st_mode & 0o777 == 0o600
     assert home.stat().st_mode & 0o777 == 0o700
     assert (authority.folder / "authority" / "key.pem").stat().st_mode & 0o777 == 0o600
 
@@ -53,6 +56,51 @@ def test_a_key_that_others_can_read_is_refused(authority: Authority) -> None:
         Authority(authority.folder)
 
 
+@pytest.mark.parametrize("name", ["authority.pem", "rules.yaml"])
+def test_what_anybody_could_have_written_is_not_believed(authority: Authority, name: str) -> None:
+    """Who may write it says who is let in, and what each may do."""
+    home = authority.add("robot")
+    (home / "rules.yaml").write_text("a: all\n")
+    assert KeyFolder.find(home, "robot").rules is not None
+    (home / name).chmod(0o666)
+    with pytest.raises(UsageError, match=rf"anybody may write '.*{name}' \(mode 0666\)"):
+        KeyFolder.find(home, "robot")
+    assert any("anybody may write" in line for line in review(authority.folder).wrong)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "loose link", "no text", "deep"])
+def test_rules_that_cannot_be_read(authority: Authority, kind: str) -> None:
+    home = authority.add("robot")
+    file = home / "rules.yaml"
+    if kind == "pipe":
+        os.mkfifo(file)
+    elif kind == "folder":
+        file.mkdir()
+    elif kind == "loose link":
+        file.symlink_to("nothing")
+    else:
+        file.write_bytes(b"\xff\xfe" if kind == "no text" else b"[" * 9999)
+    with pytest.raises((UsageError, YamlError), match=r"rules\.yaml"):
+        KeyFolder.find(home, "robot")
+    assert any("rules.yaml" in line for line in review(authority.folder).wrong)
+
+
+def test_days_that_are_none(authority: Authority) -> None:
+    with pytest.raises(UsageError, match=r"1e\+07 days from now is no date"):
+        authority.add("robot", days=1e7)
+    assert not (authority.folder / "robot").exists()
+
+
+@pytest.mark.parametrize("command", ["init", "add"])
+def test_keys_are_made_for_a_day_at_least(
+    authority: Authority, tmp_path: Path, command: str
+) -> None:
+    words = ("init", "new") if command == "init" else ("add", "robot", "-d", str(authority.folder))
+    done = rosz(tmp_path, "keys", *words, "--days", "0")
+    assert done.returncode == 2
+    assert "--days is 0; expected 1 or more days" in done.stderr
+
+
 def test_no_key(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no key in '.*' \(ROSZ_KEYS\): expected 'key.pem' there"):
         KeyFolder.find(tmp_path, "robot")
@@ -83,7 +131,7 @@ def test_nothing_is_overwritten(authority: Authority) -> None:
     assert (authority.folder / "robot" / "key.pem").read_bytes() == key
 
 
-@pytest.mark.parametrize("name", ["../up", "", "authority", "a b", "-x"])
+@pytest.mark.parametrize("name", ["../up", "", "authority", "a b", "-x", "a" * 65])
 def test_names_of_holders(authority: Authority, name: str) -> None:
     with pytest.raises(UsageError, match="is no name for a holder of keys"):
         authority.add(name)

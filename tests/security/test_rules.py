@@ -86,6 +86,18 @@ def test_who_may_set_but_a_part_cannot_tell_others_what_they_missed() -> None:
     sync = "@rosz/*/store/*/sync"
     assert sync not in allowed("a: {set: ['/gains/**']}", "ingress", "reply")
     assert sync in allowed("a: {set: ['/**']}", "ingress", "reply")
+    tell = "@rosz/*/store/*/tell"
+    part = allowed("a: {set: ['/gains/**']}", "ingress", "query")
+    assert [key for key in part if key.startswith(tell)] == [f"{tell}/gains/**"]
+    assert not any(tell in key for key in allowed("a: {get: true}", "ingress", "query"))
+
+
+def test_whose_process_shows_may_take_the_place_of_a_node() -> None:
+    process = "@rosz/*/node/**"
+    everybody = "a: {subscribe: ['/**'], publish: ['/**'], set: ['/**']}"
+    assert process in allowed(everybody, "egress", "liveliness_token")
+    assert process not in allowed(everybody, "ingress", "liveliness_token")
+    assert process in allowed("a: {control: true}", "ingress", "liveliness_token")
 
 
 @given(

@@ -221,3 +221,29 @@ def test_files_of_catkin_stay(workspace: Path) -> None:
     with pytest.raises(UsageError, match="is catkin's and stays"):
         write_setup(workspace, {"bash": "true\n"})
     assert written.read_text() == "# catkin's\n"
+
+
+def test_a_command_that_mends_is_told_once(workspace: Path) -> None:
+    node = '<node pkg="demo" type="a.py" name="{}"/>'
+    put(workspace, "scripts/a.py", "#!/usr/bin/env python3\n")
+    put(workspace, "launch/a.launch", f"<launch>{node.format('x')}{node.format('y')}</launch>")
+    put(workspace, "launch/b.launch", f"<launch>{node.format('z')}</launch>")
+    script = workspace / "src/demo/scripts/a.py"
+    assert problems(workspace) == [
+        f"demo/scripts/a.py: error: not executable; run: chmod +x {script}"
+    ]
+
+
+def test_a_misspelt_type_gets_one_hint(workspace: Path) -> None:
+    put(workspace, "msg/Strings.msg", "string[] data\n")
+    put(workspace, "msg/A.msg", "Strng x\nflot64 y\n")
+    (found,) = problems(workspace)
+    assert found.endswith("has no 'Strng.msg'; did you mean 'Strings'?")
+    put(workspace, "msg/A.msg", "flot64 y\n")
+    (found,) = problems(workspace)
+    assert found.endswith("has no 'flot64.msg'; did you mean 'float64'?")
+
+
+def test_a_file_is_no_package(workspace: Path) -> None:
+    with pytest.raises(NotFoundError, match=r"'src/demo/package\.xml' is a file; expected a pack"):
+        problems(workspace, "src/demo/package.xml")

@@ -74,7 +74,7 @@ class Ledger:
         try:
             value = normalise(value)
         except ParamError as error:
-            raise TextFault(f"parameter '{name}' {error}") from error
+            raise TextFault(f"parameter '{name}': {error}") from error
         parent = name
         while len(parent) > 1:
             parent = parent.rpartition("/")[0] or "/"

@@ -166,6 +166,8 @@ def _node(tag: Tag, ledger: Ledger, name: str) -> NodePlan:
 def _scopes(tag: Tag, ledger: Ledger, name: str) -> tuple[Scope, Scope]:
     """Open the scope of a node and that of its params."""
     ns = namespace(tag)
+    if name.startswith("~"):
+        tag.fail(f"node name '{name}' starts with '~', as only names within a node do", "name")
     try:
         own = tag.scope.child(ns)
         params = own.child(name)

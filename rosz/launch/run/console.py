@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TextIO
 
 from rosz.launch.run.folder import LaunchLog
+from rosz.launch.run.screen import Screen
 
 __all__ = ("Console",)
 
 _BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
+_END_SECONDS = 1.0
+"""How long the end waits for a screen that takes nothing."""
 
 
 class Console:
@@ -24,6 +28,7 @@ class Console:
         self._verbose = verbose
         self._out = out
         self._err = err
+        self._screen = Screen()
         self.log: LaunchLog | None = None
 
     @property
@@ -38,6 +43,15 @@ class Console:
     def show(self, sink: int, text: str) -> None:
         """Print what nodes of another machine wrote, to standard output (1) or error (2)."""
         self._put(self._out if sink == 1 else self._err, text)
+
+    @property
+    def full(self) -> bool:
+        """Whether more is to be shown than the screen takes, so that nodes should wait."""
+        return self._screen.full
+
+    def when_free(self, told: Callable[[], None]) -> None:
+        """Have something called once, on another thread, when it is not full any more."""
+        self._screen.when_free(told)
 
     def strong(self, text: str) -> None:
         """Print a line that matters."""
@@ -60,7 +74,8 @@ class Console:
             self.log.write("INFO", text)
 
     def close(self) -> None:
-        """Close the log; again is no error."""
+        """Have everything shown, and close the log; again is no error."""
+        self._screen.close(_END_SECONDS)
         if self.log is not None:
             self.log.close()
 
@@ -71,11 +86,6 @@ class Console:
             text = f"{colour}{text}{_PLAIN}"
         self._put(stream, f"{text}\n")
 
-    @staticmethod
-    def _put(stream: TextIO, text: str) -> None:
+    def _put(self, stream: TextIO, text: str) -> None:
         # One write per message, so that lines of nodes never come to lie within it.
-        try:
-            stream.write(text)
-            stream.flush()
-        except (OSError, ValueError):
-            return  # the terminal was closed; ending the nodes in order matters more
+        self._screen.write(stream, text)

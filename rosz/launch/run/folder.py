@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import time
 from pathlib import Path
@@ -78,22 +79,22 @@ class LaunchLog:
         """Append a line; a full disk does not stop the launch."""
         if self._file is None:
             return
-        stamp = time.strftime("%Y-%m-%d %H:%M:%S")
         try:
-            self._file.write(f"[{stamp}] [{level}] {text}\n")
+            self._file.write(f"[{_now()}] [{level}] {text}\n")
             self._file.flush()
         except OSError:
             self.close()
 
-    def fileno(self) -> int:
-        """Return the descriptor of the file.
-
-        Raises:
-            ValueError: It is closed.
-        """
+    def dump_stacks(self, reason: str) -> None:
+        """Append the stacks of all threads; from a signal handler too, within another `write`."""
         if self._file is None:
-            raise ValueError("the log is closed")
-        return self._file.fileno()
+            return
+        fd = self._file.fileno()
+        try:
+            os.write(fd, f"[{_now()}] [INFO] {reason}; the stacks of all threads:\n".encode())
+        except OSError:  # a full disk does not stop the launch
+            return
+        faulthandler.dump_traceback(fd)
 
     def close(self) -> None:
         """Close the file; again is no error."""
@@ -103,6 +104,10 @@ class LaunchLog:
                 file.close()
             except OSError:  # what could not be flushed is lost with the disk
                 return
+
+
+def _now() -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _file_name(label: str) -> str:

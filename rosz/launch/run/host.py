@@ -234,14 +234,16 @@ class LocalHost:
         prefix = f"[{job.label}] " if self._prefixed else ""
         if command.direct and os.isatty(0):
             return self._output.direct()
-        if job.node.output == "screen":
-            return self._output.screen(job.owner, prefix)
-        file = self._folder.stdout_log(job.label) if self._folder else None
+        shown = job.node.output == "screen"
+        file = self._folder.stdout_log(job.label) if self._folder and not shown else None
         try:
+            if shown:
+                return self._output.screen(job.owner, prefix)
             return self._output.log(job.owner, prefix, file, "a" if job.again else "w")
         except OSError as error:
+            where = "the screen" if shown else f"'{file}'"
             raise LaunchError(
-                f"cannot write the output of '{job.label}' to '{file}': {error.strerror}"
+                f"cannot write the output of '{job.label}' to {where}: {error.strerror}"
             ) from error
 
     def _logged(self, job: Job) -> tuple[str, ...]:

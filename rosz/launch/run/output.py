@@ -28,6 +28,8 @@ _DRAIN_SECONDS = 0.5
 """How long the relay may take to show the last lines before a death is reported without them."""
 _END_SECONDS = 5.0
 """How long a screen that takes nothing, such as a stopped terminal, holds up the end."""
+_ASK_SECONDS = 0.5
+"""How long the relay may take to hear a request, unless it is known to hear none."""
 
 Told = Callable[[tuple[str, ...]], None]
 
@@ -68,6 +70,7 @@ class Output:
         self._terminals = (os.isatty(1), os.isatty(2))
         self._same = _same_file(1, 2)
         self._requests, theirs = socket.socketpair()
+        self._requests.settimeout(_ASK_SECONDS)
         script = Path(__file__).with_name("relay.py")
         with theirs:
             self._process = subprocess.Popen(
@@ -127,21 +130,32 @@ class Output:
         with contextlib.suppress(OSError):
             size = fcntl.ioctl(sink, termios.TIOCGWINSZ, b"\0" * 8)
             fcntl.ioctl(theirs, termios.TIOCSWINSZ, size)
-        self._add(owner, sink, prefix, ours)
-        return theirs
+        if self._add(owner, sink, prefix, ours):
+            return theirs
+        os.close(theirs)
+        return None
 
     def _pipe(self, owner: int, sink: int, prefix: str) -> int:
         ours, theirs = os.pipe()
-        self._add(owner, sink, prefix, ours)
-        return theirs
+        if self._add(owner, sink, prefix, ours):
+            return theirs
+        os.close(theirs)
+        return os.open(os.devnull, os.O_WRONLY)
 
-    def _add(self, owner: int, sink: int, prefix: str, fd: int) -> None:
-        self._ask({"op": "add", "id": owner, "sink": sink, "prefix": prefix}, fd)
+    def _add(self, owner: int, sink: int, prefix: str, fd: int) -> bool:
+        heard = self._ask({"op": "add", "id": owner, "sink": sink, "prefix": prefix}, fd)
         os.close(fd)
+        return heard
 
-    def _ask(self, request: dict[str, Any], *fds: int) -> None:
-        with contextlib.suppress(OSError):  # the relay was killed: the screen is lost, not the run
+    def _ask(self, request: dict[str, Any], *fds: int) -> bool:
+        """Tell whether the relay takes requests; without it the screen is lost, not the run."""
+        try:
             socket.send_fds(self._requests, [json.dumps(request).encode() + b"\n"], fds)
+        except OSError:  # it was killed, or waits for a screen that has long taken nothing
+            self._requests.settimeout(0)
+            return False
+        self._requests.settimeout(_ASK_SECONDS)
+        return True
 
     def drain(self, owner: int, told: Told) -> None:
         """Have all that a process wrote shown, then be told its last lines.

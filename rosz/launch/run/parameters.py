@@ -103,8 +103,24 @@ def _set_up(step: SetupPlan, store: ParamStore, console: Console) -> None:
         console.error(f"{step.place}: parameter '{step.name}' is not set, so it is not dumped")
         return
     try:
-        Path(step.file).write_text(text, encoding="utf-8")
+        _target(step).write_text(text, encoding="utf-8")
     except OSError as error:
         raise LaunchError(
             f"{step.place}: cannot dump to '{step.file}': {error.strerror}"
         ) from error
+
+
+def _target(step: SetupPlan) -> Path:
+    """Return what to dump to; no link, by which somebody else could have a file overwritten.
+
+    Nor what would not take it, such as a pipe that nobody reads.
+    """
+    file = Path(step.file)
+    if file.is_symlink():
+        raise LaunchError(
+            f"{step.place}: cannot dump to '{file}': it is a link to '{file.readlink()}'; name the"
+            " file itself"
+        )
+    if file.exists() and not file.is_file():
+        raise LaunchError(f"{step.place}: cannot dump to '{file}': it is no regular file")
+    return file

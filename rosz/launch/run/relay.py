@@ -18,6 +18,7 @@ import contextlib
 import json
 import os
 import re
+import resource
 import select
 import selectors
 import signal
@@ -137,6 +138,8 @@ class Relay:
 
     def _obey(self, request: dict[str, Any]) -> None:
         if request["op"] == "add":
+            if not self.descriptors:  # none was left for it here: the node writes to nobody
+                return
             fd = self.descriptors.popleft()
             os.set_blocking(fd, False)
             source = Source(fd, request["id"], request["sink"], request["prefix"].encode())
@@ -210,6 +213,9 @@ def main() -> None:
     """Serve the socket whose descriptor is the first argument."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
+    # It holds two descriptors for each node, the launch one.
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     Relay(socket.socket(fileno=int(sys.argv[1]))).run()
 
 

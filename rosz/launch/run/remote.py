@@ -190,6 +190,15 @@ class RemoteHost:
             self._take(line)
         if self._out.ended:
             self._loop.unwatch(self._out.fd)
+        elif self._console.full:
+            self._loop.unwatch(self._out.fd)
+            self._console.when_free(lambda: self._loop.post(self._listen))
+
+    def _listen(self) -> None:
+        """Go on with what comes, after more of it came than the screen took."""
+        if self._out.fd >= 0 and not self._out.ended:
+            self._loop.unwatch(self._out.fd)
+            self._loop.watch(self._out.fd, self._heard)
 
     def _overheard(self) -> None:
         for line in self._err.read():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import socket
 import uuid
@@ -31,6 +32,8 @@ from rosz.launch.run.stopping import stopped_by_signals
 from rosz.launch.run.supervisor import Supervisor
 
 __all__ = ("Options", "Runner", "forced")
+
+_RUN_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]{0,63}")
 
 
 class Options(msgspec.Struct, frozen=True, kw_only=True):
@@ -186,7 +189,8 @@ class Runner:
             found = self._network.store.get(RUN_ID)
         except ParamNotFound:
             found = None
-        if isinstance(found, str) and found.replace("-", "").isalnum():
+        # Anybody may have set it, and it becomes part of paths and keys.
+        if isinstance(found, str) and _RUN_ID.fullmatch(found):
             self.run_id = found
             return False
         self.run_id = str(uuid.uuid1())
@@ -265,15 +269,15 @@ class Runner:
             supervisor,
             files=self._plan.files,
         )
-        try:
-            with stopped_by_signals(self._loop, self._console, self.stop, supervisor.kill):
+        with stopped_by_signals(self._loop, self._console, self.stop, supervisor.kill):
+            try:
                 supervisor.start()
                 self._loop.run()
-        finally:
-            supervisor.kill()
-            kill_family(self._tag)
-            if panel is not None:
-                panel.close()
+            finally:
+                supervisor.kill()
+                kill_family(self._tag)
+                if panel is not None:
+                    panel.close()
 
     def _conclude(self, supervisor: Supervisor) -> None:
         console = self._console

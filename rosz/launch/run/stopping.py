@@ -5,7 +5,6 @@ None of them leaves a node running. Only SIGKILL does, of which a process does n
 
 from __future__ import annotations
 
-import faulthandler
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -48,8 +47,7 @@ def stopped_by_signals(
             loop.post(shutdown)
             return
         if console.log is not None:
-            console.note(f"{signal.Signals(number).name}{again}; the stacks of all threads:")
-            faulthandler.dump_traceback(console.log.fileno())
+            console.log.dump_stacks(f"{signal.Signals(number).name}{again}")
         loop.post(kill)
 
     with _handled_by(handle):

@@ -43,14 +43,14 @@ class Acks:
     """All writes of this replica that somebody has still to acknowledge.
 
     A replica that once did not answer in time is *lagging*: nobody waits for it again until it is
-    heard of. Safe for threads.
+    heard of. Safe for threads, and for a signal handler that writes.
     """
 
     def __init__(self) -> None:
         self._numbers = itertools.count(1)
         self._pending: dict[int, Pending] = {}
         self._lagging: set[str] = set()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
 
     def open(self, zids: Collection[str]) -> Pending:
         """Start waiting for sessions, except for those that lag."""
@@ -90,9 +90,3 @@ class Acks:
             for pending in self._pending.values():
                 for zid in tuple(pending.waiting):
                     pending.drop(zid)
-
-    @property
-    def lagging(self) -> frozenset[str]:
-        """Sessions that did not answer the last time they were waited for."""
-        with self._lock:
-            return frozenset(self._lagging)

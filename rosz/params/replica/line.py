@@ -91,6 +91,8 @@ class Line:
         began = time.monotonic()
         deadline = began + timeout
         pending = self.acks.open(members.zids if timeout > 0 else ())
+        for zid in pending.waiting - members.zids:  # which ended since they were counted
+            self.acks.gone(zid)
         try:
             batch = Batch.of((stamp.time, stamp.id), origin, changes)
             data = seal(self._session.zid, pending.number, encode(batch))

@@ -38,6 +38,7 @@ from rosz.params.tree import MISSING, lookup
 from rosz.params.values import normalise
 from rosz.params.writes import DELETED
 from rosz.session import Closable, Session, Stamp
+from rosz.session.waiting import patience
 
 __all__ = ("ACKNOWLEDGED_BY", "Outcome", "Replica", "process_label")
 
@@ -116,6 +117,9 @@ class Replica(Reading):
         server = Server(self, keys, self._state.stamp, self._worker, lambda: self._sync.ready)
         self._declared: list[Closable] = [
             session.queryable(keys.sync(session.zid), self._sync.serve, complete=True),
+            session.queryable(
+                f"{keys.tell(session.zid)}/**", self._sync.serve_told, complete=True
+            ),
             session.queryable(keys.ask(session.zid), server.serve, complete=True),
             session.queryable(f"{keys.set(session.zid)}/**", server.serve_writes, complete=True),
         ]
@@ -194,7 +198,9 @@ class Replica(Reading):
         Raises:
             ParamError: A change has no meaning in the tree; nothing has changed then.
             ClosedError: The replica or the session is closed.
+            UsageError: The timeout is no number; nothing has changed then.
         """
+        timeout = patience(timeout)
         if self._closed:
             raise ClosedError("the parameter store of this process is closed")
         batch = list(changes)
@@ -220,6 +226,7 @@ class Replica(Reading):
         Returns:
             Whether all of them answered in time.
         """
+        timeout = patience(timeout)
         answers: SimpleQueue[bool] = SimpleQueue()
         expected = self._sync.compare_with_all(answers.put)
         try:

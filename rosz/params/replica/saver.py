@@ -62,6 +62,7 @@ class Saver:
 
     def close(self) -> None:
         """Save what is left and let go of the file; again is no error."""
+        self._worker.submit(self._flush)
         self._worker.close()
         self._keep.close()
 
@@ -69,7 +70,7 @@ class Saver:
         self._unsaved += news
         if then is not None:
             self._waiting.append(then)
-        if not self._worker.pending:
+        if not self._worker.pending:  # else whatever is next does it
             self._flush()
 
     def _replace(self, snapshot: Callable[[], list[Write]]) -> None:
@@ -78,6 +79,7 @@ class Saver:
             self._keep.replace(snapshot())
         except RoszError as error:
             _log.error("parameters are not saved: %s", error)  # the text says it all
+        self._flush()
 
     def _flush(self) -> None:
         writes, self._unsaved = self._unsaved, []
@@ -87,7 +89,8 @@ class Saver:
                 self._keep.save(writes)
         except RoszError as error:
             _log.error("parameters are not saved: %s", error)  # the text says it all
-            self._unsaved = writes + self._unsaved
+            # The disk may be full for long, and only the newest write at each path is to be kept.
+            self._unsaved = list({write.path: write for write in writes}.values())
             return
         for then in waiting:
             then()

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Final
 
-from rosz.errors import DecodeError
+from rosz.errors import DecodeError, ParamError
 from rosz.params.history import History
 from rosz.params.keys import check_reach
 from rosz.params.merge import Change
@@ -29,12 +29,20 @@ _PATIENCE: Final = 0.002
 _MOST_UNREAD: Final = 64
 """Messages that may wait to be read: what a read has to do at most before it returns."""
 
+_INTERRUPTED: Final = (
+    "a signal handler interrupted its thread at work on the parameters, and cannot work on them"
+    " itself: have it start a thread that does"
+)
+
 
 class State:
     """A history behind a lock; its tree is read without.
 
     Messages of others are only noted as they arrive, and read when somebody looks at the tree: a
     process that nobody asks costs the writers next to nothing, and who asks gets what is newest.
+
+    A signal handler may interrupt its own thread at work on the history, half of which is changed
+    then. It sees the tree as it was before, and is refused all else.
 
     Args:
         clock: The session's, which is kept ahead of all writes seen whenever it is asked.
@@ -50,7 +58,8 @@ class State:
         self._root: Tree = {}
         self._clock = clock
         self._history = History()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
+        self._holder = 0
         self._current = _Current(self)
         self._sinks: tuple[Callable[[list[Write]], None], ...] = ()
         self._unread: deque[tuple[bytes, Path]] = deque()
@@ -69,9 +78,10 @@ class State:
         return self._root
 
     def read(self) -> None:
-        """Apply what was noted."""
-        with self._current:
-            pass
+        """Apply what was noted, unless the same thread is at work on the history already."""
+        if self._holder != threading.get_ident():
+            with self._current:
+                pass
 
     def note(self, message: bytes, reach: Path = ROOT) -> bool:
         """Take in a message of another replica, sealed, in next to no time.
@@ -201,9 +211,16 @@ class State:
 
         Returns:
             Whether it is so; false when the time was over.
+
+        Raises:
+            ParamError: The same thread is at work on it already, below a signal handler.
         """
         if not self._lock.acquire(timeout=timeout):
             return False
+        if self._holder == threading.get_ident():
+            self._lock.release()
+            raise ParamError(_INTERRUPTED)
+        self._holder = threading.get_ident()
         try:
             if self._unread:
                 self._reading = True
@@ -212,12 +229,13 @@ class State:
                 self._reading = False
         except BaseException:  # Ctrl-C comes anywhere
             self._reading = False
-            self._lock.release()
+            self.leave()
             raise
         return True
 
     def leave(self) -> None:
         """End what `enter` began."""
+        self._holder = 0
         self._lock.release()
 
     def _is_followed(self) -> bool:

@@ -20,7 +20,7 @@ from typing import Final
 
 from rosz.errors import DecodeError, RoszError
 from rosz.params.digest import Digest
-from rosz.params.keys import Keys, Member
+from rosz.params.keys import Keys, Member, check_reach
 from rosz.params.replica.members import Members
 from rosz.params.replica.state import State
 from rosz.params.replica.worker import Worker
@@ -124,6 +124,12 @@ class Synchroniser:
         if not self.worker.offer(lambda: self._answer(query, payload)):
             query.close()
 
+    def serve_told(self, query: Query) -> None:
+        """Take in what another replica has found this one to lack."""
+        payload = query.payload or b""
+        if not self.worker.offer(lambda: self._take(query, payload)):
+            query.close()
+
     def meet(self, member: Member) -> None:
         """Compare with a replica that has appeared, at a moment that not all choose alike.
 
@@ -169,7 +175,6 @@ class Synchroniser:
         with query:
             try:
                 sync = decode(payload, Sync)
-                self.state.apply([record.write() for record in sync.records])
                 answer = SyncAnswer(digest=self.state.digest(), ready=self.ready)
                 if sync.digest == _NOTHING:
                     answer.records = [Record.of(write) for write in self.state.writes()]
@@ -180,6 +185,19 @@ class Synchroniser:
                 query.reply_error(str(error))
                 return
             query.reply(query.key, encode(answer))
+
+    def _take(self, query: Query, payload: bytes) -> None:
+        with query:
+            try:
+                reach = self.keys.reach(query.key, self.keys.tell(self.session.zid))
+                writes = [record.write() for record in decode(payload, Sync).records]
+                check_reach((write.path for write in writes), reach)
+                self.state.apply(writes)
+            except DecodeError as error:
+                self.state.complaints.tell("a replica told what is no write", error)
+                query.reply_error(str(error))
+                return
+            query.reply(query.key, encode(SyncAnswer(digest=self.state.digest())))
 
     def _settle(self, index: Index, answer: SyncAnswer) -> None:
         theirs = {path: (time_, clock) for path, time_, clock in index.entries}
@@ -200,6 +218,7 @@ class _Comparison:
         self._zid = zid
         self._done = done
         self._ready = False
+        self._open = 0
 
     def start(self) -> None:
         self._ask(Sync(digest=self._state.digest()), self._on_digest)
@@ -222,10 +241,32 @@ class _Comparison:
 
     def _on_index(self, answer: SyncAnswer) -> None:
         found = [self._state.find(split_path(path)) for path in answer.wanted]
-        records = [Record.of(write) for write in found if write is not None]
-        if records:
-            self._ask(Sync(records=records), lambda _: self._end())
-        else:
+        lacking = [write for write in found if write is not None]
+        # Where keys name how far writes reach, one that may not be made holds up no other.
+        parts = [[write] for write in lacking] if self._owner.keys.scoped else [lacking]
+        self._open = len(parts) if lacking else 0
+        if not self._open:
+            self._end()
+        for part in parts[: self._open]:
+            self._tell(part)
+
+    def _tell(self, writes: list[Write]) -> None:
+        keys, worker = self._owner.keys, self._owner.worker
+        try:
+            self._owner.session.get_async(
+                keys.reaching(keys.tell(self._zid), (write.path for write in writes)),
+                bool,
+                lambda: worker.submit(self._told),
+                payload=encode(Sync(records=[Record.of(write) for write in writes])),
+                timeout=_TIMEOUT,
+            )
+        except RoszError:
+            self._end(failed=True)
+            raise
+
+    def _told(self) -> None:
+        self._open -= 1
+        if not self._open:
             self._end()
 
     def _ask(self, sync: Sync, then: Callable[[SyncAnswer], None]) -> None:

@@ -89,12 +89,15 @@ class _Step(msgspec.Struct, frozen=True):
 
 
 class Watchers:
-    """All watches of one replica, and the thread that calls them back. Safe for threads."""
+    """All watches of one replica, and the thread that calls them back.
+
+    Safe for threads, and for a signal handler that ends a watch.
+    """
 
     def __init__(self) -> None:
         self._watches: tuple[Watch, ...] = ()
         self._steps: deque[_Step] = deque()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._worker: Worker | None = None
         self._closed = False
 

@@ -134,7 +134,7 @@ def run_hooks(reason: str) -> None:
 def _call(hook: Callable[..., object], *args: str) -> None:
     try:
         hook(*args)
-    except Exception as error:  # noqa: BLE001  # the callback boundary
+    except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
         if state.node is not None:
             state.node.log.report(f"shutdown hook {hook!r} failed", error)
         else:

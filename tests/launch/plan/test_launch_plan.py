@@ -279,7 +279,7 @@ def test_failed_commands_are_refused() -> None:
     [
         ('name="" value="1"', "the root of all parameters takes no value"),
         ('name="/" value="1"', "the root of all parameters takes no value"),
-        ('name="big" type="int" value="99999999999999999999"', "64"),
+        ('name="big" type="int" value="99999999999999999999"', "parameter '/big': the int"),
         ('name="none" type="yaml" value="~"', "null"),
     ],
 )

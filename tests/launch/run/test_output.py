@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
@@ -9,8 +10,12 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+import pytest
+
+from rosz.launch.run.output import Output
+
 from .outside import outside
-from .scene import alive, program, shell, wait_until
+from .scene import PATIENCE, alive, launch, program, shell, wait_until
 
 CHATTER = (
     "import sys, time\n"
@@ -173,3 +178,51 @@ def test_a_relay_whose_screen_is_gone_lets_nodes_go_on(tmp_path: Path) -> None:
         wait_until(lambda: count.stat().st_size > before + 20000, "ticks")
         run.process.send_signal(signal.SIGTERM)
         assert run.process.wait(10) == 0
+
+
+def test_many_nodes_and_few_descriptors(tmp_path: Path) -> None:
+    """What brings output to the screen holds more of them than the launch."""
+    nodes = [shell(f"n{i}", f"echo up{i}; exec sleep 600", output="screen") for i in range(40)]
+    limit = ("sh", "-c", 'ulimit -S -n 64; exec "$@"', "sh")
+    with outside(tmp_path, *nodes, prefix=limit, separate=True) as run:
+        for i in range(40):
+            run.expect(rf"\bup{i}\n")
+    assert (tmp_path / "err").read_text() == ""
+
+
+def test_no_descriptors_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who cannot be started for want of them is named, and the rest goes on."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(Output, "screen", refuse)
+    nodes = shell("n", "exit 0", output="screen"), shell("m", "exec sleep 600")
+    with launch(tmp_path, *nodes) as run:
+        run.err.wait_for("cannot write the output of 'n-1' to the screen: Too many open files")
+        assert alive(run.pid("m-2"))
+        assert run.stop() == 1
+
+
+STALLING = shell("n", "while :; do echo ticking along; done", output="screen")
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_screen_that_takes_nothing_holds_up_no_launch(tmp_path: Path, *, terminal: bool) -> None:
+    """A pager, or a terminal behind a link that hangs: nodes start anew, and end, all the same."""
+    count = tmp_path / "count"
+    loud = f"echo >> {count}; seq 100; exit 3"
+    nodes = STALLING, shell("m", loud, output="screen", respawn=True)
+    with outside(tmp_path, *nodes, terminal=terminal) as run:
+        run.expect(r"m-2\]: started with pid")
+        run.expect("ticking")
+        wait_until(count.exists, "first start")
+        before = count.stat().st_size
+        wait_until(lambda: count.stat().st_size > before + 3, "starts anew")
+        (log,) = (tmp_path / "log/latest").glob("roslaunch-*.log")
+        run.process.send_signal(signal.SIGINT)
+        assert run.process.wait(PATIENCE) == 0
+    said = log.read_text()
+    assert said.endswith("[INFO] done\n")
+    pids = [int(pid) for pid in re.findall(r"started with pid \[(\d+)\]", said)]
+    assert not any(map(alive, pids))

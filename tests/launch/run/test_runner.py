@@ -124,6 +124,36 @@ def test_a_dump_that_cannot_be_written_stops_the_launch(tmp_path: Path) -> None:
         run.join()
 
 
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder"])
+def test_a_dump_goes_to_files_alone(tmp_path: Path, kind: str) -> None:
+    target, precious = tmp_path / "dump.yaml", tmp_path / "precious"
+    precious.write_text("mine\n")
+    if kind == "link":
+        target.symlink_to(precious)
+    elif kind == "pipe":
+        os.mkfifo(target)
+    else:
+        target.mkdir()
+    reason = f"is a link to '{precious}'" if kind == "link" else "is no regular file"
+    plan = Plan(setup=(setup("dump", "/a", str(target)),))
+    with (
+        pytest.raises(LaunchError, match=rf"cannot dump to '{target}': it {reason}"),
+        launch(tmp_path, plan=plan, store=MemoryStore(a=1)) as run,
+    ):
+        run.join()
+    assert precious.read_text() == "mine\n"
+
+
+@pytest.mark.parametrize("found", ["../../up", "", "a" * 70_000, "-", "a/b", 7, "ä"])
+def test_a_run_id_that_is_none(tmp_path: Path, found: object) -> None:
+    """Anybody on the network may have set it."""
+    store = MemoryStore(run_id=found)
+    with launch(tmp_path, shell("n", "exit 0"), store=store) as run:
+        assert run.join() == 0
+    assert store.values["/run_id"] == run.runner.run_id != found
+    assert (tmp_path / "log" / run.runner.run_id).is_dir()
+
+
 def test_a_launch_without_nodes_holds_the_parameters_when_alone(tmp_path: Path) -> None:
     with launch(tmp_path, plan=Plan(params=(param("/a", 1),))) as run:
         run.out.wait_for("nobody else holds the parameters: staying until Ctrl-C\n")

@@ -258,6 +258,7 @@ def test_hooks_may_use_the_node(network: Network) -> None:
     program = start(
         network,
         """
+        import sys
         import rospy
         from std_msgs.msg import String
         from std_srvs.srv import Trigger
@@ -275,6 +276,7 @@ def test_hooks_may_use_the_node(network: Network) -> None:
             print(heard, rospy.ServiceProxy("brake", Trigger)().message, flush=True)
         rospy.on_shutdown(hook)
         rospy.on_shutdown(lambda: 1 / 0)
+        rospy.on_shutdown(lambda: sys.exit("in a hook"))
         rospy.on_shutdown(lambda: print("last", flush=True))
         print("ready", flush=True)
         rospy.spin()
@@ -286,6 +288,7 @@ def test_hooks_may_use_the_node(network: Network) -> None:
     assert program.lines[1] == "['halt'] braking"
     assert program.lines[-1] == "last"
     assert "ZeroDivisionError: division by zero" in program.lines
+    assert "SystemExit: in a hook" in program.lines
 
 
 def test_a_newer_node_of_the_name_takes_over(network: Network) -> None:

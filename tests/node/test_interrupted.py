@@ -1,0 +1,70 @@
+"""What a signal handler may call in the midst of the same call: here it is called from within."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+from network import PATIENCE, Network
+
+from rosz.msgs.std_msgs.msg import String
+from rosz.session.settle import Settling
+
+
+def in_time(call: Any) -> None:
+    """Call on a thread of its own, so that one which waits for itself does not end the test run."""
+    thread = threading.Thread(target=call, daemon=True)
+    thread.start()
+    thread.join(PATIENCE)
+    assert not thread.is_alive(), "it waits for the one that it interrupted"
+
+
+def test_subscribing(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    context = network.context()
+    inbox, session = context.inbox, context.session
+    subscriber = session.subscriber
+    opened: list[int] = []
+
+    def interrupted(*args: Any) -> Any:
+        if not opened:
+            opened.append(1)
+            inbox.open(1, lambda _: None)
+        return subscriber(*args)
+
+    monkeypatch.setattr(session, "subscriber", interrupted)
+    in_time(lambda: inbox.open(2, lambda _: None))
+    assert set(inbox._owners) == {"1", "2"}
+
+
+def test_learning_a_type(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    subscription = network.node().subscription("chatter")
+    learn = subscription._learn
+    learned: list[str] = []
+
+    def interrupted(type_name: str, type_hash: str) -> Any:
+        learned.append(type_name)
+        if len(learned) == 1:
+            subscription._channel(String._type, String._type_hash)
+        return learn(type_name, type_hash)
+
+    monkeypatch.setattr(subscription, "_learn", interrupted)
+    in_time(lambda: subscription._channel(String._type_name, String._type_hash))
+    assert len(learned) == 2
+
+
+def test_waiting_for_neighbours(network: Network) -> None:
+    settling = Settling(network.session(), 0, threading.Event())
+    asked: list[int] = []
+
+    class Interrupted(threading.Event):
+        def is_set(self) -> bool:
+            if not asked:
+                asked.append(1)
+                settling.when_settled(lambda: asked.append(2))
+            return super().is_set()
+
+    settling.settled = Interrupted()
+    in_time(lambda: settling.when_settled(lambda: asked.append(3)))
+    assert asked == [1]
+    assert len(settling._waiting) == 2
