@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import secrets
 import socket
+import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -30,9 +31,9 @@ _LEASE_MS = 60_000
 _LEASE_BEYOND_MS = 8_000
 """The same beyond the machine. A link that was cut is opened anew when this is over; TCP by itself
 tries again ever more rarely, so that after a minute's cut it may rest for another one."""
-_LOCAL_LINKS = {"open_timeout": 86_400_000, "accept_timeout": 60_000}
-"""How long either end tries to open a link. Where many start at once answers take long, and one
-that is stopped answers when it goes on; Zenoh tries those that it heard of only once."""
+_LOCAL_LINKS = {"open_timeout": 10_000, "accept_timeout": 60_000, "accept_pending": 1000}
+"""How long either end tries to open a link, and how many may try: where many start at once answers
+take long, and Zenoh tries those that it heard of only once."""
 _OPEN_BEYOND_MS = 3_000
 """The same beyond the machine, where what the network swallowed gives way to the next attempt."""
 _ROUTER_BY = 10.0
@@ -51,10 +52,10 @@ _AUTOCONNECT = {"router": ["router"], "peer": ["router", "peer"], "client": ["ro
 _ONE_DIALS = {"autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}}}
 """Of two that hear of each other, that with the greater id connects. If both do, their links get in
 each other's way, and of eighty that start at once some never are linked."""
-_GREATEST = "fffff"
+_GREATEST = b"\xff\xff"
 """How ids end of sessions that stay on the machine: who reaches beyond may not reach them, so it is
 they who connect. Zenoh compares ends first."""
-_ID_BYTES = 13
+_COUNTDOWN_BYTES, _RANDOM_BYTES = 6, 8
 _EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
 """Who looks for others by multicast has to be reached by those it finds."""
 
@@ -154,10 +155,17 @@ def keys_of(env: Environment) -> KeyFolder | None:
 
 
 def new_id(config: SessionConfig) -> str:
-    """Return an id for a session, if it matters how that compares; empty for any."""
+    """Return an id for a session, if it matters how that compares; empty for any.
+
+    It is smaller the later it is made. So who is there connects to who comes: one that is stopped
+    does so when it goes on, and nobody waits for its answer meanwhile.
+    """
     if config.mode != "peer" or config.reaches_beyond:
         return ""
-    return f"1{secrets.token_hex(_ID_BYTES)}{_GREATEST}"  # no id begins with 0
+    left = (1 << 8 * _COUNTDOWN_BYTES) - time.time_ns() // 1_000_000
+    some = bytearray(secrets.token_bytes(_RANDOM_BYTES))
+    some[0] |= 0x10  # no id begins with 0
+    return (some + left.to_bytes(_COUNTDOWN_BYTES, "little") + _GREATEST).hex()
 
 
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:

@@ -23,7 +23,7 @@ import zenoh
 from rosz.session.presence import marks, stopped_holder
 from rosz.session.sockets import connections
 from rosz.session.starting import start
-from rosz.session.stopped import peer_of
+from rosz.session.stopped import peer_of, ports_of
 
 __all__ = ("close", "parting_from_stopped")
 
@@ -125,7 +125,7 @@ def _look(raw: Any, rendezvous: str) -> _Stopped | None:
     if not there:
         return None
     sessions = {mark.zid for mark in there}
-    ports = {mark.port for mark in there if mark.port}
+    ports = {mark.port for mark in there}.union(*(ports_of(mark.pid) for mark in there))
     ports |= {_port(link.dst) for link in raw.info.links() if str(link.zid) in sessions}
     protocol, _, path = rendezvous.partition("#")[0].partition("?")[0].partition("/")
     if stopped_holder(rendezvous, there) is not None:

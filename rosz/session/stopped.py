@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-__all__ = ("describe", "is_stopped", "listener", "namespace", "peer_of", "remedy")
+__all__ = ("describe", "is_stopped", "listener", "namespace", "peer_of", "ports_of", "remedy")
 
 _PROC = Path("/proc")
 _STOPPED = frozenset("Tt")
@@ -26,7 +26,7 @@ _SHOWN = 60
 def is_stopped(pid: int) -> bool:
     """Tell whether a process of this machine is stopped; one that cannot be seen is not."""
     try:
-        line = (_PROC / str(pid) / "stat").read_text()
+        line = (_PROC / str(pid) / "stat").read_text(errors="replace")
     except OSError:
         return False
     return line.rpartition(")")[2].split()[0] in _STOPPED
@@ -99,8 +99,21 @@ def peer_of(connection: socket.socket) -> int:
     return pid
 
 
+def ports_of(pid: int) -> set[int]:
+    """Return the TCP ports at which a process has sockets, as far as they may be seen."""
+    own = set(_sockets(pid))
+    return {port for name, port, _ in _tcp_sockets() if name in own}
+
+
 def _tcp_listeners(port: int) -> Iterator[str]:
     """Yield the sockets that listen at a port of this machine, as links of open files name them."""
+    for name, here, state in _tcp_sockets():
+        if state == _LISTENS and here == port:
+            yield name
+
+
+def _tcp_sockets() -> Iterator[tuple[str, int, str]]:
+    """Yield the TCP sockets of this machine, as links of open files name them, port and state."""
     for table in ("net/tcp", "net/tcp6"):
         try:
             lines = (_PROC / table).read_text().splitlines()[1:]
@@ -108,8 +121,7 @@ def _tcp_listeners(port: int) -> Iterator[str]:
             continue
         for line in lines:
             place, _, state, *rest = line.split()[1:]
-            if state == _LISTENS and int(place.rpartition(":")[2], 16) == port:
-                yield f"socket:[{rest[5]}]"
+            yield f"socket:[{rest[5]}]", int(place.rpartition(":")[2], 16), state
 
 
 def _sockets(pid: int) -> Iterator[str]:

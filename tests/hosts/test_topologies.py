@@ -6,7 +6,7 @@ import shutil
 import sys
 
 import pytest
-from network import eventually
+from network import eventually, repeats
 
 from hosts.host import Host, HostProgram
 from hosts.scripts import LISTENER, TALKER, first_messages, p95, slack
@@ -138,6 +138,18 @@ def test_multicast_when_asked_for(world: World) -> None:
     assert "/talker" in laptop.ask("node", "list", ROSZ_MULTICAST="1")
     assert unasked.output == ""
     assert other.listening() == []
+
+
+def test_who_was_not_asked_to_look_beyond_hears_all(world: World) -> None:
+    """Nobody can connect to such a node from another machine, so it must be the one that does."""
+    robot, laptop = world.hosts("robot", "laptop")
+    talker(laptop, ROSZ_MULTICAST="1")
+    between = robot.program(LISTENER, "between", ROSZ_MULTICAST="1")
+    between.wait_for("heard")
+    for number in range(repeats(4, 20)):
+        unasked = robot.program(LISTENER, f"unasked{number}")
+        unasked.wait_for("heard")
+    assert robot.ask("node", "list").split().count("/talker") == 1
 
 
 def test_cores_find_each_other_by_multicast(world: World) -> None:

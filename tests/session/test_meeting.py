@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import secrets
 import socket
 
 import pytest
 import zenoh
-from network import Network, repeats
+from network import Network, eventually, repeats
 
 from rosz.session import Session, SessionConfig
+from rosz.session.config import new_id
 from rosz.session.probe import is_answered
 
 PEER = """
@@ -77,3 +79,24 @@ def test_who_is_told_not_to_listen_there(network: Network) -> None:
     environment = network.environment(zenoh_override='listen/endpoints=["tcp/127.0.0.1:0"]')
     with Session.open(SessionConfig.node(environment)):
         assert not is_answered(network.rendezvous)
+
+
+def test_who_was_there_first_connects_to_who_comes(network: Network) -> None:
+    """Of two peers that hear of each other that with the greater id does; its end counts most."""
+    here = SessionConfig.node(network.environment())
+    first = new_id(here)
+    eventually(lambda: bytes.fromhex(new_id(here))[::-1] < bytes.fromhex(first)[::-1], "a later id")
+    everybody = secrets.token_hex(16)
+    assert bytes.fromhex(new_id(here))[::-1] > bytes.fromhex(everybody)[::-1]
+    beyond = SessionConfig.node(network.environment(listen=("tcp/0.0.0.0:0",)))
+    told = SessionConfig.node(network.environment(zenoh_override='connect/endpoints=["tcp/a:7"]'))
+    assert new_id(beyond) == new_id(told) == ""
+    with Session.open(here) as one, Session.open(here) as other:
+        assert bytes.fromhex(one.zid)[::-1] > bytes.fromhex(other.zid)[::-1]
+        eventually(lambda: one.peers() == [other.zid], "a link")
+
+
+def test_the_id_that_somebody_asks_for(network: Network) -> None:
+    environment = network.environment(zenoh_override='id="1234abcd"')
+    with Session.open(SessionConfig.node(environment)) as session:
+        assert session.zid == "1234abcd"
