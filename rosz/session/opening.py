@@ -35,6 +35,8 @@ __all__ = ("open_raw", "places_of")
 _NOBODY = "Unable to connect to any of"
 _RUNTIME = "ZENOH_RUNTIME"
 _ROUTER_RECEIVERS = 16
+_BUSY_BY = 60.0
+"""Seconds that a node waits for a busy router."""
 _RARER = "retry_period_init_ms=100;retry_period_max_ms=86400000;retry_period_increase_factor=4"
 
 _log = logging.getLogger("rosz.session")
@@ -52,7 +54,7 @@ def open_raw(config: SessionConfig, presence: Presence | None = None) -> Any:
             occupied or malformed, or a configuration value is refused.
         UsageError: The override text is malformed.
     """
-    config = _sharing_if_possible(_within_reach(config))
+    config = _sharing_if_possible(_within_reach(_patient(config)))
     settings = _settings(config)
     if presence is not None:
         _listen_where_marked(settings, presence)
@@ -136,6 +138,15 @@ def _sharing_if_possible(config: SessionConfig) -> SessionConfig:
         return config
     _log.warning("no shared memory, for %s cannot be written to: samples go by links", SEGMENTS)
     return msgspec.structs.replace(config, shared_memory=0)
+
+
+def _patient(config: SessionConfig) -> SessionConfig:
+    """Have a node wait longer for who is there: of many that start at once some come last."""
+    if config.mode != "client" or config.must_connect:
+        return config
+    if all(mark.is_stopped for mark in marks(config.rendezvous)):
+        return config
+    return msgspec.structs.replace(config, open_timeout=max(config.open_timeout, _BUSY_BY))
 
 
 def _within_reach(config: SessionConfig) -> SessionConfig:
