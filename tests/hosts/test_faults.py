@@ -212,7 +212,7 @@ with rosz.Node(sys.argv[1]) as node:
     def hear(message):
         global count
         count += 1
-    node.subscription("fast", String, hear, queue_size=10)
+    node.subscription("fast", String, hear, queue_size=30000)  # all of it, on a busy machine too
     print("ready", flush=True)
     for line in sys.stdin:
         print("count", count, flush=True)
