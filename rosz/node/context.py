@@ -6,6 +6,7 @@ import atexit
 import itertools
 import logging
 import os
+import socket
 import threading
 import weakref
 from collections.abc import Callable, Sequence
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from rosz.node.endpoint import Endpoint
     from rosz.params.replica import Replica
+    from rosz.security import Leave
     from rosz.typestore import TypeStore
 
 __all__ = ("Context",)
@@ -59,6 +61,7 @@ class Context:
         inbox: What comes for single subscriptions of this process.
         reason: Why it is shut down, or about to be.
         passing: Whether this is a command rather than a part of the system: it holds no parameters.
+        leave: What rules let this machine do elsewhere, where it knows of any.
         cooperative: Whether the program has shown that it asks for the end by itself.
         forked: Whether this is the copy in a forked child, which can do nothing.
 
@@ -81,6 +84,7 @@ class Context:
         self.domain = self.environment.domain
         config = config or SessionConfig.node(self.environment)
         self.passing = config.must_connect
+        self.leave = _leave(config)
         alone = config.mode == "peer" and not (
             config.connect
             or config.listen
@@ -326,6 +330,15 @@ class Context:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _leave(config: SessionConfig) -> Leave | None:
+    """Return what rules say of this machine, if what it declares is for others as well."""
+    if config.keys is None or not (config.reaches_beyond or config.must_connect):
+        return None
+    from rosz.security import Leave
+
+    return Leave.find(config.keys, socket.gethostname())
 
 
 _contexts: weakref.WeakSet[Context] = weakref.WeakSet()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import threading
 import time
@@ -11,6 +12,7 @@ import msgspec
 
 from rosz.errors import RoszError
 from rosz.node.endpoint import Withdrawal
+from rosz.node.pool import Jobs, Pool
 from rosz.session.starting import start
 from rosz.wire import ProcessToken, own_key
 
@@ -20,9 +22,12 @@ if TYPE_CHECKING:
 
 __all__ = ("NodeInfo", "attach", "control_key")
 
+_log = logging.getLogger("rosz.control")
+
 _REPLACED = "new node registered with same name"
 _ANSWER_BY = 1.0
 _TOGETHER = 0.2
+_THREADS = 4
 
 
 class NodeInfo(msgspec.Struct, frozen=True):
@@ -75,28 +80,36 @@ def attach(node: Node) -> None:
     context = node.context
     key = control_key(context.domain, context.session.zid, node.node_id)
     began = time.monotonic()
+    ending = threading.Lock()
+    rivals: Jobs[ProcessToken] = Jobs()
+    contests: list[Pool[ProcessToken]] = []
 
-    def arrived(query: Query) -> None:
-        start(
-            threading.Thread(
-                target=_serve,
-                args=(node, key, query, began),
-                name=f"rosz-control{node.name}",
-                daemon=True,
-            )
-        )
+    def serve(query: Query) -> None:
+        reason = _serve(node, key, query, began)
+        if reason and ending.acquire(blocking=False):
+            # Hooks of the program may take their time, and more may be asked meanwhile.
+            name = f"rosz-shutdown{node.name}"
+            start(threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True))
+
+    def contend(other: ProcessToken) -> None:
+        _contend(node, other, began)
 
     def appeared(other: ProcessToken, alive: bool) -> None:
         if alive and other.node == node.name and other != node.process:
-            start(threading.Thread(target=_contend, args=(node, other, began), daemon=True))
+            rivals.put(other)
+            if not contests:
+                contests.append(Pool(_THREADS, f"rosz-rivals{node.name}", rivals.take, contend))
 
-    node.keep(context.session.queryable(key, arrived))
+    questions = context.session.questions(key)
+    node.keep(questions)
+    Pool(_THREADS, f"rosz-control{node.name}", questions.take, serve)
+    node.keep(rivals)
     node.keep(Withdrawal(context.graph.listen_to_processes(appeared)))
 
 
 def _contend(node: Node, other: ProcessToken, began: float) -> None:
     """End a node if another one of its name is newer."""
-    if _is_newer(node, other, began):
+    if not node.is_shutdown and _is_newer(node, other, began):
         node.log.warning(
             "shutdown request: %s (process %d on %s)", _REPLACED, other.pid, other.host
         )
@@ -122,17 +135,21 @@ def _is_newer(node: Node, other: ProcessToken, began: float) -> bool:
     return other.newer_than(node.process)
 
 
-def _serve(node: Node, key: str, query: Query, began: float) -> None:
-    shut_down = ""
+def _serve(node: Node, key: str, query: Query, began: float) -> str:
+    """Answer a question; return the reason of the shutdown that is to follow, if one is."""
     with query:
         try:
-            request = msgspec.msgpack.decode(query.payload or b"\x80", type=Request)
-            answer, shut_down = _answer(node, request, time.monotonic() - began)
+            try:
+                request = msgspec.msgpack.decode(query.payload or b"\x80", type=Request)
+                answer, shut_down = _answer(node, request, time.monotonic() - began)
+            except (msgspec.MsgspecError, RoszError, ValueError) as error:
+                query.reply_error(str(error))
+                return ""
             query.reply(key, msgspec.msgpack.encode(answer))
-        except (msgspec.MsgspecError, RoszError, ValueError) as error:
-            query.reply_error(str(error))
-    if shut_down:
-        node.shutdown(shut_down)
+        except RoszError as error:
+            _log.debug("who asks %s cannot be answered: %s", node.name, error)
+            return ""
+    return shut_down
 
 
 def _info(node: Node, age: float) -> NodeInfo:

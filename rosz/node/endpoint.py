@@ -126,6 +126,8 @@ class Endpoint:
             ClosedError: The session is closed.
         """
         context = self.node.context
+        if context.leave and (objection := context.leave.objection(self.token.kind, self.name)):
+            self.node.log.warning("%s", objection)
         context.add_endpoint(self, watch=watch)
         self._declared.append(context.session.token(self._token_key))
 

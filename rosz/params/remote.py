@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
-from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
+from rosz.errors import DecodeError, NoReplica, ParamError, ParamNotFound, WaitTimeout
 from rosz.params.keys import Keys, Member
 from rosz.params.merge import Change, condense, spread
 from rosz.params.paths import joined, split
@@ -157,7 +157,9 @@ class ParamClient:
             self._look()
             return Outcome(0)
         seen = self._ask(Question("stamp")).value
-        self._session.clock.observe(Stamp(int(seen), ""))
+        if type(seen) is not int:
+            raise DecodeError("answer about parameters", -1, f"{seen!r}, expected a stamp")
+        self._session.clock.observe(Stamp(seen, ""))
         stamp = self._session.stamp()
         message = Batch.of((stamp.time, stamp.id), self._origin or process_label(), batch)
         patience = min(ACKNOWLEDGED_BY, self._timeout)

@@ -39,9 +39,6 @@ __all__ = (
     "unseal",
 )
 
-_LATEST: Final = 1 << 62
-"""A time that no clock shows before the year 2116; nothing later can be stamped."""
-
 _MOMENT: Final = 1
 _DATE: Final = 2
 _PLAIN: Final = frozenset({bool, int, float, str, bytes})
@@ -283,8 +280,8 @@ def split_path(text: str) -> Path:
 
 
 def _stamp(time: int, clock: str) -> tuple[int, str]:
-    if not 0 < time < _LATEST:
-        raise DecodeError("parameter stamp", -1, f"the time {time}, expected one before {_LATEST}")
+    if time <= 0:
+        raise DecodeError("parameter stamp", -1, f"the time {time}, expected one after the epoch")
     return time, clock
 
 

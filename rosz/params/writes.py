@@ -11,11 +11,19 @@ from typing import Final, Literal
 
 import msgspec
 
-from rosz.errors import ParamError
+from rosz.errors import DecodeError, ParamError
 from rosz.params.paths import ROOT, Path, joined
 from rosz.params.values import MAX_DEPTH, Value, type_name
 
-__all__ = ("DELETED", "Deleted", "Write", "check_write", "delete", "put")
+__all__ = ("DELETED", "Deleted", "Write", "check_time", "check_write", "delete", "put")
+
+_KNOWN: Final = 1_767_225_600 * 10**9
+"""A moment that is over, the year 2026: clocks without a battery begin anew, years behind."""
+
+_YEAR: Final = 365 * 86_400 * 10**9
+_AHEAD: Final = 10
+"""Years that a clock may be ahead. Were later stamps believed, all that is written after one of
+them would have to be stamped still later, on every machine and for ever."""
 
 
 class Deleted(enum.Enum):
@@ -75,6 +83,26 @@ def delete(path: Path, stamp: tuple[int, str], origin: str = "") -> Write:
         ParamError: The path is too deep.
     """
     return put(path, stamp, DELETED if path else {}, origin)
+
+
+def check_time(write: Write, now: int) -> None:
+    """Refuse a write that is stamped so late that no clock can have been meant.
+
+    Args:
+        write: It.
+        now: What the clock here says, in nanoseconds since the epoch.
+
+    Raises:
+        DecodeError: It is.
+    """
+    ahead = write.time - max(now, _KNOWN)
+    if ahead > _AHEAD * _YEAR:
+        raise DecodeError(
+            "parameter stamp",
+            -1,
+            f"'{joined(write.path)}' of {write.origin!r} is stamped {ahead // _YEAR} years ahead,"
+            f" expected at most {_AHEAD}: set the clock of the machine that wrote it",
+        )
 
 
 def check_write(path: Path, value: Value | Deleted) -> None:

@@ -6,6 +6,7 @@ names each holder of a key may publish, subscribe to, call, serve and set.
 
 from rosz.security.access import access_control
 from rosz.security.folder import KeyFolder
+from rosz.security.leave import Leave
 from rosz.security.rules import Permit, Rules, read_rules
 
-__all__ = ("KeyFolder", "Permit", "Rules", "access_control", "read_rules")
+__all__ = ("KeyFolder", "Leave", "Permit", "Rules", "access_control", "read_rules")

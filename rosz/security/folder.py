@@ -36,10 +36,12 @@ class KeyFolder(msgspec.Struct, frozen=True):
     Attributes:
         path: The folder.
         rules: What others may do; everything when ``None``.
+        rules_file: Where that stands.
     """
 
     path: Path
     rules: Rules | None
+    rules_file: Path | None = None
 
     @classmethod
     def find(cls, folder: Path, host: str) -> KeyFolder:
@@ -64,7 +66,8 @@ class KeyFolder(msgspec.Struct, frozen=True):
                 raise UsageError(f"'{own}' has a key but no '{name}'; copy the whole folder")
         check_private(own / KEY)
         check_trusted(own / AUTHORITY)
-        return cls(own, _rules(own, folder))
+        file = next((one / RULES for one in (own, folder) if os.path.lexists(one / RULES)), None)
+        return cls(own, None if file is None else load_rules(file), file)
 
     @property
     def authority(self) -> Path:
@@ -108,11 +111,6 @@ def check_trusted(file: Path) -> None:
             f"anybody may write '{file}' (mode {mode:04o}): see that it says what it should, then"
             f" 'chmod 600 {file}'"
         )
-
-
-def _rules(*folders: Path) -> Rules | None:
-    found = next((one / RULES for one in folders if os.path.lexists(one / RULES)), None)
-    return load_rules(found) if found is not None else None
 
 
 def load_rules(file: Path) -> Rules:

@@ -64,6 +64,10 @@ class Permit(msgspec.Struct, frozen=True, kw_only=True):
         names = dict.fromkeys(NAME_VERBS, (EVERYTHING,))
         return cls(**names, get=True, control=True)
 
+    def allows(self, verb: str, name: str) -> bool:
+        """Tell whether a verb with names covers a global name."""
+        return any(_matches(pattern, name) for pattern in getattr(self, verb))
+
     @property
     def is_all(self) -> bool:
         """Whether it is leave to do everything."""
@@ -78,6 +82,16 @@ class Rules(msgspec.Struct, frozen=True):
     """
 
     permits: dict[str, Permit]
+
+    def told_of(self, name: str) -> Permit | None:
+        """Return all that a holder may do, if the rules name it; else they may not be meant."""
+        own = self.permits.get(name)
+        if own is None:
+            return None
+        all_may = self.permits.get(ANYBODY, Permit())
+        names = {verb: getattr(own, verb) + getattr(all_may, verb) for verb in NAME_VERBS}
+        flags = {flag: getattr(own, flag) or getattr(all_may, flag) for flag in _FLAGS}
+        return msgspec.convert({**names, **flags}, Permit)
 
 
 def read_rules(text: str, file: str) -> Rules:
@@ -105,6 +119,14 @@ def read_rules(text: str, file: str) -> Rules:
     reader = _Reader(file)
     holders = reader.items(top, "key holders")
     return Rules({str(name.value): reader.permit(value) for name, value in holders})
+
+
+def _matches(pattern: str, name: str) -> bool:
+    parts = [
+        r"(/[^/]+)*" if part == "**" else "/" + re.escape(part).replace(r"\*", "[^/]*")
+        for part in pattern.split("/")[1:]
+    ]
+    return re.fullmatch("".join(parts), name) is not None
 
 
 class _Reader:

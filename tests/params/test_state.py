@@ -3,16 +3,20 @@ from __future__ import annotations
 import logging
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from rosz.errors import ParamError
+from rosz.errors import DecodeError, ParamError
 from rosz.params.replica.state import State
 from rosz.params.wire import Batch, encode, seal
-from rosz.params.writes import Write
+from rosz.params.writes import Write, delete, put
 from rosz.session import HybridClock, Stamp
+
+YEAR = 365 * 86_400 * 10**9
+LATE = (1 << 62) - 1
 
 
 @pytest.fixture
@@ -133,12 +137,55 @@ def test_taking_does_not_wait_for_others() -> None:
 
 def test_own_stamps_are_later_than_all_that_was_noted() -> None:
     shared = state()
-    far = 1 << 61
+    far = time.time_ns() + 9 * YEAR
     shared.note(message("a", 1, far))
     stamp, (_, new, _) = shared.write([(("a",), 2)], "me")
     assert stamp > Stamp(far, "bb")
     assert new == {"a": 2}
     assert shared.stamp() > stamp
+
+
+@pytest.mark.parametrize("clock", [0, 1_795_000_000 * 10**9])
+def test_stamps_years_ahead_are_not_taken_in(
+    clock: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A clock that lost its battery is years behind: what others stamp by theirs is believed."""
+    monkeypatch.setattr(time, "time_ns", lambda: clock)
+    shared = state()
+    now = 1_795_000_000 * 10**9
+    late = [LATE, (1 << 64) - 1, now + 11 * YEAR]
+    with caplog.at_level(logging.WARNING, "rosz.params"):
+        for at in late:
+            shared.note(message("a", "noted", at))
+            shared.take(message("a", "taken", at))
+            assert shared.take_soon(message("a", "soon", at))
+            shared.apply([put(("a",), (at, "bb"), "applied")])
+            with pytest.raises(DecodeError, match=r"'/a' of 'me' is stamped .* years ahead"):
+                shared.write([(("a",), "written")], "me", Stamp(at, "bb"))
+        assert shared.root == {}
+        shared.take(message("b", 1, now))
+    assert shared.root == {"b": 1}
+    assert shared.stamp().time == max(clock, now) + 1
+    assert caplog.text.count("years ahead") == 1
+    assert "'/a' of 'other' is stamped" in caplog.text
+
+
+def test_what_was_saved_years_ahead_counts_as_new(caplog: pytest.LogCaptureFixture) -> None:
+    shared = state()
+    saved = [
+        put(("b",), (5, "bb"), "sound"),
+        put(("a", "x"), (LATE, "bb"), "newest"),
+        put(("a",), (LATE - 1, "bb"), {"x": "older", "y": 1}),
+        delete(("b",), (LATE, "bb")),
+    ]
+    begun = time.time_ns()
+    with caplog.at_level(logging.WARNING, "rosz.params"):
+        assert shared.restore(saved)
+    assert caplog.text.count("counts as written just now") == 1
+    assert shared.root == {"a": {"x": "newest", "y": 1}}
+    assert all(begun < write.time <= shared.stamp().time for write in shared.writes())
+    assert shared.stamp().time < time.time_ns() + YEAR
+    assert not shared.restore(shared.writes())
 
 
 def test_damaged_messages_change_nothing(caplog: pytest.LogCaptureFixture) -> None:

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -248,6 +249,26 @@ def held(saver: Saver) -> threading.Event:
 
     saver._worker.submit(wait)
     return go_on
+
+
+def test_a_file_with_stamps_years_ahead_is_read_and_mended(
+    network: Network, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "params"
+    with closing(Store(path)) as store:
+        store.save([put(("a",), (time, "f0"), "kept") for time in ((1 << 62) - 1, (1 << 62) + 1)])
+        store.save([put(("b",), (5, "f0"), 1)])
+    for _ in range(2):
+        replica = network.replica(keep=Store(path))
+        assert replica.root["a"] in {"kept", "new"}
+        assert replica.set("/a", "new").slow == ()
+        replica.close()
+    assert caplog.text.count("years ahead") == 1
+    with closing(Store(path)) as store:
+        found = {write.path: write for write in store.load()}
+    assert found[("a",)].value == "new"
+    assert found[("a",)].time < time.time_ns() + 10**9
+    assert found[("b",)].time == 5
 
 
 def test_what_comes_right_before_the_end_is_saved() -> None:

@@ -6,9 +6,11 @@ import logging
 
 from rosz.errors import DecodeError
 
-__all__ = ("NO_PARAMETER", "Complaints")
+__all__ = ("AHEAD", "NO_PARAMETER", "SAVED_AHEAD", "Complaints")
 
 NO_PARAMETER = "a replica wrote what is no parameter"
+AHEAD = "a replica wrote what is not taken in"
+SAVED_AHEAD = "what was saved counts as written just now"
 
 _log = logging.getLogger("rosz.params")
 

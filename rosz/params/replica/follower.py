@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from rosz.errors import DecodeError, NoReplica
-from rosz.params.keys import Keys
+from rosz.params.keys import Keys, Member
 from rosz.params.replica.complaints import NO_PARAMETER
 from rosz.params.replica.members import Members
 from rosz.params.replica.reading import Reading
@@ -35,14 +35,14 @@ class Follower(Reading):
 
     def __init__(self, session: Session, domain: int, timeout: float) -> None:
         super().__init__(State(session.clock))
-        keys = Keys(domain)
+        keys = Keys(domain, scoped=session.secured)
         self._worker = Worker("rosz-params")
         self._members = Members(session, keys)
         self._sync = Synchroniser(session, keys, self._state, self._members, self._worker)
         self._keys = keys
         self._subscriber = session.subscriber(f"{keys.change}/**", self._on_change)
         try:
-            self._members.follow(lambda _member, _alive: None, timeout)
+            self._members.follow(self._on_member, timeout)
             self._join()
         except BaseException:
             self.close()
@@ -71,6 +71,10 @@ class Follower(Reading):
         if not self._members.zids:
             raise NoReplica(NOBODY)
         self._sync.join()
+
+    def _on_member(self, member: Member, alive: bool) -> None:
+        if not alive:
+            self._sync.gone(member.zid)
 
     def _on_change(self, sample: Sample) -> None:
         payload, key = sample.payload, sample.key

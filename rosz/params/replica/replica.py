@@ -117,9 +117,7 @@ class Replica(Reading):
         server = Server(self, keys, self._state.stamp, self._worker, lambda: self._sync.ready)
         self._declared: list[Closable] = [
             session.queryable(keys.sync(session.zid), self._sync.serve, complete=True),
-            session.queryable(
-                f"{keys.tell(session.zid)}/**", self._sync.serve_told, complete=True
-            ),
+            session.queryable(f"{keys.tell(session.zid)}/**", self._sync.serve_told, complete=True),
             session.queryable(keys.ask(session.zid), server.serve, complete=True),
             session.queryable(f"{keys.set(session.zid)}/**", server.serve_writes, complete=True),
         ]
@@ -197,6 +195,7 @@ class Replica(Reading):
 
         Raises:
             ParamError: A change has no meaning in the tree; nothing has changed then.
+            DecodeError: The stamp given lies years ahead; nothing has changed then.
             ClosedError: The replica or the session is closed.
             UsageError: The timeout is no number; nothing has changed then.
         """
@@ -282,7 +281,8 @@ class Replica(Reading):
         if keep is None:
             return None
         saver = Saver(keep)
-        self._state.apply(saver.load())
+        if self._state.restore(saver.load()):
+            saver.trim(self._state.writes)
         self._state.feed(saver.take)
         return saver
 
@@ -295,7 +295,7 @@ class Replica(Reading):
         if known:
             self._sync.join()
         else:
-            self._state.apply(self._mirror.restore())
+            self._state.restore(self._mirror.restore())
             self._sync.ready = True
         for member in self._members.all():
             if member.zid not in known:
@@ -304,6 +304,7 @@ class Replica(Reading):
     def _on_member(self, member: Member, alive: bool) -> None:
         if not alive:
             self._line.gone(member.zid)
+            self._sync.gone(member.zid)
         elif self._sync.ready and member < self._own:
             self._sync.meet(member)
 

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Final
+
+from msgspec import structs
 
 from rosz.errors import DecodeError, ParamError
 from rosz.params.history import History
 from rosz.params.keys import check_reach
 from rosz.params.merge import Change
 from rosz.params.paths import ROOT, Path
-from rosz.params.replica.complaints import NO_PARAMETER, Complaints
+from rosz.params.replica.complaints import AHEAD, NO_PARAMETER, SAVED_AHEAD, Complaints
 from rosz.params.replica.watch import Callback, Watch, Watchers
 from rosz.params.tree import Tree
 from rosz.params.wire import Batch, decode, unseal
-from rosz.params.writes import DELETED, Write, delete, put
+from rosz.params.writes import DELETED, Write, check_time, delete, put
 from rosz.session import HybridClock, Stamp
 
 __all__ = ("State", "Step")
@@ -111,24 +114,46 @@ class State:
 
         Raises:
             ParamError: A change has no meaning in the tree; nothing has changed then.
+            DecodeError: The stamp given lies years ahead; nothing has changed then.
         """
         with self._current:
-            stamp = stamp or self._now()
+            given, stamp = stamp, stamp or self._now()
             at = (stamp.time, stamp.id)
             writes = [
                 delete(path, at, origin) if value is DELETED else put(path, at, value, origin)
                 for path, value in changes
             ]
+            if given is not None:
+                now = time.time_ns()
+                for write in writes:
+                    check_time(write, now)
             return stamp, self._apply(writes)
 
     def apply(self, writes: Iterable[Write]) -> Step:
-        """Take in writes of others.
+        """Take in writes of others, except for those stamped years ahead.
 
         Raises:
             ParamError: A write has no meaning in the tree; nothing has changed then.
         """
         with self._current:
-            return self._apply(writes)
+            return self._apply(self._parted(writes, AHEAD)[0])
+
+    def restore(self, writes: Iterable[Write]) -> bool:
+        """Take in writes that were saved; those stamped years ahead as if they were made now.
+
+        Returns:
+            Whether there were such.
+
+        Raises:
+            ParamError: A write has no meaning in the tree.
+        """
+        with self._current:
+            sound, ahead = self._parted(writes, SAVED_AHEAD)
+            self._apply(sound)
+            for write in sorted(ahead, key=lambda write: write.order):
+                now = self._now()
+                self._apply([structs.replace(write, time=now.time, clock=now.id)])
+            return bool(ahead)
 
     def take(self, message: bytes, reach: Path = ROOT) -> None:
         """Apply a message of another replica, sealed; the arguments are those of `note`."""
@@ -246,9 +271,28 @@ class State:
             start = unseal(message)[2]
             writes = decode(memoryview(message)[start:], Batch).writes()
             check_reach((write.path for write in writes), reach)
-            self._apply(writes)
+            self._apply(self._parted(writes, AHEAD)[0])
         except DecodeError as error:
             self.complaints.tell(NO_PARAMETER, error)
+
+    def _parted(self, writes: Iterable[Write], what: str) -> tuple[list[Write], list[Write]]:
+        """Return the writes that clocks can have stamped, and those that lie years ahead.
+
+        Args:
+            writes: All.
+            what: What to say of the latter.
+        """
+        now = time.time_ns()
+        sound: list[Write] = []
+        ahead: list[Write] = []
+        for write in writes:
+            try:
+                check_time(write, now)
+                sound.append(write)
+            except DecodeError as error:
+                self.complaints.tell(what, error)
+                ahead.append(write)
+        return sound, ahead
 
     def _now(self) -> Stamp:
         self._clock.observe(Stamp(self._history.latest, ""))

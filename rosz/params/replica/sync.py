@@ -21,7 +21,9 @@ from typing import Final
 from rosz.errors import DecodeError, RoszError
 from rosz.params.digest import Digest
 from rosz.params.keys import Keys, Member, check_reach
+from rosz.params.paths import Path, common
 from rosz.params.replica.members import Members
+from rosz.params.replica.refusals import Refusals
 from rosz.params.replica.state import State
 from rosz.params.replica.worker import Worker
 from rosz.params.wire import (
@@ -69,6 +71,7 @@ class Synchroniser:
     Attributes:
         ready: Whether this replica has what the others had when it came.
         busy: Those that it is comparing itself with.
+        refusals: What others do not take.
     """
 
     def __init__(
@@ -81,6 +84,7 @@ class Synchroniser:
         self.members = members
         self.worker = worker
         self.busy: set[str] = set()
+        self.refusals = Refusals()
         self._met: set[str] = set()
 
     def join(self) -> None:
@@ -128,7 +132,8 @@ class Synchroniser:
         """Take in what another replica has found this one to lack."""
         payload = query.payload or b""
         if not self.worker.offer(lambda: self._take(query, payload)):
-            query.close()
+            with query:
+                query.reply_error("too much is told to this replica; tell it again later")
 
     def meet(self, member: Member) -> None:
         """Compare with a replica that has appeared, at a moment that not all choose alike.
@@ -138,9 +143,14 @@ class Synchroniser:
         """
         self.worker.submit(lambda: self._meet(member.zid))
 
+    def gone(self, zid: str) -> None:
+        """Begin anew with a replica if it comes back: it may have been out of reach."""
+        self.worker.submit(lambda: self.refusals.forget(zid))
+
     def compare_with_one(self) -> None:
         """Compare with a replica chosen by chance."""
         zids = sorted(self.members.zids)
+        self.worker.submit(lambda: self.refusals.trim(self.state))
         if zids:
             zid = random.choice(zids)  # noqa: S311  # nothing secret
             self.worker.submit(lambda: self._compare(zid))
@@ -218,7 +228,7 @@ class _Comparison:
         self._zid = zid
         self._done = done
         self._ready = False
-        self._open = 0
+        self._parts: list[list[Write]] = []
 
     def start(self) -> None:
         self._ask(Sync(digest=self._state.digest()), self._on_digest)
@@ -240,23 +250,32 @@ class _Comparison:
         self._ask(Sync(index=Index(buckets, entries)), self._on_index)
 
     def _on_index(self, answer: SyncAnswer) -> None:
+        owner = self._owner
         found = [self._state.find(split_path(path)) for path in answer.wanted]
-        lacking = [write for write in found if write is not None]
-        # Where keys name how far writes reach, one that may not be made holds up no other.
-        parts = [[write] for write in lacking] if self._owner.keys.scoped else [lacking]
-        self._open = len(parts) if lacking else 0
-        if not self._open:
+        lacking = [
+            write
+            for write in found
+            if write is not None and not owner.refusals.rests(self._zid, write)
+        ]
+        if lacking:
+            self._parts.append(lacking)
+        self._tell_next()
+
+    def _tell_next(self) -> None:
+        if self._parts:
+            self._tell(self._parts.pop())
+        else:
+            self._owner.refusals.report(self._zid, self._owner.members.label(self._zid))
             self._end()
-        for part in parts[: self._open]:
-            self._tell(part)
 
     def _tell(self, writes: list[Write]) -> None:
         keys, worker = self._owner.keys, self._owner.worker
+        taken: list[bool] = []
         try:
             self._owner.session.get_async(
                 keys.reaching(keys.tell(self._zid), (write.path for write in writes)),
-                bool,
-                lambda: worker.submit(self._told),
+                lambda reply: taken.append(reply.ok),
+                lambda: worker.submit(lambda: self._on_told(writes, taken)),
                 payload=encode(Sync(records=[Record.of(write) for write in writes])),
                 timeout=_TIMEOUT,
             )
@@ -264,10 +283,18 @@ class _Comparison:
             self._end(failed=True)
             raise
 
-    def _told(self) -> None:
-        self._open -= 1
-        if not self._open:
-            self._end()
+    def _on_told(self, writes: list[Write], taken: list[bool]) -> None:
+        # Links that go leave questions without answers just as rules do.
+        if False in taken or self._zid not in self._owner.members.zids:
+            self._end(failed=True)
+            return
+        if not taken and self._owner.keys.scoped:
+            # Rules judge by the path that all of a message lies below: parts of it may pass.
+            if len(writes) > 1:
+                self._parts += _parted(writes)
+            else:
+                self._owner.refusals.add(self._zid, writes[0])
+        self._tell_next()
 
     def _ask(self, sync: Sync, then: Callable[[SyncAnswer], None]) -> None:
         answers: list[bytes] = []
@@ -295,9 +322,18 @@ class _Comparison:
             then(answer)
         except DecodeError as error:
             label = self._owner.members.label(self._zid)
-            _log.warning("the replica in %s answered nonsense: %s", label, error)
+            self._state.complaints.tell(f"the replica in {label} answered nonsense", error)
             self._end(failed=True)
 
     def _end(self, *, failed: bool = False) -> None:
         self._owner.busy.discard(self._zid)
         self._done(self._ready and not failed)
+
+
+def _parted(writes: list[Write]) -> list[list[Write]]:
+    """Return writes by the part of their paths in which they begin to differ."""
+    depth = len(common(write.path for write in writes)) + 1
+    parts: dict[Path, list[Write]] = {}
+    for write in writes:
+        parts.setdefault(write.path[:depth], []).append(write)
+    return list(parts.values())

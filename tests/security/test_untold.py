@@ -1,0 +1,70 @@
+"""Parameters that a machine has written and another may not take, among many that it may."""
+
+from __future__ import annotations
+
+import pytest
+from hosts.host import Host
+from hosts.world import World
+from network import eventually
+
+from rosz.security.authority import Authority
+
+WRITER = """
+    import logging, sys
+    import rosz
+    from rosz.params.replica import keeper, sync
+    logging.basicConfig()
+    keeper._COMPARE_EVERY = (0.2, 0.2)
+    keeper._TICK = 0.2
+    tell = sync._Comparison._tell
+
+    def told(self, writes):
+        print("told", len(writes), min(write.path for write in writes), flush=True)
+        tell(self, writes)
+
+    sync._Comparison._tell = told
+    with rosz.Node("writer") as node:
+        store = node.context.params
+        store._line.tell = lambda *_: ()  # as if the link were cut
+        store.merge("/", {
+            "gains": {f"g{n}": n for n in range(2000)},
+            "secrets": {"pin": 1, "word": "x"},
+            "gains_too": 1,
+        })
+        print("wrote", flush=True)
+        for line in sys.stdin:
+            for _ in range(int(line)):
+                print("compared", store.compare(60), flush=True)
+"""
+
+
+@pytest.fixture
+def pair(world: World, authority: Authority) -> tuple[Host, Host]:
+    robot, laptop = world.hosts("robot", "laptop")
+    for host in (robot, laptop):
+        host.variables["ROSZ_KEYS"] = str(authority.add(host.name))
+    return robot, laptop
+
+
+@pytest.mark.parametrize("permitted", [True, False])
+def test_what_rules_forbid_holds_up_nothing_and_is_told_once(
+    pair: tuple[Host, Host], authority: Authority, permitted: bool
+) -> None:
+    robot, laptop = pair
+    some = ", set: ['/gains/**']" if permitted else ""
+    (authority.folder / "robot/rules.yaml").write_text(f"laptop: {{get: true{some}}}\n")
+    robot.rosz("core", "--listen", "tcp/0.0.0.0:7447").wait_for("started core")
+    writer = laptop.program(WRITER, ROSZ_CONNECT="tcp/robot:7447")
+    warning = writer.wait_for("which differs there from now on", 60)
+    assert f" and {2 if permitted else 2002} more" in warning
+    begun = len(writer.lines)
+    writer.say("5")
+    eventually(lambda: writer.output.count("compared") == 5, "5 comparisons", 60)
+    assert "compared True" in writer.output  # those that the keeper is at already say False
+    assert [line for line in writer.lines[begun:] if line.startswith("told")] == []
+    assert writer.output.count("differs there from now on") == 1
+    held = robot.ask("param", "list").split()
+    assert ("/gains/g1999" in held) == permitted
+    assert not {"/secrets/pin", "/secrets/word", "/gains_too"} & {*held}
+    # Those that pass do so together.
+    assert len([line for line in writer.lines if line.startswith("told")]) < 10 or not permitted
