@@ -24,6 +24,10 @@ DEFAULT_RENDEZVOUS = "tcp/localhost:7447"
 """Where sessions of one machine meet; rmw_zenoh's router port."""
 
 _MAX_DOMAIN = 232
+_MAX_PORT = 65535
+_WITH_PORT = frozenset({"tcp", "udp", "tls", "quic", "ws"})
+_PROTOCOLS = _WITH_PORT | {"unixsock-stream", "unixpipe", "vsock", "serial"}
+"""Of Zenoh's links; which of them there are depends on how it was built."""
 
 
 class Environment(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,7 +52,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         package_roots: Folders to look for packages in, first ones first.
         completion: ``ROSZ_COMPLETION_TIMEOUT``: seconds that the TAB key waits at most; 0.5.
         console_format: ``ROSCONSOLE_FORMAT``.
-        color: Whether terminals get colours; ``NO_COLOR`` says no.
+        color: Whether terminals get colours; ``NO_COLOR`` and ``TERM=dumb`` say no.
         home: ``ROS_HOME`` or ``~/.ros``.
         log_dir: ``ROS_LOG_DIR`` or ``<home>/log``.
     """
@@ -85,15 +89,16 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         """
         env = os.environ if environ is None else environ
         home = Path(env.get("ROS_HOME") or Path(env.get("HOME") or "/") / ".ros")
-        connect = _endpoints(env.get("ROSZ_CONNECT", ""))
-        listen = _endpoints(env.get("ROSZ_LISTEN", ""))
+        connect = _endpoints("ROSZ_CONNECT", env)
+        listen = _endpoints("ROSZ_LISTEN", env)
         return cls(
             domain=_domain(env.get("ROS_DOMAIN_ID", "")),
-            rendezvous=env.get("ROSZ_RENDEZVOUS") or DEFAULT_RENDEZVOUS,
+            rendezvous=_endpoint("ROSZ_RENDEZVOUS", env.get("ROSZ_RENDEZVOUS", ""))
+            or DEFAULT_RENDEZVOUS,
             connect=connect,
             listen=listen,
             mode=_mode(env.get("ROSZ_MODE", ""), dials=bool(connect and not listen)),
-            multicast=env.get("ROSZ_MULTICAST", "") not in {"", "0"},
+            multicast=_switch("ROSZ_MULTICAST", env),
             shared_memory=_bytes("ROSZ_SHM", env.get("ROSZ_SHM", "")),
             keys=Path(env["ROSZ_KEYS"]).expanduser().absolute() if env.get("ROSZ_KEYS") else None,
             namespace=env.get("ROS_NAMESPACE", ""),
@@ -103,7 +108,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
             package_roots=_package_roots(env, cwd or _working_folder()),
             completion=_seconds("ROSZ_COMPLETION_TIMEOUT", env, 0.5),
             console_format=env.get("ROSCONSOLE_FORMAT", ""),
-            color=not env.get("NO_COLOR"),
+            color=not env.get("NO_COLOR") and env.get("TERM") != "dumb",
             home=home,
             log_dir=Path(env.get("ROS_LOG_DIR") or home / "log"),
         )
@@ -173,8 +178,28 @@ def _working_folder() -> Path:
         return Path("/")
 
 
-def _endpoints(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(",") if part.strip())
+def _endpoints(name: str, env: Mapping[str, str]) -> tuple[str, ...]:
+    parts = env.get(name, "").split(",")
+    return tuple(_endpoint(name, part.strip()) for part in parts if part.strip())
+
+
+def _endpoint(name: str, text: str) -> str:
+    protocol, _, address = text.partition("#")[0].partition("?")[0].partition("/")
+    port = address.rpartition(":")[2] if protocol in _WITH_PORT else "0"
+    is_port = port.isascii() and port.isdigit() and int(port) <= _MAX_PORT
+    if text and not (protocol in _PROTOCOLS and address and is_port):
+        raise UsageError(
+            f"{name} is '{text}'; expected PROTOCOL/ADDRESS, such as '{DEFAULT_RENDEZVOUS}' or"
+            " 'unixsock-stream//tmp/robot.sock'"
+        )
+    return text
+
+
+def _switch(name: str, env: Mapping[str, str]) -> bool:
+    text = env.get(name, "")
+    if text not in {"", "0", "1"}:
+        raise UsageError(f"{name} is '{text}'; expected '1' for on, '0' for off")
+    return text == "1"
 
 
 def _domain(text: str) -> int:

@@ -120,8 +120,48 @@ def test_shipped_packages_are_found(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("ROS_DOMAIN_ID", "x"), ("ROS_DOMAIN_ID", "233"), ("ROSZ_MODE", "mesh"), ("ROSZ_SHM", "-1")],
+    [
+        ("ROS_DOMAIN_ID", "x"),
+        ("ROS_DOMAIN_ID", "233"),
+        ("ROSZ_MODE", "mesh"),
+        ("ROSZ_SHM", "-1"),
+        ("ROSZ_MULTICAST", "maybe"),
+        ("ROSZ_COMPLETION_TIMEOUT", "soon"),
+        ("ROSZ_RENDEZVOUS", "bogus"),
+        ("ROSZ_RENDEZVOUS", "localhost:7447"),
+        ("ROSZ_RENDEZVOUS", "tcp/localhost"),
+        ("ROSZ_RENDEZVOUS", "tcp/localhost:77777"),
+        ("ROSZ_RENDEZVOUS", "tpc/localhost:7447"),
+        ("ROSZ_RENDEZVOUS", "unixsock-stream/"),
+        ("ROSZ_CONNECT", "robot"),
+        ("ROSZ_LISTEN", "0.0.0.0"),
+    ],
 )
 def test_meaningless_settings_are_refused(tmp_path: Path, name: str, value: str) -> None:
-    with pytest.raises(UsageError, match=f"{name} is '{value}'"):
+    with pytest.raises(UsageError, match=f"{name} is '{value}'; expected "):
         Environment.read({name: value}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    ["tcp/[::1]:7447", "udp/robot:1?rel=1", "tls/robot:7447#iface=eth0", "unixsock-stream//a/z"],
+)
+def test_endpoints_as_zenoh_has_them(tmp_path: Path, endpoint: str) -> None:
+    variables = {"ROSZ_RENDEZVOUS": endpoint, "ROSZ_CONNECT": f"tcp/base:7447, {endpoint}"}
+    found = Environment.read(variables, tmp_path)
+    assert found.rendezvous == endpoint
+    assert found.connect == ("tcp/base:7447", endpoint)
+
+
+def test_switches(tmp_path: Path) -> None:
+    found = [Environment.read({"ROSZ_MULTICAST": value}, tmp_path).multicast for value in "10"]
+    assert found == [True, False]
+    assert not Environment.read({}, tmp_path).multicast
+
+
+@pytest.mark.parametrize(
+    ("variables", "color"),
+    [({}, True), ({"TERM": "xterm"}, True), ({"TERM": "dumb"}, False), ({"NO_COLOR": "1"}, False)],
+)
+def test_who_wants_no_colours(tmp_path: Path, variables: dict[str, str], color: bool) -> None:
+    assert Environment.read(variables, tmp_path).color is color

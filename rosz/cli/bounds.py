@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rosz.errors import UsageError
 
-__all__ = ("at_least", "seconds")
+__all__ = ("at_least", "per_second", "seconds")
 
 _LONGEST = 1e9
 """Thirty years: what waits for longer is a slip, and more than some clocks of the system hold."""
@@ -23,6 +23,21 @@ def seconds(option: str, value: float) -> float:
     """
     if not 0 < value <= _LONGEST:
         raise UsageError(f"{option} is {value:g}; expected seconds above 0, at most {_LONGEST:g}")
+    return value
+
+
+def per_second(option: str, value: float) -> float:
+    """Return how often something is to be done.
+
+    Args:
+        option: What gives it.
+        value: Times a second.
+
+    Raises:
+        UsageError: It is no rate.
+    """
+    if not 1 / _LONGEST <= value <= _MOST:
+        raise UsageError(f"{option} is {value:g}; expected a rate above 0, at most {_MOST:g} Hz")
     return value
 
 

@@ -40,10 +40,9 @@ class Option:
         metavar: What help calls its value.
         help: What help says of it.
         hidden: Whether help leaves it out.
-        min: The least value.
     """
 
-    __slots__ = ("help", "hidden", "metavar", "min", "names")
+    __slots__ = ("help", "hidden", "metavar", "names")
 
     def __init__(
         self,
@@ -51,13 +50,11 @@ class Option:
         metavar: str | None = None,
         help: str | None = None,  # noqa: A002  # as typer calls it
         hidden: bool = False,
-        min: int | None = None,  # noqa: A002  # as typer calls it
     ) -> None:
         self.names = names
         self.metavar = metavar
         self.help = help
         self.hidden = hidden
-        self.min = min
 
     def spelled(self, argument: str) -> tuple[str, ...]:
         """Return all its spellings.

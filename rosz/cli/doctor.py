@@ -6,9 +6,9 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
+from rosz.cli.bounds import seconds
 from rosz.cli.declare import App, Option
 from rosz.cli.group import print_json, takes_escapes
-from rosz.errors import UsageError
 
 if TYPE_CHECKING:
     from rosz.doctor import Examination, Finding
@@ -31,8 +31,8 @@ def doctor_command(
 
     Exit code 1 if there is an error; a warning, which may be meant, is none.
     """
-    if not wait >= 0:
-        raise UsageError(f"--wait is {wait:g}; expected seconds, 0 or more")
+    if wait:
+        seconds("--wait", wait)
     from rosz.doctor import Examination, examine
     from rosz.environment import Environment
 

@@ -29,7 +29,7 @@ def init_keys(
     name: Annotated[
         str, Option(metavar="NAME", help="What certificates call the authority.")
     ] = "rosz",
-    days: Annotated[int, Option(min=1, metavar="DAYS", help="How long it is good for.")] = 3650,
+    days: Annotated[int, Option(metavar="DAYS", help="How long it is good for.")] = 3650,
 ) -> None:
     """Make a folder of keys, with an authority that signs them."""
     from rosz.cli.bounds import at_least
@@ -55,7 +55,7 @@ def add_keys(
             help="An address or further name that others reach the host at; repeatable.",
         ),
     ] = None,
-    days: Annotated[int, Option(min=1, metavar="DAYS", help="How long they are good for.")] = 825,
+    days: Annotated[int, Option(metavar="DAYS", help="How long they are good for.")] = 825,
     folder: _Folder = "",
 ) -> None:
     """Make keys for machines or people."""

@@ -11,8 +11,9 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import LaunchError, TransportError, UsageError
+from rosz.introspect.reach import command_config
 from rosz.launch.run.control import order, statuses
-from rosz.session import Session, SessionConfig
+from rosz.session import Session
 
 if TYPE_CHECKING:
     from rosz.launch.run import LaunchStatus, NodeStatus
@@ -35,7 +36,7 @@ def control(words: Sequence[str], *, status: bool, restart: str, stop: str, as_j
         raise UsageError("--status, --restart and --stop stand alone: one of them, and no file")
     environment = Environment.read()
     try:
-        session = Session.open(SessionConfig.command(environment))
+        session = Session.open(command_config(environment))
     except TransportError as error:
         raise LaunchError(
             f"no launch is running: nobody answers at {environment.rendezvous}"

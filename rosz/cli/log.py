@@ -83,8 +83,10 @@ def _set_level(call: Call, words: Sequence[str]) -> None:
     from rosz.introspect import control
     from rosz.introspect.nodes import members
     from rosz.introspect.survey import take
+    from rosz.node.severity import parse_severity
 
     _, node, logger, level = words
+    parse_severity(level)
     with call.session() as session:
         for token in members(take(session, call.domain), call.resolve(node, _TOOL)):
             control.set_level(session, token, logger, level)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -16,6 +17,8 @@ from typing import TYPE_CHECKING, NoReturn
 from rosz.errors import RoszError, UsageError, near_miss
 
 if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
     from rosz.cli.declare import App
 
 __all__ = ("COMMANDS", "main", "run")
@@ -48,6 +51,7 @@ def main() -> None:
     """Run the command line of this process, and exit with its code."""
     gc.set_threshold(_GARBAGE)
     _stand_in_for_closed_streams()
+    _name_stdout()
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()
@@ -55,7 +59,7 @@ def main() -> None:
         _forget_stdout()
     except OSError as error:
         _forget_stdout()
-        code = code or _fail(f"cannot write to standard output: {error.strerror}", 1)
+        code = code or _fail(_of_system(error), 1)
     _leave(code)
 
 
@@ -68,6 +72,33 @@ def _stand_in_for_closed_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115  # for good, and pathlib takes long to load
+
+
+class _Stdout(io.FileIO):
+    """Standard output, whose errors tell where they come from."""
+
+    def write(self, data: ReadableBuffer, /) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            error.filename = "cannot write to standard output"
+            raise
+
+
+def _name_stdout() -> None:
+    """Have errors of standard output, at whatever write they come, told as such."""
+    given = sys.stdout
+    if not isinstance(given, io.TextIOWrapper) or given.closed or given.name != "<stdout>":
+        return
+    raw = _Stdout(given.fileno(), "w", closefd=False)
+    raw.name = given.name
+    sys.stdout = io.TextIOWrapper(
+        raw if given.write_through else io.BufferedWriter(raw),  # as python -u has it
+        encoding=given.encoding,
+        errors=given.errors,
+        line_buffering=given.line_buffering,
+        write_through=given.write_through,
+    )
 
 
 def _leave(code: int) -> NoReturn:
@@ -110,11 +141,6 @@ def _of_system(error: OSError) -> str:
     """Return what to say of the system's refusal, which often tells no place."""
     if error.filename:
         return f"{error.filename}: {error.strerror}"
-    try:
-        sys.stdout.flush()  # what could not be written is still there, and refused again
-    except OSError as again:
-        _forget_stdout()
-        return f"cannot write to standard output: {again.strerror}"
     try:
         os.getcwd()  # noqa: PTH109  # pathlib takes long to load
     except FileNotFoundError:

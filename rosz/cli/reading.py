@@ -183,10 +183,6 @@ class _Line:
 
 def _value(one: Parameter, word: str) -> Any:
     try:
-        value = one.kind(word)
+        return one.kind(word)
     except ValueError:
         raise _Unsound from None
-    least = one.mark.min if isinstance(one.mark, Option) else None
-    if least is not None and value < least:
-        raise _Unsound
-    return value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from rosz.cli.bounds import at_least
+from rosz.cli.bounds import at_least, per_second
 from rosz.cli.declare import Argument, Context, Option
 from rosz.cli.group import call_of, new_group, print_json, print_lines
 from rosz.errors import UsageError
@@ -274,8 +274,8 @@ def pub_command(
     """Publish messages."""
     if rate is not None and once:
         raise UsageError("-r and -1 exclude each other")
-    if rate is not None and not rate > 0:
-        raise UsageError(f"-r is {rate:g}; expected a rate above 0")
+    if rate is not None:
+        per_second("-r", rate)
     if values and file:
         raise UsageError("-f gives the messages: no values are taken beside it")
     from rosz.cli.topic_pub import pub

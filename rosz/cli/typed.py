@@ -76,5 +76,5 @@ def _in_words_of_typer(hint: Any) -> Any:
     if isinstance(mark, Argument):
         return Annotated[hint.__origin__, typer.Argument(metavar=mark.metavar)]
     assert isinstance(mark, Option)  # noqa: S101  # there is no third
-    option = typer.Option(*mark.names, metavar=mark.metavar, hidden=mark.hidden, min=mark.min)
+    option = typer.Option(*mark.names, metavar=mark.metavar, hidden=mark.hidden)
     return Annotated[hint.__origin__, option]

@@ -13,6 +13,7 @@ from rosz.doctor.finding import Finding, error, warning
 from rosz.environment import Environment
 from rosz.errors import TransportError
 from rosz.session import Session, SessionConfig
+from rosz.session.config import keys_of
 
 __all__ = ("check_connect", "check_rendezvous", "check_socket_files", "why_refused")
 
@@ -112,6 +113,7 @@ def _greets(endpoint: str, environment: Environment) -> bool:
         rendezvous=endpoint,
         must_connect=True,
         open_timeout=_GREETING_SECONDS,
+        keys=keys_of(environment),
         override=environment.zenoh_override,
     )
     try:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections import defaultdict
 from collections.abc import Iterator
 
 import msgspec
 
-from rosz.doctor.finding import Finding, error
+from rosz.doctor.finding import Finding, error, warning
 from rosz.doctor.stopped import state
 from rosz.introspect.survey import Survey, place, take
 from rosz.node.control import NodeInfo, Request, control_key
@@ -71,6 +72,16 @@ def check_answers(
         return
     silent &= set(take(session, survey.domain, processes=True).processes)
     silent -= set(interview(session, survey.domain))
+    barred = _barred(session, survey, silent, answers)
+    silent -= barred
+    if barred:
+        yield warning(
+            "silent-machine",
+            f"{len(barred)} nodes are listed, and none of their machines answers",
+            sorted(_name(survey, node) for node in barred),
+            "nothing, if the rules there are not to let this machine control nodes (control: in"
+            " rules.yaml); else they hang, or the link to their machine is broken",
+        )
     if silent:
         yield error(
             "unreachable-node",
@@ -79,6 +90,17 @@ def check_answers(
             "they hang, are stopped (Ctrl-Z: 'fg' lets them go on), or the link to their machine"
             " is broken: check it with ping, and end them with 'rosz node kill'",
         )
+
+
+def _barred(
+    session: Session, survey: Survey, silent: set[_Node], answers: dict[_Node, Answer]
+) -> set[_Node]:
+    """Return the nodes that rules may keep from answering: all of a machine that needs keys."""
+    if not session.secured:
+        return set()
+    known = {node: process.host for node, process in survey.processes.items()}
+    speak = {known.get(node, "") for node in answers} | {socket.gethostname()}
+    return {node for node in silent if node in known and known[node] not in speak}
 
 
 def check_sight(

@@ -16,19 +16,22 @@ from typing import TYPE_CHECKING
 from rosz.environment import Environment
 from rosz.errors import TransportError
 from rosz.session import Session, SessionConfig, places_of
-from rosz.session.presence import is_anybody_awake, is_router_stopped, why_unanswered
+from rosz.session.presence import is_anybody_awake, is_router_stopped, marks, why_unanswered
 from rosz.session.probe import is_answered
 from rosz.session.settle import Settling
 
 if TYPE_CHECKING:
     from rosz.node import Context
 
-__all__ = ("open_context", "open_session")
+__all__ = ("command_config", "open_context", "open_session")
 
 _MEET_SECONDS = 0.5
 """Somewhat more than the pause in which a lone peer tries the rendezvous again."""
 _SETTLE_SECONDS = 1.0
 _LOOK_SECONDS = 0.002
+_ANSWER_SECONDS = 1.0
+_BUSY_SECONDS = 10.0
+"""How long one that is known to be awake may take to answer, as where many start at once."""
 
 
 def open_session(environment: Environment) -> Session:
@@ -40,7 +43,7 @@ def open_session(environment: Environment) -> Session:
     _check_awake(environment)
     if _may_answer(environment):
         try:
-            return Session.open(SessionConfig.command(environment))
+            return Session.open(command_config(environment))
         except TransportError as error:
             _check_free(environment, error)
     session = Session.open(SessionConfig.node(environment))
@@ -70,7 +73,7 @@ def open_context(
     _check_awake(environment)
     if not lasting and _may_answer(environment):
         try:
-            return Context(environment, argv, SessionConfig.command(environment))
+            return Context(environment, argv, command_config(environment))
         except TransportError as error:
             _check_free(environment, error)
     context = Context(environment, argv)
@@ -83,14 +86,27 @@ def open_context(
     return context
 
 
+def command_config(environment: Environment) -> SessionConfig:
+    """Return what the session of a command that asks and ends is to be.
+
+    It waits longer where a session of rosz is awake: whatever listens there will answer.
+    """
+    rendezvous = environment.rendezvous
+    awake = not _reaches_beyond(environment) and any(not m.is_stopped for m in marks(rendezvous))
+    return SessionConfig.command(environment, _BUSY_SECONDS if awake else _ANSWER_SECONDS)
+
+
+def _reaches_beyond(environment: Environment) -> bool:
+    return bool(environment.connect or environment.multicast or environment.zenoh_config)
+
+
 def _check_awake(environment: Environment) -> None:
     """See that not all who are there are stopped.
 
     Raises:
         TransportError: They are.
     """
-    beyond = environment.connect or environment.multicast or environment.zenoh_config
-    if not beyond and not is_anybody_awake(environment.rendezvous):
+    if not _reaches_beyond(environment) and not is_anybody_awake(environment.rendezvous):
         stopped = why_unanswered(environment.rendezvous)
         if stopped:
             raise TransportError(stopped)
@@ -99,10 +115,8 @@ def _check_awake(environment: Environment) -> None:
 def _may_answer(environment: Environment) -> bool:
     """Tell whether it is worth the wait to try as a client."""
     return bool(
-        environment.connect
-        or environment.multicast
+        _reaches_beyond(environment)
         or environment.mode == "client"
-        or environment.zenoh_config
         or (is_answered(environment.rendezvous) and not is_router_stopped(environment.rendezvous))
     )
 

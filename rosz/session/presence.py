@@ -9,6 +9,7 @@ the port of the loopback where its session can be reached directly.
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import sys
@@ -18,6 +19,7 @@ from zlib import crc32
 
 import msgspec
 
+from rosz.errors import TransportError
 from rosz.session.probe import is_answered
 from rosz.session.stopped import describe, is_stopped, listener, namespace, remedy
 
@@ -71,6 +73,9 @@ class Presence:
     Args:
         rendezvous: Endpoint where it meets others.
         reachable: Whether a port is to be kept for it until it listens there itself.
+
+    Raises:
+        TransportError: There is one in this process that is not reachable either: a router.
     """
 
     def __init__(self, rendezvous: str, *, reachable: bool = True) -> None:
@@ -114,7 +119,16 @@ class Presence:
     def _leave(self, mark: Mark) -> None:
         made = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         parts = (mark.space, mark.pid, mark.port, mark.zid)
-        made.bind(f"\0{_start(self.rendezvous)}{'/'.join(map(str, parts))}")
+        try:
+            made.bind(f"\0{_start(self.rendezvous)}{'/'.join(map(str, parts))}")
+        except OSError as error:
+            made.close()
+            if error.errno != errno.EADDRINUSE:
+                raise
+            raise TransportError(
+                f"this process has a router at {self.rendezvous} already, and there is one for"
+                " each meeting point: close that one first"
+            ) from error
         self._sockets.append(made)
 
 

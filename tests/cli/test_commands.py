@@ -141,13 +141,27 @@ def test_a_full_disk_is_told_of_the_file(network: Network) -> None:
     node = network.node()
     node.params.set("/a", 1)
     line = [sys.executable, "-P", "-m", "rosz", "param", "dump"]
-    variables = {k: v for k, v in network.variables().items() if k != "PYTHONUNBUFFERED"}
     done = subprocess.run(
-        [*line, "/dev/full"], env=variables, capture_output=True, text=True, check=False
+        [*line, "/dev/full"], env=network.variables(), capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (1, "rosz: /dev/full: No space left on device\n")
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"], ids=["buffered", "unbuffered"])
+@pytest.mark.parametrize("size", [1, 100_000], ids=["little", "much"])
+def test_a_full_disk_is_told_of_standard_output(
+    network: Network, unbuffered: str, size: int
+) -> None:
+    network.node().params.set("/a", "x" * size)
     with open("/dev/full", "w") as full:  # noqa: PTH123  # a device, written to by a child
-        done = subprocess.run(line, env=variables, stdout=full, stderr=-1, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", "rosz", "param", "get", "/a"],
+            env=network.variables(PYTHONUNBUFFERED=unbuffered),
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     expected = "rosz: cannot write to standard output: No space left on device\n"
     assert (done.returncode, done.stderr) == (1, expected)
 
@@ -188,14 +202,19 @@ def test_a_second_signal_is_the_same_wish_or_ends_at_once(
 
 
 @pytest.mark.parametrize(
-    ("variable", "value", "reason"),
+    ("variable", "value", "code", "reason"),
     [
-        ("ROSZ_CONNECT", "bogus", "of the form <protocol>/<address>"),
-        ("ZENOH_SESSION_CONFIG_URI", "/nonexistent.json5", "No such file"),
+        ("ROSZ_CONNECT", "bogus", 2, "ROSZ_CONNECT is 'bogus'; expected PROTOCOL/ADDRESS"),
+        (
+            "ZENOH_SESSION_CONFIG_URI",
+            "/nonexistent.json5",
+            1,
+            "cannot read the Zenoh configuration: No such file",
+        ),
     ],
 )
 def test_a_refused_setting_is_told_beside_a_live_node(
-    network: Network, variable: str, value: str, reason: str
+    network: Network, variable: str, value: str, code: int, reason: str
 ) -> None:
     network.node()
     done = subprocess.run(
@@ -205,9 +224,8 @@ def test_a_refused_setting_is_told_beside_a_live_node(
         text=True,
         check=False,
     )
-    assert done.returncode == 1
-    assert done.stderr.startswith("rosz: cannot read the Zenoh configuration: ")
-    assert reason in done.stderr
+    assert done.returncode == code
+    assert done.stderr.startswith(f"rosz: {reason}")
 
 
 def test_a_topic_without_a_name(network: Network, capsys: pytest.CaptureFixture[str]) -> None:

@@ -50,4 +50,4 @@ def test_much_evidence_is_counted(shell: Shell, network: Network) -> None:
 def test_a_wait_that_means_nothing(shell: Shell) -> None:
     result = shell("doctor", "--wait", "-1")
     assert result.code == 2
-    assert "--wait is -1; expected seconds, 0 or more" in result.err
+    assert "--wait is -1; expected seconds above 0" in result.err

@@ -105,7 +105,7 @@ def test_levels(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "text"),
     [
-        (["level", "/ns/busy", "rosout", "loud"], 1, "'loud' is no level"),
+        (["level", "/ns/busy", "rosout", "loud"], 2, "'loud' is no level"),
         (["level", "/ns/busy", "leg", "INFO"], 1, "has no logger 'leg'"),
         (["level", "/ns/bus", "rosout", "INFO"], 1, "did you mean '/ns/busy'?"),
         (["level", "/ns/busy"], 2, "rosz log level NODE LOGGER LEVEL"),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import signal
 
 import pytest
 from network import Network
 
+from rosz.errors import TransportError
+from rosz.session import Session, SessionConfig
 from rosz.session.presence import is_anybody_awake
 
 OLD = """
@@ -44,3 +47,12 @@ def test_a_newcomer_right_after_the_death_of_the_first(network: Network) -> None
     programs["first"].kill()
     newcomer = network.program(NEW)
     assert newcomer.wait_for("read") == "read ['first', 'second', 'third']"
+
+
+def test_a_second_router_of_a_process_is_refused(network: Network) -> None:
+    config = SessionConfig(mode="router", rendezvous=network.rendezvous)
+    with Session.open(config):
+        told = rf"has a router at {re.escape(network.rendezvous)} already.*: close that one first"
+        with pytest.raises(TransportError, match=told):
+            Session.open(config)
+    Session.open(config).close()

@@ -66,6 +66,20 @@ def test_a_process_that_is_stopped(network: Network) -> None:
     assert not is_stopped(program.pid)
 
 
+def test_a_process_whose_name_is_no_utf8(network: Network) -> None:
+    program = network.program(
+        """
+        from pathlib import Path
+        Path("/proc/self/comm").write_bytes(b"\\xff) T (")
+        print("up")
+        input()
+        """
+    )
+    program.wait_for("up")
+    assert not is_stopped(program.pid)
+    stop(program)
+
+
 def test_a_process_by_its_command(network: Network, tmp_path: Path) -> None:
     script = tmp_path / "talker.py"
     script.write_text("print('up'); input()")

@@ -104,10 +104,13 @@ class SystemContext:
         """Return the content of a file.
 
         Raises:
-            OSError: It cannot be read.
+            OSError: It cannot be read, or is no regular file: a pipe may never end, or begin.
         """
-        with Path(self.cwd, path).open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
+        file = Path(self.cwd, path)
+        if file.exists() and not (file.is_file() or file.is_dir() or path == os.devnull):
+            raise OSError(errno.EINVAL, "it is no regular file", path)
+        with file.open("rb") as stream:
+            data = stream.read(_MOST_BYTES + 1)
         if len(data) > _MOST_BYTES:
             raise OSError(errno.EFBIG, f"too large, expected at most {_MOST_BYTES} bytes", path)
         return data

@@ -157,7 +157,7 @@ class Agent:
         except LaunchError as error:
             self._outbox.send(Notice(f"WARNING: {error}; going on without logs"))
             folder = None
-        self._output = Output(self._loop)
+        self._output = Output(self._loop, lambda text: self._outbox.send(Notice(text)))
         workplace = Workplace(
             package_index(environment), environment, self._environ, str(Path.cwd())
         )

@@ -22,10 +22,14 @@ class Console:
         out: For what goes well.
         err: For what does not.
         verbose: Whether notes are printed too.
+        color: Whether terminals get colours.
     """
 
-    def __init__(self, out: TextIO, err: TextIO, *, verbose: bool = False) -> None:
+    def __init__(
+        self, out: TextIO, err: TextIO, *, verbose: bool = False, color: bool = True
+    ) -> None:
         self._verbose = verbose
+        self._color = color
         self._out = out
         self._err = err
         self._screen = Screen()
@@ -82,7 +86,7 @@ class Console:
     def _print(self, stream: TextIO, text: str, colour: str, level: str) -> None:
         if text and self.log is not None:
             self.log.write(level, text)
-        if colour and stream.isatty():
+        if colour and self._color and stream.isatty():
             text = f"{colour}{text}{_PLAIN}"
         self._put(stream, f"{text}\n")
 

@@ -23,7 +23,9 @@ _PROC = Path("/proc")
 _TICKS = os.sysconf("SC_CLK_TCK")
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _CENSUS_SECONDS = 0.05
-_STATE, _GROUP, _UTIME, _STIME, _RSS = 0, 2, 11, 12, 21
+_STATE, _GROUP, _UTIME, _STIME, _VSIZE, _RSS = 0, 2, 11, 12, 20, 21
+_LOOKS, _LOOK_SECONDS = 10, 0.002
+"""How often those are looked at again that show no environment: some have none for good."""
 
 
 class Usage(msgspec.Struct, frozen=True):
@@ -74,19 +76,30 @@ def _stat(pid: str) -> list[str]:
 
 def family(tag: str) -> dict[int, str]:
     """Return the processes whose mark is, or begins with, a text, with their whole marks."""
+    return _look(tag)[0]
+
+
+def _look(tag: str) -> tuple[dict[int, str], bool]:
+    """Return the processes of a family, and whether some may be that show no environment now.
+
+    That is so in the instant in which a process becomes another program.
+    """
     found: dict[int, str] = {}
+    unclear = False
     name = TAG.encode() + b"="
     wanted = name + tag.encode()
     for pid in _processes():
         with suppress(OSError):  # it ended meanwhile, or belongs to another user
             environ = Path(_PROC, pid, "environ").read_bytes()
+            # What has ended, and threads of the kernel, hold no memory either.
+            unclear = unclear or (not environ and _stat(pid)[_VSIZE] != "0")
             if wanted not in environ:
                 continue
             for variable in environ.split(b"\0"):
                 mark = variable.removeprefix(name).decode(errors="replace")
                 if variable.startswith(wanted) and belongs(mark, tag):
                     found[int(pid)] = mark
-    return found
+    return found, unclear
 
 
 def belongs(mark: str, tag: str) -> bool:
@@ -97,11 +110,19 @@ def belongs(mark: str, tag: str) -> bool:
 def kill_family(tag: str) -> None:
     """Kill all processes that carry a mark; those that appear meanwhile too."""
     killed: set[int] = set()
-    while fresh := set(family(tag)) - killed:
+    looks = _LOOKS
+    while looks:
+        found, unclear = _look(tag)
+        fresh = set(found) - killed
         for pid in fresh:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
         killed |= fresh
+        if not fresh:
+            if not unclear:
+                return
+            looks -= 1
+            time.sleep(_LOOK_SECONDS)
 
 
 class Census:

@@ -28,6 +28,8 @@ _DRAIN_SECONDS = 0.5
 """How long the relay may take to show the last lines before a death is reported without them."""
 _END_SECONDS = 5.0
 """How long a screen that takes nothing, such as a stopped terminal, holds up the end."""
+_LEAST_LIFE_SECONDS = 1.0
+"""A relay that dies sooner would die again."""
 _ASK_SECONDS = 0.5
 """How long the relay may take to hear a request, unless it is known to hear none."""
 
@@ -61,14 +63,20 @@ class Output:
 
     Args:
         loop: Where its answers are awaited.
+        warn: Told when it has died.
     """
 
-    def __init__(self, loop: Loop) -> None:
+    def __init__(self, loop: Loop, warn: Callable[[str], None]) -> None:
         self._loop = loop
+        self._warn = warn
         self._waiting: dict[int, tuple[Told, Timer]] = {}
         self._unread = b""
         self._terminals = (os.isatty(1), os.isatty(2))
         self._same = _same_file(1, 2)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._began = self._loop.now()
         self._requests, theirs = socket.socketpair()
         self._requests.settimeout(_ASK_SECONDS)
         script = Path(__file__).with_name("relay.py")
@@ -80,7 +88,7 @@ class Output:
                 start_new_session=True,
                 cwd="/",
             )
-        loop.watch(self._requests.fileno(), self._answered)
+        self._loop.watch(self._requests.fileno(), self._answered)
 
     def screen(self, owner: int, prefix: str) -> Streams:
         """Return streams that end up on the screen.
@@ -180,11 +188,27 @@ class Output:
         except ConnectionError:
             data = b""
         if not data:
-            self._loop.unwatch(self._requests.fileno())
+            self._lost()
         *lines, self._unread = (self._unread + data).split(b"\n")
         for line in lines:
             answer = json.loads(line)
             self._tell(answer["id"], tuple(answer["tail"]))
+
+    def _lost(self) -> None:
+        """Begin anew after the death of the relay, unless it has only just begun."""
+        self._loop.unwatch(self._requests.fileno())
+        code = self._process.wait()
+        self._unread = b""
+        told = f"what shows the output of nodes (pid {self._process.pid}) has died ({code}): nodes"
+        if self._loop.now() - self._began < _LEAST_LIFE_SECONDS:
+            self._warn(f"{told} write to nobody from now on")
+            return
+        self._warn(
+            f"{told} that run now write to nobody, and may end of it; those that start from now on"
+            " are shown again ('rosz launch --restart NODE')"
+        )
+        self._requests.close()
+        self._begin()
 
     def close(self) -> None:
         """Have everything shown, and end the relay; again is no error."""

@@ -286,6 +286,8 @@ class Process:
 
     def _give_up(self) -> None:
         """Stop waiting for what not even SIGKILL ends, such as a process stuck in a driver."""
+        if self.alive:  # as far as anybody knows here
+            self.ended = self._loop.now()
         self._gone()
 
     def _gone(self) -> None:

@@ -117,7 +117,8 @@ class Runner:
         self._workplace = workplace
         self._network = network
         self._options = options
-        self._console = Console(out, err, verbose=options.verbose)
+        color = workplace.environment.color
+        self._console = Console(out, err, verbose=options.verbose, color=color)
         self._loop = Loop()
         self._machines = Machines(self._loop, self._console)
         self._stop: Callable[[], None] = self._loop.stop
@@ -145,7 +146,7 @@ class Runner:
             ParamError: A parameter is not acceptable.
             UsageError: The options do not fit the plan.
         """
-        output = Output(self._loop)
+        output = Output(self._loop, self._console.error)
         try:
             supervisor = self._prepare(output)
             self._supervise(supervisor)
@@ -210,7 +211,7 @@ class Runner:
 
     def _introduce(self) -> None:
         plan, console = self._plan, self._console
-        if self._options.title:
+        if self._options.title and self._workplace.environ.get("TERM") != "dumb":
             console.title(",".join(plan.files))
         if self._options.overview:
             machines = any(not is_local(machine) for machine in plan.machines)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from rosz.errors import RoszError
 from rosz.ros1.rclpy import state
 from rosz.ros1.rclpy.task import Future, Task
+from rosz.session.waiting import patience
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -285,4 +286,4 @@ class MultiThreadedExecutor(Executor):
 
 def _deadline(timeout: float | None) -> float | None:
     """Return when a wait ends; negative and missing timeouts mean never, as in rclpy."""
-    return None if timeout is None or timeout < 0 else time.monotonic() + timeout
+    return None if timeout is None or timeout < 0 else time.monotonic() + patience(timeout)

@@ -24,6 +24,7 @@ from rosz.ros1.rospy.names import resolve_name
 from rosz.ros1.rospy.service import ServiceEnd, ServiceException
 from rosz.ros1.rospy.state import context, helper
 from rosz.ros1.rospy.state import is_shutdown as ended
+from rosz.session.waiting import patience
 from rosz.time import DurationValue
 
 __all__ = ("ServiceProxy", "wait_for_message", "wait_for_service")
@@ -134,6 +135,7 @@ def wait_for_service(service: str, timeout: float | DurationValue | None = None)
     Raises:
         ROSException: Nobody did in time.
         ValueError: The time is 0.
+        UsageError: The time is no number.
         ROSInterruptException: The node was shut down meanwhile.
     """
     if timeout == 0:
@@ -164,6 +166,7 @@ def wait_for_message(
 
     Raises:
         ROSException: None came in time.
+        UsageError: The time is no number.
         ROSInterruptException: The node was shut down meanwhile.
     """
     from rosz.ros1.rospy.topics import Subscriber
@@ -193,7 +196,7 @@ def _deadline(timeout: float | DurationValue | None) -> float:
     if timeout is None:
         return time.monotonic() + _FOREVER
     seconds = timeout.to_sec() if isinstance(timeout, DurationValue) else timeout
-    return time.monotonic() + seconds
+    return time.monotonic() + patience(seconds)
 
 
 def _check_running() -> None:

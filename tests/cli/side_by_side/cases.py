@@ -65,6 +65,7 @@ service find std_srvs/SetBool
 service find nothing/Nothing
 service args /power
 service args /robot/reset
+service args /nowhere
 service node /power
 service uri /power
 service call /power true
@@ -141,6 +142,7 @@ DIFFERENCES = {
     "topic delay /counter": "a topic without a header is told once and ends it, not per message",
     "topic pub -1 /cmd std_msgs/Int32 hello": "rosz refuses a value that ROS 1 quietly drops",
     "topic nothing": _USAGE,
+    "service args /nowhere": "what is not there is code 1; ROS 1's 2 means wrong usage here",
     "service call /power 1 2": "a call that fails has code 1; ROS 1's 2 means wrong usage here",
     "service call /nowhere": "a call that fails has code 1; ROS 1's 2 means wrong usage here",
     "node info /listener": "tells the command line; a link to another node has no socket to tell",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -77,10 +78,36 @@ def test_a_command_without_end_is_ended(tmp_path: Path) -> None:
     assert not Path("/proc", (tmp_path / "pid").read_text().strip()).exists()
 
 
+READING = [
+    '<param name="a" textfile="{}"/>',
+    '<param name="a" binfile="{}"/>',
+    '<rosparam file="{}"/>',
+    '<include file="{}"/>',
+]
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("text", READING)
+@pytest.mark.parametrize("name", ["pipe", "/dev/zero"])
+def test_what_is_no_regular_file_is_refused(tmp_path: Path, text: str, name: str) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "a.launch").write_text(f"<launch>{text.format(name)}</launch>")
+    where = rf"a\.launch:1:\d+: '{name}' cannot be read: it is no regular file"
+    with pytest.raises(LaunchFileError, match=where):
+        plan(["a.launch"], {}, outside(tmp_path))
+
+
+def test_nothing_can_be_read(tmp_path: Path) -> None:
+    (tmp_path / "a.launch").write_text('<launch><rosparam file="/dev/null"/></launch>')
+    assert plan(["a.launch"], {}, outside(tmp_path)).params == ()
+
+
 def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
-    text = '<launch><param name="a" textfile="/dev/zero"/></launch>'
+    with (tmp_path / "large").open("wb") as large:
+        large.truncate(64 * 1024 * 1024 + 1)
+    text = '<launch><param name="a" textfile="large"/></launch>'
     (tmp_path / "a.launch").write_text(text)
-    with pytest.raises(LaunchFileError, match=r"a\.launch:1:35: '/dev/zero' .*: too large"):
+    with pytest.raises(LaunchFileError, match=r"a\.launch:1:35: 'large' .*: too large"):
         plan(["a.launch"], {}, outside(tmp_path))
 
 

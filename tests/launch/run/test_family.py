@@ -7,7 +7,9 @@ import secrets
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -53,6 +55,33 @@ def test_all_descendants_are_killed(tag: str, parent: subprocess.Popen[bytes]) -
     kill_family(tag)
     parent.wait(10)
     wait_until(lambda: not any(map(alive, pids)), "end of both")
+
+
+def test_who_becomes_another_program_is_killed_as_well(
+    tag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with subprocess.Popen(["sleep", "600"]) as changing:
+        entry = tmp_path / str(changing.pid)
+        entry.mkdir()
+        (entry / "environ").write_bytes(b"")
+        (entry / "stat").write_text(Path(f"/proc/{changing.pid}/stat").read_text())
+        monkeypatch.setattr("rosz.launch.run.family._PROC", tmp_path)
+        shown = f"A=1\0ROSZ_LAUNCH={tag}:1\0".encode()
+        monkeypatch.setattr(time, "sleep", lambda _: (entry / "environ").write_bytes(shown))
+        kill_family(tag)
+        monkeypatch.undo()
+        assert changing.wait(10) == -signal.SIGKILL
+
+
+def test_who_has_no_environment_holds_up_nothing(tag: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with subprocess.Popen(["sleep", "600"], env={}) as bare:
+        looks: list[float] = []
+        monkeypatch.setattr(time, "sleep", looks.append)
+        kill_family(tag)
+        monkeypatch.undo()
+        assert 1 <= len(looks) <= 20
+        assert bare.poll() is None
+        bare.kill()
 
 
 def test_marks_of_an_inner_launch_belong_to_the_outer(tag: str) -> None:

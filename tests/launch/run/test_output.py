@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -164,6 +165,51 @@ def test_a_relay_is_found_while_it_runs(tmp_path: Path) -> None:
     with outside(tmp_path, shell("n", "echo hello; exec sleep 600", output="screen")) as run:
         run.expect(r"\nhello\n")
         assert len(_relays_of(run._reading)) == 1
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_another_relay_takes_the_place_of_one_that_died(tmp_path: Path, *, terminal: bool) -> None:
+    script = "while :; do echo tick || exit 3; sleep 0.05; done"
+    node = shell("n", script, output="screen", respawn=True)
+    with outside(tmp_path, node, shell("m", "exec sleep 600"), terminal=terminal) as run:
+        run.expect(r"tick\r?\n")
+        relay = _relay_below(run.process.pid)
+        wait_until(lambda: _age(relay) > 1.5, "some life")
+        os.kill(relay, signal.SIGKILL)
+        run.expect(
+            rf"what shows the output of nodes \(pid {relay}\) has died \(-9\): nodes that run"
+        )
+        run.expect(r"\[n-1\] restarting process(.*\n)+tick\r?\n")
+        assert alive(run.pids()[1])
+        run.process.send_signal(signal.SIGINT)
+        assert run.finish() == 0
+    assert "Traceback" not in run.text
+
+
+def test_a_relay_that_dies_at_once_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosz.launch.run.output._LEAST_LIFE_SECONDS", 1000.0)
+    with launch(tmp_path, shell("n", "exec sleep 600", output="screen")) as run:
+        pid = run.pid("n-1")
+        os.kill(_relay_below(os.getpid()), signal.SIGKILL)
+        run.err.wait_for("has died (-9): nodes write to nobody from now on")
+        assert alive(pid)
+        assert run.stop() == 0
+
+
+def _relay_below(pid: int) -> int:
+    """Return the relay that a process has started."""
+    for entry in Path(f"/proc/{pid}/task").iterdir():
+        for child in (entry / "children").read_text().split():
+            if b"relay.py" in Path(f"/proc/{child}/cmdline").read_bytes():
+                return int(child)
+    raise AssertionError(f"{pid} has no relay")
+
+
+def _age(pid: int) -> float:
+    """Return for how many seconds a process has been there."""
+    return time.time() - Path(f"/proc/{pid}").stat().st_ctime
 
 
 def test_a_relay_whose_screen_is_gone_lets_nodes_go_on(tmp_path: Path) -> None:

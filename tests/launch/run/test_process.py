@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -12,6 +13,7 @@ from rosz.launch.run.family import Usage
 from rosz.launch.run.host import Confirmed, Ended, Job
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.process import Process, State, Timeouts
+from rosz.launch.run.summary import reason
 
 from .scene import program
 
@@ -90,6 +92,21 @@ def loop() -> Iterator[Loop]:
     made = Loop()
     yield made
     made.close()
+
+
+def test_what_nothing_ends_ended_when_it_was_given_up(loop: Loop) -> None:
+    machine, record = Machine(pending=False), Record()
+    process = Process(
+        program("n", "x"), "n-1", 1, machine, loop, record, timeouts=Timeouts(0.01, 0.01)
+    )
+    process.begin()
+    process.stop()
+    while not process.over:
+        loop.step(5.0)
+    assert process.ended > process.began
+    assert re.fullmatch(
+        r"did not end when asked to, and was killed after [1-9][0-9.]* s", reason(process)
+    )
 
 
 @pytest.mark.parametrize("pending", [False, True], ids=["here", "there"])

@@ -231,3 +231,18 @@ def test_a_call_ends_with_the_node(network: Network) -> None:
         "call -> ServiceException | service [/slow] returned no response",
         "after -> ServiceException | service [/slow] unavailable",
     ]
+
+
+def test_a_wait_that_is_no_time_is_refused(network: Network) -> None:
+    lines = run(
+        network,
+        f"""{BEGIN}
+    from std_msgs.msg import String
+
+    nan = float("nan")
+    show("message", lambda: rospy.wait_for_message("none", String, timeout=nan))
+    show("service", lambda: rospy.wait_for_service("none", timeout=nan))
+""",
+    )
+    told = "UsageError | timeout is 'nan': expected a number of seconds"
+    assert lines == [f"message -> {told}", f"service -> {told}"]

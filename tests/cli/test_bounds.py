@@ -1,0 +1,94 @@
+"""Numbers of command lines that make no sense are refused, whoever reads the line."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rosz.cli.main import COMMANDS
+from rosz.cli.reading import options, read
+from rosz.cli.typed import to_typer
+from rosz.errors import UsageError
+
+COUNTS = ["0", "-1", "2000000000"]
+TIMES = ["0", "-1", "nan", "inf", "1e300"]
+LINES = {
+    "launch --sigint-timeout {} x.launch": TIMES,
+    "launch --sigterm-timeout {} x.launch": TIMES,
+    "launch --lost-after {} x.launch": TIMES,
+    "param watch -n {} /a": COUNTS,
+    "reconfigure get --timeout {} /a": TIMES,
+    "reconfigure set --timeout {} /a b 1": TIMES,
+    "reconfigure set_from_parameters --timeout {} /a": TIMES,
+    "reconfigure dump --timeout {} /a a.yaml": TIMES,
+    "reconfigure load --timeout {} /a a.yaml": TIMES,
+    "reconfigure describe --timeout {} /a": TIMES,
+    "reconfigure watch --timeout {} /a": TIMES,
+    "reconfigure watch -n {} /a": COUNTS,
+    "topic echo -n {} /a": COUNTS,
+    "topic echo -w {} /a": ["0", "1", "-1", "2000000000"],
+    "topic hz --window {} /a": ["0", "1", "2000000000"],
+    "topic bw --window {} /a": ["0", "1", "2000000000"],
+    "topic delay --window {} /a": ["0", "1", "2000000000"],
+    "topic pub --rate {} /a std_msgs/String b": TIMES,
+    "service call --timeout {} /a": TIMES,
+    "node ping -c {} /a": COUNTS,
+    "log -n {}": COUNTS,
+    "keys init --days {} keys": COUNTS,
+    "keys add --days {} robot": COUNTS,
+    "doctor --wait {}": TIMES[1:],
+}
+
+
+def _call(name: str, words: list[str], *, typer: bool) -> None:
+    app: Any = import_module(f"rosz.cli.{name}").app
+    if typer:
+        context, left = app.sorted_out(words)
+        to_typer(app, context)(args=left, prog_name="x", standalone_mode=False)
+        return
+    ready = read(app, words)
+    assert ready is not None
+    ready()
+
+
+def _refusal(name: str, words: list[str], *, typer: bool) -> str:
+    with pytest.raises(UsageError) as refused:
+        _call(name, words, typer=typer)
+    return str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "value"), [(line, value) for line, values in LINES.items() for value in values]
+)
+def test_a_number_out_of_bounds_is_refused(
+    line: str, value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("x.launch").write_text("<launch/>")
+    Path("a.yaml").write_text("a: 1")
+    name, *words = [word.format(value) for word in line.split()]
+    told = _refusal(name, words, typer=True)
+    assert "; expected " in told
+    if not value.startswith("-"):  # which only typer reads
+        assert _refusal(name, words, typer=False) == told
+
+
+def test_no_number_is_left_out() -> None:
+    tried = {
+        (name, words[0] if import_module(f"rosz.cli.{name}").app.text else "", option)
+        for name, *words in map(str.split, LINES)
+        for option in words
+        if option.startswith("-")
+    }
+    for name in COMMANDS:
+        for command, declared in import_module(f"rosz.cli.{name}").app.commands.items():
+            numbers = {
+                one.name: [s for s, o in options(declared.function).items() if o.name == one.name]
+                for one in options(declared.function).values()
+                if one.kind in {int, float}
+            }
+            for spellings in numbers.values():
+                assert any((name, command, each) in tried for each in spellings), spellings
