@@ -8,7 +8,7 @@ multicast is off unless asked for.
 
 from __future__ import annotations
 
-import secrets
+import os
 import socket
 import time
 from collections.abc import Mapping
@@ -163,7 +163,7 @@ def new_id(config: SessionConfig) -> str:
     if config.mode != "peer" or config.reaches_beyond:
         return ""
     left = (1 << 8 * _COUNTDOWN_BYTES) - time.time_ns() // 1_000_000
-    some = bytearray(secrets.token_bytes(_RANDOM_BYTES))
+    some = bytearray(os.urandom(_RANDOM_BYTES))
     some[0] |= 0x10  # no id begins with 0
     return (some + left.to_bytes(_COUNTDOWN_BYTES, "little") + _GREATEST).hex()
 
