@@ -161,19 +161,18 @@ def test_its_view_of_us(sdk: Partner, node: Node) -> None:
     node.publisher("scan", Image)
     node.subscription("cmd", Twist, print)
     node.service("add", AddTwoInts, lambda _: 0)
-    topics = {
-        "/scan": ["sensor_msgs/msg/Image"],
-        "/cmd": ["geometry_msgs/msg/Twist"],
-        "/rosout": ["rcl_interfaces/msg/Log"],
+    expected = {
+        "topics": {
+            "/scan": ["sensor_msgs/msg/Image"],
+            "/cmd": ["geometry_msgs/msg/Twist"],
+            "/rosout": ["rcl_interfaces/msg/Log"],
+        },
+        "services": {"/add": ["example_interfaces/srv/AddTwoInts"]},
     }
-    services = {"/add": ["example_interfaces/srv/AddTwoInts"]}
 
     def is_whole() -> bool:
         seen = sdk("see")
-        return (
-            topics.items() <= seen["topics"].items()
-            and services.items() <= seen["services"].items()
-        )
+        return all(of_us.items() <= seen[kind].items() for kind, of_us in expected.items())
 
     # Each look asks anew, and while the two link directly it may find only a part.
     eventually(is_whole, "all of us in its view")
