@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from hosts.host import Host, HostProgram
-from hosts.world import World
 from network import eventually
 
 from rosz.security.authority import Authority
@@ -88,15 +87,6 @@ FORGER = """
         session.put("@rosz/0/change/gains", fair)
         print("done", flush=True)
 """
-
-
-@pytest.fixture
-def pair(world: World, authority: Authority) -> tuple[Host, Host]:
-    """A robot with a core and rules, and a laptop with a key."""
-    robot, laptop = world.hosts("robot", "laptop")
-    for host in (robot, laptop):
-        host.variables["ROSZ_KEYS"] = str(authority.add(host.name))
-    return robot, laptop
 
 
 def start(robot: Host, authority: Authority, rules: str) -> HostProgram:

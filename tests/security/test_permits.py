@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import pytest
 from hosts.host import Host, HostProgram
-from hosts.world import World
 from network import eventually
-
-from rosz.security.authority import Authority
 
 SERVER = """
     import sys, threading
@@ -22,12 +19,10 @@ SERVER = """
 
 
 @pytest.fixture
-def pair(world: World, authority: Authority) -> tuple[Host, Host]:
-    robot, laptop = world.hosts("robot", "laptop")
-    for host in (robot, laptop):
-        host.variables["ROSZ_KEYS"] = str(authority.add(host.name))
+def pair(pair: tuple[Host, Host]) -> tuple[Host, Host]:
+    _, laptop = pair
     laptop.variables["ROSZ_CONNECT"] = "tcp/robot:7447"
-    return robot, laptop
+    return pair
 
 
 def start(pair: tuple[Host, Host], rules: str) -> HostProgram:

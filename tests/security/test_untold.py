@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from hosts.host import Host
-from hosts.world import World
 from network import eventually
 
 from rosz.security.authority import Authority
@@ -36,14 +35,6 @@ WRITER = """
             for _ in range(int(line)):
                 print("compared", store.compare(60), flush=True)
 """
-
-
-@pytest.fixture
-def pair(world: World, authority: Authority) -> tuple[Host, Host]:
-    robot, laptop = world.hosts("robot", "laptop")
-    for host in (robot, laptop):
-        host.variables["ROSZ_KEYS"] = str(authority.add(host.name))
-    return robot, laptop
 
 
 @pytest.mark.parametrize("permitted", [True, False])
