@@ -36,7 +36,6 @@ MODULES = (
     "genmsg",
     "genpy",
     "message_filters",
-    "rclpy",
     "rosgraph",
     "roslib",
     "rosmsg",
@@ -55,8 +54,8 @@ MODULES = (
 )
 """ROS 1's Python modules, which lie beside this one."""
 
-_RENAMED = {"tf_transformations": "tf.transformations"}
-"""Names that ROS 2 has for what ROS 1 has under another one."""
+_ELSEWHERE = {"rclpy": "ros2.rclpy", "tf_transformations": "ros1.tf.transformations"}
+"""ROS 2's names, and where below ``rosz`` their modules lie."""
 
 _KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
 _CFG = "cfg"
@@ -180,7 +179,7 @@ class _First(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self.types = types
         self._shipped = shipped_packages()
-        self._modules = frozenset((*MODULES, *_RENAMED))
+        self._modules = frozenset((*MODULES, *_ELSEWHERE))
 
     def find_spec(
         self,
@@ -198,7 +197,8 @@ class _First(MetaPathFinder):
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
         if root in self._modules:
-            return self._known(fullname, f"rosz.ros1.{_RENAMED.get(fullname, fullname)}")
+            ours = _ELSEWHERE.get(root, f"ros1.{root}") + fullname[len(root) :]
+            return self._known(fullname, f"rosz.{ours}")
         if root in self._shipped and not rest:
             return _same(fullname, lambda: import_module(f"rosz.msgs.{root}"))
         return None

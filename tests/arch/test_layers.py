@@ -50,6 +50,7 @@ FLOORS = {
     "rosz.transforms": 6,
     "rosz.turtlesim": 6,
     "rosz.ros1": 7,
+    "rosz.ros2": 7,
     "rosz.workspace": 7,
     "rosz.cli": 8,
 }

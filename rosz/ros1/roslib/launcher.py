@@ -10,7 +10,7 @@ from rosz.ros1.rospkg import RosPack
 
 __all__ = ("load_manifest",)
 
-_PROVIDED = frozenset({*MODULES, "rosbag", "roscpp", "rosconsole", "rosout"})
+_PROVIDED = frozenset({*MODULES, "rclpy", "rosbag", "roscpp", "rosconsole", "rosout"})
 """Packages of ROS itself that are no folder here: what they have imports without them."""
 
 

@@ -8,25 +8,25 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeVar
 from rosz.errors import UsageError
 from rosz.node import Node as RoszNode
 from rosz.node.standard import simulate
-from rosz.ros1.rclpy import state
-from rosz.ros1.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
-from rosz.ros1.rclpy.client import Client
-from rosz.ros1.rclpy.clock import Clock, Rate, ROSClock
-from rosz.ros1.rclpy.declared import Declared
-from rosz.ros1.rclpy.exceptions import NotInitializedException
-from rosz.ros1.rclpy.logging import RcutilsLogger, write_as_rclpy
-from rosz.ros1.rclpy.node_graph import NodeGraph
-from rosz.ros1.rclpy.node_parameters import NodeParameters
-from rosz.ros1.rclpy.parameter import Parameter
-from rosz.ros1.rclpy.publisher import Publisher
-from rosz.ros1.rclpy.qos import QoSProfile, to_qos
-from rosz.ros1.rclpy.service import Service
-from rosz.ros1.rclpy.subscription import Subscription
-from rosz.ros1.rclpy.timer import Timer
+from rosz.ros2.rclpy import state
+from rosz.ros2.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
+from rosz.ros2.rclpy.client import Client
+from rosz.ros2.rclpy.clock import Clock, Rate, ROSClock
+from rosz.ros2.rclpy.declared import Declared
+from rosz.ros2.rclpy.exceptions import NotInitializedException
+from rosz.ros2.rclpy.logging import RcutilsLogger, write_as_rclpy
+from rosz.ros2.rclpy.node_graph import NodeGraph
+from rosz.ros2.rclpy.node_parameters import NodeParameters
+from rosz.ros2.rclpy.parameter import Parameter
+from rosz.ros2.rclpy.publisher import Publisher
+from rosz.ros2.rclpy.qos import QoSProfile, to_qos
+from rosz.ros2.rclpy.service import Service
+from rosz.ros2.rclpy.subscription import Subscription
+from rosz.ros2.rclpy.timer import Timer
 
 if TYPE_CHECKING:
-    from rosz.ros1.rclpy.context import Context
-    from rosz.ros1.rclpy.executors import Entity, Executor
+    from rosz.ros2.rclpy.context import Context
+    from rosz.ros2.rclpy.executors import Entity, Executor
 
 __all__ = ("Node",)
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rosz.ros1.rclpy.context import Context
-    from rosz.ros1.rclpy.executors import Executor
+    from rosz.ros2.rclpy.context import Context
+    from rosz.ros2.rclpy.executors import Executor
 
 __all__ = ("default_context", "global_executor")
 
@@ -26,7 +26,7 @@ _held = _Held()
 def default_context() -> Context:
     """Return the context that is meant when none is given."""
     if _held.context is None:
-        from rosz.ros1.rclpy.context import Context
+        from rosz.ros2.rclpy.context import Context
 
         _held.context = Context()
     return _held.context
@@ -34,7 +34,7 @@ def default_context() -> Context:
 
 def global_executor() -> Executor:
     """Return the executor that is meant when none is given, for the context as it is now."""
-    from rosz.ros1.rclpy.executors import SingleThreadedExecutor
+    from rosz.ros2.rclpy.executors import SingleThreadedExecutor
 
     if _held.executor is None:
         _held.executor = SingleThreadedExecutor()

@@ -6,8 +6,8 @@ import time
 
 from rosz.errors import ClosedError
 from rosz.node.clock import Clock as _RosClock
-from rosz.ros1.rclpy.duration import Duration
-from rosz.ros1.rclpy.time import ClockType, Time
+from rosz.ros2.rclpy.duration import Duration
+from rosz.ros2.rclpy.time import ClockType, Time
 
 __all__ = ("Clock", "ClockType", "ROSClock")
 
@@ -85,7 +85,7 @@ class Rate:
         Raises:
             ROSInterruptException: The node was shut down meanwhile.
         """
-        from rosz.ros1.rclpy.exceptions import ROSInterruptException
+        from rosz.ros2.rclpy.exceptions import ROSInterruptException
 
         try:
             self._rate.sleep()

@@ -5,7 +5,7 @@ nodes, guard conditions, waitables or event handlers; whatever is not there is a
 or ``ModuleNotFoundError`` with its name.
 """
 
-from rosz.ros1.rclpy import (
+from rosz.ros2.rclpy import (
     callback_groups,
     clock,
     context,
@@ -20,7 +20,7 @@ from rosz.ros1.rclpy import (
     time,
     utilities,
 )
-from rosz.ros1.rclpy.program import (
+from rosz.ros2.rclpy.program import (
     create_node,
     get_default_context,
     get_global_executor,
@@ -32,7 +32,7 @@ from rosz.ros1.rclpy.program import (
     spin_until_future_complete,
     try_shutdown,
 )
-from rosz.ros1.rclpy.task import Future
+from rosz.ros2.rclpy.task import Future
 
 __all__ = (
     "Future",

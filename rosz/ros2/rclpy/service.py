@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ServiceError
 from rosz.node import Node as RoszNode
-from rosz.ros1.rclpy.callback_groups import CallbackGroup
+from rosz.ros2.rclpy.callback_groups import CallbackGroup
 
 if TYPE_CHECKING:
     from rosz.message import Service as ServiceType

@@ -7,7 +7,7 @@ from typing import Any
 
 from rosz.errors import UsageError
 from rosz.qos import FOREVER, QoS
-from rosz.ros1.rclpy.duration import Duration, Infinite
+from rosz.ros2.rclpy.duration import Duration, Infinite
 
 __all__ = (
     "DurabilityPolicy",

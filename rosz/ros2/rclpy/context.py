@@ -14,8 +14,8 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import UsageError
 from rosz.node import Context as RoszContext
-from rosz.ros1.rclpy import arguments
-from rosz.ros1.rclpy.exceptions import NotInitializedException
+from rosz.ros2.rclpy import arguments
+from rosz.ros2.rclpy.exceptions import NotInitializedException
 
 if TYPE_CHECKING:
     from types import FrameType, TracebackType

@@ -7,8 +7,8 @@ from typing import Any
 
 from rosz.node import Timer as RoszTimer
 from rosz.node.clock import Clock as RoszClock
-from rosz.ros1.rclpy.callback_groups import CallbackGroup
-from rosz.ros1.rclpy.clock import Clock, Rate
+from rosz.ros2.rclpy.callback_groups import CallbackGroup
+from rosz.ros2.rclpy.clock import Clock, Rate
 
 __all__ = ("Rate", "Timer")
 

@@ -10,11 +10,11 @@ from rosz.errors import NotFoundError, UsageError, YamlError
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.qos import QoS
-from rosz.ros1.rclpy import qos
-from rosz.ros1.rclpy.arguments import parse, remove_ros_args
-from rosz.ros1.rclpy.duration import Duration, Infinite
-from rosz.ros1.rclpy.parameter import Parameter, get_parameter_value
-from rosz.ros1.rclpy.time import ClockType, Time
+from rosz.ros2.rclpy import qos
+from rosz.ros2.rclpy.arguments import parse, remove_ros_args
+from rosz.ros2.rclpy.duration import Duration, Infinite
+from rosz.ros2.rclpy.parameter import Parameter, get_parameter_value
+from rosz.ros2.rclpy.time import ClockType, Time
 
 Type = Parameter.Type
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from rosz.ros1.rclpy import state
-from rosz.ros1.rclpy.context import Context
-from rosz.ros1.rclpy.executors import Executor
-from rosz.ros1.rclpy.node import Node
-from rosz.ros1.rclpy.task import Future
+from rosz.ros2.rclpy import state
+from rosz.ros2.rclpy.context import Context
+from rosz.ros2.rclpy.executors import Executor
+from rosz.ros2.rclpy.node import Node
+from rosz.ros2.rclpy.task import Future
 
 __all__ = (
     "create_node",

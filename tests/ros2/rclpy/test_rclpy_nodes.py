@@ -14,15 +14,15 @@ from rosz.errors import ClosedError, ServiceError
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import SetBool
-from rosz.ros1.rclpy import exceptions, executors
-from rosz.ros1.rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rosz.ros1.rclpy.clock import ClockType
-from rosz.ros1.rclpy.context import Context
-from rosz.ros1.rclpy.duration import Duration
-from rosz.ros1.rclpy.node import Node
-from rosz.ros1.rclpy.parameter import Parameter
-from rosz.ros1.rclpy.qos import DurabilityPolicy, QoSProfile
-from rosz.ros1.rclpy.task import Future
+from rosz.ros2.rclpy import exceptions, executors
+from rosz.ros2.rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rosz.ros2.rclpy.clock import ClockType
+from rosz.ros2.rclpy.context import Context
+from rosz.ros2.rclpy.duration import Duration
+from rosz.ros2.rclpy.node import Node
+from rosz.ros2.rclpy.parameter import Parameter
+from rosz.ros2.rclpy.qos import DurabilityPolicy, QoSProfile
+from rosz.ros2.rclpy.task import Future
 
 Start = Callable[..., Context]
 

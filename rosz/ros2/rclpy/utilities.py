@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from rosz.ros1.rclpy.arguments import remove_ros_args as _remove
-from rosz.ros1.rclpy.program import get_default_context, ok, shutdown, try_shutdown
+from rosz.ros2.rclpy.arguments import remove_ros_args as _remove
+from rosz.ros2.rclpy.program import get_default_context, ok, shutdown, try_shutdown
 
 __all__ = (
     "get_default_context",

@@ -15,15 +15,15 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from rosz.errors import RoszError
-from rosz.ros1.rclpy import state
-from rosz.ros1.rclpy.task import Future, Task
+from rosz.ros2.rclpy import state
+from rosz.ros2.rclpy.task import Future, Task
 from rosz.session.waiting import patience
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from rosz.ros1.rclpy.callback_groups import CallbackGroup
-    from rosz.ros1.rclpy.context import Context
+    from rosz.ros2.rclpy.callback_groups import CallbackGroup
+    from rosz.ros2.rclpy.context import Context
 
 __all__ = (
     "Entity",

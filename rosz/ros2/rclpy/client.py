@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.errors import RoszError, WaitTimeout
 from rosz.node import Node as RoszNode
-from rosz.ros1.rclpy.task import Future
+from rosz.ros2.rclpy.task import Future
 
 if TYPE_CHECKING:
     from rosz.message import Service as ServiceType

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosz.node import Node as RoszNode
 from rosz.node import Subscription as RoszSubscription
 from rosz.qos import QoS
-from rosz.ros1.rclpy.callback_groups import CallbackGroup
+from rosz.ros2.rclpy.callback_groups import CallbackGroup
 
 if TYPE_CHECKING:
     from rosz.message import Message

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rosz.params.values import type_name
-from rosz.ros1.rclpy.exceptions import (
+from rosz.ros2.rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidParameterValueException,
     ParameterAlreadyDeclaredException,
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
-from rosz.ros1.rclpy.parameter import Parameter
+from rosz.ros2.rclpy.parameter import Parameter
 
 if TYPE_CHECKING:
     from rosz.node import Node as RoszNode

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rosz.ros1.rclpy.declared import Declared
-from rosz.ros1.rclpy.exceptions import ParameterNotDeclaredException
-from rosz.ros1.rclpy.parameter import Parameter
+from rosz.ros2.rclpy.declared import Declared
+from rosz.ros2.rclpy.exceptions import ParameterNotDeclaredException
+from rosz.ros2.rclpy.parameter import Parameter
 
 __all__ = ("NodeParameters",)
 

@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import Any, Self, overload
 
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
-from rosz.ros1.rclpy.duration import Duration
+from rosz.ros2.rclpy.duration import Duration
 
 __all__ = ("CONVERSION_CONSTANT", "ClockType", "Time")
 
