@@ -31,6 +31,7 @@ FLOORS = {
     "rosz.wire": 1,
     "rosz.msgs": 2,
     "rosz.typestore": 2,
+    "rosz.worker": 3,
     "rosz.environment": 3,
     "rosz.security": 3,
     "rosz.security.rules": 1,

@@ -1,0 +1,189 @@
+"""The bounded worker: order, bounds, delays, and what happens where there are no threads."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from queue import SimpleQueue
+
+import pytest
+from network import PATIENCE
+
+from rosz import worker
+from rosz.errors import ClosedError
+from rosz.worker import Worker
+
+
+def test_items_are_handled_in_order_on_one_thread() -> None:
+    handled: list[tuple[int, str]] = []
+    numbers: Worker[int] = Worker(
+        "numbers", lambda item: handled.append((item, threading.current_thread().name))
+    )
+    for number in range(100):
+        numbers.submit(number)
+    assert numbers.flush(PATIENCE)
+    numbers.close()
+    assert handled == [(number, "numbers") for number in range(100)]
+
+
+def test_a_failing_item_is_logged_and_the_next_one_handled(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    tasks: Worker[object] = Worker("tasks", lambda item: item.missing)  # type: ignore[attr-defined]
+    with caplog.at_level(logging.ERROR):
+        tasks.submit(object())
+        tasks.submit(object())
+        assert tasks.flush(PATIENCE)
+    tasks.close()
+    assert caplog.text.count("tasks: handling an item failed") == 2
+
+
+def test_closed_errors_are_not_logged_once_it_is_closed(caplog: pytest.LogCaptureFixture) -> None:
+    entered, release = threading.Event(), threading.Event()
+
+    def task() -> None:
+        entered.set()
+        release.wait(PATIENCE)
+        raise ClosedError("the session is closed")
+
+    tasks: Worker[object] = Worker("tasks")
+    tasks.submit(task)
+    assert entered.wait(PATIENCE)
+    tasks.close(timeout=0)
+    release.set()
+    tasks.close(PATIENCE)
+    assert "failed" not in caplog.text
+
+
+def test_close_handles_what_is_queued_and_drops_the_rest() -> None:
+    handled: list[int] = []
+    numbers: Worker[int] = Worker("numbers", handled.append)
+    numbers.later(3600, -1)
+    numbers.submit(1)
+    numbers.submit(2)
+    numbers.close(PATIENCE)
+    numbers.close(PATIENCE)
+    numbers.submit(3)
+    assert not numbers.offer(4)
+    assert handled == [1, 2]
+
+
+def test_delayed_items_come_by_their_time() -> None:
+    handled: SimpleQueue[int] = SimpleQueue()
+    numbers: Worker[int] = Worker("numbers", handled.put)
+    numbers.later(0.05, 2)
+    numbers.later(0.01, 1)
+    numbers.submit(0)
+    assert [handled.get(timeout=PATIENCE) for _ in range(3)] == [0, 1, 2]
+    numbers.close()
+
+
+def test_offer_refuses_beyond_the_capacity_and_tells_when_free() -> None:
+    gate, entered, free = threading.Event(), threading.Event(), threading.Event()
+
+    def handle(_text: str) -> None:
+        entered.set()
+        gate.wait(PATIENCE)
+
+    texts: Worker[str] = Worker("texts", handle, capacity=10, size=len)
+    texts.submit("x" * 6)
+    assert entered.wait(PATIENCE)
+    assert texts.offer("y" * 6)
+    assert texts.full
+    assert not texts.offer("z")
+    texts.when_free(free.set)
+    assert not free.is_set()
+    gate.set()
+    assert free.wait(PATIENCE)
+    assert texts.flush(PATIENCE)
+    assert texts.waiting == 0
+    texts.when_free(free.clear)
+    assert not free.is_set()
+    texts.close()
+
+
+def test_flush_of_a_busy_worker_times_out() -> None:
+    gate = threading.Event()
+    tasks: Worker[object] = Worker("tasks")
+    tasks.submit(lambda: gate.wait(PATIENCE))
+    assert not tasks.flush(0.01)
+    gate.set()
+    assert tasks.flush(PATIENCE)
+    tasks.close(PATIENCE)
+
+
+def test_a_task_may_flush_and_close_its_own_worker() -> None:
+    flushed: SimpleQueue[bool] = SimpleQueue()
+    tasks: Worker[object] = Worker("tasks")
+
+    def task() -> None:
+        flushed.put(tasks.flush(PATIENCE))
+        tasks.close()
+        flushed.put(tasks.closed)
+
+    tasks.submit(task)
+    assert flushed.get(timeout=PATIENCE)
+    assert flushed.get(timeout=PATIENCE)
+    tasks.close(PATIENCE)
+
+
+def test_several_threads_handle_items_at_once() -> None:
+    both = threading.Barrier(2)
+    done: SimpleQueue[int] = SimpleQueue()
+
+    def handle(item: int) -> None:
+        both.wait(PATIENCE)
+        done.put(item)
+
+    numbers: Worker[int] = Worker("numbers", handle, threads=2)
+    numbers.submit(1)
+    numbers.submit(2)
+    assert {done.get(timeout=PATIENCE) for _ in range(2)} == {1, 2}
+    numbers.close(PATIENCE)
+
+
+def test_items_of_another_queue_are_received_until_none() -> None:
+    queue: SimpleQueue[int | None] = SimpleQueue()
+    done: SimpleQueue[int] = SimpleQueue()
+    numbers: Worker[int] = Worker("numbers", done.put, receive=queue.get)
+    queue.put(1)
+    queue.put(2)
+    assert [done.get(timeout=PATIENCE) for _ in range(2)] == [1, 2]
+    queue.put(None)
+    numbers.close(PATIENCE)
+    assert not [thread for thread in threading.enumerate() if thread.name == "numbers"]
+
+
+@pytest.mark.parametrize("answer", [False, RuntimeError("can't start new thread")])
+def test_work_goes_on_where_the_system_has_no_more_threads(
+    monkeypatch: pytest.MonkeyPatch, answer: bool | RuntimeError
+) -> None:
+    done: SimpleQueue[tuple[int, threading.Thread]] = SimpleQueue()
+    numbers: Worker[int] = Worker(
+        "numbers", lambda item: done.put((item, threading.current_thread())), threads=2
+    )
+    first = threading.Event()
+
+    def refuse_all_but_the_first(thread: threading.Thread) -> bool:
+        if not first.is_set():
+            first.set()
+            thread.start()
+            return True
+        if isinstance(answer, RuntimeError):
+            raise answer
+        return False
+
+    with monkeypatch.context() as patched:
+        patched.setattr(worker, "start_thread", refuse_all_but_the_first)
+        for number in range(3):
+            numbers.submit(number)
+        handled = [done.get(timeout=PATIENCE) for _ in range(3)]
+    assert [number for number, _ in handled] == [0, 1, 2]
+    assert len({thread for _, thread in handled}) == 1
+    both = threading.Barrier(2)
+    numbers._handle = lambda _: both.wait(PATIENCE)
+    numbers.submit(3)
+    numbers.submit(4)
+    assert numbers.flush(PATIENCE)
+    numbers.close(PATIENCE)
+    assert not both.broken
