@@ -80,8 +80,7 @@ def log_command(
 def _set_level(call: Call, words: Sequence[str]) -> None:
     if len(words) != _LEVEL_WORDS:
         raise UsageError("expected: rosz log level NODE LOGGER LEVEL")
-    from rosz.introspect import control
-    from rosz.introspect.nodes import members
+    from rosz.introspect.nodes import members, set_level
     from rosz.introspect.survey import take
     from rosz.node.severity import parse_severity
 
@@ -89,12 +88,11 @@ def _set_level(call: Call, words: Sequence[str]) -> None:
     parse_severity(level)
     with call.session() as session:
         for token in members(take(session, call.domain), call.resolve(node, _TOOL)):
-            control.set_level(session, token, logger, level)
+            set_level(session, token, logger, level)
 
 
 def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
-    from rosz.introspect import control
-    from rosz.introspect.nodes import members
+    from rosz.introspect.nodes import get_levels, members
     from rosz.introspect.survey import take
 
     if not nodes:
@@ -104,7 +102,7 @@ def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
         survey = take(session, call.domain)
         for node in nodes:
             for token in members(survey, call.resolve(node, _TOOL)):
-                found[token.node_name] = control.get_levels(session, token)
+                found[token.node_name] = get_levels(session, token)
     if as_json:
         print_json(found)
         return

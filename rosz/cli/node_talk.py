@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rosz.cli.group import Call, print_json, print_lines
-from rosz.errors import NotFoundError, RoszError, WaitTimeout, near_miss
-from rosz.introspect import control
-from rosz.introspect.nodes import connections, describe, members
+from rosz.errors import NotFoundError, RoszError, near_miss
+from rosz.introspect import nodes as library
+from rosz.introspect.nodes import PING_TIMEOUT, connections, describe, members
 from rosz.introspect.survey import Survey, ros1_type, take
 from rosz.wire import Kind
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 __all__ = ("choose", "info", "kill", "ping", "ping_all")
 
 _TOOL = "rosnode"
-_PING_SECONDS = 3.0
 _PING_PERIOD = 1.0
 _REASON = "user request"
 
@@ -53,7 +52,7 @@ def info(call: Call, names: Sequence[str], *, quiet: bool, as_json: bool) -> Non
 
 def _answers(session: Session, node: Token) -> str:
     try:
-        answer = control.ask_info(session, node)
+        answer = library.get_info(session, node)
     except NotFoundError as error:
         return f"{error}\n"
     return f"Pid: {answer.pid}\nCommand: {' '.join(answer.argv)}\n"
@@ -78,7 +77,7 @@ def _row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> dict[
     if process is not None:
         row |= {"host": process.host, "pid": process.pid, "started": process.started}
     if process is not None and not quiet:
-        row["argv"] = control.ask_info(session, node).argv
+        row["argv"] = library.get_info(session, node).argv
     return row
 
 
@@ -96,7 +95,7 @@ def ping(call: Call, name: str, count: int | None) -> int:
     with call.session() as session:
         survey = take(session, call.domain, processes=True)
         node = members(survey, full)[-1]
-        print_lines([f"pinging {full} with a timeout of {_PING_SECONDS}s"])
+        print_lines([f"pinging {full} with a timeout of {PING_TIMEOUT}s"])
         try:
             while True:
                 times.append(_ping(session, survey, node))
@@ -110,20 +109,8 @@ def ping(call: Call, name: str, count: int | None) -> int:
 
 
 def _ping(session: Session, survey: Survey, node: Token) -> float:
-    """Return how many milliseconds a node takes to answer.
-
-    Raises:
-        NotFoundError: It is gone, or no rosz node.
-        WaitTimeout: It does not answer.
-    """
-    began = time.perf_counter()
-    try:
-        control.ask_info(session, node, _PING_SECONDS)
-    except NotFoundError as error:
-        if take(session, node.domain).members(node.node_name):
-            raise
-        raise NotFoundError(f"node '{node.node_name}' has ended") from error
-    taken = (time.perf_counter() - began) * 1e3
+    """Ping a node, print its reply, and return how many milliseconds it took."""
+    taken = library.ping(session, node) * 1e3
     print_lines([f"reply from {survey.address(node)}\ttime={taken:f}ms"])
     return taken
 
@@ -136,7 +123,7 @@ def ping_all(call: Call) -> int:
         print_lines(["Will ping the following nodes: ", *(f" * {name}" for name in names), ""])
         code = 0
         for name in names:
-            print_lines([f"pinging {name} with a timeout of {_PING_SECONDS}s"])
+            print_lines([f"pinging {name} with a timeout of {PING_TIMEOUT}s"])
             for node in survey.members(name):
                 try:
                     _ping(session, survey, node)
@@ -190,15 +177,10 @@ def kill(call: Call, names: Sequence[str], *, everybody: bool) -> int:
             if len(chosen) > 1
             else [f"killing {chosen[0]}"]
         )
-        failed: list[str] = []
-        for name in chosen:
-            for node in survey.members(name):
-                try:
-                    control.end(session, node, _REASON)
-                except (RoszError, WaitTimeout) as error:
-                    failed.append(f" * {name}: {error}")
+        failed = library.kill_nodes(session, survey, chosen, _REASON)
     if failed:
-        sys.stderr.write("\n".join(["ERROR: Failed to kill:", *failed, ""]))
+        lines = [f" * {name}: {error}" for name, error in failed]
+        sys.stderr.write("\n".join(["ERROR: Failed to kill:", *lines, ""]))
         return 1
     print_lines(["killed"])
     return 0

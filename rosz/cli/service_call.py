@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
 from rosz.cli.group import Call, print_json, print_lines, until_stopped, warn
-from rosz.errors import EncodeError, NotFoundError, UsageError
+from rosz.errors import EncodeError, UsageError
 from rosz.introspect.documents import read_arguments, read_stream
 from rosz.introspect.echo import plain
-from rosz.introspect.fill import fill, list_arguments, with_arguments
-from rosz.introspect.services import server
+from rosz.introspect.fill import list_arguments, with_arguments
+from rosz.introspect.services import call as send_call
+from rosz.introspect.services import server, wait_for_server
 from rosz.node import Client, Node
-
-if TYPE_CHECKING:
-    from rosz.node import Context
-    from rosz.wire import Token
 
 __all__ = ("CallOptions", "call_service")
 
@@ -56,7 +52,11 @@ def call_service(call: Call, name: str, words: Sequence[str], options: CallOptio
     # Waiting is to be outlived by nothing, so it is done as a peer.
     with until_stopped() as ready, call.context(lasting=options.wait) as context:
         ready()
-        token = _find(context, call.resolve(name, _TOOL), wait=options.wait)
+        full = call.resolve(name, _TOOL)
+        if options.wait:
+            token = wait_for_server(context, full, warn)
+        else:
+            token = server(context.graph.refresh(), full)
         stopped = context.session.why_silent(token.zid)
         if stopped:
             warn(f"service [{token.name}] does not answer as long as {stopped}")
@@ -78,32 +78,11 @@ def call_service(call: Call, name: str, words: Sequence[str], options: CallOptio
                 _call(client, values, options)
 
 
-def _find(context: Context, name: str, *, wait: bool) -> Token:
-    """Return who serves a service.
-
-    Raises:
-        NotFoundError: Nobody does.
-    """
-    view = context.graph.refresh()
-    try:
-        return server(view, name)
-    except NotFoundError as error:
-        if not wait:
-            raise
-        warn(f"service [{name}] is not there yet ({error})")
-    view = context.graph.wait_for(
-        lambda view: bool(view.servers(name)), threading.TIMEOUT_MAX / 2, f"service '{name}'"
-    )
-    return server(view, name)
-
-
 def _call(client: Client, values: Sequence[Any], options: CallOptions) -> None:
-    request_type = client.service_type.Request
     try:
-        request = fill(request_type, values, time.time_ns())
+        request, response = send_call(client, values, time.time_ns())
     except EncodeError as error:
-        raise with_arguments(error, request_type) from error
-    response = client.call(request)
+        raise with_arguments(error, client.service_type.Request) from error
     if options.as_json:
         print_json(
             {"request": plain(request), "response": plain(response)}

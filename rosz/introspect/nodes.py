@@ -1,26 +1,50 @@
-"""Nodes as rosnode lists and describes them."""
+"""Nodes: listing and describing them as rosnode does, and asking rosz nodes about themselves.
+
+A node that is not rosz's (a ROS 2 node) is listed, and does not answer requests.
+"""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 
-from rosz.errors import NotFoundError, near_miss
-from rosz.introspect.survey import Survey, ros1_type
-from rosz.wire import Kind, Token
+from rosz.errors import NotFoundError, RoszError, WaitTimeout, near_miss
+from rosz.introspect.survey import Survey, ros1_type, take
+from rosz.wire import Kind, Token, tokens_key
+
+if TYPE_CHECKING:
+    from rosz.node import NodeInfo
+    from rosz.node.control import Request
+    from rosz.session import Session
 
 __all__ = (
+    "PING_TIMEOUT",
     "NodeEntry",
     "connections",
     "describe",
+    "get_info",
+    "get_levels",
+    "kill",
+    "kill_nodes",
     "list_nodes",
     "machines",
     "members",
     "on_machine",
+    "ping",
+    "query_node",
+    "set_level",
 )
 
+PING_TIMEOUT = 3.0
+"""Seconds that a node has to answer a ping."""
+_KILL_TIMEOUT = 10.0
 _RULE = "-" * 80
+
+T = TypeVar("T")
 
 
 class NodeEntry(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -142,3 +166,144 @@ def on_machine(nodes: Iterable[NodeEntry], machine: str) -> list[str]:
         listing = f"; nodes run on {', '.join(hosts)}" if hosts else ""
         raise NotFoundError(f"no node runs on '{machine}'{near_miss(machine, hosts) or listing}")
     return found
+
+
+def query_node(
+    session: Session,
+    node: Token,
+    request: Request,
+    reply_type: type[T],
+    timeout: float = PING_TIMEOUT,
+) -> T:
+    """Send a request to a rosz node and return its reply.
+
+    Args:
+        session: The session to send it on.
+        node: One of the node's tokens.
+        request: The request.
+        reply_type: Type of the reply.
+        timeout: Time limit in seconds.
+
+    Raises:
+        NotFoundError: Nothing replies: it is not a rosz node, or has just ended.
+        WaitTimeout: The node does not reply in time.
+        RoszError: The node refuses, or its reply cannot be decoded; the text says why.
+    """
+    from rosz.node.control import control_key
+
+    key = control_key(node.domain, node.zid, node.node_id)
+    replies = session.get(key, payload=msgspec.msgpack.encode(request), timeout=timeout)
+    if not replies:
+        raise NotFoundError(f"node '{node.node_name}' takes no questions: it is no rosz node")
+    reply = replies[0]
+    if reply.ok:
+        try:
+            return msgspec.msgpack.decode(reply.payload, type=reply_type)
+        except msgspec.MsgspecError as error:
+            raise RoszError(
+                f"node '{node.node_name}' answers what makes no sense: {error}; is it of another"
+                " version of rosz?"
+            ) from error
+    text = reply.payload.decode(errors="replace")
+    if text == "Timeout":
+        why = session.why_silent(node.zid) or "it hangs or is stopped"
+        raise WaitTimeout(f"answer of node '{node.node_name}'", timeout, why)
+    raise RoszError(text)
+
+
+def get_info(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> NodeInfo:
+    """Return what a node tells about itself; errors as those of `query_node`."""
+    from rosz.node.control import NodeInfo, Request
+
+    return query_node(session, node, Request("info"), NodeInfo, timeout)
+
+
+def ping(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> float:
+    """Return how many seconds a node takes to reply.
+
+    Args:
+        session: The session to send the request on.
+        node: One of the node's tokens.
+        timeout: Time limit in seconds.
+
+    Raises:
+        NotFoundError: The node has ended, or is not a rosz node.
+        WaitTimeout: The node does not reply in time.
+        RoszError: Its reply cannot be decoded.
+    """
+    began = time.perf_counter()
+    try:
+        get_info(session, node, timeout)
+    except NotFoundError as error:
+        if take(session, node.domain).members(node.node_name):
+            raise
+        raise NotFoundError(f"node '{node.node_name}' has ended") from error
+    return time.perf_counter() - began
+
+
+def kill(session: Session, node: Token, reason: str) -> None:
+    """Request a node to shut down, and wait until it is gone.
+
+    Args:
+        session: The session to send the request on.
+        node: One of the node's tokens.
+        reason: Reason that the node logs.
+
+    Raises:
+        NotFoundError: It is not a rosz node, and does not take requests.
+        WaitTimeout: The node does not reply, or replies and stays.
+        RoszError: The node refuses.
+    """
+    from rosz.node.control import Request
+
+    gone = threading.Event()
+    prefix = f"{tokens_key(node.domain, node.zid).removesuffix('**')}{node.node_id}/"
+
+    def changed(key: str, alive: bool) -> None:
+        if not alive and key.startswith(prefix):
+            gone.set()
+
+    watch = session.tokens(f"{prefix}{node.node_id}/NN/**", changed)
+    try:
+        query_node(session, node, Request("shutdown", reason=reason), bool)
+        if not gone.wait(_KILL_TIMEOUT):
+            raise WaitTimeout(
+                f"end of node '{node.node_name}'", _KILL_TIMEOUT, "it was told, and goes on"
+            )
+    finally:
+        watch.close()
+
+
+def kill_nodes(
+    session: Session, survey: Survey, names: Iterable[str], reason: str
+) -> list[tuple[str, RoszError]]:
+    """Shut nodes down, and return the names of those that stay, each with the error.
+
+    Args:
+        session: The session to send the requests on.
+        survey: The nodes that are running.
+        names: Full names; each may be that of several nodes.
+        reason: Reason that the nodes log.
+    """
+    failed: list[tuple[str, RoszError]] = []
+    for name in names:
+        for node in survey.members(name):
+            try:
+                kill(session, node, reason)
+            except RoszError as error:
+                failed.append((name, error))
+    return failed
+
+
+def get_levels(session: Session, node: Token) -> dict[str, str]:
+    """Return the loggers of a node with their levels; errors as those of `query_node`."""
+    from rosz.node.control import Request
+
+    return query_node(session, node, Request("levels"), dict[str, str])
+
+
+def set_level(session: Session, node: Token, logger: str, level: str) -> None:
+    """Set the level of a logger of a node; errors as those of `query_node`."""
+    from rosz.node.control import Request
+
+    query_node(session, node, Request("set_level", logger=logger, level=level), bool)

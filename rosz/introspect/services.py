@@ -1,15 +1,30 @@
-"""Services as rosservice lists and describes them."""
+"""Services: listing, finding and calling them as rosservice does."""
 
 from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from rosz.errors import NotFoundError, near_miss
-from rosz.graph import View
 from rosz.introspect.survey import ros1_type
 from rosz.wire import Token, endpoint_key
 
-__all__ = ("ServiceEntry", "find", "list_services", "server", "uri")
+if TYPE_CHECKING:
+    from rosz.graph import View
+    from rosz.node import Client, Context
+
+__all__ = (
+    "ServiceEntry",
+    "call",
+    "find",
+    "list_services",
+    "server",
+    "uri",
+    "wait_for_server",
+)
 
 
 class ServiceEntry(msgspec.Struct, frozen=True):
@@ -56,3 +71,43 @@ def server(view: View, name: str) -> Token:
 def uri(token: Token) -> str:
     """Return where a service is called: its key expression on Zenoh."""
     return endpoint_key(token.domain, token.name, token.type_name, token.type_hash)
+
+
+def wait_for_server(context: Context, name: str, warn: Callable[[str], object]) -> Token:
+    """Return who serves a service, and wait while nobody does.
+
+    Args:
+        context: The context whose graph is watched.
+        name: Full name of the service.
+        warn: Function called with a sentence if it has to wait.
+
+    Raises:
+        ClosedError: The context is shut down meanwhile.
+    """
+    view = context.graph.refresh()
+    try:
+        return server(view, name)
+    except NotFoundError as error:
+        warn(f"service [{name}] is not there yet ({error})")
+    view = context.graph.wait_for(
+        lambda view: bool(view.servers(name)), threading.TIMEOUT_MAX / 2, f"service '{name}'"
+    )
+    return server(view, name)
+
+
+def call(client: Client, values: Sequence[Any], now: int) -> tuple[Any, Any]:
+    """Call a service with values from a command line, and return request and response.
+
+    Args:
+        client: Client of the service.
+        values: One dictionary of fields, or a value for each field.
+        now: ROS time in nanoseconds, for ``now`` and ``auto``.
+
+    Raises:
+        EncodeError: The values do not fit the request.
+        RoszError: The call fails.
+    """
+    from rosz.introspect.fill import fill
+
+    request = fill(client.service_type.Request, values, now)
+    return request, client.call(request)

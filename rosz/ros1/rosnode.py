@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import sys
 import threading
-import time
 from collections.abc import Sequence
 
 from rosz.errors import NotFoundError, RoszError
-from rosz.introspect import control, nodes
+from rosz.introspect import nodes
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import in_namespace
 from rosz.ros1.rosgraph import Master, MasterException, live
@@ -98,18 +97,10 @@ def kill_nodes(node_names: Sequence[str]) -> tuple[list[str], list[str]]:
         The names of those that are gone, and of those that are not.
     """
     found = live.survey()
-    gone: list[str] = []
-    failed: list[str] = []
-    for name in node_names:
-        members = found.members(name)
-        try:
-            for member in members:
-                control.end(live.context().session, member, _KILLED)
-        except RoszError:
-            failed.append(name)
-        else:
-            (gone if members else failed).append(name)
-    return gone, failed
+    known = [name for name in node_names if found.members(name)]
+    stayed = {name for name, _ in nodes.kill_nodes(live.context().session, found, known, _KILLED)}
+    gone = [name for name in known if name not in stayed]
+    return gone, [name for name in node_names if name not in gone]
 
 
 def _member(found: Survey, name: str) -> Token | None:
@@ -149,16 +140,14 @@ def rosnode_ping(
             if verbose:
                 sys.stderr.write(f"cannot ping [{name}]: unknown node\n")
             return False
-        began = time.perf_counter()
         try:
-            control.ask_info(live.context().session, member)
+            passed = nodes.ping(live.context().session, member) * 1e3
         except RoszError as error:
             if verbose:
                 sys.stderr.write(f"connection to [{name}] failed: {error}\n")
             return False
         sent += 1
         if verbose:
-            passed = (time.perf_counter() - began) * 1e3
             address = live.address(found, member)
             sys.stdout.write(f"reply from {address}\ttime={passed:f}ms\n")
     return True

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rosz.errors import EncodeError, NotFoundError, RoszError
-from rosz.introspect.services import find, server, uri
+from rosz.introspect.services import call, find, server, uri
 from rosz.introspect.survey import ros1_type
 from rosz.ros1.genpy.message import get_printable_message_args, get_service_class
 from rosz.ros1.rosgraph import Master, live
@@ -146,22 +146,18 @@ def call_service(
     Raises:
         ROSServiceException: Nobody serves it, the values do not fit, or it failed.
     """
-    from rosz.introspect.fill import fill
-
     name = script_resolve_name(NAME, service_name)
     found = service_class or get_service_class_by_name(name)
     with live.nameless_node(NAME) as node:
+        client = node.client(name, found)
         try:
-            request = fill(found.Request, list(service_args), node.now())
+            return call(client, list(service_args), node.now())
         except EncodeError as error:
             given = "\n".join(f" * {one} (type {type(one).__name__})" for one in service_args)
             raise ROSServiceException(
                 f"Incompatible arguments to call service:\n{error}\nProvided arguments are:\n"
                 f"{given}\n\nService arguments are: [{get_printable_message_args(found.Request())}]"
             ) from error
-        client = node.client(name, found)
-        try:
-            return request, client.call(request)
         except RoszError as error:
             raise ROSServiceException(str(error)) from error
         finally:

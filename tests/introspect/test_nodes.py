@@ -8,7 +8,7 @@ import pytest
 from network import Network
 
 from rosz.errors import RoszError
-from rosz.introspect.control import ask_info
+from rosz.introspect.nodes import get_info
 from rosz.node.control import control_key
 from rosz.session import Query
 from rosz.wire import Kind, Token
@@ -29,4 +29,4 @@ def test_an_answer_that_makes_no_sense(network: Network) -> None:
         closing(session.queryable(key, answer)),
         pytest.raises(RoszError, match=r"node '/odd' answers what makes no sense: .*version"),
     ):
-        ask_info(network.context().session, token)
+        get_info(network.context().session, token)
