@@ -1,0 +1,263 @@
+"""The public API as lines of text: one per name, method, property and field."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from enum import Enum
+from functools import cache, cached_property
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import msgspec
+
+__all__ = ("MODULES", "docs", "signatures")
+
+_TABLE = {
+    "rosz": "errors qos time names params reconfigure transforms message idl typestore launch.plan "
+    "node ros1",
+    "rospy": "client core exceptions impl.tcpros impl.tcpros_base impl.tcpros_service msg msproxy "
+    "names numpy_msg rostime service timer topics",
+    "rosparam": "",
+    "rosgraph": "masterapi names network rosenv",
+    "rospkg": "common environment manifest rospack",
+    "roslib": "launcher message names packages rospack",
+    "rostopic": "",
+    "rosservice": "",
+    "rosnode": "",
+    "rosmsg": "",
+    "genpy": "message rostime",
+    "genmsg": "names",
+    "message_filters": "",
+    "actionlib": "",
+    "tf": "broadcaster listener transformations",
+    "tf_transformations": "",
+    "tf2_ros": "buffer",
+    "tf2_geometry_msgs": "",
+    "tf_conversions": "",
+    "dynamic_reconfigure": "client encoding exceptions parameter_generator "
+    "parameter_generator_catkin server",
+    "rostest": "",
+    "rosunit": "",
+    "rclpy": "callback_groups client clock context duration exceptions executors logging node "
+    "parameter publisher qos service subscription task time timer utilities",
+}
+"""Packages and their public modules, by the names that users import."""
+
+MODULES = [
+    f"{package}.{name}".rstrip(".")
+    for package, names in _TABLE.items()
+    for name in ("", *names.split())
+]
+"""Every public module; a class is described in the first one that has it."""
+
+_ROOTS = set(_TABLE)
+_PATH = re.compile(r"\b(?:[a-z_]\w*\.)+(?=[A-Za-z_])")
+_LONGEST = 60
+_PLAIN = (bool, bytes, dict, float, frozenset, int, list, str, tuple, type(None))
+_STARS: dict[Any, str] = {
+    inspect.Parameter.VAR_POSITIONAL: "*",
+    inspect.Parameter.VAR_KEYWORD: "**",
+}
+
+
+def signatures(module: str) -> str:
+    """Return the names of a module with their kinds and signatures."""
+    return "".join(f"{line}\n" for line in _Module(module).lines())
+
+
+def docs(module: str) -> str:
+    """Return the first line of the docstring of each name of a module that has one."""
+    found = {"": _first_line(import_module(module))}
+    for name, value in _public(import_module(module)):
+        if _is_ours(value) and _homes().get(id(value), module) == module:
+            found[name] = _first_line(value)
+            if isinstance(value, type):
+                found |= {f"{name}.{key}": _first_line(one) for key, one in _members(value)}
+    return "".join(f"{name}: {text}\n" for name, text in found.items() if text)
+
+
+class _Module:
+    """The lines of one module.
+
+    Args:
+        name: The name that users import.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._module = import_module(name)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines of all names."""
+        for name, value in _public(self._module):
+            home = _homes().get(id(value), self._name)
+            if home != self._name:
+                yield f"{name}: the one of {home}"
+            elif isinstance(value, type) and _is_ours(value):
+                yield from _class(name, value)
+            else:
+                yield f"{name}{_value(value)}"
+
+
+def _public(module: ModuleType) -> list[tuple[str, Any]]:
+    names = getattr(module, "__all__", None)
+    if names is None:
+        names = [name for name in vars(module) if not name.startswith("_")]
+    return [(name, getattr(module, name)) for name in sorted(names)]
+
+
+def _is_ours(value: object) -> bool:
+    if not (inspect.isclass(value) or inspect.isroutine(value)):
+        return False
+    return str(getattr(value, "__module__", "")).partition(".")[0] in _ROOTS
+
+
+@cache
+def _homes() -> dict[int, str]:
+    """Return the first public module of each of our classes and functions, by their ids."""
+    import_module("rosz.ros1").install()
+    found: dict[int, str] = {}
+    for module in MODULES:
+        for _, value in _public(import_module(module)):
+            if _is_ours(value):
+                found.setdefault(id(value), module)
+    return found
+
+
+def _class(name: str, value: type) -> Iterator[str]:
+    bases = [one.__name__ for one in value.__mro__[1:-1] if _is_known(one)]
+    bases = [name for name in bases if name != "BaseException"]
+    yield f"class {name}({', '.join(bases)}){_constructor(value)}"
+    if issubclass(value, msgspec.Struct):
+        for field in msgspec.structs.fields(value):
+            yield f"  {name}.{field.name}: {_type(_annotation(value, field.name))}{_of(field)}"
+    for key, member in _members(value):
+        yield f"  {name}.{key}{_value(member)}"
+
+
+def _is_known(value: type) -> bool:
+    """Tell whether a base class is public: what is inherited from others is listed as own."""
+    return id(value) in _homes() or (value.__module__ == "builtins")
+
+
+def _members(value: type) -> list[tuple[str, Any]]:
+    """Return what a class, and those of its bases that are ours, have beside fields."""
+    fields = set(value.__struct_fields__) if issubclass(value, msgspec.Struct) else set()
+    found: dict[str, Any] = {}
+    for base in value.__mro__:
+        if _is_ours(base):
+            for key, member in vars(base).items():
+                found.setdefault(key, member)
+    if issubclass(value, Enum):
+        found |= dict(value.__members__)
+    return sorted(
+        (key, one) for key, one in found.items() if not key.startswith("_") and key not in fields
+    )
+
+
+def _annotation(value: type, field: str) -> object:
+    return next(
+        found[field] for base in value.__mro__ if field in (found := inspect.get_annotations(base))
+    )
+
+
+def _of(field: Any) -> str:
+    if field.default is not msgspec.NODEFAULT:
+        return f" = {_plain(field.default)}"
+    if field.default_factory is not msgspec.NODEFAULT:
+        return f" = {field.default_factory.__name__}()"
+    return ""
+
+
+def _constructor(value: type) -> str:
+    """Return the signature of a class whose constructor is ours."""
+    if issubclass(value, msgspec.Struct) and "__init__" not in vars(value):
+        options = value.__struct_config__
+        return f" struct, frozen={options.frozen}, kw_only from {_first_keyword(value)}"
+    for name in ("__init__", "__new__"):
+        method = getattr(value, name)
+        if inspect.isfunction(method) and _is_ours(method) and not issubclass(value, Enum):
+            return _signature(method)
+    return ""
+
+
+def _first_keyword(value: type) -> str | None:
+    each = inspect.signature(value).parameters.values()
+    return next((one.name for one in each if one.kind is one.KEYWORD_ONLY), None)
+
+
+def _value(value: Any) -> str:
+    """Return what follows the name of a value: its kind, its signature, or the value itself."""
+    if isinstance(value, staticmethod | classmethod):
+        return f": {type(value).__name__}{_signature(value.__func__)}"
+    if inspect.isfunction(value) or inspect.ismethod(value):
+        return f": function{_signature(value)}"
+    if isinstance(value, property | cached_property):
+        getter: Any = value.fget if isinstance(value, property) else value.func
+        setter = ", can be set" if isinstance(value, property) and value.fset else ""
+        return f": property -> {_type(inspect.signature(getter).return_annotation)}{setter}"
+    if isinstance(value, Enum) or type(value) in _PLAIN:
+        text = _plain(value)
+        return f" = {text}" if len(text) <= _LONGEST else f": {type(value).__name__}"
+    return f": {_kind(value)}"
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, type):
+        return f"class {value.__name__}"
+    if inspect.ismodule(value):
+        return "module"
+    if inspect.ismemberdescriptor(value):
+        return "attribute"
+    return type(value).__name__ if _is_known(type(value)) else "object"
+
+
+def _signature(function: Any) -> str:
+    signature = inspect.signature(function)
+    kinds, parts = [one.kind for one in signature.parameters.values()], []
+    for place, one in enumerate(signature.parameters.values()):
+        if one.kind is one.KEYWORD_ONLY and not {one.VAR_POSITIONAL, one.KEYWORD_ONLY} & {
+            *kinds[:place]
+        }:
+            parts.append("*")
+        kind = "" if one.annotation is one.empty else f": {_type(one.annotation)}"
+        default = "" if one.default is one.empty else f" = {_plain(one.default)}"
+        parts.append(f"{_STARS.get(one.kind, '')}{one.name}{kind}{default}")
+        if one.kind is one.POSITIONAL_ONLY and one.POSITIONAL_ONLY not in kinds[place + 1 :]:
+            parts.append("/")
+    empty = signature.return_annotation is signature.empty
+    result = "" if empty else f" -> {_type(signature.return_annotation)}"
+    return f"({', '.join(parts)}){result}"
+
+
+def _type(annotation: object) -> str:
+    """Return an annotation without the paths of modules."""
+    if annotation is inspect.Signature.empty:
+        return "?"
+    text = annotation if isinstance(annotation, str) else inspect.formatannotation(annotation)
+    return _PATH.sub("", text)
+
+
+def _plain(value: object) -> str:
+    """Return a value that reads the same in each process."""
+    if isinstance(value, Enum):
+        return f"{type(value).__name__}.{value.name}"
+    if isinstance(value, type) or inspect.isroutine(value):
+        return value.__name__
+    if isinstance(value, frozenset | set):
+        return f"{{{', '.join(sorted(map(_plain, value)))}}}"
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(_plain, value))}]"
+    text = repr(value)
+    return "..." if text.startswith("<") or " object at " in text else _PATH.sub("", text)
+
+
+def _first_line(value: object) -> str:
+    if isinstance(value, staticmethod | classmethod):
+        value = value.__func__
+    if not (inspect.ismodule(value) or _is_ours(value) or isinstance(value, property)):
+        return ""
+    return (inspect.cleandoc(value.__doc__ or "").splitlines() or [""])[0]
