@@ -33,6 +33,7 @@ FLOORS = {
     "rosz.typestore": 2,
     "rosz.worker": 3,
     "rosz.environment": 3,
+    "rosz.lifecycle": 3,
     "rosz.security": 3,
     "rosz.security.rules": 1,
     "rosz.security.access": 1,

@@ -1,0 +1,293 @@
+"""The life of whatever can be closed: open, closing, closed.
+
+An owner has a `Lifecycle` and closes itself with it::
+
+    class Feed:
+        def __init__(self) -> None:
+            self._lifecycle = Lifecycle("the feed", on_fork=self._forked)
+
+        def close(self) -> None:
+            self._lifecycle.close(self._finish)
+
+The first `Lifecycle.close` does the work. A later one on another thread waits for the first; one on
+the same thread, from a hook or a signal handler, returns at once. No method holds a lock, so a
+signal handler may come in between anywhere.
+
+Threads and Zenoh's links do not survive a fork. In a forked child this module closes every
+lifecycle of the parent, without running hooks and without closing parts, and then calls ``on_fork``
+of each. That is the only place where rosz deals with forks.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import weakref
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+from rosz.errors import ClosedError
+
+__all__ = ("FORKED", "Closable", "Hook", "Lifecycle", "Registration")
+
+FORKED = (
+    "this process was forked from one that uses rosz, and threads and links do not outlive a fork:"
+    " start the child first, or use the 'spawn' method of multiprocessing"
+)
+"""Reason of every lifecycle that a forked child inherits."""
+
+Hook = Callable[[str], object]
+"""A function that is called with the reason of the end."""
+
+_CLOSED_BY = 10.0
+"""Seconds that a second caller of `Lifecycle.close` waits for the first."""
+
+_log = logging.getLogger("rosz.lifecycle")
+
+
+class Closable(Protocol):
+    """Something that can be closed."""
+
+    def close(self) -> None:
+        """Close it; closing it again is not an error."""
+
+
+P = TypeVar("P", bound=Closable)
+T = TypeVar("T")
+
+
+class Registration:
+    """Something that was registered; closing it unregisters it.
+
+    Args:
+        unregister: The function that does so; calling it twice must not be an error.
+    """
+
+    def __init__(self, unregister: Callable[[], object]) -> None:
+        self._unregister = unregister
+
+    def close(self) -> None:
+        """Unregister."""
+        self._unregister()
+
+
+class Lifecycle:
+    """The state of an owner that can be closed, with its hooks and parts.
+
+    Reading an attribute is all that a hot path needs: ``if lifecycle.closing: ...``.
+
+    Args:
+        what: The owner in error texts, such as ``the publisher``.
+        log: Logger for hooks and parts that fail.
+        on_fork: Method of the owner that a forked child calls: to replace locks, and to keep alive
+            what must not be freed. It must touch neither threads nor links. Only a weak reference
+            to the owner is kept.
+
+    Attributes:
+        closing: Whether closing has begun; stays true.
+        closed: Whether closing is complete.
+        reason: Reason of the end; may be set before the end.
+        forked: Whether the owner was inherited from the parent of this forked process.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        log: logging.Logger = _log,
+        on_fork: Callable[[], object] | None = None,
+    ) -> None:
+        self.closing = False
+        self.closed = False
+        self.reason = ""
+        self.forked = False
+        self._what = what
+        self._log = log
+        self._on_fork = None if on_fork is None else weakref.WeakMethod(on_fork)
+        self._parts: list[Closable] = []
+        self._hooks: list[Hook] = []
+        self._closer: dict[str, tuple[int]] = {}
+        self._closing_flag = _Flag()
+        self._closed_flag = _Flag()
+        _lifecycles.add(self)
+
+    def check_open(self, doing: str) -> None:
+        """Refuse an operation on a closed owner.
+
+        Args:
+            doing: The operation, such as ``publish on '/chatter'``.
+
+        Raises:
+            ClosedError: Closing has begun.
+        """
+        if self.closing:
+            why = f"{self._what} is closed"
+            if self.reason:
+                why = self.reason if self.forked else f"{why}: {self.reason}"
+            raise ClosedError(f"cannot {doing}: {why}")
+
+    def keep(self, part: P) -> P:
+        """Close a part together with the owner, before the parts that came earlier.
+
+        Returns:
+            The part.
+
+        Raises:
+            ClosedError: Closing has begun; the part has been closed.
+        """
+        self._parts.append(part)
+        if self.closing:
+            self.forget(part)
+            part.close()
+            self.check_open("add a part")
+        return part
+
+    def forget(self, part: Closable) -> None:
+        """Remove a part that was closed on its own."""
+        _remove(self._parts, part)
+
+    def on_close(self, hook: Hook) -> Callable[[], None]:
+        """Call a function when closing begins; hooks are called newest first.
+
+        Returns:
+            A function that removes the hook.
+
+        Raises:
+            ClosedError: Closing has begun; the hook will not be called.
+        """
+        self._hooks.append(hook)
+        if self.closing and _remove(self._hooks, hook):
+            self.check_open("add a shutdown hook")
+
+        def remove() -> None:
+            _remove(self._hooks, hook)
+
+        return remove
+
+    def call(self, hook: Hook) -> None:
+        """Call a hook with the reason, and log what it raises."""
+        try:
+            hook(self.reason)
+        except (Exception, SystemExit):  # noqa: BLE001  # the callback boundary
+            self._log.exception("a shutdown hook failed")
+
+    def close(
+        self,
+        finish: Callable[[], object] | None = None,
+        *,
+        first: Callable[[], object] | None = None,
+        reason: str = "",
+    ) -> bool:
+        """Close the owner: call the hooks, then `finish`, then close the parts, newest first.
+
+        Args:
+            finish: The owner's own work. It runs even if Ctrl-C interrupts a hook.
+            first: Function to call before the hooks.
+            reason: Reason of the end, for hooks and errors.
+
+        Returns:
+            Whether the owner is closed now. False on the thread that is closing it, and when the
+            thread that closes it needs more than 10 seconds.
+        """
+        call = (threading.get_ident(),)
+        closer = self._closer.setdefault("", call)
+        if closer is not call:
+            return self.closed or (closer != call and self._wait_for_closer())
+        try:
+            self.reason = reason or self.reason
+            self.closing = True
+            self._closing_flag.set()
+            if first is not None:
+                first()
+            while self._hooks:
+                self.call(self._hooks.pop())
+        finally:  # also where Ctrl-C interrupts a hook
+            try:
+                if finish is not None:
+                    finish()
+            finally:
+                self._close_parts()
+        return True
+
+    def wait_closing(self, timeout: float | None = None) -> bool:
+        """Wait until closing begins.
+
+        Args:
+            timeout: Time limit in seconds; none when not given.
+
+        Returns:
+            Whether closing has begun.
+        """
+        return self.closing or self._closing_flag.wait(timeout)
+
+    def _close_parts(self) -> None:
+        try:
+            while self._parts:
+                part = self._parts.pop()
+                try:
+                    part.close()
+                except Exception:  # noqa: BLE001  # a part may be anybody's
+                    self._log.exception("a part of %s could not be closed", self._what)
+        finally:
+            self.closed = True
+            self._closed_flag.set()
+
+    def _wait_for_closer(self) -> bool:
+        """Wait for the first caller, which the main thread must not outrun on its way out."""
+        if self._closed_flag.wait(_CLOSED_BY):
+            return True
+        self._log.warning(
+            "closing %s takes more than %g s: a hook blocks it", self._what, _CLOSED_BY
+        )
+        return False
+
+    def _close_in_child(self) -> None:
+        self.reason = FORKED
+        self.forked = self.closing = self.closed = True
+        self._closer = {"": (threading.get_ident(),)}
+        on_fork = None if self._on_fork is None else self._on_fork()
+        if on_fork is not None:
+            on_fork()
+
+
+class _Flag:
+    """An event that a signal handler may set while its own thread is about to wait for it."""
+
+    def __init__(self) -> None:
+        self._is_set = False
+        self._waiters: list[threading.Lock] = []
+
+    def set(self) -> None:
+        self._is_set = True
+        while self._waiters:
+            self._waiters.pop().release()
+
+    def wait(self, timeout: float | None) -> bool:
+        waiter = threading.Lock()
+        waiter.acquire()
+        self._waiters.append(waiter)
+        try:
+            return self._is_set or waiter.acquire(timeout=-1 if timeout is None else timeout)
+        finally:
+            _remove(self._waiters, waiter)
+
+
+def _remove(items: list[T], item: T) -> bool:
+    """Remove an item that may be gone already; tell whether it was there."""
+    try:
+        items.remove(item)
+    except ValueError:
+        return False
+    return True
+
+
+_lifecycles: weakref.WeakSet[Lifecycle] = weakref.WeakSet()
+
+
+def _close_all_in_child() -> None:
+    for lifecycle in list(_lifecycles):
+        lifecycle._close_in_child()  # noqa: SLF001  # this module's own
+
+
+os.register_at_fork(after_in_child=_close_all_in_child)
