@@ -70,9 +70,9 @@ def signatures(module: str) -> str:
 
 def docs(module: str) -> str:
     """Return the first line of the docstring of each name of a module that has one."""
-    found = {"": _first_line(import_module(module))}
-    for name, value in _public(import_module(module)):
-        if _is_ours(value) and _homes().get(id(value), module) == module:
+    found = {"": _first_line(_load(module))}
+    for name, value in _public(_load(module)):
+        if _is_ours(value) and _home(value, module) == module:
             found[name] = _first_line(value)
             if isinstance(value, type):
                 found |= {f"{name}.{key}": _first_line(one) for key, one in _members(value)}
@@ -88,12 +88,12 @@ class _Module:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._module = import_module(name)
+        self._module = _load(name)
 
     def lines(self) -> Iterator[str]:
         """Yield the lines of all names."""
         for name, value in _public(self._module):
-            home = _homes().get(id(value), self._name)
+            home = _home(value, self._name)
             if home != self._name:
                 yield f"{name}: the one of {home}"
             elif isinstance(value, type) and _is_ours(value):
@@ -115,15 +115,24 @@ def _is_ours(value: object) -> bool:
     return str(getattr(value, "__module__", "")).partition(".")[0] in _ROOTS
 
 
-@cache
-def _homes() -> dict[int, str]:
-    """Return the first public module of each of our classes and functions, by their ids."""
+def _load(name: str) -> ModuleType:
     import_module("rosz.ros1").install()
-    found: dict[int, str] = {}
+    return import_module(name)
+
+
+def _home(value: object, default: str = "") -> str:
+    """Return the first public module that has one of our classes or functions."""
+    return _homes().get(id(value), (default, None))[0]
+
+
+@cache
+def _homes() -> dict[int, tuple[str, object]]:
+    """Return the first public module of each object by its id, and the object to keep the id."""
+    found: dict[int, tuple[str, object]] = {}
     for module in MODULES:
-        for _, value in _public(import_module(module)):
+        for _, value in _public(_load(module)):
             if _is_ours(value):
-                found.setdefault(id(value), module)
+                found.setdefault(id(value), (module, value))
     return found
 
 
@@ -140,7 +149,7 @@ def _class(name: str, value: type) -> Iterator[str]:
 
 def _is_known(value: type) -> bool:
     """Tell whether a base class is public: what is inherited from others is listed as own."""
-    return id(value) in _homes() or (value.__module__ == "builtins")
+    return bool(_home(value)) or value.__module__ == "builtins"
 
 
 def _members(value: type) -> list[tuple[str, Any]]:
