@@ -1,9 +1,15 @@
-"""What tests on the network share: see `network.Network`."""
+"""Fixtures and markers of all tests.
+
+Markers select a part of the tests: ``pytest -m hosts``, ``pytest -m "not system and not ros1"``.
+``system`` (opens sessions or starts processes) and ``hosts`` (network namespaces) follow from the
+fixtures of a test and its folder; ``ros1`` (compares with real ROS 1) is written in the file.
+"""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from network import Network
@@ -16,6 +22,20 @@ def pytest_configure() -> None:
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+_HOSTS = Path(__file__).parent / "hosts"
+_SYSTEM = {"course", "faults", "hosts", "interop"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests by what they need."""
+    for item in items:
+        folder = item.path.relative_to(_HOSTS.parent).parts[0]
+        if folder == _HOSTS.name:
+            item.add_marker(pytest.mark.hosts)
+        if folder in _SYSTEM or "network" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.system)
 
 
 @pytest.fixture
