@@ -25,6 +25,7 @@ __all__ = (
     "join",
     "namespace",
     "resolve",
+    "short_type",
 )
 
 _VALID = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*", re.ASCII)
@@ -148,6 +149,19 @@ def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> st
     else:
         resolved = canonical(namespace(node) + name)
     return remaps.get(resolved, resolved) if remaps else resolved
+
+
+def short_type(name: str) -> str:
+    """Return a type name without its middle part, as ROS 1 spells it.
+
+    ``std_msgs/msg/String`` gives ``std_msgs/String``, ``std_srvs/srv/SetBool_Request`` gives
+    ``std_srvs/SetBoolRequest``.
+    """
+    package, _, rest = name.partition("/")
+    kind, _, base = rest.rpartition("/")
+    if kind == "srv":
+        base = re.sub(r"_(Request|Response)$", r"\1", base)
+    return f"{package}/{base}"
 
 
 def anonymous(base: str, host: str, pid: int, moment: int) -> str:

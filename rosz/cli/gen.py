@@ -37,7 +37,7 @@ def gen_command(
     Running programs needs none of this: what is not generated is compiled when it is imported.
     """
     from rosz.environment import Environment, package_index
-    from rosz.introspect.generate import Generator
+    from rosz.workspace.generate import Generator
 
     folder = Path(output).absolute() if output else None
     generator = Generator(package_index(Environment.read()), folder, Path.cwd())

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from rosz import names, remap
 from rosz.cli.declare import App, Context
 from rosz.environment import Environment
-from rosz.introspect.reach import open_context, open_session
+from rosz.introspect.connect import open_context, open_session
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -103,10 +103,10 @@ class Call:
         Raises:
             TransportError: Nobody answers.
         """
-        from rosz.introspect.survey import take
+        from rosz.introspect.survey import take_survey
 
         with self.session() as session:
-            survey = take(session, self.domain, processes=processes)
+            survey = take_survey(session, self.domain, processes=processes)
         for damage in survey.damaged:
             warn(f"ignoring what is no name of a node or topic: {damage}")
         return survey

@@ -11,7 +11,7 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import LaunchError, TransportError, UsageError
-from rosz.introspect.reach import command_config
+from rosz.introspect.connect import command_config
 from rosz.launch.run.control import order, statuses
 from rosz.session import Session
 

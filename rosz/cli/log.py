@@ -81,25 +81,25 @@ def _set_level(call: Call, words: Sequence[str]) -> None:
     if len(words) != _LEVEL_WORDS:
         raise UsageError("expected: rosz log level NODE LOGGER LEVEL")
     from rosz.introspect.nodes import members, set_level
-    from rosz.introspect.survey import take
+    from rosz.introspect.survey import take_survey
     from rosz.node.severity import parse_severity
 
     _, node, logger, level = words
     parse_severity(level)
     with call.session() as session:
-        for token in members(take(session, call.domain), call.resolve(node, _TOOL)):
+        for token in members(take_survey(session, call.domain), call.resolve(node, _TOOL)):
             set_level(session, token, logger, level)
 
 
 def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
     from rosz.introspect.nodes import get_levels, members
-    from rosz.introspect.survey import take
+    from rosz.introspect.survey import take_survey
 
     if not nodes:
         raise UsageError("expected: rosz log levels NODE")
     found: dict[str, dict[str, str]] = {}
     with call.session() as session:
-        survey = take(session, call.domain)
+        survey = take_survey(session, call.domain)
         for node in nodes:
             for token in members(survey, call.resolve(node, _TOOL)):
                 found[token.node_name] = get_levels(session, token)
@@ -148,10 +148,10 @@ def _follow(
 
 def _samples(node: Node, log_type: type[Log]) -> Iterator[Sample]:
     """Yield what is published on ``/rosout`` from now on, until the node ends."""
-    from rosz.introspect.tap import open_tap
+    from rosz.introspect.subscribe import subscribe_samples
 
     queue: SimpleQueue[Sample | None] = SimpleQueue()
-    open_tap(node, _ROSOUT, log_type._type_name, log_type._type_hash, queue.put)
+    subscribe_samples(node, _ROSOUT, log_type._type_name, log_type._type_hash, queue.put)
     node.on_shutdown(lambda _: queue.put(None))
     while (sample := queue.get()) is not None:
         yield sample

@@ -11,7 +11,8 @@ from rosz.cli.group import Call, print_json, print_lines
 from rosz.errors import NotFoundError, RoszError, near_miss
 from rosz.introspect import nodes as library
 from rosz.introspect.nodes import PING_TIMEOUT, connections, describe, members
-from rosz.introspect.survey import Survey, ros1_type, take
+from rosz.introspect.survey import Survey, take_survey
+from rosz.names import short_type
 from rosz.wire import Kind
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def info(call: Call, names: Sequence[str], *, quiet: bool, as_json: bool) -> Non
     """
     rows: list[dict[str, Any]] = []
     with call.session() as session:
-        survey = take(session, call.domain, processes=True)
+        survey = take_survey(session, call.domain, processes=True)
         chosen = [node for name in names for node in members(survey, call.resolve(name, _TOOL))]
         for node in chosen:
             if as_json:
@@ -68,7 +69,7 @@ def _row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> dict[
     }
     for kind, title in kinds.items():
         ends[title] = [
-            {"name": token.name, "type": ros1_type(token.type_name), "hash": token.type_hash}
+            {"name": token.name, "type": short_type(token.type_name), "hash": token.type_hash}
             for token in survey.view.endpoints(kind)
             if (token.zid, token.node_id) == (node.zid, node.node_id)
         ]
@@ -93,7 +94,7 @@ def ping(call: Call, name: str, count: int | None) -> int:
     print_lines([f"rosnode: node is [{full}]"])
     times: list[float] = []
     with call.session() as session:
-        survey = take(session, call.domain, processes=True)
+        survey = take_survey(session, call.domain, processes=True)
         node = members(survey, full)[-1]
         print_lines([f"pinging {full} with a timeout of {PING_TIMEOUT}s"])
         try:
@@ -118,7 +119,7 @@ def _ping(session: Session, survey: Survey, node: Token) -> float:
 def ping_all(call: Call) -> int:
     """Ping every node once, and return the exit code."""
     with call.session() as session:
-        survey = take(session, call.domain, processes=True)
+        survey = take_survey(session, call.domain, processes=True)
         names = sorted(set(survey.view.nodes()))
         print_lines(["Will ping the following nodes: ", *(f" * {name}" for name in names), ""])
         code = 0
@@ -162,7 +163,7 @@ def kill(call: Call, names: Sequence[str], *, everybody: bool) -> int:
         NotFoundError: There is no such node; then none is ended.
     """
     with call.session() as session:
-        survey = take(session, call.domain, processes=True)
+        survey = take_survey(session, call.domain, processes=True)
         known = sorted(set(survey.view.nodes()))
         chosen = known if everybody else [call.resolve(name, _TOOL) for name in names]
         unknown = [name for name in chosen if name not in known]

@@ -257,7 +257,7 @@ def _client(
 ) -> Iterator[tuple[ParamClient, Callable[[str], str]]]:
     """Give the way to the store, and what turns names into global ones."""
     from rosz.environment import Environment
-    from rosz.introspect.reach import open_context, open_session
+    from rosz.introspect.connect import open_context, open_session
     from rosz.params.paths import resolve
     from rosz.params.remote import ParamClient
 

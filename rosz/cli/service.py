@@ -49,13 +49,13 @@ def list_command(
 def info_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Tell who serves a service, of what type and with what arguments."""
     from rosz.introspect import services as library
-    from rosz.introspect.fill import list_arguments
-    from rosz.introspect.survey import ros1_type
+    from rosz.introspect.arguments import list_arguments
+    from rosz.names import short_type
 
     call = call_of(context)
     token = library.server(call.survey().view, call.resolve(service, _TOOL))
     arguments = list_arguments(call.types.service(token.type_name).Request)
-    type_name = ros1_type(token.type_name)
+    type_name = short_type(token.type_name)
     if json:
         row = {"name": token.name, "node": token.node_name, "uri": library.uri(token)}
         print_json(row | {"type": type_name, "args": arguments.split()})
@@ -74,10 +74,10 @@ def info_command(context: Context, service: _ServiceName, *, json: _Json = False
 def type_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the type of a service."""
     from rosz.introspect.services import server
-    from rosz.introspect.survey import ros1_type
+    from rosz.names import short_type
 
     call = call_of(context)
-    name = ros1_type(server(call.survey().view, call.resolve(service, _TOOL)).type_name)
+    name = short_type(server(call.survey().view, call.resolve(service, _TOOL)).type_name)
     _print_one("type", name, as_json=json)
 
 
@@ -108,7 +108,7 @@ def find_command(
 @app.command("args")
 def args_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the arguments that a service takes."""
-    from rosz.introspect.fill import list_arguments
+    from rosz.introspect.arguments import list_arguments
     from rosz.introspect.services import server
 
     call = call_of(context)

@@ -11,11 +11,10 @@ import msgspec
 
 from rosz.cli.group import Call, print_json, print_lines, until_stopped, warn
 from rosz.errors import EncodeError, UsageError
-from rosz.introspect.documents import read_arguments, read_stream
-from rosz.introspect.echo import plain
-from rosz.introspect.fill import list_arguments, with_arguments
+from rosz.introspect.arguments import list_arguments, read_arguments, read_stream, with_arguments
 from rosz.introspect.services import call as send_call
 from rosz.introspect.services import server, wait_for_server
+from rosz.message.values import to_jsonable
 from rosz.node import Client, Node
 
 __all__ = ("CallOptions", "call_service")
@@ -85,9 +84,9 @@ def _call(client: Client, values: Sequence[Any], options: CallOptions) -> None:
         raise with_arguments(error, client.service_type.Request) from error
     if options.as_json:
         print_json(
-            {"request": plain(request), "response": plain(response)}
+            {"request": to_jsonable(request), "response": to_jsonable(response)}
             if options.verbose
-            else plain(response)
+            else to_jsonable(response)
         )
         return
     if options.verbose:

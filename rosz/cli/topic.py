@@ -112,7 +112,7 @@ def type_command(
 ) -> None:
     """Print the type of a topic, or of a field of it."""
     from rosz.introspect.fields import find_target
-    from rosz.introspect.follow import resolve_field, topic_types
+    from rosz.introspect.subscribe import resolve_field, topic_types
 
     call = call_of(context)
     name = resolve_field(topic, lambda each: call.resolve(each, "rostopic"))
@@ -166,7 +166,7 @@ def echo_command(
     """Print the messages of a topic."""
     from rosz.cli.topic_follow import echo
     from rosz.introspect.echo import EchoOptions
-    from rosz.introspect.expression import Filter
+    from rosz.introspect.fields import Filter
 
     if width is not None:
         at_least("-w", width, 2, "characters", _WIDEST)
@@ -203,7 +203,7 @@ def hz_command(
 ) -> None:
     """Print every second how many messages come."""
     from rosz.cli.topic_follow import hz
-    from rosz.introspect.expression import Filter
+    from rosz.introspect.fields import Filter
 
     chosen = Filter(condition) if condition else None
     hz(

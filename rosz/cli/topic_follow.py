@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.cli.group import Call, print_lines, until_stopped, warn
 from rosz.errors import ClosedError, NotFoundError
-from rosz.introspect.follow import find_class, find_token, resolve_field, wait_for_target
+from rosz.introspect.subscribe import find_class, find_token, resolve_field, wait_for_target
 from rosz.node import Context, Node
 from rosz.qos import QoS
 
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from msgspec import Struct
 
     from rosz.introspect.echo import EchoOptions
-    from rosz.introspect.expression import Filter
-    from rosz.introspect.fields import Target
+    from rosz.introspect.fields import Filter, Target
     from rosz.node import MessageInfo
     from rosz.session import Sample
     from rosz.wire import Token
@@ -151,7 +150,7 @@ def hz(
     as_json: bool,
 ) -> None:
     """Print rates."""
-    from rosz.introspect.rate import RateMeter, report, report_all
+    from rosz.introspect.measure import RateMeter, format_rate, format_rates
 
     with _node(call) as node:
         clock = time.monotonic_ns if wall_time else node.context.clock.steady
@@ -171,14 +170,14 @@ def hz(
             if as_json:
                 _print_stats(found)
                 continue
-            text = report_all(found) if len(found) > 1 else report(*found.values())
+            text = format_rates(found) if len(found) > 1 else format_rate(*found.values())
             print_lines([text])
 
 
 def _tap(node: Node, token: Token, callback: Callable[[Sample], None]) -> None:
-    from rosz.introspect.tap import open_tap
+    from rosz.introspect.subscribe import subscribe_samples
 
-    open_tap(node, token.name, token.type_name, token.type_hash, callback)
+    subscribe_samples(node, token.name, token.type_name, token.type_hash, callback)
 
 
 def _print_stats(found: Mapping[str, Struct | None]) -> None:
@@ -201,7 +200,7 @@ def _filtered(node: Node, token: Token, condition: Filter, meter: Any, clock: An
 
 def bw(call: Call, topic: str, *, window: int | None, as_json: bool) -> None:
     """Print bandwidth."""
-    from rosz.introspect.bandwidth import BandwidthMeter, report
+    from rosz.introspect.measure import BandwidthMeter, format_bandwidth
 
     with _node(call) as node:
         meter = BandwidthMeter(window)
@@ -215,12 +214,12 @@ def bw(call: Call, topic: str, *, window: int | None, as_json: bool) -> None:
             if as_json:
                 _print_stats({token.name: stats})
             elif stats is not None:
-                print_lines([report(stats)])
+                print_lines([format_bandwidth(stats)])
 
 
 def delay(call: Call, topic: str, *, window: int | None, as_json: bool) -> None:
     """Print ages."""
-    from rosz.introspect.delay import DelayMeter, read_stamp, report
+    from rosz.introspect.measure import DelayMeter, format_delay, read_stamp
 
     with _node(call) as node:
         meter = DelayMeter(window)
@@ -242,4 +241,4 @@ def delay(call: Call, topic: str, *, window: int | None, as_json: bool) -> None:
             if as_json:
                 _print_stats({token.name: meter.stats()})
             elif meter.begun:
-                print_lines([report(meter.stats())])
+                print_lines([format_delay(meter.stats())])

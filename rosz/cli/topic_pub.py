@@ -10,8 +10,13 @@ import msgspec
 
 from rosz.cli.group import Call, print_lines, until_stopped, warn
 from rosz.errors import EncodeError, UsageError
-from rosz.introspect.documents import read_arguments, read_file, read_stream
-from rosz.introspect.fill import list_arguments, with_arguments
+from rosz.introspect.arguments import (
+    list_arguments,
+    read_arguments,
+    read_file,
+    read_stream,
+    with_arguments,
+)
 from rosz.introspect.publish import DEFAULT_RATE, Sender, SendOptions
 from rosz.node import Node
 

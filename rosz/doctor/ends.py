@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 from rosz.doctor.finding import Finding, error, warning
 from rosz.errors import RoszError, TypeNotFound, near_miss
-from rosz.introspect.survey import Survey, ros1_type
+from rosz.introspect.survey import Survey
+from rosz.names import short_type
 from rosz.wire import NO_HASH, Kind, Token
 
 __all__ = (
@@ -56,7 +57,7 @@ def check_types(survey: Survey) -> Iterator[Finding]:
                 "type-mismatch",
                 f"{word} {name} has several types: those of different types do not reach each"
                 " other",
-                sorted(f"{_end(survey, t)} {ros1_type(t.type_name)}" for t in tokens),
+                sorted(f"{_end(survey, t)} {short_type(t.type_name)}" for t in tokens),
                 "give all sides one type, or one side another name (remap it)",
             )
 
@@ -70,7 +71,7 @@ def check_hashes(survey: Survey) -> Iterator[Finding]:
                 yield error(
                     "hash-mismatch",
                     f"{word} {name}: its sides have different definitions of"
-                    f" {ros1_type(type_name)}, and do not reach each other",
+                    f" {short_type(type_name)}, and do not reach each other",
                     sorted(f"{_end(survey, t)} {t.type_hash[:_HASH_SHOWN]}…" for t in same),
                     f"bring the package '{type_name.partition('/')[0]}' to one version on all"
                     " sides, and start again what uses it",
@@ -169,7 +170,7 @@ def _alone(survey: Survey, lonely: Iterable[Token], others: list[Token]) -> list
     for token in lonely:
         kin = [other.name for other in others if other.type_name == token.type_name]
         hint = near_miss(token.name, kin).replace("did you mean", "is it meant for")
-        lines.add(f"{token.name} [{ros1_type(token.type_name)}]: {_end(survey, token)}{hint}")
+        lines.add(f"{token.name} [{short_type(token.type_name)}]: {_end(survey, token)}{hint}")
     return sorted(lines)
 
 
@@ -196,7 +197,7 @@ def check_packages(
         except TypeNotFound as fault:
             yield error(
                 "missing-package",
-                f"the type {ros1_type(type_name)} is not known here: {fault}",
+                f"the type {short_type(type_name)} is not known here: {fault}",
                 ends,
                 f"put the package '{package}' on the package path (ROSZ_PACKAGE_PATH); its"
                 " package.xml and .msg files are enough",
@@ -204,7 +205,7 @@ def check_packages(
         except RoszError as fault:
             yield error(
                 "bad-definition",
-                f"the type {ros1_type(type_name)} cannot be used here: {fault}",
+                f"the type {short_type(type_name)} cannot be used here: {fault}",
                 ends,
                 "correct the definition: 'rosz pkg check' shows all that is wrong",
             )
@@ -212,7 +213,7 @@ def check_packages(
             if type_hash not in {known, NO_HASH} and distro != "humble":
                 yield warning(
                     "other-definition",
-                    f"{ros1_type(type_name)} has another definition here: commands and nodes of"
+                    f"{short_type(type_name)} has another definition here: commands and nodes of"
                     " this machine do not reach those",
                     [
                         f"{end} {type_hash[:_HASH_SHOWN]}…, here {known[:_HASH_SHOWN]}…"

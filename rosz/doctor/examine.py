@@ -26,8 +26,8 @@ from rosz.doctor.stamps import check_stamps
 from rosz.doctor.stopped import check_stopped
 from rosz.environment import Environment, package_index
 from rosz.errors import TransportError
-from rosz.introspect.reach import open_session
-from rosz.introspect.survey import take
+from rosz.introspect.connect import open_session
+from rosz.introspect.survey import take_survey
 from rosz.session import Session
 from rosz.session.segments import SEGMENTS
 from rosz.typestore import TypeStore
@@ -85,7 +85,7 @@ def examine(examination: Examination) -> Iterator[Finding]:
 
 def _examine_network(session: Session, examination: Examination) -> Iterator[Finding]:
     environment = examination.environment
-    survey = take(session, environment.domain, processes=True)
+    survey = take_survey(session, environment.domain, processes=True)
     examination.nodes = len(survey.view.nodes())
     yield from check_domains(session, survey)
     yield from check_versions(session)

@@ -11,7 +11,7 @@ import msgspec
 
 from rosz.doctor.finding import Finding, error, warning
 from rosz.doctor.stopped import state
-from rosz.introspect.survey import Survey, place, take
+from rosz.introspect.survey import Survey, process_address, take_survey
 from rosz.node.control import NodeInfo, Request, control_key
 from rosz.session import Session
 
@@ -70,7 +70,7 @@ def check_answers(
     silent = set(survey.processes) - set(answers)
     if not silent:
         return
-    silent &= set(take(session, survey.domain, processes=True).processes)
+    silent &= set(take_survey(session, survey.domain, processes=True).processes)
     silent -= set(interview(session, survey.domain))
     barred = _barred(session, survey, silent, answers)
     silent -= barred
@@ -112,7 +112,7 @@ def check_sight(
         return
     time.sleep(_AGAIN)
     survey, answers = (
-        take(session, survey.domain, processes=True),
+        take_survey(session, survey.domain, processes=True),
         interview(session, survey.domain),
     )
     blind = _blind(survey, answers, stopped)
@@ -180,7 +180,9 @@ def check_clocks(survey: Survey, answers: dict[_Node, Answer]) -> Iterator[Findi
 
 def _name(survey: Survey, node: _Node) -> str:
     process = survey.processes.get(node)
-    return f"session {node[0]}" if process is None else f"{process.node} ({place(process)})"
+    return (
+        f"session {node[0]}" if process is None else f"{process.node} ({process_address(process)})"
+    )
 
 
 def _state(survey: Survey, node: _Node) -> str:
@@ -194,4 +196,4 @@ def _names(survey: Survey, zid: str) -> str:
     if not mine:
         return f"session {zid}"
     more = f" and {len(mine) - 1} more" if len(mine) > 1 else ""
-    return f"{mine[0].node}{more} ({place(mine[0])})"
+    return f"{mine[0].node}{more} ({process_address(mine[0])})"

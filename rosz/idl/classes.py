@@ -11,9 +11,10 @@ from rosz.idl.encode import Encoder
 from rosz.idl.layout import ARRAYS, OCTETS
 from rosz.idl.md5 import message_md5, service_md5
 from rosz.idl.names import Module, attribute, class_name
-from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec, ros1_name
+from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec
 from rosz.idl.typehash import message_hash, service_hash
 from rosz.idl.wrap import wrap
+from rosz.names import short_type
 
 __all__ = ("message_class", "service_class")
 
@@ -101,7 +102,7 @@ def _docstring(text: str) -> list[str]:
 
 def _names(name: str, type_hash: str, md5: str, text: str) -> list[str]:
     return [
-        f'_type = "{ros1_name(name)}"',
+        f'_type = "{short_type(name)}"',
         f'_type_name = "{name}"',
         f'_type_hash = "{type_hash}"',
         f'_md5sum = "{md5}"',

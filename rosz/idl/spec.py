@@ -18,7 +18,6 @@ __all__ = (
     "Shape",
     "Value",
     "element_of",
-    "ros1_name",
 )
 
 Shape: TypeAlias = Literal["one", "fixed", "bounded", "sequence"]
@@ -157,13 +156,3 @@ class ActionSpec(msgspec.Struct, frozen=True):
     feedback: MessageSpec
     text: str = ""
     path: str = "<string>"
-
-
-def ros1_name(name: str) -> str:
-    """Spell a full name as ROS 1 does: ``std_msgs/String``, ``std_srvs/SetBoolRequest``."""
-    package, _, rest = name.partition("/")
-    base = rest.rpartition("/")[2]
-    for part in ("Request", "Response"):
-        if "/srv/" in name and base.endswith(f"_{part}"):
-            base = base.removesuffix(f"_{part}") + part
-    return f"{package}/{base}"

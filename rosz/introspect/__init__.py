@@ -1,10 +1,10 @@
-"""Looking at a running system: what its commands show, measure, send and ask.
+"""Inspect a running system: what the commands list, measure, send and query.
 
-``reach`` finds the way into the network and ``survey`` sees who is there; ``topics``, ``services``,
-``nodes`` and ``definitions`` put that into ROS 1's words; ``echo``, ``rate``, ``bandwidth``,
-``delay`` and ``rosout`` follow topics; ``fill``, ``documents`` and ``publish`` send messages made
-from text; ``control`` talks to nodes. Whoever needs one of them imports it alone, so nothing is
-imported here.
+``connect`` opens the session of a command, and ``survey`` takes a snapshot of the network;
+``topics``, ``services``, ``nodes`` and ``definitions`` list and describe what is there, as ROS 1's
+tools do. ``subscribe``, ``fields``, ``echo``, ``measure`` and ``rosout`` follow topics;
+``arguments`` and ``publish`` send messages that are written as YAML. Each module is public and
+imported alone, since a command has to start fast; nothing is imported here.
 """
 
 __all__: tuple[str, ...] = ()

@@ -9,7 +9,7 @@ import msgspec
 
 from rosz.errors import TypeNotFound, UsageError, near_miss
 from rosz.idl import Catalog, MessageSpec, message_hash, message_md5, service_hash, service_md5
-from rosz.idl.spec import ros1_name
+from rosz.names import short_type
 from rosz.typestore import Kind, TypeStore
 
 __all__ = ("Definitions", "TypeSummary")
@@ -145,7 +145,7 @@ class Definitions:
         """
         parts = self.parts(name)
         return TypeSummary(
-            name=ros1_name(name),
+            name=short_type(name),
             type_name=name,
             md5=self.md5(name),
             hash=self.hash(name),
@@ -160,5 +160,5 @@ def _written(kind: Any) -> str:
     if kind.primitive:
         base = kind.base + (f"<={kind.bound}" if kind.bound else "")
     else:
-        base = _PRIMITIVE_IN_ROS1.get(kind.base) or ros1_name(kind.base)
+        base = _PRIMITIVE_IN_ROS1.get(kind.base) or short_type(kind.base)
     return f"{base}{kind.suffix}"

@@ -1,37 +1,42 @@
-"""Messages of a topic as text, one after the other: ``rostopic echo``."""
+"""Messages of a topic as text: ``rostopic echo``.
+
+The forms are YAML, JSON and rows of numbers for plotting (``-p``); arrays and strings can be left
+out of each (``--noarr``, ``--nostr``).
+"""
 
 from __future__ import annotations
 
-from base64 import b64encode
-from collections.abc import Callable
-from keyword import iskeyword
-from math import isfinite, isnan
+from array import array
+from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import Any
 
 import msgspec
 
-from rosz.introspect.expression import Filter
-from rosz.introspect.fields import FieldPath
-from rosz.introspect.shorten import Shortener
+from rosz.introspect.fields import FieldPath, Filter
+from rosz.message import Message
+from rosz.message.values import to_jsonable
+from rosz.time import DurationValue, TimeValue
 
-__all__ = ("Echo", "EchoOptions", "dump_bytes", "plain")
+__all__ = ("Echo", "EchoOptions", "dump_bytes")
 
-CLEAR = "\033[2J\033[;H"
+_CLEAR = "\033[2J\033[;H"
 _DUMP_WIDTH = 16
+_STAMPS = frozenset({"builtin_interfaces/Time", "builtin_interfaces/Duration"})
 
 
 class EchoOptions(msgspec.Struct, frozen=True, kw_only=True):
     """How messages are shown.
 
     Attributes:
-        plot: As rows of numbers.
-        as_json: As JSON, one line for each.
-        clear: Clear the screen before each.
-        width: Of numbers, in characters; 0 for as wide as they are.
-        offset: Show times as seconds from now.
-        no_arrays: Leave out arrays.
-        no_strings: Leave out texts.
-        condition: Show only those that it accepts.
+        plot: Whether to show rows of numbers.
+        as_json: Whether to show JSON, one line for each message.
+        clear: Whether to clear the screen before each message.
+        width: Width of numbers in characters; 0 for their own width.
+        offset: Whether to show times as seconds from now.
+        no_arrays: Whether to leave out arrays.
+        no_strings: Whether to leave out strings.
+        condition: Filter that a message must pass.
     """
 
     plot: bool = False
@@ -45,29 +50,34 @@ class EchoOptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Echo:
-    """Turns the messages of one topic into text.
+    """Formats the messages of one topic.
 
     Args:
         topic: Name of the topic, for the filter.
-        kind: Type of what is shown, as ROS 1 spells it.
-        path: From a message to what is shown.
-        options: How.
-        now: Gives ROS time in nanoseconds.
+        type_name: Type of the part that is shown, as ROS 1 spells it.
+        path: Path from a message to the part that is shown.
+        options: How messages are shown.
+        now: Function that returns ROS time in nanoseconds.
     """
 
     def __init__(
-        self, topic: str, kind: str, path: FieldPath, options: EchoOptions, now: Callable[[], int]
+        self,
+        topic: str,
+        type_name: str,
+        path: FieldPath,
+        options: EchoOptions,
+        now: Callable[[], int],
     ) -> None:
         self._topic = topic
-        self._kind = kind
+        self._type_name = type_name
         self._path = path
         self._options = options
         self._now = now
-        self._shortener = Shortener(no_arrays=options.no_arrays, no_strings=options.no_strings)
-        self._headed = False
+        self._shortened = options.no_arrays or options.no_strings
+        self._has_head = False
 
     def text(self, message: Any) -> str | None:
-        """Return what to print for a message; ``None`` if it is not wanted.
+        """Return what to print for a message; None if the filter refuses it.
 
         Raises:
             LookupError: The message has no element at an index of the path.
@@ -79,22 +89,11 @@ class Echo:
         value = self._path.read(message)
         if self._options.plot:
             return self._plot(value)
-        if not self._shortener.idle:
-            value = self._shortener.apply(value, self._kind)
+        if self._shortened:
+            value = self._shorten(value, self._type_name)
         if self._options.as_json:
-            return _json(value)
+            return msgspec.json.encode(to_jsonable(value)).decode() + "\n"
         return self._yaml(value)
-
-    def _plot(self, value: Any) -> str:
-        from rosz.introspect.plot import plot_head, plot_row
-
-        now = self._now()
-        offset = now if self._options.offset else 0
-        row = plot_row(value, self._shortener.fields, now, offset) + "\n"
-        if self._headed:
-            return row
-        self._headed = True
-        return f"{plot_head(value, self._shortener.fields)}\n{row}"
 
     def _yaml(self, value: Any) -> str:
         from rosz.message.text import strify_message
@@ -107,31 +106,93 @@ class Echo:
         text = strify_message(
             value, time_offset=offset, fixed_numeric_width=self._options.width or None
         )
-        return f"{CLEAR * self._options.clear}{text}\n---\n"
+        return f"{_CLEAR * self._options.clear}{text}\n---\n"
+
+    # Arrays and strings left out.
+
+    def _shorten(self, value: Any, type_name: str) -> Any:
+        """Return a value, with notes in place of what is left out."""
+        note = self._note(value, type_name)
+        if note is not None:
+            return note
+        if not isinstance(value, Message) or value._type in _STAMPS:
+            return value
+        shortened = _untyped(type(value))()
+        for name, inner in zip(value.__slots__, value._slot_types, strict=True):
+            setattr(shortened, name, self._shorten(getattr(value, name), inner))
+        return shortened
+
+    def _note(self, value: Any, type_name: str) -> str | None:
+        """Return the note that replaces a value; None where the value stays."""
+        element, bracket, _ = type_name.partition("[")
+        text = self._options.no_strings and element.startswith("string")
+        if bracket and (self._options.no_arrays or text):
+            return f"<array type: {element}, length: {len(value)}>"
+        if text and not bracket:
+            return f"<string length: {len(value)}>"
+        return None
+
+    # Rows of numbers.
+
+    def _plot(self, value: Any) -> str:
+        """Return the row of a message, or of a value in it, behind a head if it is the first.
+
+        The first column is the time of the message's header, or else now; bytes are left out, as
+        ``rostopic`` does.
+        """
+        time = now = self._now()
+        offset = now if self._options.offset else 0
+        if isinstance(value, Message) and value._has_header:
+            time = value.header.stamp.to_nsec()  # type: ignore[attr-defined]  # it has one
+        row = f"{time - offset}," + ",".join(self._numbers(value, offset)) + "\n"
+        if self._has_head:
+            return row
+        self._has_head = True
+        return f"%time,{','.join(self._columns(value, 'field'))}\n{row}"
+
+    def _fields(self, message: Message) -> Iterator[str]:
+        """Yield the fields of a message that are shown."""
+        no_arrays, no_strings = self._options.no_arrays, self._options.no_strings
+        for name, type_name in zip(message.__slots__, message._slot_types, strict=True):
+            if not (no_arrays and "[" in type_name) and not (
+                no_strings and type_name.startswith("string")
+            ):
+                yield name
+
+    def _columns(self, value: Any, name: str) -> Iterator[str]:
+        if isinstance(value, Message) and not isinstance(value, TimeValue | DurationValue):
+            for field in self._fields(value):
+                yield from self._columns(getattr(value, field), f"{name}.{field}")
+        elif isinstance(value, list | tuple | array):
+            for number, one in enumerate(value):
+                if isinstance(one, Message) and not isinstance(one, TimeValue | DurationValue):
+                    yield from self._columns(one, f"{name}{number}")
+                else:
+                    yield f"{name}{number}"
+        elif not isinstance(value, bytes):
+            yield name
+
+    def _numbers(self, value: Any, offset: int) -> Iterator[str]:
+        if isinstance(value, bool):
+            yield "1" if value else "0"
+        elif isinstance(value, TimeValue):
+            yield str(value.to_nsec() - offset)
+        elif isinstance(value, DurationValue):
+            yield str(value.to_nsec())
+        elif isinstance(value, Message):
+            for field in self._fields(value):
+                yield from self._numbers(getattr(value, field), offset)
+        elif isinstance(value, list | tuple | array):
+            for one in value:
+                yield from self._numbers(one, offset)
+        elif not isinstance(value, bytes):
+            yield str(value)
 
 
-def _json(value: Any) -> str:
-    return msgspec.json.encode(plain(value)).decode() + "\n"
-
-
-def plain(value: Any) -> Any:
-    """Return a message, or a value in one, as what JSON has; see `rosz.message.values.to_json`."""
-    if hasattr(value, "_schema"):
-        return {_shown(name): plain(getattr(value, name)) for name in type(value).__slots__}
-    if isinstance(value, bytes | bytearray):
-        return b64encode(value).decode()
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
-    if isinstance(value, float) and not isfinite(value):
-        return "NaN" if isnan(value) else "Infinity" if value > 0 else "-Infinity"
-    return value
-
-
-def _shown(name: str) -> str:
-    """Return the name of a field without what sets it apart from a word of Python."""
-    return name[:-1] if name.endswith("_") and iskeyword(name[:-1]) else name
+@lru_cache(maxsize=1024)
+def _untyped(cls: type[Message]) -> type[Any]:
+    """Return a class with the fields of a message class, which hold any value."""
+    return type(cls.__name__, (), {"__slots__": cls.__slots__, "_schema": (), "_type": cls._type})
 
 
 def dump_bytes(data: bytes) -> str:

@@ -1,10 +1,12 @@
-"""Paths to fields of messages: ``pose/position``, ``ranges[0]``, ``poses[2:4]/x``.
+"""Fields of messages that a person names, and filters on them.
 
-A path is checked against the type before the first message comes, so a wrong name is told at once.
+A path (``pose/position``, ``ranges[0]``, ``poses[2:4]/x``) is checked against the type before the
+first message arrives, so that a wrong name is an error at once.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from array import array
 from collections.abc import Callable, Mapping, Sequence
@@ -13,35 +15,35 @@ from typing import Any
 import msgspec
 
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
-from rosz.introspect.survey import ros1_type
 from rosz.message import Message
-from rosz.message.schema import Slot, slots
-from rosz.message.schema import ros1_type as slot_type
+from rosz.message.schema import Slot, slot_type, slots
+from rosz.names import short_type
 
-__all__ = ("FieldPath", "Target", "find_target")
+__all__ = ("FieldPath", "Filter", "Target", "find_target")
 
 _STEP = re.compile(r"(\w+)(?:\[([^\]]*)\])?")
 _MOST_SLICE_PARTS = 3
+_FEW = 100
 
 Loader = Callable[[str], type[Message]]
 
 
-class Step(msgspec.Struct, frozen=True):
-    """One name of a path, with what is in brackets behind it."""
+class _Step(msgspec.Struct, frozen=True):
+    """One name of a path, with the index or slice behind it."""
 
     name: str
     index: int | slice | None
 
 
 class FieldPath:
-    """The way from a message to a part of it.
+    """The path from a message to a part of it.
 
     Args:
         text: Names joined by slashes, each with an index or slice where it is a sequence; without
-            any name it leads to the message itself.
+            any name it is the message itself.
 
     Raises:
-        UsageError: It has not that form.
+        UsageError: The text does not have that form.
     """
 
     def __init__(self, text: str) -> None:
@@ -61,7 +63,7 @@ class FieldPath:
 
         Raises:
             NotFoundError: The class has no such field.
-            UsageError: An index is given for what is no sequence, or none where one is needed.
+            UsageError: An index is given for what is not a sequence, or is missing for one.
         """
         type_text = cls._type
         here: type[Any] | str = cls
@@ -74,10 +76,10 @@ class FieldPath:
             type_text = slot_type(slot)
             before = f"{before}.{step.name}"
             if step.index is not None and slot.shape == "one" and slot.kind != "string":
-                raise UsageError(f"'{before}' is a {type_text}, no sequence: it takes no index")
+                raise UsageError(f"'{before}' is a {type_text}, not a sequence: it takes no index")
             if step.index is None and slot.shape != "one" and step is not self.steps[-1]:
                 raise UsageError(
-                    f"'{before}' is a {type_text}: say which of them, as in {step.name}[0]"
+                    f"'{before}' is a {type_text}: give an index, as in {step.name}[0]"
                 )
             if isinstance(step.index, int):
                 type_text = slot_type(msgspec.structs.replace(slot, shape="one"))
@@ -87,32 +89,34 @@ class FieldPath:
         return f"FieldPath({self.text!r})"
 
 
-def _parse_step(part: str, whole: str) -> Step:
+def _parse_step(part: str, whole: str) -> _Step:
     match = _STEP.fullmatch(part)
     if match is None:
-        raise UsageError(f"'{part}' in '{whole}' is no field; expected a form such as ranges[0:3]")
+        raise UsageError(
+            f"'{part}' in '{whole}' is not a field; expected a form such as ranges[0:3]"
+        )
     name, inside = match.groups()
     if inside is None:
-        return Step(name, None)
+        return _Step(name, None)
     numbers = inside.split(":")
     try:
         ends = [int(number) if number.strip() else None for number in numbers]
     except ValueError as error:
         raise UsageError(
-            f"'[{inside}]' in '{whole}' is no index; expected whole numbers"
+            f"'[{inside}]' in '{whole}' is not an index; expected whole numbers"
         ) from error
     if len(ends) == 1 and ends[0] is not None:
-        return Step(name, ends[0])
+        return _Step(name, ends[0])
     if len(ends) == 1 or len(ends) > _MOST_SLICE_PARTS:
         raise UsageError(
-            f"'[{inside}]' in '{whole}' is no index; expected [3] or [start:stop:step]"
+            f"'[{inside}]' in '{whole}' is not an index; expected [3] or [start:stop:step]"
         )
     if len(ends) == _MOST_SLICE_PARTS and ends[2] == 0:
-        raise UsageError(f"'[{inside}]' in '{whole}' goes nowhere; expected a step other than 0")
-    return Step(name, slice(*ends))
+        raise UsageError(f"'[{inside}]' in '{whole}' has step 0; expected a step other than 0")
+    return _Step(name, slice(*ends))
 
 
-def _follow(value: Any, steps: Sequence[Step]) -> Any:
+def _follow(value: Any, steps: Sequence[_Step]) -> Any:
     for number, step in enumerate(steps):
         value = getattr(value, step.name)
         if step.index is None:
@@ -140,12 +144,12 @@ def _slot(cls: type[Any], name: str) -> Slot:
 
 
 class Target(msgspec.Struct, frozen=True):
-    """A topic, or a field of what is sent on it.
+    """A topic, or a field of its messages.
 
     Attributes:
         topic: Name of the topic.
-        type_name: Its type, ``pkg/msg/Name``.
-        path: From a message to the part that is meant.
+        type_name: Type of the topic, ``pkg/msg/Name``.
+        path: Path from a message to the field.
     """
 
     topic: str
@@ -156,23 +160,23 @@ class Target(msgspec.Struct, frozen=True):
         """Return what ``rostopic type`` prints.
 
         Raises:
-            RoszError: The type of a field cannot be told.
+            RoszError: The path does not fit the type.
         """
-        own = ros1_type(self.type_name)
+        own = short_type(self.type_name)
         if not self.path.steps:
             return own
         return f"{own} {self.path.text} {self.path.type_in(load(self.type_name))}"
 
 
 def find_target(name: str, topics: Mapping[str, Sequence[str]], load: Loader) -> Target:
-    """Find the topic that a name means, or the topic and the field in it.
+    """Find the topic, or the topic and the field, that a name stands for.
 
-    The whole name is a topic, or else its longest beginning that is one and has such a field.
+    The whole name is a topic, or else its longest beginning that is a topic and has such a field.
 
     Args:
         name: Global name, fields and indices included.
         topics: Types by topic.
-        load: Gives the class of a type.
+        load: Function that returns the class of a type.
 
     Raises:
         NotFoundError: There is no such topic, or it has no such field; the text says which.
@@ -192,3 +196,42 @@ def find_target(name: str, topics: Mapping[str, Sequence[str]], load: Loader) ->
             continue
         return Target(topic, topics[topic][0], path)
     raise NotFoundError(f"unknown topic '{name}'{refused or near_miss(name, topics)}")
+
+
+class Filter:
+    """A condition on messages, written in Python as ``rostopic`` takes it: ``m.data > 3``.
+
+    Args:
+        text: Python expression of ``m``, the message, and ``topic``, its name.
+
+    Raises:
+        UsageError: The text is not an expression.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        try:
+            self._code = compile(ast.parse(text.strip(), "<filter>", "eval"), "<filter>", "eval")
+        except SyntaxError as error:
+            place = f" at column {error.offset}" if error.offset else ""
+            raise self._refused(f"{error.msg}{place}") from error
+        except ValueError as error:
+            raise self._refused(str(error)) from error
+        except (MemoryError, RecursionError) as error:
+            raise self._refused("it is nested too deep") from error
+
+    def _refused(self, reason: str) -> UsageError:
+        return UsageError(f"filter '{self.text:.{_FEW}}' is not a Python expression: {reason}")
+
+    def accepts(self, message: Any, topic: str = "") -> bool:
+        """Return whether a message passes.
+
+        Raises:
+            RoszError: The expression fails on this message.
+        """
+        try:
+            return bool(eval(self._code, {"m": message, "topic": topic}))  # noqa: S307  # the user's
+        except Exception as error:
+            raise RoszError(
+                f"filter '{self.text}' failed: {type(error).__name__}: {error}"
+            ) from error

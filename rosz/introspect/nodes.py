@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, TypeVar
 import msgspec
 
 from rosz.errors import NotFoundError, RoszError, WaitTimeout, near_miss
-from rosz.introspect.survey import Survey, ros1_type, take
+from rosz.introspect.survey import Survey, take_survey
+from rosz.names import short_type
 from rosz.wire import Kind, Token, tokens_key
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def describe(survey: Survey, node: Token) -> str:
     """
     lines = [_RULE, f"Node [{node.node_name}]"]
     for title, kind in (("Publications", Kind.PUBLISHER), ("Subscriptions", Kind.SUBSCRIPTION)):
-        found = {(t.name, ros1_type(t.type_name)) for t in _endpoints(survey, node, kind)}
+        found = {(t.name, short_type(t.type_name)) for t in _endpoints(survey, node, kind)}
         lines += _section(title, [f"{name} [{type_name}]" for name, type_name in sorted(found)])
     served = {t.name for t in _endpoints(survey, node, Kind.SERVICE)}
     lines += _section("Services", sorted(served))
@@ -235,7 +236,7 @@ def ping(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> float:
     try:
         get_info(session, node, timeout)
     except NotFoundError as error:
-        if take(session, node.domain).members(node.node_name):
+        if take_survey(session, node.domain).members(node.node_name):
             raise
         raise NotFoundError(f"node '{node.node_name}' has ended") from error
     return time.perf_counter() - began

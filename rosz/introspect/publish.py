@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from rosz.introspect.fill import fill
+from rosz.introspect.arguments import make_message
 
 if TYPE_CHECKING:
     from rosz.node import Node, Publisher
@@ -105,7 +105,7 @@ class Sender:
 
     def _make(self, arguments: Sequence[Any]) -> Any:
         now = self._node.now() if self._options.ros_time else time.time_ns()
-        return fill(self._publisher.message_type, arguments, now)
+        return make_message(self._publisher.message_type, arguments, now)
 
     def _latch(self, arguments: Sequence[Any], *, once: bool) -> None:
         message = self._make(arguments)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.errors import NotFoundError, near_miss
-from rosz.introspect.survey import ros1_type
+from rosz.names import short_type
 from rosz.wire import Token, endpoint_key
 
 if TYPE_CHECKING:
@@ -46,13 +46,13 @@ def list_services(view: View) -> list[ServiceEntry]:
     entries: list[ServiceEntry] = []
     for name, types in view.services().items():
         nodes = tuple(sorted({token.node_name for token in view.servers(name)}))
-        entries.append(ServiceEntry(name, tuple(map(ros1_type, types)), nodes))
+        entries.append(ServiceEntry(name, tuple(map(short_type, types)), nodes))
     return entries
 
 
 def find(view: View, type_name: str) -> list[str]:
     """Return the names of the services of a type, which may be spelled as in ROS 1 or 2."""
-    wanted = ros1_type(type_name)
+    wanted = short_type(type_name)
     return [entry.name for entry in list_services(view) if wanted in entry.types]
 
 
@@ -107,7 +107,7 @@ def call(client: Client, values: Sequence[Any], now: int) -> tuple[Any, Any]:
         EncodeError: The values do not fit the request.
         RoszError: The call fails.
     """
-    from rosz.introspect.fill import fill
+    from rosz.introspect.arguments import make_message
 
-    request = fill(client.service_type.Request, values, now)
+    request = make_message(client.service_type.Request, values, now)
     return request, client.call(request)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.environment import Environment, package_index
 from rosz.errors import RoszError
-from rosz.introspect.survey import Survey, ros1_type, take
+from rosz.introspect.survey import Survey, take_survey
+from rosz.names import short_type
 from rosz.packages import PackageIndex
 from rosz.session import Session, SessionConfig
 from rosz.session.probe import is_answered
@@ -62,7 +63,9 @@ class Suggestions:
         if self._found is None:
             with self._session() as session:
                 if session is not None:
-                    self._found = take(session, self._environment.domain, processes=processes)
+                    self._found = take_survey(
+                        session, self._environment.domain, processes=processes
+                    )
         return self._found
 
     @property
@@ -89,7 +92,7 @@ class Suggestions:
         """Return the types of a topic; of one that is not there, all that are known."""
         survey = self._survey()
         known = [] if survey is None else survey.view.topics().get(topic, [])
-        return [ros1_type(name) for name in known] or self.messages()
+        return [short_type(name) for name in known] or self.messages()
 
     def fields(self, word: str) -> list[str]:
         """Return the fields of a topic that a word names, with a part of a field or without."""
@@ -209,7 +212,7 @@ class Suggestions:
 
 
 def _flat(types: Any) -> list[str]:
-    return sorted({ros1_type(name) for names in types for name in names})
+    return sorted({short_type(name) for names in types for name in names})
 
 
 def _files(folder: Path, word: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Who is there at this moment: nodes, what they offer, and the processes behind them."""
+"""A snapshot of the network: nodes, their topics and services, and their processes."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from rosz.wire import (
     tokens_key,
 )
 
-__all__ = ("Survey", "place", "ros1_type", "take")
+__all__ = ("Survey", "process_address", "take_survey")
 
 T = TypeVar("T")
-_ANSWER_SECONDS = 2.0
+_REPLY_TIMEOUT = 2.0
 
 
 class Survey(msgspec.Struct, frozen=True):
-    """What was found.
+    """The nodes of a domain and what they declare.
 
     Attributes:
         domain: The ROS domain.
-        view: Nodes and endpoints.
-        processes: The processes of rosz nodes by session and number; ROS 2 tells none.
-        damaged: What was wrong with tokens that could not be read.
+        view: Nodes and their publishers, subscriptions, services and clients.
+        processes: Processes of rosz nodes by session and node id; ROS 2 nodes declare none.
+        damaged: Reasons why tokens could not be read.
     """
 
     domain: int
@@ -45,9 +45,9 @@ class Survey(msgspec.Struct, frozen=True):
         return self.processes.get((token.zid, token.node_id))
 
     def address(self, token: Token) -> str:
-        """Say where a node is, as far as it tells."""
+        """Return where a node runs, as far as it is known."""
         process = self.process(token)
-        return f"session {token.zid}" if process is None else place(process)
+        return f"session {token.zid}" if process is None else process_address(process)
 
     def host(self, token: Token) -> str:
         """Return the host of the node that a token belongs to."""
@@ -55,34 +55,34 @@ class Survey(msgspec.Struct, frozen=True):
         return "unknown host" if process is None else process.host
 
     def members(self, node: str) -> list[Token]:
-        """Return one token for every node of that full name, endpoints aside."""
+        """Return one token for each node of a full name."""
         found = {(t.zid, t.node_id): t for t in self.view.tokens if t.node_name == node}
         return [found[key] for key in sorted(found)]
 
 
-def place(process: ProcessToken) -> str:
-    """Say where a process is."""
+def process_address(process: ProcessToken) -> str:
+    """Return the host and the id of a process."""
     return f"{process.host}, pid {process.pid}"
 
 
-def take(session: Session, domain: int, *, processes: bool = False) -> Survey:
-    """Ask the network who is there.
+def take_survey(session: Session, domain: int, *, processes: bool = False) -> Survey:
+    """Query the network for the nodes of a domain.
 
     Args:
-        session: Where to ask.
+        session: The session to query with.
         domain: The ROS domain.
-        processes: Whether to ask for processes as well.
+        processes: Whether to query processes as well.
 
     Raises:
         ClosedError: The session is closed.
-        WaitTimeout: There was no end of answers.
+        WaitTimeout: The replies do not end in time.
     """
     damaged: list[str] = []
-    keys = session.live_tokens(tokens_key(domain), _ANSWER_SECONDS)
+    keys = session.live_tokens(tokens_key(domain), _REPLY_TIMEOUT)
     tokens = list(_read(keys, parse_token, damaged))
     found: dict[tuple[str, int], ProcessToken] = {}
     if processes:
-        keys = session.live_tokens(processes_key(domain), _ANSWER_SECONDS)
+        keys = session.live_tokens(processes_key(domain), _REPLY_TIMEOUT)
         found = {(one.zid, one.node_id): one for one in _read(keys, parse_process, damaged)}
     return Survey(domain, View(tokens), found, tuple(damaged))
 
@@ -93,9 +93,3 @@ def _read(keys: Iterable[str], parse: Callable[[str], T], damaged: list[str]) ->
             yield parse(key)
         except DecodeError as error:
             damaged.append(str(error))
-
-
-def ros1_type(name: str) -> str:
-    """Spell a full type name as ROS 1 does: ``std_msgs/msg/String`` is ``std_msgs/String``."""
-    package, _, rest = name.partition("/")
-    return f"{package}/{rest.rpartition('/')[2]}"

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import msgspec
 
 from rosz.errors import NotFoundError, near_miss
-from rosz.introspect.survey import Survey, ros1_type
+from rosz.introspect.survey import Survey
+from rosz.names import short_type
 from rosz.wire import Kind, Token
 
 __all__ = (
@@ -51,7 +52,7 @@ def list_topics(tokens: Iterable[Token]) -> list[Topic]:
         if token.kind not in {Kind.PUBLISHER, Kind.SUBSCRIPTION}:
             continue
         types, publishers, subscribers = ends.setdefault(token.name, (set(), [], []))
-        types.add(ros1_type(token.type_name))
+        types.add(short_type(token.type_name))
         side = publishers if token.kind is Kind.PUBLISHER else subscribers
         side.append(token.node_name)
     return [
@@ -75,7 +76,7 @@ def by_host(survey: Survey) -> dict[str, list[Token]]:
 
 def find(topics: Iterable[Topic], type_name: str) -> list[str]:
     """Return the names of the topics of a type, which may be spelled as in ROS 1 or 2."""
-    wanted = ros1_type(type_name)
+    wanted = short_type(type_name)
     return [topic.name for topic in topics if wanted in topic.types]
 
 
@@ -134,7 +135,7 @@ def describe(survey: Survey, name: str) -> str:
     for title, tokens in (("Publishers", publishers), ("Subscribers", subscriptions)):
         lines.append(f"{title}: " if tokens else f"{title}: None")
         for token in tokens:
-            type_text = f" [{ros1_type(token.type_name)}]" if mixed else ""
+            type_text = f" [{short_type(token.type_name)}]" if mixed else ""
             lines.append(f" * {token.node_name} ({survey.address(token)}){type_text}")
         lines.append("")
     return "\n".join([*lines, ""])
@@ -142,7 +143,7 @@ def describe(survey: Survey, name: str) -> str:
 
 def end_row(survey: Survey, token: Token) -> dict[str, str | int]:
     """Return one end of a topic as plain values."""
-    row: dict[str, str | int] = {"node": token.node_name, "type": ros1_type(token.type_name)}
+    row: dict[str, str | int] = {"node": token.node_name, "type": short_type(token.type_name)}
     process = survey.process(token)
     if process is not None:
         row |= {"host": process.host, "pid": process.pid}

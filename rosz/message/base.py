@@ -22,7 +22,7 @@ from typing import (
 
 import msgspec
 
-from rosz.message.schema import Schema, rclpy_type, ros1_type, slots
+from rosz.message.schema import Schema, rclpy_type, slot_type, slots
 
 __all__ = ("Array", "Bytes", "Message", "Sequenced", "Service", "Writable")
 
@@ -65,7 +65,7 @@ class _Derived(Generic[_T]):
 
 
 def _slot_types(cls: type[Message]) -> list[str]:
-    types = [ros1_type(slot) for slot in slots(cls)]
+    types = [slot_type(slot) for slot in slots(cls)]
     return ["uint32", *types] if issubclass(cls, Sequenced) else types
 
 

@@ -49,10 +49,10 @@ def fill_message_args(msg: Message, msg_args: Any, keys: Mapping[str, Any] | Non
     _Filler(msg._type, keys or {}).fill(msg, [] if msg_args is None else msg_args, "")
 
 
-def shown_name(slot: Slot) -> str:
-    """Return the name of a field as its definition has it: Python's words without the ``_``."""
-    bare = slot.name.removesuffix("_")
-    return bare if keyword.iskeyword(bare) else slot.name
+def shown_name(name: str) -> str:
+    """Return the name that a field has in its definition: Python's keywords without the ``_``."""
+    bare = name.removesuffix("_")
+    return bare if keyword.iskeyword(bare) else name
 
 
 class _Filler:
@@ -87,7 +87,7 @@ class _Filler:
         if issubclass(cls, Sequenced) and count == len(fields) + 1:
             return [_SEQ, *fields]  # as ROS 1 counts
         if count != len(fields):
-            names = ", ".join(shown_name(slot) for slot in fields)
+            names = ", ".join(shown_name(slot.name) for slot in fields)
             values = {0: "no values", 1: "1 value"}.get(len(fields), f"{len(fields)} values")
             owner = f"of {cls._type} " if path else ""
             what = f"{values} for the fields {owner}({names})" if fields else values
@@ -95,7 +95,7 @@ class _Filler:
         return fields
 
     def _slot(self, cls: type[Message], name: Any, path: str) -> Slot:
-        known = {shown_name(slot): slot for slot in slots(cls)}
+        known = {shown_name(slot.name): slot for slot in slots(cls)}
         if issubclass(cls, Sequenced):
             known["seq"] = _SEQ
         if issubclass(cls, TimeValue | DurationValue):

@@ -14,7 +14,7 @@ __all__ = (
     "Schema",
     "Slot",
     "rclpy_type",
-    "ros1_type",
+    "slot_type",
     "slots",
 )
 
@@ -105,7 +105,7 @@ def _slot(name: str, kind: str | type[Any], suffix: str) -> Slot:
     return Slot(name, kind, bound, "fixed", int(inside))
 
 
-def ros1_type(slot: Slot) -> str:
+def slot_type(slot: Slot) -> str:
     """Spell the type of a field as ROS 1 does, such as ``geometry_msgs/Point[]`` or ``time``."""
     if isinstance(slot.kind, str):
         base = slot.kind + (f"<={slot.bound}" if slot.bound else "")

@@ -23,6 +23,7 @@ __all__ = (
     "from_plain",
     "from_yaml",
     "to_json",
+    "to_jsonable",
     "to_plain",
     "to_yaml",
 )
@@ -38,7 +39,9 @@ Now: TypeAlias = "TimeValue | Callable[[], TimeValue]"
 
 def to_plain(message: Message) -> dict[str, Any]:
     """Return a message as dicts, lists, numbers, texts and bytes, by the names of its fields."""
-    return {shown_name(slot): _plain(getattr(message, slot.name)) for slot in slots(type(message))}
+    return {
+        shown_name(slot.name): _plain(getattr(message, slot.name)) for slot in slots(type(message))
+    }
 
 
 def to_json(message: Message) -> str:
@@ -47,7 +50,24 @@ def to_json(message: Message) -> str:
     Sequences of octets are Base64 texts; numbers that JSON lacks are ``"NaN"``, ``"Infinity"`` and
     ``"-Infinity"``. :func:`from_json` reads all of them.
     """
-    return json.dumps(_jsonable(to_plain(message)), ensure_ascii=False, allow_nan=False)
+    return json.dumps(to_jsonable(to_plain(message)), ensure_ascii=False, allow_nan=False)
+
+
+def to_jsonable(value: Any) -> Any:
+    """Return a message, or any value of a field, as values that JSON has; see `to_json`."""
+    if hasattr(value, "_schema"):
+        value = {shown_name(name): getattr(value, name) for name in type(value).__slots__}
+    if isinstance(value, dict):
+        return {name: to_jsonable(one) for name, one in value.items()}
+    if isinstance(value, bytes | bytearray):
+        return base64.b64encode(value).decode()
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [to_jsonable(one) for one in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
 
 
 def to_yaml(message: Message) -> str:
@@ -111,16 +131,4 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, list | tuple):
         return [_plain(one) for one in value]
-    return value
-
-
-def _jsonable(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _jsonable(one) for name, one in value.items()}
-    if isinstance(value, list):
-        return [_jsonable(one) for one in value]
-    if isinstance(value, bytes):
-        return base64.b64encode(value).decode()
-    if isinstance(value, float) and not math.isfinite(value):
-        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     return value

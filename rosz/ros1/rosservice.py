@@ -7,7 +7,7 @@ from typing import Any
 
 from rosz.errors import EncodeError, NotFoundError, RoszError
 from rosz.introspect.services import call, find, server, uri
-from rosz.introspect.survey import ros1_type
+from rosz.names import short_type
 from rosz.ros1.genpy.message import get_printable_message_args, get_service_class
 from rosz.ros1.rosgraph import Master, live
 from rosz.ros1.rosgraph.names import make_global_ns, script_resolve_name
@@ -68,7 +68,7 @@ def _server(service_name: str) -> Any:
 def get_service_type(service_name: str) -> str | None:
     """Return the type of a service; None if nobody serves it."""
     token = _server(service_name)
-    return None if token is None else ros1_type(token.type_name)
+    return None if token is None else short_type(token.type_name)
 
 
 def get_service_node(service_name: str) -> str | None:

@@ -125,7 +125,7 @@ def test_call_of_what_fails(shell: Shell) -> None:
         (["{c: 1}"], 1, "AddTwoIntsRequest: it has no field 'c'; it has a, b\n"),
         (["-x"], 2, "no such option: -x; see 'rosz service call --help'\n"),
         (["1", "x"], 1, "expected int64, got str 'x'"),
-        (["[1"], 2, "value 1, '[1', is no YAML"),
+        (["[1"], 2, "value 1, '[1', is not YAML"),
         (["--timeout", "0", "1", "2"], 2, "--timeout is 0"),
         (["--timeout", "inf", "1", "2"], 2, "--timeout is inf; expected seconds above 0"),
     ],

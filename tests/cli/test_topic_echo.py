@@ -114,7 +114,7 @@ def test_another_definition_is_told(shell: Shell, talker: Node) -> None:
     latch(talker, "/strange", other("x"))
     result = shell("topic", "echo", "-n", "1", "/strange")
     assert result.code == 1
-    assert "'std_msgs/String' is defined otherwise at node /talker" in result.err
+    assert "'std_msgs/String' has another definition at node /talker" in result.err
     assert shell("topic", "echo", "-n", "1", "--raw", "/strange").code == 0
 
 

@@ -110,7 +110,7 @@ def test_standard_input(shell: Shell, talker: Node) -> None:
             "the values are: [linear.x linear.y",
         ),
         (["/x", "std_msgs/Int8", "300"], 1, "std_msgs/Int8.data: expected int8"),
-        (["/x", "std_msgs/Int8", "[1"], 2, "value 1, '[1', is no YAML"),
+        (["/x", "std_msgs/Int8", "[1"], 2, "value 1, '[1', is not YAML"),
         (["/x", "std_msgs/Nope", "1"], 1, "package 'std_msgs' has no such msg"),
         (["-f", "/nowhere", "/x", "std_msgs/Int8"], 1, "file '/nowhere' is not there"),
         (["-r", "0", "/x", "std_msgs/Int8", "1"], 2, "expected a rate above 0"),

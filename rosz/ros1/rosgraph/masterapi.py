@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Any, NoReturn
 
 from rosz.errors import ParamError, ParamNotFound, RoszError, TransportError
-from rosz.introspect.survey import ros1_type
+from rosz.names import short_type
 from rosz.ros1.rosgraph import live
 from rosz.ros1.rosgraph.names import make_caller_id
 from rosz.ros1.rosgraph.rosenv import get_master_uri
@@ -200,7 +200,7 @@ class Master:
 
 
 def _types(tokens: Iterable[Token]) -> Pairs:
-    found = {token.name: ros1_type(token.type_name) for token in tokens}
+    found = {token.name: short_type(token.type_name) for token in tokens}
     return [[name, type_name] for name, type_name in sorted(found.items())]
 
 

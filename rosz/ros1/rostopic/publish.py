@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rosz.errors import EncodeError, TypeNotFound
-from rosz.introspect.fill import fill
+from rosz.introspect.arguments import make_message
 from rosz.introspect.publish import ONCE_SECONDS
 from rosz.ros1 import rospy
 from rosz.ros1.genpy.message import get_message_class, get_printable_message_args
@@ -92,7 +92,7 @@ def publish_message(  # noqa: PLR0917  # ROS 1's
 
 def _make(cls: type[Any], arguments: Sequence[Any]) -> Any:
     try:
-        return fill(cls, arguments, rospy.get_rostime().to_nsec())
+        return make_message(cls, arguments, rospy.get_rostime().to_nsec())
     except EncodeError as error:
         raise ROSTopicException(
             f"{error}\n\nArgs are: [{get_printable_message_args(cls())}]"

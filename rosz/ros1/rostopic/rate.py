@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from rosz.introspect.rate import RateMeter, report, report_all
+from rosz.introspect.measure import RateMeter, format_rate, format_rates
 from rosz.ros1.rosgraph import live
 
 __all__ = ("ROSTopicHz",)
@@ -66,7 +66,7 @@ class ROSTopicHz:
         """Write what was measured to stdout."""
         names = list(topics)
         if len(names) == 1:
-            text = report(self._meter(names[0]).stats())
+            text = format_rate(self._meter(names[0]).stats())
         else:
-            text = report_all({str(name): self._meter(name).stats() for name in names})
+            text = format_rates({str(name): self._meter(name).stats() for name in names})
         sys.stdout.write(f"{text}\n")

@@ -9,8 +9,9 @@ from typing import Any
 
 from rosz.errors import NotFoundError, RoszError, TypeNotFound
 from rosz.introspect.fields import FieldPath, find_target
-from rosz.introspect.survey import Survey, ros1_type
+from rosz.introspect.survey import Survey
 from rosz.introspect.topics import describe, find, list_topics
+from rosz.names import short_type
 from rosz.ros1.genpy.message import get_message_class
 from rosz.ros1.importer import type_store
 from rosz.ros1.rosgraph import Master, live
@@ -96,7 +97,7 @@ def _find(topic: str) -> Found:
         raise
     except NotFoundError:
         return None, None, None
-    return ros1_type(target.type_name), target.topic, msgevalgen(target.path.text)
+    return short_type(target.type_name), target.topic, msgevalgen(target.path.text)
 
 
 def get_topic_class(
@@ -139,7 +140,7 @@ def get_topic_list(master: Master | None = None) -> tuple[list[Any], list[Any]]:
 def _ends(found: Survey, kind: Kind) -> list[Any]:
     topics: dict[str, tuple[str, dict[str, None]]] = {}
     for token in found.view.endpoints(kind):
-        _, nodes = topics.setdefault(token.name, (ros1_type(token.type_name), {}))
+        _, nodes = topics.setdefault(token.name, (short_type(token.type_name), {}))
         nodes[token.node_name] = None
     return [[name, type_name, list(nodes)] for name, (type_name, nodes) in topics.items()]
 

@@ -6,7 +6,7 @@ import signal
 
 from network import Network, eventually
 
-from rosz.introspect.reach import command_config
+from rosz.introspect.connect import command_config
 from rosz.session.stopped import is_stopped
 
 NODE = """

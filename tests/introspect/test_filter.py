@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rosz.errors import RoszError, UsageError
-from rosz.introspect.expression import Filter
+from rosz.introspect.fields import Filter
 from rosz.msgs.std_msgs.msg import Int32
 
 REFUSED = {
@@ -19,7 +19,7 @@ REFUSED = {
 
 @pytest.mark.parametrize(("text", "reason"), REFUSED.items(), ids=range(len(REFUSED)))
 def test_what_is_no_expression(text: str, reason: str) -> None:
-    with pytest.raises(UsageError, match="is no Python expression: ") as caught:
+    with pytest.raises(UsageError, match="is not a Python expression: ") as caught:
         Filter(text)
     assert reason in str(caught.value)
     assert len(str(caught.value)) < 300

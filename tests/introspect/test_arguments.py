@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rosz.errors import UsageError, YamlError
-from rosz.introspect.documents import read_arguments, read_file, read_stream
+from rosz.introspect.arguments import read_arguments, read_file, read_stream
 
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 12)
@@ -72,7 +72,7 @@ def test_a_stream_tells_the_line_of_the_whole() -> None:
 
 
 def test_a_stream_of_other_bytes() -> None:
-    with pytest.raises(YamlError, match=r"standard input:2: byte 0xff is no UTF-8"):
+    with pytest.raises(YamlError, match=r"standard input:2: byte 0xff is not UTF-8"):
         list(read_stream(io.BytesIO(b"a: 1\n\xff\n---\n"), pytest.fail))
 
 

@@ -1,0 +1,145 @@
+"""Messages from YAML: arguments of a command, documents of a file or a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from rosz.errors import EncodeError, NotFoundError, UsageError, YamlError
+from rosz.message.fill import fill_message_args
+from rosz.message.schema import slots
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.params.nodes import read_plain
+from rosz.time import DurationValue, TimeValue
+
+__all__ = (
+    "list_arguments",
+    "make_message",
+    "read_arguments",
+    "read_file",
+    "read_stream",
+    "with_arguments",
+)
+
+_STREAM = "standard input"
+_FEW = 60
+
+
+def read_arguments(words: Sequence[str]) -> list[Any]:
+    """Return the values of command-line arguments; an empty one is an empty string.
+
+    Raises:
+        UsageError: An argument is not YAML.
+    """
+    return [_read_argument(word, number) for number, word in enumerate(words, 1)]
+
+
+def _read_argument(word: str, number: int) -> Any:
+    try:
+        found = list(read_plain(word, "<value>")) if word else [""]
+    except YamlError as error:
+        raise UsageError(
+            f"value {number}, '{word:.{_FEW}}', is not YAML: {error.reason}"
+        ) from error
+    if len(found) > 1:
+        raise UsageError(
+            f"value {number}, '{word:.{_FEW}}', is {len(found)} YAML documents; expected one"
+        )
+    return found[0] if found else None
+
+
+def read_file(path: Path) -> list[Any]:
+    """Return the documents of a YAML file, without the empty ones.
+
+    Raises:
+        NotFoundError: The file does not exist.
+        YamlError: The file is not YAML.
+    """
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise NotFoundError(f"file '{path}' is not there") from error
+    return list(_read(data, str(path)))
+
+
+def read_stream(lines: Iterable[bytes], warn: Callable[[str], None]) -> Iterator[Any]:
+    """Yield the YAML documents of a stream, each as soon as a line of three dashes ends it.
+
+    What follows the last such line counts as unfinished and is skipped, as in ROS 1's tools.
+
+    Args:
+        lines: Lines of the stream.
+        warn: Function called with a sentence about a document that is skipped.
+
+    Raises:
+        YamlError: A document is not YAML.
+    """
+    begun: list[bytes] = []
+    for number, line in enumerate(lines, 1):
+        if line.strip() != b"---":
+            begun.append(line)
+            continue
+        before = number - len(begun) - 1
+        try:
+            found = list(_read(b"".join(begun), _STREAM))
+        except YamlError as error:
+            raise YamlError(error.reason, _STREAM, before + error.line, error.column) from error
+        begun.clear()
+        yield from found
+    if b"".join(begun).strip():
+        warn(f"{_STREAM} ends without a line '---': what comes after the last one is left out")
+
+
+def _read(data: bytes, path: str) -> Iterator[Any]:
+    """Yield the documents that are not empty."""
+    try:
+        text = data.decode()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise YamlError(f"byte {data[error.start]:#04x} is not UTF-8", path, line) from error
+    yield from (one for one in read_plain(text, path) if one is not None)
+
+
+def make_message(cls: type[Any], arguments: Sequence[Any], now: int) -> Any:
+    """Make a message from values that were read as YAML.
+
+    Args:
+        cls: The message class.
+        arguments: One dictionary of fields, or a value for each field.
+        now: ROS time in nanoseconds, for ``now`` and ``auto``.
+
+    Raises:
+        EncodeError: A value does not fit; the error names the field and what was expected.
+    """
+    message = cls()
+    fill_message_args(message, list(arguments), {"now": Time.from_nsec(now)})
+    cls._encode(message)  # raises for what does not fit before anything is sent
+    return message
+
+
+def list_arguments(cls: type[Any]) -> str:
+    """Return the names of the values that a message is made of, as ``rosservice args`` prints."""
+    return " ".join(_arguments(cls, ""))
+
+
+def with_arguments(error: EncodeError, cls: type[Any]) -> EncodeError:
+    """Return an error that also lists the values of a message, unless it lists them already."""
+    if not error.field and list_arguments(cls) == " ".join(cls.__slots__):
+        return error
+    between = " " if error.reason.endswith("?") else "; "
+    reason = f"{error.reason}{between}the values are: [{list_arguments(cls)}]"
+    return EncodeError(error.type_name, error.field, reason)
+
+
+def _arguments(cls: type[Any], prefix: str) -> list[str]:
+    found: list[str] = []
+    kinds = {slot.name: slot for slot in slots(cls)}
+    for name in cls.__slots__:
+        slot = kinds.get(name)
+        kind = slot.kind if slot is not None and slot.shape == "one" else ""
+        if isinstance(kind, type) and not issubclass(kind, TimeValue | DurationValue):
+            found += _arguments(kind, f"{prefix}{name}.")
+        else:
+            found.append(prefix + name)
+    return found

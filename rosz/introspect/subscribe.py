@@ -1,0 +1,138 @@
+"""Subscribing to a topic of any type: find it, wait for it, load its class, receive its samples."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from rosz import names
+from rosz.errors import DefinitionError, InvalidName, NotFoundError
+from rosz.introspect.fields import Target, find_target
+from rosz.node.endpoint import Endpoint
+from rosz.qos import DEFAULT
+from rosz.wire import NO_HASH, Kind, Token, endpoint_key
+
+if TYPE_CHECKING:
+    from rosz.graph import View
+    from rosz.message import Message
+    from rosz.node import Context, Node
+    from rosz.session import Sample
+
+__all__ = (
+    "find_class",
+    "find_token",
+    "resolve_field",
+    "subscribe_samples",
+    "topic_types",
+    "wait_for_target",
+)
+
+
+def resolve_field(name: str, resolve: Callable[[str], str]) -> str:
+    """Return the global name of a topic, or of a field of one with its indices.
+
+    Args:
+        name: Name as a person wrote it.
+        resolve: Function that resolves a name.
+
+    Raises:
+        InvalidName: The name is not legal.
+    """
+    head, bracket, tail = name.partition("[")
+    if not head:
+        raise InvalidName(name, "it is empty; expected the name of a topic")
+    return resolve(names.check(head)) + bracket + tail
+
+
+def topic_types(view: View) -> Mapping[str, Sequence[str]]:
+    """Return the types of all topics, those of publishers before those of subscriptions."""
+    found: dict[str, Sequence[str]] = {}
+    for name, types in view.topics().items():
+        published = sorted({token.type_name for token in view.publishers(name)})
+        found[name] = [*published, *(each for each in types if each not in published)]
+    return found
+
+
+def wait_for_target(context: Context, name: str, warn: Callable[[str], object]) -> Target:
+    """Return the topic, or the topic and the field, of a name; wait while there is none.
+
+    Args:
+        context: The context whose graph is watched.
+        name: Global name, fields and indices included.
+        warn: Function called with a sentence if it has to wait.
+
+    Raises:
+        ClosedError: The context is shut down meanwhile.
+    """
+    load = context.types.message
+    try:
+        return find_target(name, topic_types(context.graph.refresh()), load)
+    except NotFoundError as error:
+        warn(f"topic [{name}] does not appear to be published yet ({error})")
+    found: list[Target] = []
+
+    def look(view: View) -> bool:
+        try:
+            found.append(find_target(name, topic_types(view), load))
+        except NotFoundError:
+            return False
+        return True
+
+    context.graph.wait_for(look, threading.TIMEOUT_MAX / 2, f"topic '{name}'")
+    return found[-1]
+
+
+def find_token(view: View, topic: str, type_name: str) -> Token:
+    """Return the token of a publisher of a topic, or else of a subscription.
+
+    Raises:
+        NotFoundError: The topic has neither.
+    """
+    for token in (*view.publishers(topic), *view.subscriptions(topic)):
+        if token.type_name == type_name:
+            return token
+    raise NotFoundError(f"topic '{topic}' is gone")
+
+
+def find_class(context: Context, token: Token) -> type[Message]:
+    """Return the class of the messages that a publisher sends or a subscription expects.
+
+    Raises:
+        TypeNotFound: The type is not known here.
+        DefinitionError: Its definition here differs from the one there, or is not well-formed.
+    """
+    cls = context.types.message(token.type_name)
+    if token.type_hash not in {cls._type_hash, NO_HASH}:
+        raise DefinitionError(
+            f"'{cls._type}' has another definition at node {token.node_name}: its hash there is"
+            f" {token.type_hash}, here it is {cls._type_hash}; put the same definition on"
+            " ROSZ_PACKAGE_PATH here, or look with --raw",
+            token.name,
+        )
+    return cls
+
+
+def subscribe_samples(
+    node: Node, topic: str, type_name: str, type_hash: str, callback: Callable[[Sample], None]
+) -> Endpoint:
+    """Subscribe to the encoded samples of a topic, of all its types, without a queue.
+
+    To other nodes it is a subscription like any other.
+
+    Args:
+        node: The node that the subscription belongs to and is closed with.
+        topic: Full name of the topic.
+        type_name: The type that others see, ``pkg/msg/Name``.
+        type_hash: Hash of that type.
+        callback: Function called with each sample on a Zenoh thread; must be short.
+
+    Raises:
+        ClosedError: The node is closed.
+    """
+    entity = Endpoint(node, Kind.SUBSCRIPTION, topic, type_name, type_hash, DEFAULT)
+    context = node.context
+    every_type = endpoint_key(context.domain, topic, "*", "*")
+    entity.also_close(context.session.subscriber(every_type, callback))
+    entity.announce(watch=False)
+    return node.keep(entity)
