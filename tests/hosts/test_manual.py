@@ -1,4 +1,4 @@
-"""A new user with two laptops, who types what README's section on several machines says."""
+"""A new user with two machines, who types what the manual says."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from network import eventually
 
 from hosts.host import Host, HostProgram
-from hosts.readme import block, line, word
+from hosts.manual import block, line, word
 from hosts.scripts import LISTENER, TALKER
 from hosts.sshd import befriend, install_rosz, serve_ssh
 from hosts.world import World
@@ -30,7 +30,7 @@ def output_of(host: Host, command: str) -> list[str]:
 
 
 def core(host: Host, beginning: str) -> list[str]:
-    """Start a core as README says, and return what it says."""
+    """Start a core as the manual says, and return what it says."""
     started = type_in(host, line(beginning))
     started.wait_for("started core")
     return started.lines
