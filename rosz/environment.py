@@ -24,10 +24,6 @@ DEFAULT_RENDEZVOUS = "tcp/localhost:7447"
 """Where sessions of one machine meet; rmw_zenoh's router port."""
 
 _MAX_DOMAIN = 232
-_MAX_PORT = 65535
-_WITH_PORT = frozenset({"tcp", "udp", "tls", "quic", "ws"})
-_PROTOCOLS = _WITH_PORT | {"unixsock-stream", "unixpipe", "vsock", "serial"}
-"""Of Zenoh's links; which of them there are depends on how it was built."""
 
 
 class Environment(msgspec.Struct, frozen=True, kw_only=True):
@@ -184,15 +180,11 @@ def _endpoints(name: str, env: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def _endpoint(name: str, text: str) -> str:
-    protocol, _, address = text.partition("#")[0].partition("?")[0].partition("/")
-    port = address.rpartition(":")[2] if protocol in _WITH_PORT else "0"
-    is_port = port.isascii() and port.isdigit() and int(port) <= _MAX_PORT
-    if text and not (protocol in _PROTOCOLS and address and is_port):
-        raise UsageError(
-            f"{name} is '{text}'; expected PROTOCOL/ADDRESS, such as '{DEFAULT_RENDEZVOUS}' or"
-            " 'unixsock-stream//tmp/robot.sock'"
-        )
-    return text
+    if not text:
+        return ""
+    from rosz.wire import Endpoint  # unset in most processes, which can do without the import
+
+    return str(Endpoint.parse(text, name))
 
 
 def _switch(name: str, env: Mapping[str, str]) -> bool:

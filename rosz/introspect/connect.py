@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.session import Session, SessionConfig, places_of
+from rosz.session import Session, SessionConfig, is_listening, places_of
 from rosz.session.presence import is_anybody_awake, is_router_stopped, marks, why_unanswered
-from rosz.session.probe import is_answered
 from rosz.session.settle import Settling
 
 if TYPE_CHECKING:
@@ -117,7 +116,7 @@ def _may_answer(environment: Environment) -> bool:
     return bool(
         _reaches_beyond(environment)
         or environment.mode == "client"
-        or (is_answered(environment.rendezvous) and not is_router_stopped(environment.rendezvous))
+        or (is_listening(environment.rendezvous) and not is_router_stopped(environment.rendezvous))
     )
 
 
@@ -131,7 +130,7 @@ def _check_free(environment: Environment, error: TransportError) -> None:
     stopped = why_unanswered(environment.rendezvous)
     if stopped:
         raise TransportError(stopped) from error
-    if is_answered(environment.rendezvous):
+    if is_listening(environment.rendezvous):
         raise TransportError(
             f"what listens at {environment.rendezvous} does not answer: it is stopped, or it is no"
             " Zenoh; end it, or set ROSZ_RENDEZVOUS to another endpoint for all"

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Self
 from rosz.environment import Environment
 from rosz.errors import TransportError
 from rosz.introspect.interfaces import Latecomers
-from rosz.session import Session, SessionConfig, is_local, keys_of, places_of
+from rosz.session import Session, SessionConfig, keys_of, places_of
+from rosz.wire import Endpoint
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -61,7 +62,7 @@ class Core:
         from rosz.params.replica import Replica
 
         listen = (*environment.listen, *listen)
-        if environment.multicast and all(map(is_local, listen)):
+        if environment.multicast and all(Endpoint(text).is_local for text in listen):
             listen += _everywhere(environment.rendezvous)
         self.domain = environment.domain
         self.store = store
@@ -115,8 +116,10 @@ class Core:
 
 def _everywhere(rendezvous: str) -> tuple[str, ...]:
     """Return where whoever finds this core by multicast can reach it."""
-    protocol, _, place = rendezvous.partition("/")
-    return (f"tcp/0.0.0.0:{place.rpartition(':')[2]}",) if protocol == "tcp" else ()
+    place = Endpoint(rendezvous)
+    if place.protocol != "tcp" or place.port is None:
+        return ()
+    return (str(Endpoint.of("tcp", "0.0.0.0", place.port)),)  # noqa: S104  # as multicast is
 
 
 def _explained(error: TransportError, endpoints: Sequence[str]) -> TransportError:

@@ -16,8 +16,7 @@ from rosz.errors import RoszError
 from rosz.introspect.survey import Survey, take_survey
 from rosz.names import short_type
 from rosz.packages import PackageIndex
-from rosz.session import Session, SessionConfig
-from rosz.session.probe import is_answered
+from rosz.session import Session, SessionConfig, is_listening
 from rosz.wire import Kind
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ class Suggestions:
     def _session(self) -> Iterator[Session | None]:
         """Open a session if somebody is there to talk to at once."""
         known = self._environment
-        if not (known.connect or known.multicast or is_answered(known.rendezvous)):
+        if not (known.connect or known.multicast or is_listening(known.rendezvous)):
             yield None
             return
         try:

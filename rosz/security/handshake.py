@@ -9,6 +9,7 @@ import socket
 import ssl
 
 from rosz.security.folder import KeyFolder
+from rosz.wire import Endpoint
 
 __all__ = ("refusal", "wants_keys")
 
@@ -18,20 +19,20 @@ _ALERT_BY = 0.5
 """Seconds within which the other end of a finished handshake says that it is not content."""
 
 
-def refusal(endpoint: str, keys: KeyFolder, timeout: float = 2.0) -> str:
+def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
     """Return why no link to an endpoint comes about; empty when one does.
 
     Args:
-        endpoint: Such as ``tls/robot1:7447``.
-        keys: Those of this machine.
-        timeout: Seconds for connection and handshake.
+        endpoint: The endpoint to connect to, such as ``tls/robot1:7447``.
+        keys: The keys of this machine.
+        timeout: Time limit of connection and of handshake, in seconds.
     """
     context = ssl.create_default_context(cafile=keys.authority)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     # Zenoh does not mind what this forbids, such as a certificate that names no key of its issuer.
     context.verify_flags &= ~ssl.VERIFY_X509_STRICT
     try:
-        host, port = _place(endpoint)
+        host, port = endpoint.host, endpoint.port
         context.load_cert_chain(keys.certificate, keys.key)
         with (
             socket.create_connection((host, port), timeout) as plain,
@@ -57,26 +58,22 @@ def refusal(endpoint: str, keys: KeyFolder, timeout: float = 2.0) -> str:
     return ""
 
 
-def wants_keys(endpoint: str, timeout: float = 1.0) -> bool:
+def wants_keys(endpoint: Endpoint, timeout: float = 1.0) -> bool:
     """Tell whether what answers at an endpoint is TLS, to which a link needs keys.
 
     Args:
-        endpoint: Such as ``tcp/robot1:7447``.
-        timeout: Seconds for connection and handshake; what is not TLS says nothing.
+        endpoint: The endpoint to connect to, such as ``tcp/robot1:7447``.
+        timeout: Time limit of connection and of handshake, in seconds; what is not TLS sends
+            nothing.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE
     try:
         with (
-            socket.create_connection(_place(endpoint), timeout) as plain,
+            socket.create_connection((endpoint.host, endpoint.port), timeout) as plain,
             context.wrap_socket(plain),
         ):
             return True
     except (OSError, ValueError):
         return False
-
-
-def _place(endpoint: str) -> tuple[str, int]:
-    host, _, port = endpoint.partition("/")[2].partition("?")[0].partition("#")[0].rpartition(":")
-    return host.strip("[]"), int(port)

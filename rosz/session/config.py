@@ -18,7 +18,8 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import UsageError
-from rosz.session.endpoints import dialled, is_local, listening, loopback, secured
+from rosz.session.endpoints import connect_endpoint, listen_endpoints, loopback_interfaces
+from rosz.wire import Endpoint
 
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
@@ -100,7 +101,8 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
     def reaches_beyond(self) -> bool:
         """Whether there may be links to other machines."""
         told = bool(self.config_file) or "endpoints" in self.override
-        return self.multicast or told or not all(map(is_local, self.endpoints))
+        local = all(Endpoint(text).is_local for text in self.endpoints)
+        return self.multicast or told or not local
 
     @classmethod
     def node(cls, env: Environment) -> SessionConfig:
@@ -174,7 +176,7 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     if config.mode != "router":
         connect.insert(0, config.rendezvous)
     if config.keys is not None:
-        connect = [dialled(endpoint) for endpoint in connect]
+        connect = [connect_endpoint(endpoint) for endpoint in connect]
     listen = _listen(config)
     local = not config.reaches_beyond
     must_listen = config.mode == "router"
@@ -215,10 +217,10 @@ def _listen(config: SessionConfig) -> list[str]:
     keys = config.keys is not None
     places = config.listen
     if config.mode == "router" or (config.mode == "peer" and config.hold_rendezvous):
-        places = listening(config.rendezvous, places, keys=keys)
+        places = listen_endpoints(config.rendezvous, places, keys=keys)
     if config.mode == "peer":
         places = (*places, _EPHEMERAL_EVERYWHERE if config.multicast else EPHEMERAL)
-    return [secured(place) for place in places] if keys else [*places]
+    return [str(Endpoint(place).secured()) for place in places] if keys else [*places]
 
 
 def key_settings(config: SessionConfig) -> dict[str, Any]:
@@ -229,7 +231,7 @@ def key_settings(config: SessionConfig) -> dict[str, Any]:
 
     return {
         "transport/link/tls": _tls(config.keys),
-        "access_control": access_control(config.keys.rules, loopback()),
+        "access_control": access_control(config.keys.rules, loopback_interfaces()),
     }
 
 

@@ -1,4 +1,4 @@
-"""Where to listen and to connect: which endpoints stay on the machine, and which need keys."""
+"""Where to listen and where to connect, by the network interfaces of this machine."""
 
 from __future__ import annotations
 
@@ -7,149 +7,134 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
 
-from rosz.errors import UsageError
+from rosz.wire import Endpoint
 
-__all__ = ("dialled", "is_local", "listening", "loopback", "secured")
+__all__ = ("connect_endpoint", "listen_endpoints", "loopback_interfaces")
 
-_EVERYWHERE = {"0.0.0.0": "127.", "[::]": ""}  # noqa: S104  # told apart, not listened at
-"""Addresses that mean all of the machine's, with what those of the machine alone begin with."""
 _INTERFACES = Path("/sys/class/net")
 _LOOPBACK = "772"
-"""What Linux calls the kind of such an interface (ARPHRD_LOOPBACK)."""
+"""The type of a loopback interface on Linux (ARPHRD_LOOPBACK)."""
 
 
-class _Parts(NamedTuple):
-    protocol: str
-    host: str
-    port: str
+def connect_endpoint(text: str) -> str:
+    """Return the endpoint to connect to where links beyond this machine need keys.
 
-
-def is_local(endpoint: str) -> bool:
-    """Tell whether an endpoint stays on this machine, by what it says."""
-    protocol, host, _ = _parts(endpoint)
-    host = host.strip("[]")
-    return protocol.startswith("unix") or host in {"localhost", "::1"} or host.startswith("127.")
-
-
-def secured(endpoint: str) -> str:
-    """Return what an endpoint is called where links beyond the machine need keys.
-
-    Raises:
-        UsageError: Its protocol knows none.
-    """
-    protocol, _, place = endpoint.partition("/")
-    if protocol in {"tls", "unixsock-stream"} or (protocol == "tcp" and is_local(endpoint)):
-        return endpoint
-    if protocol == "tcp":
-        return f"tls/{place}"
-    raise UsageError(
-        f"'{endpoint}': with ROSZ_KEYS, links beyond this machine are tls; expected 'tls/{place}'"
-    )
-
-
-def dialled(endpoint: str) -> str:
-    """Return what to connect to where links beyond the machine need keys.
-
-    A machine that is told to connect to itself, as all of several machines may be, stays at home.
-
-    Raises:
-        UsageError: Its protocol knows no keys.
-    """
-    place = secured(endpoint)
-    protocol, host, port = _parts(place)
-    return f"tcp/localhost:{port}" if protocol == "tls" and _is_own(host) else place
-
-
-def listening(rendezvous: str, listen: Sequence[str], *, keys: bool = False) -> tuple[str, ...]:
-    """Return where to listen so that the rendezvous is held at all addresses of its name.
-
-    ``tcp/0.0.0.0:7447`` holds ``127.0.0.1:7447`` already, and nobody can listen there twice; but
-    where ``localhost`` is ``::1`` as well, that has to be held too, or the next node would. With
-    keys the port is plain for this machine and TLS for others: Linux has them share it when each
-    keeps to its network interfaces, whatever addresses these have or will have.
+    A machine that is told to connect to itself, as when several machines share one setting, uses
+    the loopback.
 
     Args:
-        rendezvous: Where the sessions of this machine meet.
+        text: The endpoint as it was configured.
+
+    Raises:
+        UsageError: The protocol cannot use keys.
+    """
+    endpoint = Endpoint(text).secured()
+    if endpoint.protocol == "tls" and endpoint.port is not None and _is_own(endpoint.host):
+        return str(Endpoint.of("tcp", "localhost", endpoint.port))
+    return str(endpoint)
+
+
+def listen_endpoints(
+    rendezvous: str, listen: Sequence[str], *, keys: bool = False
+) -> tuple[str, ...]:
+    """Return where to listen so that the rendezvous is held at all addresses of its name.
+
+    ``tcp/0.0.0.0:7447`` includes ``127.0.0.1:7447``, and a second listener there would fail. Where
+    ``localhost`` is also ``::1``, that address has to be held too, or the next node would hold it.
+    With keys, one port serves this machine without TLS and other machines with TLS. Linux lets both
+    listeners share the port when each is bound to its network interfaces.
+
+    Args:
+        rendezvous: The endpoint where the sessions of this machine meet.
         listen: Further endpoints.
         keys: Whether links beyond the machine need keys.
 
     Raises:
-        UsageError: A protocol knows no keys.
+        UsageError: A protocol cannot use keys.
     """
+    meeting, others = Endpoint(rendezvous), [Endpoint(text) for text in listen]
     if keys:
-        rendezvous, listen = secured(rendezvous), [secured(endpoint) for endpoint in listen]
-    protocol, host, port = _parts(rendezvous)
-    wide = {endpoint for endpoint in listen if _is_wide(endpoint, port)}
-    addresses = _addresses(host, port) if wide and protocol == "tcp" else []
-    if not addresses:
-        return tuple(dict.fromkeys((rendezvous, *listen)))
-    if any(endpoint.startswith("tls/") for endpoint in wide) and sys.platform == "linux":
-        parted = [one for endpoint in listen for one in _parted(endpoint, endpoint in wide)]
-        own = [f"tcp/{one}:{port}#iface={name}" for one in addresses for name in loopback()]
-        return tuple(dict.fromkeys((*parted, *own)))
-    held = tuple(_EVERYWHERE[_parts(endpoint).host] for endpoint in wide)
-    rest = [f"tcp/{one}:{port}" for one in addresses if not one.startswith(held)]
-    return tuple(dict.fromkeys((*listen, *rest)))
+        meeting, others = meeting.secured(), [endpoint.secured() for endpoint in others]
+    wide = [endpoint for endpoint in others if _covers(endpoint, meeting.port)]
+    held = _tcp_endpoints(meeting) if wide and meeting.protocol == "tcp" else []
+    if not held:
+        return _texts(meeting, *others)
+    if any(endpoint.protocol == "tls" for endpoint in wide) and sys.platform == "linux":
+        split = [
+            one
+            for endpoint in others
+            for one in (_on_each_interface(endpoint) if endpoint in wide else [endpoint])
+        ]
+        own = [one.on_interface(name) for one in held for name in loopback_interfaces()]
+        return _texts(*split, *own)
+    all_v4 = any(endpoint.host == "0.0.0.0" for endpoint in wide)  # noqa: S104
+    all_v6 = any(endpoint.host == "::" for endpoint in wide)  # on Linux, it serves IPv4 as well
+    rest = [one for one in held if not (all_v6 or (all_v4 and one.host.startswith("127.")))]
+    return _texts(*others, *rest)
 
 
-def loopback() -> list[str]:
-    """Return the network interfaces that lead nowhere else."""
+def loopback_interfaces() -> list[str]:
+    """Return the names of the network interfaces whose traffic stays on this machine."""
     names = [name for _, name in socket.if_nameindex()]
     if not _INTERFACES.is_dir():
         return [name for name in names if name.startswith("lo0")]
-    return [name for name in names if _kind(name) == _LOOPBACK]
+    return [name for name in names if _interface_type(name) == _LOOPBACK]
 
 
-def _parts(endpoint: str) -> _Parts:
-    protocol, _, place = endpoint.partition("#")[0].partition("/")
-    host, _, port = place.partition("?")[0].rpartition(":")
-    return _Parts(protocol, host, port)
+def _texts(*endpoints: Endpoint) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(map(str, endpoints)))
 
 
-def _is_wide(endpoint: str, port: str) -> bool:
-    """Tell whether an endpoint is a port at all addresses."""
-    protocol, host, at = _parts(endpoint)
-    return protocol in {"tcp", "tls"} and host in _EVERYWHERE and at == port and "#" not in endpoint
+def _covers(endpoint: Endpoint, port: int | None) -> bool:
+    """Tell whether an endpoint is a port at all addresses of this machine."""
+    return (
+        endpoint.is_tcp
+        and endpoint.is_any_address
+        and endpoint.port == port
+        and not endpoint.configuration
+    )
 
 
-def _parted(endpoint: str, wide: bool) -> Iterator[str]:
-    """Yield an endpoint of all addresses once for each network interface that leads somewhere."""
-    if not wide:
-        yield endpoint
-        return
+def _on_each_interface(endpoint: Endpoint) -> Iterator[Endpoint]:
+    """Yield an endpoint of all addresses once for each interface to other machines."""
     for _, name in socket.if_nameindex():
-        # Part of a bridge, it has no addresses of its own.
-        if _kind(name) != _LOOPBACK and not (_INTERFACES / name / "master").exists():
-            yield f"{endpoint}#iface={name}"
+        # An interface that is part of a bridge has no addresses of its own.
+        if _interface_type(name) != _LOOPBACK and not (_INTERFACES / name / "master").exists():
+            yield endpoint.on_interface(name)
 
 
-def _kind(interface: str) -> str:
+def _interface_type(name: str) -> str:
     try:
-        return (_INTERFACES / interface / "type").read_text().strip()
-    except OSError:  # it is gone
+        return (_INTERFACES / name / "type").read_text().strip()
+    except OSError:  # the interface is gone
         return ""
 
 
-def _addresses(host: str, port: str) -> list[str]:
-    try:
-        found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
-    except (OSError, ValueError):  # Zenoh says better what is wrong with it
+def _tcp_endpoints(endpoint: Endpoint) -> list[Endpoint]:
+    """Return an endpoint once for each address of its host name."""
+    if (port := endpoint.port) is None:
         return []
-    names = dict.fromkeys(str(entry[4][0]) for entry in found)
-    return [f"[{name}]" if ":" in name else name for name in names]
+    return [Endpoint.of("tcp", address, port) for address in _addresses(endpoint.host)]
+
+
+def _addresses(host: str) -> list[str]:
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except (OSError, ValueError):  # Zenoh's own error says what is wrong with the host
+        return []
+    return list(dict.fromkeys(str(entry[4][0]) for entry in found))
 
 
 def _is_own(host: str) -> bool:
-    """Tell whether a name is of this machine, however others reach it there."""
-    found = _addresses(host, "0")
-    return bool(found) and all(map(_can_bind, found))
+    """Tell whether all addresses of a host name belong to this machine."""
+    addresses = _addresses(host)
+    return bool(addresses) and all(map(_can_bind, addresses))
 
 
 def _can_bind(address: str) -> bool:
-    family = socket.AF_INET6 if address.startswith("[") else socket.AF_INET
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
     with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
-        probe.bind((address.strip("[]"), 0))
+        probe.bind((address, 0))
         return True
     return False

@@ -13,13 +13,13 @@ from typing import Any
 
 import zenoh
 
-from rosz.session.probe import is_answered
+from rosz.session.probe import is_listening
+from rosz.wire import Endpoint
 
 __all__ = ("open_at",)
 
 _ATTEMPTS = 8
 _PAUSE = 0.02
-_LOCAL = ("tcp/127.", "tcp/localhost:", "tcp/[::1]:", "unixsock-stream/")
 
 
 def open_at(settings: zenoh.Config, rendezvous: str, opened: Callable[[], Any]) -> Any:
@@ -35,9 +35,10 @@ def open_at(settings: zenoh.Config, rendezvous: str, opened: Callable[[], Any]) 
         zenoh.ZError: The session cannot be opened.
     """
     raw: Any = opened()
-    if rendezvous.startswith(_LOCAL) and _is_held(rendezvous, settings):
+    endpoint = Endpoint(rendezvous)
+    if _can_be_refused(endpoint) and _is_held(endpoint, settings):
         for _ in range(_ATTEMPTS):
-            if is_answered(rendezvous):
+            if is_listening(rendezvous):
                 break
             raw.close()
             # Who was refused together must not come back together.
@@ -46,7 +47,11 @@ def open_at(settings: zenoh.Config, rendezvous: str, opened: Callable[[], Any]) 
     return raw
 
 
-def _is_held(rendezvous: str, settings: zenoh.Config) -> bool:
-    """Tell whether a configuration listens at the meeting point, be it by another name."""
+def _can_be_refused(endpoint: Endpoint) -> bool:
+    return endpoint.is_local and (endpoint.is_unix or endpoint.protocol == "tcp")
+
+
+def _is_held(endpoint: Endpoint, settings: zenoh.Config) -> bool:
+    """Tell whether a configuration listens at the meeting point, also under another name."""
     places = settings.get_json("listen/endpoints")
-    return rendezvous in places or f":{rendezvous.rpartition(':')[2]}" in places
+    return str(endpoint) in places or f":{endpoint.port}" in places

@@ -25,7 +25,7 @@ from rosz.session.declared import mapped
 from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
 from rosz.session.presence import Presence, marks, stopped_holder, why_unanswered
-from rosz.session.probe import first_answered
+from rosz.session.probe import first_listening
 from rosz.session.refusals import refusals, tell_refusals
 from rosz.session.segments import SEGMENTS, sweep
 from rosz.session.stopped import describe, remedy
@@ -163,7 +163,7 @@ def _within_reach(config: SessionConfig) -> SessionConfig:
     wanted = (*config.connect, *home) if config.must_connect else (*home, *config.connect)
     if wanted == (config.rendezvous,):
         return config
-    place = first_answered(wanted, config.open_timeout)
+    place = first_listening(wanted, config.open_timeout)
     if not place:
         raise _nobody(config)
     return msgspec.structs.replace(config, rendezvous=place, connect=())

@@ -24,6 +24,7 @@ from rosz.session.presence import marks, stopped_holder
 from rosz.session.sockets import connections
 from rosz.session.starting import start
 from rosz.session.stopped import peer_of, ports_of
+from rosz.wire import Endpoint
 
 __all__ = ("close", "parting_from_stopped")
 
@@ -126,13 +127,15 @@ def _look(raw: Any, rendezvous: str) -> _Stopped | None:
         return None
     sessions = {mark.zid for mark in there}
     ports = {mark.port for mark in there}.union(*(ports_of(mark.pid) for mark in there))
-    ports |= {_port(link.dst) for link in raw.info.links() if str(link.zid) in sessions}
-    protocol, _, path = rendezvous.partition("#")[0].partition("?")[0].partition("/")
+    ports |= {
+        Endpoint(link.dst).port or 0 for link in raw.info.links() if str(link.zid) in sessions
+    }
+    meeting = Endpoint(rendezvous)
     if stopped_holder(rendezvous, there) is not None:
-        ports.add(_port(rendezvous))
+        ports.add(meeting.port or 0)
     return _Stopped(
         ports=ports - {0},
-        path=path if protocol == "unixsock-stream" else "",
+        path=meeting.address if meeting.is_unix else "",
         processes={mark.pid for mark in there},
     )
 
@@ -143,9 +146,3 @@ def _change(stopped: _Stopped, change: Callable[[socket.socket], None]) -> None:
         with suppress(OSError):  # it has ended meanwhile
             if stopped.is_other_end(connection):
                 change(connection)
-
-
-def _port(locator: str) -> int:
-    """Return the port of a Zenoh locator; 0 if it has none."""
-    port = locator.partition("#")[0].partition("?")[0].rpartition(":")[2]
-    return int(port) if port.isdecimal() else 0

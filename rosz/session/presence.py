@@ -20,8 +20,9 @@ from zlib import crc32
 import msgspec
 
 from rosz.errors import TransportError
-from rosz.session.probe import is_answered
+from rosz.session.probe import is_listening
 from rosz.session.stopped import describe, is_stopped, listener, namespace, remedy
+from rosz.wire import Endpoint
 
 __all__ = (
     "Mark",
@@ -62,7 +63,7 @@ class Mark(msgspec.Struct, frozen=True):
     @property
     def endpoint(self) -> str:
         """Where it can be reached; empty if nowhere."""
-        return f"tcp/{_LOOPBACK}:{self.port}" if self.port else ""
+        return str(Endpoint.of("tcp", _LOOPBACK, self.port)) if self.port else ""
 
 
 class Presence:
@@ -154,7 +155,7 @@ def marks(rendezvous: str) -> list[Mark]:
 def stopped_holder(rendezvous: str, there: Iterable[Mark]) -> int | None:
     """Return the process that holds a meeting point, if it is one of some and stopped."""
     stopped = [mark.pid for mark in there if mark.is_stopped]
-    return listener(rendezvous, stopped) if stopped else None
+    return listener(Endpoint(rendezvous), stopped) if stopped else None
 
 
 def is_anybody_awake(rendezvous: str) -> bool:
@@ -162,7 +163,7 @@ def is_anybody_awake(rendezvous: str) -> bool:
     there = marks(rendezvous)
     if any(not mark.is_stopped for mark in there):
         return True
-    return is_answered(rendezvous) and stopped_holder(rendezvous, there) is None
+    return is_listening(rendezvous) and stopped_holder(rendezvous, there) is None
 
 
 def is_router_stopped(rendezvous: str) -> bool:

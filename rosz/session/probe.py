@@ -7,7 +7,9 @@ import threading
 import time
 from collections.abc import Sequence
 
-__all__ = ("first_answered", "is_answered")
+from rosz.wire import Endpoint
+
+__all__ = ("first_listening", "is_listening", "why_refused")
 
 _TIMEOUT = 0.5
 _AGAIN_SECONDS = 0.1
@@ -15,7 +17,7 @@ _GRACE_SECONDS = 0.3
 """How long an endpoint that is less wanted waits for word of one that is wanted more."""
 
 
-def first_answered(endpoints: Sequence[str], timeout: float) -> str:
+def first_listening(endpoints: Sequence[str], timeout: float) -> str:
     """Return the first of some endpoints where somebody accepts connections; empty for none.
 
     All are tried at once, so that one that is out of reach holds up nothing for long.
@@ -31,7 +33,7 @@ def first_answered(endpoints: Sequence[str], timeout: float) -> str:
 
     def look(endpoint: str) -> None:
         while not over.is_set():
-            answer = is_answered(endpoint, timeout)
+            answer = is_listening(endpoint, timeout)
             with changed:
                 answers[endpoint] = answer
                 changed.notify()
@@ -58,29 +60,50 @@ def first_answered(endpoints: Sequence[str], timeout: float) -> str:
         return next((endpoint for endpoint in endpoints if answers.get(endpoint)), "")
 
 
-def is_answered(endpoint: str, timeout: float = _TIMEOUT) -> bool:
+def is_listening(endpoint: str, timeout: float = _TIMEOUT) -> bool:
     """Tell whether somebody accepts connections at a Zenoh endpoint.
 
     Args:
-        endpoint: Such as ``tcp/localhost:7447`` or ``unixsock-stream//run/z.sock``; for a protocol
-            without connections the answer is yes, as it cannot be known.
-        timeout: Seconds to wait for an answer.
+        endpoint: The endpoint; for a protocol without connections the result is true.
+        timeout: Time limit in seconds.
     """
-    protocol, _, address = endpoint.partition("#")[0].partition("/")
-    address = address.partition("?")[0]
-    if protocol == "unixsock-stream":
-        return _connects(socket.AF_UNIX, address, timeout)
-    if protocol in {"tcp", "tls"}:
-        host, _, port = address.rpartition(":")
-        try:
-            found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
-        except (OSError, ValueError):
-            return False
-        return any(_connects(family, place, timeout) for family, _, _, _, place in found)
-    return True
+    return not why_refused(endpoint, timeout)
 
 
-def _connects(family: int, address: object, timeout: float) -> bool:
+def why_refused(endpoint: str, timeout: float = _TIMEOUT) -> str:
+    """Return why nobody can connect to an endpoint; empty if one can, or if that is unknown.
+
+    Args:
+        endpoint: The endpoint.
+        timeout: Time limit for each of its addresses, in seconds.
+    """
+    place = Endpoint(endpoint)
+    if place.is_unix:
+        return _connect(socket.AF_UNIX, place.address, timeout)
+    if not (place.is_tcp or place.protocol == "ws"):
+        return ""
+    if place.port is None:
+        return f"'{endpoint}' has no port"
+    try:
+        found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)
+    except (OSError, ValueError) as error:
+        return f"the name '{place.host}' is not known: {getattr(error, 'strerror', error)}"
+    reasons = []
+    for family, _, _, _, address in found:
+        if not (reason := _connect(family, address, timeout)):
+            return ""
+        reasons.append(reason)
+    return reasons[0]
+
+
+def _connect(family: int, address: object, timeout: float) -> str:
+    """Return why a connection fails; empty if it succeeds."""
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.settimeout(timeout)
-        return probe.connect_ex(address) == 0  # type: ignore[arg-type]  # differs by family
+        try:
+            probe.connect(address)  # type: ignore[arg-type]  # differs by family
+        except TimeoutError:
+            return f"no answer within {timeout:g} s: no such machine, or a firewall"
+        except OSError as error:
+            return error.strerror or str(error)
+    return ""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import zenoh
 
-from rosz.session.endpoints import dialled, is_local
+from rosz.session.endpoints import connect_endpoint
+from rosz.wire import Endpoint
 
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
@@ -26,13 +27,14 @@ def refusals(config: SessionConfig) -> list[str]:
     """
     places = list(dict.fromkeys((config.rendezvous, *config.connect)))
     if config.keys is not None:
-        places = [dialled(endpoint) for endpoint in places]
+        places = [connect_endpoint(endpoint) for endpoint in places]
     reasons = {endpoint: _reason(endpoint, config.keys) for endpoint in places}
     return [f"'{endpoint}': {reason}" for endpoint, reason in reasons.items() if reason]
 
 
-def _reason(endpoint: str, keys: KeyFolder | None) -> str:
-    if is_local(endpoint) or not endpoint.startswith(("tcp/", "tls/")):
+def _reason(place: str, keys: KeyFolder | None) -> str:
+    endpoint = Endpoint(place)
+    if endpoint.is_local or not endpoint.is_tcp:
         return ""
     from rosz.security.handshake import refusal, wants_keys
 

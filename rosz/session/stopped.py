@@ -13,6 +13,8 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
+from rosz.wire import Endpoint
+
 __all__ = ("describe", "is_stopped", "listener", "namespace", "peer_of", "ports_of", "remedy")
 
 _PROC = Path("/proc")
@@ -64,22 +66,19 @@ def remedy(pid: int) -> str:
     )
 
 
-def listener(endpoint: str, candidates: Iterable[int]) -> int | None:
+def listener(endpoint: Endpoint, candidates: Iterable[int]) -> int | None:
     """Return the process that listens at an endpoint of this machine, if it is one of some.
 
     Args:
-        endpoint: Such as ``tcp/localhost:7447`` or ``unixsock-stream//run/z.sock``.
+        endpoint: The endpoint.
         candidates: Ids of the processes that it may be.
     """
-    protocol, _, address = endpoint.partition("#")[0].partition("/")
-    address = address.partition("?")[0]
-    if protocol == "unixsock-stream":
-        pid = _unix_listener(address)
+    if endpoint.is_unix:
+        pid = _unix_listener(endpoint.address)
         return pid if pid in candidates else None
-    if protocol not in {"tcp", "tls"}:
+    if not endpoint.is_tcp or endpoint.port is None:
         return None
-    port = address.rpartition(":")[2]
-    wanted = set(_tcp_listeners(int(port))) if port.isdecimal() else set()
+    wanted = set(_tcp_listeners(endpoint.port))
     return next((pid for pid in candidates if not wanted.isdisjoint(_sockets(pid))), None)
 
 

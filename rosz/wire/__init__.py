@@ -1,6 +1,7 @@
 """The text and bytes that rosz shares with ROS 2's rmw_zenoh; pure."""
 
 from rosz.wire.attachment import Attachment, pack, read, unpack
+from rosz.wire.endpoint import Endpoint
 from rosz.wire.gid import gid
 from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, endpoint_key, own_key, ros_type
 from rosz.wire.processes import ProcessToken, format_process, parse_process, processes_key
@@ -11,6 +12,7 @@ __all__ = (
     "NO_HASH",
     "OWN_SPACE",
     "Attachment",
+    "Endpoint",
     "Kind",
     "ProcessToken",
     "Token",

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from network import Network, eventually, repeats
 
-from rosz.session.probe import is_answered
+from rosz.session import is_listening
 
 from .command import package
 from .launching import Start, runs, started
@@ -80,9 +80,9 @@ def test_a_launch_ended_as_its_core_comes_up_leaves_none(
     file = fleet(network.folder, TALKER, 26)
     for _ in range(repeats(1, 20)):
         run = launch(file)
-        eventually(lambda: is_answered(network.rendezvous), "the core", 30)
+        eventually(lambda: is_listening(network.rendezvous), "the core", 30)
         run.send(number)
         assert run.exit_code(40) in {0, 130}
         assert "Traceback" not in run.output
-        assert not is_answered(network.rendezvous)
+        assert not is_listening(network.rendezvous)
         assert not any(map(runs, started(run).values()))

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 from network import Network
 
-from rosz.doctor.endpoints import why_refused
 from rosz.doctor.memory import check_segments
+from rosz.session import why_refused
 
 from .conftest import Doctor
 

@@ -13,7 +13,7 @@ from rosz.errors import UsageError, YamlError
 from rosz.security import KeyFolder
 from rosz.security.authority import Authority
 from rosz.security.review import review
-from rosz.session import secured
+from rosz.wire import Endpoint
 
 
 def test_files_are_for_their_owner_alone(authority: Authority) -> None:
@@ -185,10 +185,10 @@ def test_review_takes_its_date_from_the_caller(authority: Authority) -> None:
     ],
 )
 def test_endpoints(given: str, expected: str) -> None:
-    assert secured(given) == expected
+    assert str(Endpoint(given).secured()) == expected
 
 
 @pytest.mark.parametrize("endpoint", ["udp/robot:7447", "ws/robot:80", "quic/robot:7447"])
 def test_no_way_around(endpoint: str) -> None:
     with pytest.raises(UsageError, match="links beyond this machine are tls"):
-        secured(endpoint)
+        Endpoint(endpoint).secured()

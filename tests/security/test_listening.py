@@ -9,7 +9,7 @@ from hosts.world import World
 from network import eventually
 
 from rosz.security.authority import Authority
-from rosz.session import dialled, listening
+from rosz.session import connect_endpoint, listen_endpoints
 
 ONE = "127.0.0.1 localhost\n"
 BOTH = "127.0.0.1 localhost\n::1 localhost\n"
@@ -131,13 +131,13 @@ def test_a_core_on_each_machine(world: World, authority: Authority) -> None:
 
 
 def test_another_port_is_shared_with_nobody() -> None:
-    places = listening("tcp/127.0.0.1:7447", ["tcp/0.0.0.0:9000"], keys=True)
+    places = listen_endpoints("tcp/127.0.0.1:7447", ["tcp/0.0.0.0:9000"], keys=True)
     assert places == ("tcp/127.0.0.1:7447", "tls/0.0.0.0:9000")
     socket = "unixsock-stream//run/z.sock"
-    assert listening(socket, ["tcp/0.0.0.0:7447"], keys=True) == (socket, "tls/0.0.0.0:7447")
+    assert listen_endpoints(socket, ["tcp/0.0.0.0:7447"], keys=True) == (socket, "tls/0.0.0.0:7447")
 
 
 @pytest.mark.parametrize("own", ["127.0.1.1", "localhost"])
 def test_a_machine_that_dials_itself_stays_at_home(own: str) -> None:
-    assert dialled(f"tls/{own}:7447") == "tcp/localhost:7447"
-    assert dialled("tcp/192.0.2.1:7447") == "tls/192.0.2.1:7447"
+    assert connect_endpoint(f"tls/{own}:7447") == "tcp/localhost:7447"
+    assert connect_endpoint("tcp/192.0.2.1:7447") == "tls/192.0.2.1:7447"

@@ -9,9 +9,8 @@ import pytest
 import zenoh
 from network import Network, eventually, repeats
 
-from rosz.session import Session, SessionConfig
+from rosz.session import Session, SessionConfig, is_listening
 from rosz.session.config import new_id
-from rosz.session.probe import is_answered
 
 PEER = """
     import sys
@@ -72,13 +71,13 @@ def test_refused_at_first(network: Network, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(zenoh, "open", refused_once)
     with Session.open(SessionConfig.node(network.environment())):
         assert len(opened) == 2
-        assert is_answered(network.rendezvous)
+        assert is_listening(network.rendezvous)
 
 
 def test_who_is_told_not_to_listen_there(network: Network) -> None:
     environment = network.environment(zenoh_override='listen/endpoints=["tcp/127.0.0.1:0"]')
     with Session.open(SessionConfig.node(environment)):
-        assert not is_answered(network.rendezvous)
+        assert not is_listening(network.rendezvous)
 
 
 def test_who_was_there_first_connects_to_who_comes(network: Network) -> None:

@@ -11,8 +11,7 @@ import pytest
 from network import Network
 
 from rosz.errors import TransportError
-from rosz.session import Session, SessionConfig
-from rosz.session.probe import first_answered
+from rosz.session import Session, SessionConfig, first_listening
 
 NOWHERE = "tcp/192.0.2.1:9"
 """An address that nobody has: no answer at all, or none but a router's."""
@@ -33,19 +32,19 @@ def refused() -> str:
 def test_the_most_wanted_that_answers(served: str, refused: str) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         other = f"tcp/127.0.0.1:{server.getsockname()[1]}"
-        assert first_answered([served, other], 5) == served
-        assert first_answered([other, served], 5) == other
-        assert first_answered([refused, other], 5) == other
+        assert first_listening([served, other], 5) == served
+        assert first_listening([other, served], 5) == other
+        assert first_listening([refused, other], 5) == other
 
 
 def test_one_out_of_reach_holds_up_nobody_for_long(served: str) -> None:
     began = time.monotonic()
-    assert first_answered([NOWHERE, served], 10) == served
+    assert first_listening([NOWHERE, served], 10) == served
     assert time.monotonic() - began < 5
 
 
 def test_nobody_answers(refused: str) -> None:
-    assert first_answered([refused, NOWHERE], 0.3) == ""
+    assert first_listening([refused, NOWHERE], 0.3) == ""
 
 
 def test_one_that_comes_later(refused: str) -> None:
@@ -55,7 +54,7 @@ def test_one_that_comes_later(refused: str) -> None:
         0.2, lambda: servers.append(socket.create_server(("127.0.0.1", int(place))))
     )
     late.start()
-    assert first_answered([refused], 10) == refused
+    assert first_listening([refused], 10) == refused
     late.join()
     servers[0].close()
 

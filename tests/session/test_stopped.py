@@ -12,6 +12,7 @@ from network import Network, Program, eventually
 
 from rosz.session.presence import Presence, is_anybody_awake, marks, why_unanswered
 from rosz.session.stopped import describe, is_stopped, listener
+from rosz.wire import Endpoint
 
 LISTEN = """
     import socket, sys
@@ -95,10 +96,10 @@ def test_who_listens_somewhere(network: Network, kind: str) -> None:
     program = network.program(LISTEN, kind, str(network.folder / "s"))
     place = program.wait_for("at ").split()[1]
     endpoint = f"unixsock-stream/{place}" if kind == "unix" else f"tcp/localhost:{place}"
-    assert listener(endpoint, [os.getpid(), program.pid]) == program.pid
-    assert listener(endpoint, [os.getpid()]) is None
+    assert listener(Endpoint(endpoint), [os.getpid(), program.pid]) == program.pid
+    assert listener(Endpoint(endpoint), [os.getpid()]) is None
     program.kill()
-    assert listener(endpoint, [os.getpid(), program.pid]) is None
+    assert listener(Endpoint(endpoint), [os.getpid(), program.pid]) is None
 
 
 def test_a_mark_tells_where_its_session_is_reached(network: Network) -> None:

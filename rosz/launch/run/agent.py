@@ -45,7 +45,7 @@ from rosz.launch.run.protocol import (
     Started,
     rosz_version,
 )
-from rosz.session.probe import first_answered, is_answered
+from rosz.session import first_listening, is_listening
 
 __all__ = ("serve",)
 
@@ -235,7 +235,7 @@ def _is_linked(environment: Environment) -> bool:
         or environment.listen
         or environment.multicast
         or environment.zenoh_config
-        or is_answered(environment.rendezvous)
+        or is_listening(environment.rendezvous)
     )
 
 
@@ -253,14 +253,14 @@ def _reaches(environment: Environment, setup: Setup, connection: str) -> str:
         return "whom multicast finds"
     if environment.listen or environment.zenoh_config:
         return "whom this machine's settings name"
-    if is_answered(environment.rendezvous):
+    if is_listening(environment.rendezvous):
         return environment.rendezvous
     caller = connection.partition(" ")[0]
     caller = f"[{caller}]" if ":" in caller else caller
     meet = [
         place.replace("/:", f"/{caller}:") for place in setup.meet if caller or "/:" not in place
     ]
-    return first_answered(meet, _REACH_SECONDS) if meet else ""
+    return first_listening(meet, _REACH_SECONDS) if meet else ""
 
 
 def serve() -> None:

@@ -22,7 +22,7 @@ from rosz.errors import LaunchError
 from rosz.launch.run.command import TAG
 from rosz.launch.run.console import Console
 from rosz.launch.run.loop import Loop
-from rosz.session.probe import is_answered
+from rosz.session import is_listening
 
 __all__ = ("MESH_LIMIT", "Hub", "wants_hub")
 
@@ -55,7 +55,7 @@ def wants_hub(nodes: int, environment: Environment, environ: Mapping[str, str]) 
         (nodes > MESH_LIMIT or dials)
         and not environ.get(_MODE)
         and not environment.zenoh_config
-        and not is_answered(environment.rendezvous)
+        and not is_listening(environment.rendezvous)
     )
 
 
@@ -102,7 +102,7 @@ class Hub:
 
     def _await(self, rendezvous: str) -> None:
         deadline = time.monotonic() + _UP_SECONDS
-        while not is_answered(rendezvous):
+        while not is_listening(rendezvous):
             if self._process.poll() is not None:
                 raise LaunchError(
                     f"the core for these nodes ended with exit code {self._process.returncode};"

@@ -16,6 +16,7 @@ from rosz.launch.run.console import Console
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.protocol import Setup
 from rosz.launch.run.remote import RemoteHost, await_hosts
+from rosz.wire import Endpoint
 
 __all__ = ("MachineCall", "Machines", "meeting_places", "moved")
 
@@ -25,8 +26,6 @@ _CALL = re.compile(
 )
 _SSH_PORT = 22
 _TIMEOUT = 10.0
-_LOCAL = ("127.", "localhost", "[::1]")
-_EVERYWHERE = {"0.0.0.0", "[::]"}  # noqa: S104  # looked for, not bound
 
 
 class MachineCall(msgspec.Struct, frozen=True):
@@ -118,17 +117,16 @@ def meeting_places(environment: Environment) -> tuple[str, ...]:
     """
     places = []
     for endpoint in (*environment.listen, environment.rendezvous):
-        protocol, _, place = endpoint.partition("#")[0].partition("/")
-        host, _, port = place.rpartition(":")
-        if protocol not in {"tcp", "tls"}:
+        place = Endpoint(endpoint)
+        if not place.is_tcp:
             continue
-        if host in _EVERYWHERE or host.startswith(_LOCAL):
+        if place.is_any_address or place.is_local:
             # Keys are for a name, and seldom for an address.
             names = [socket.gethostname()] if environment.keys is not None else []
-            places += [f"{protocol}/{name}:{port}" for name in (*names, "")]
+            places += [f"{place.protocol}/{name}:{place.port}" for name in (*names, "")]
         else:
             places.append(endpoint)
-    places += [place for place in environment.connect if f"/{_LOCAL[1]}" not in place]
+    places += [place for place in environment.connect if "/localhost" not in place]
     return tuple(dict.fromkeys(places))
 
 

@@ -18,7 +18,7 @@ from typing import IO, Self
 
 import msgspec
 
-from rosz.session.probe import is_answered
+from rosz.session import is_listening
 
 __all__ = ("Outcome", "Ros1", "Rosz", "World")
 
@@ -159,7 +159,7 @@ class Ros1(World):
     def __enter__(self) -> Self:
         self.start("/usr/bin/roscore", "-p", str(self._port))
         deadline = time.monotonic() + _PATIENCE
-        while not is_answered(f"tcp/127.0.0.1:{self._port}"):
+        while not is_listening(f"tcp/127.0.0.1:{self._port}"):
             assert time.monotonic() < deadline, "roscore does not start"
             time.sleep(0.02)
         return super().__enter__()

@@ -16,7 +16,7 @@ from network import Network as Net
 from rosz.launch.run import Hub, Network, wants_hub
 from rosz.launch.run.hub import MESH_LIMIT
 from rosz.node import Context
-from rosz.session.probe import is_answered
+from rosz.session import is_listening
 
 from .scene import alive, launch, shell, wait_until
 
@@ -45,7 +45,7 @@ def test_when_a_core_is_started(network: Net) -> None:
 
 
 def test_it_is_up_when_it_is_there_and_gone_when_closed(hub: Hub, network: Net) -> None:
-    assert is_answered(network.rendezvous)
+    assert is_listening(network.rendezvous)
     assert alive(hub.pid)
     assert (hub.environment.mode, hub.environ["ROSZ_MODE"]) == ("client", "client")
     with Context(hub.environment) as one, Context(hub.environment) as two:
@@ -53,7 +53,7 @@ def test_it_is_up_when_it_is_there_and_gone_when_closed(hub: Hub, network: Net) 
         assert two.params.get("/x") == 1
     hub.close()
     assert not alive(hub.pid)
-    assert not is_answered(network.rendezvous)
+    assert not is_listening(network.rendezvous)
 
 
 def test_a_launch_keeps_it_up(hub: Hub, tmp_path: Path) -> None:
@@ -65,7 +65,7 @@ def test_a_launch_keeps_it_up(hub: Hub, tmp_path: Path) -> None:
             os.kill(first, signal.SIGKILL)
             run.err.wait_for(f"[core] process has died [pid {first}, exit code -9].")
             run.out.wait_for("process[core]: started", times=2)
-            wait_until(lambda: is_answered(hub.environment.rendezvous), "the new core")
+            wait_until(lambda: is_listening(hub.environment.rendezvous), "the new core")
             assert hub.pid != first
             wait_until(context.session.peers, "the link to it")
             assert run.stop() == 0
