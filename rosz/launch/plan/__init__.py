@@ -1,27 +1,32 @@
-"""Launch files to plans: XML, scopes, substitutions. Pure but for what a context provides.
+"""Launch plans: the XML of launch files, its scopes and substitutions. Pure apart from the context.
 
-``plan(files, args, context)`` settles files and arguments into a frozen `Plan`; `report` answers
-the questions that need nothing more than one. May import floor 0 and `rosz.params.yaml`.
+``plan(files, args, context)`` reads files and arguments into a frozen `Plan`. The public module
+`report` returns what roslaunch prints about one. May import floor 0 and `rosz.params`.
 
-Beyond roslaunch, additive: ``wait_for``, ``wait_timeout``, ``spawn_delay``, ``respawn_max`` (see
-`rosz.launch.plan.waiting`), and of ROS 2's XML:
+Additions to roslaunch: ``wait_for``, ``wait_timeout``, ``spawn_delay``, ``respawn_max`` (see
+`rosz.launch.plan.node`), and from ROS 2's XML:
 
 - ``exec`` for ``type`` on ``<node>`` and ``<test>``; the name may then be left out.
 - ``namespace`` for ``ns`` on node, test, group and include; ``description`` for ``doc``.
-- ``<push_ros_namespace namespace="…"/>`` (or with dashes) holds to the end of its group or file;
-  in ROS 2 it leaks out of an included file.
+- ``<push_ros_namespace namespace="…"/>`` (or with dashes) lasts to the end of its group or file;
+  in ROS 2 it also affects the file that includes it.
 - ``<let name="…" value="…"/>`` sets an arg, declared or not, to the end of its group or file.
 - ``<set_env>`` is ``<env>``. ``$(var x)`` is ``$(arg x)``. ``$(find-pkg-share pkg)`` is the folder
   of a package.
-- ``<executable cmd="…">`` runs a program that is no node; ``shell`` is not supported.
+- ``<executable cmd="…">`` runs a program that is not a node; ``shell`` is not supported.
 
 ``<arg>`` and ``<param>`` keep ROS 1's rules: an included file sees only what is passed to it, and a
 ``<param>`` outside a node is a global parameter. For ``<param from="…">`` there is
 ``<rosparam file="…">``.
 """
 
-from rosz.launch.plan.arguments import LaunchArguments, parse_arguments
-from rosz.launch.plan.context import LaunchContext, LaunchText, SystemContext
+from rosz.launch.plan.context import (
+    LaunchArguments,
+    LaunchContext,
+    LaunchText,
+    SystemContext,
+    parse_arguments,
+)
 from rosz.launch.plan.loader import describe_args, plan
 from rosz.launch.plan.model import (
     ArgDoc,

@@ -1,19 +1,32 @@
-"""XML with places: a tree of tags that know their line and column.
+"""The XML of launch files: the tags, and a tree of elements that know their line and column.
 
-The tree is made for launch files: attributes are text, text is kept only where a tag gives it a
-meaning (``<rosparam>``), comments are dropped. Columns of attributes are worked out when somebody
-asks, from the bytes of the tag.
+Attributes are plain text. Text between tags is kept only inside ``<rosparam>``, and comments are
+dropped. The column of an attribute is computed only when a message needs it, from the bytes of its
+tag.
+
+The two exceptions here carry what is wrong up to the loader. Code below the loader knows only a
+text or an element; the loader also knows the chain of includes and raises `LaunchFileError`.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from xml.parsers import expat
 
 from rosz.errors import LaunchFileError, near_miss
-from rosz.launch.plan.tags import TAGS
 
-__all__ = ("Document", "Element", "parse")
+__all__ = (
+    "TAGS",
+    "Document",
+    "Element",
+    "TagError",
+    "TagRule",
+    "TextError",
+    "misplaced",
+    "parse",
+    "unknown_attribute",
+)
 
 _TEXT_TAGS = frozenset({"rosparam"})
 _MAX_ENTITY = 4096
@@ -38,16 +51,136 @@ _HINTS = {
 }
 
 
-class Element:
-    """A tag.
+class TagRule:
+    """The attributes and children that a tag may have.
+
+    Args:
+        attributes: Names of roslaunch's attributes, separated by spaces.
+        more: Names of attributes that only rosz understands: ROS 2's names for the same thing, and
+            rosz's own additions. roslaunch ignores them with a warning.
+        holds: Names of the tags allowed inside.
 
     Attributes:
-        tag: Its name as written.
-        attributes: Name to value, references resolved.
-        children: The tags inside it, in order.
-        line: 1-based line of its ``<``.
-        column: 1-based column of its ``<``.
-        chunks: (text, line, column) of its own text, for tags whose text means something.
+        attributes: All attribute names, including ``if`` and ``unless``.
+        holds: Names of the tags allowed inside.
+    """
+
+    def __init__(self, attributes: str, more: str = "", holds: str = "") -> None:
+        self.attributes = frozenset(f"{attributes} {more} if unless".split())
+        self.holds = frozenset(holds.split())
+
+
+_BODY = (
+    "arg env executable group include let machine node param push-ros-namespace push_ros_namespace"
+    " remap rosparam set_env test"
+)
+_NODE = "args clear_params cwd launch-prefix machine name ns output pkg required type"
+_NODE_BODY = "env param remap rosparam"
+_WAIT = "wait_for wait_timeout"
+_START = f"respawn_max spawn_delay {_WAIT}"
+
+TAGS = {
+    "arg": TagRule("default doc name value", "description"),
+    "env": TagRule("name value"),
+    "executable": TagRule(
+        "", f"args cmd cwd launch-prefix name output required respawn respawn_delay {_START}", "env"
+    ),
+    "group": TagRule("clear_params ns", f"namespace {_WAIT}", _BODY),
+    "include": TagRule("clear_params file ns pass_all_args", "namespace", "arg env"),
+    "launch": TagRule("deprecated", "version", _BODY),
+    "let": TagRule("", "name value"),
+    "machine": TagRule("address default env-loader name password ssh-port timeout user"),
+    "node": TagRule(f"{_NODE} respawn respawn_delay", f"exec namespace {_START}", f"{_NODE_BODY}"),
+    "param": TagRule("binfile command name textfile type value"),
+    "push-ros-namespace": TagRule("", "namespace"),
+    "push_ros_namespace": TagRule("", "namespace"),
+    "remap": TagRule("from to"),
+    "rosparam": TagRule("command file ns param subst_value"),
+    "set_env": TagRule("", "name value"),
+    "test": TagRule(f"{_NODE} retry test-name time-limit", "exec namespace", f"{_NODE_BODY}"),
+}
+"""The rules of all tags by name."""
+
+
+def misplaced(tag: str, parent: str) -> str:
+    """Return the warning about a tag that has no meaning inside another."""
+    holds = TAGS[parent].holds
+    if not holds:
+        return f"<{tag}> means nothing in <{parent}>, which holds no tags"
+    hint = near_miss(tag, holds)
+    if not hint and tag in TAGS:
+        parents = [name for name, rule in TAGS.items() if tag in rule.holds]
+        hint = f"; it is allowed in {_listing(parents)}"
+    return (
+        f"<{tag}> means nothing in <{parent}>{hint}"
+        if hint
+        else f"<{tag}> is not a launch file tag; <{parent}> may hold {_listing(holds)}"
+    )
+
+
+def unknown_attribute(tag: str, attribute: str) -> str:
+    """Return the warning about an attribute that a tag does not have."""
+    known = TAGS[tag].attributes
+    hint = near_miss(attribute, known) or f"; it has {', '.join(sorted(known))}"
+    return f"<{tag}> has no attribute '{attribute}'{hint}"
+
+
+def _listing(names: Iterable[str]) -> str:
+    return ", ".join(f"<{name}>" for name in sorted(names))
+
+
+class TextError(Exception):
+    """An error in a text, such as the value of an attribute.
+
+    Attributes:
+        reason: Description of the error, what was expected, and what to do.
+        index: 0-based index of the character where the error is.
+    """
+
+    def __init__(self, reason: str, index: int = 0) -> None:
+        self.reason = reason
+        self.index = index
+        super().__init__(reason)
+
+
+class TagError(Exception):
+    """An error in an element.
+
+    Attributes:
+        element: The element.
+        reason: Description of the error, what was expected, and what to do.
+        attribute: Name of the wrong attribute, or None for the element itself.
+        index: 0-based index in the value of the attribute.
+        place: Path, line and column of the error if it is outside the tag.
+    """
+
+    def __init__(
+        self,
+        element: Element,
+        reason: str,
+        attribute: str | None = None,
+        index: int = 0,
+        *,
+        place: tuple[str, int, int] | None = None,
+    ) -> None:
+        self.element = element
+        self.reason = reason
+        self.attribute = attribute
+        self.index = index
+        self.place = place
+        super().__init__(reason)
+
+
+class Element:
+    """One XML element.
+
+    Attributes:
+        tag: Name as written.
+        attributes: Values by name, with references resolved.
+        children: Child elements in order.
+        line: 1-based line of the ``<``.
+        column: 1-based column of the ``<``.
+        chunks: (text, line, column) of each piece of text, for elements whose text is kept.
     """
 
     __slots__ = (
@@ -73,16 +206,16 @@ class Element:
 
     @property
     def file(self) -> str:
-        """What its file is called."""
+        """Path of the file, as messages show it."""
         return self._document.path
 
     @property
     def text(self) -> str:
-        """Its own text, without that of tags inside it."""
+        """Text of this element, without the text of its children."""
         return "".join(chunk for chunk, _, _ in self.chunks)
 
     def locate(self, attribute: str | None = None, index: int = 0) -> tuple[int, int]:
-        """Return line and column of the tag, or of a character in the value of an attribute."""
+        """Return the line and column of the tag, or of a character in an attribute's value."""
         if attribute is None or attribute not in self.attributes:
             return self.line, self.column
         source = self._document.source(self._offset)
@@ -93,7 +226,7 @@ class Element:
         return self.line, self.column
 
     def locate_text(self, line: int, column: int) -> tuple[int, int]:
-        """Return where a line and column (both 0-based) of its text stand in the file."""
+        """Return the file position of a 0-based line and column of the text."""
         at_line, at_column = 0, 0
         place = (self.line, self.column)
         for chunk, chunk_line, chunk_column in self.chunks:
@@ -116,11 +249,12 @@ class Element:
 
 
 class Document:
-    """A parsed file.
+    """A parsed launch file.
 
     Attributes:
-        path: What it is called in messages.
-        data: Its bytes.
+        path: Path as messages show it.
+        data: Content of the file.
+        launch: The ``<launch>`` element.
     """
 
     def __init__(self, path: str, data: bytes) -> None:
@@ -129,7 +263,10 @@ class Document:
         self.launch = Element(self, "launch", {}, (0, 0, 0))
 
     def source(self, offset: int) -> str:
-        """Return the text of the tag that starts at a byte offset; empty where unknown."""
+        """Return the source of the tag at a byte offset, or "" if it cannot be read.
+
+        That is the case for UTF-16, whose bytes are not searched here.
+        """
         if (
             self.data.startswith((b"\xff\xfe", b"\xfe\xff"))
             or self.data[offset : offset + 1] != b"<"
@@ -148,8 +285,8 @@ class Document:
         return self.data[offset : end + 1].decode("utf-8", "replace")
 
 
-class _Reader:
-    """The handlers of one parse."""
+class _Handlers:
+    """The handlers that expat calls during one parse."""
 
     def __init__(self, document: Document) -> None:
         self.document = document
@@ -219,8 +356,8 @@ class _Reader:
             reason, self.document.path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
         )
 
-    def damaged(self, error: expat.ExpatError) -> LaunchFileError:
-        """Say what is not well-formed, with the tag that it concerns."""
+    def explain(self, error: expat.ExpatError) -> LaunchFileError:
+        """Return the error for XML that is not well-formed, naming the tag concerned."""
         reason = expat.errors.messages.get(error.code, str(error))
         if error.code == expat.errors.codes[expat.errors.XML_ERROR_TAG_MISMATCH] and self.open:
             closing = _CLOSING_TAG.search(self.document.data, self.parser.ErrorByteIndex - 2)
@@ -235,37 +372,37 @@ class _Reader:
                 opened = self.open[-1]
                 reason = f"the file ends inside <{opened.tag}> of line {opened.line}"
         else:
-            reason += self._quotes(error) or _HINTS.get(error.code, "")
+            reason += self._curly_quote(error) or _HINTS.get(error.code, "")
         return LaunchFileError(
             f"not well-formed XML: {reason}", self.document.path, error.lineno, error.offset + 1
         )
 
-    def _quotes(self, error: expat.ExpatError) -> str:
-        """Recognise quotes that a word processor has put in place of those of XML."""
+    def _curly_quote(self, error: expat.ExpatError) -> str:
+        """Return a hint if the error is a curly quote from a word processor."""
         if error.code != expat.errors.codes[expat.errors.XML_ERROR_INVALID_TOKEN]:
             return ""
         start = self.parser.ErrorByteIndex
         found = self.document.data[start : start + 3].decode("utf-8", "replace")
-        return f'; {found} is no quote of XML: write "' if found in _CURLY_QUOTES else ""
+        return f'; {found} is not an XML quote: write "' if found in _CURLY_QUOTES else ""
 
 
 def parse(path: str, data: bytes) -> Document:
-    """Read a launch file.
+    """Parse a launch file.
 
     Args:
-        path: What to call it in messages.
-        data: Its bytes, in any encoding that XML can declare.
+        path: Path to show in messages.
+        data: Content of the file, in any encoding that XML can declare.
 
     Raises:
-        LaunchFileError: It is not well-formed, declares entities that are refused, or has not
-            exactly one ``<launch>``.
+        LaunchFileError: If the XML is not well-formed, declares an entity that is refused, or
+            does not contain exactly one ``<launch>``.
     """
     document = Document(path, data)
-    reader = _Reader(document)
+    reader = _Handlers(document)
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:
-        raise reader.damaged(error) from None
+        raise reader.explain(error) from None
     except (LookupError, UnicodeError, ValueError) as error:
         raise LaunchFileError(f"the declared encoding fails: {error}", path, 1, 1) from error
     if len(reader.launches) == 1:
@@ -281,7 +418,7 @@ def parse(path: str, data: bytes) -> Document:
 
 
 def _qualified(name: str) -> str:
-    """Turn expat's ``uri local prefix`` into the name as written."""
+    """Return the name as written for expat's ``uri local prefix``."""
     match name.split(" "):
         case [_uri, local, prefix]:
             return f"{prefix}:{local}"
@@ -291,7 +428,7 @@ def _qualified(name: str) -> str:
 
 
 def _raw_index(raw: str, index: int) -> int:
-    """Return where the character of that index in the value starts in its source text."""
+    """Return the position in the source text of the value's character at an index."""
     at = 0
     for _ in range(index):
         reference = _REFERENCE.match(raw, at)
@@ -300,6 +437,6 @@ def _raw_index(raw: str, index: int) -> int:
 
 
 def _slash(tag: str) -> str:
-    """Say how a tag that holds nothing is closed at once."""
+    """Return the hint that a tag without children may end with ``/>``."""
     holds = tag in TAGS and (TAGS[tag].holds or tag in _TEXT_TAGS)
     return "" if holds or tag not in TAGS else ", or '/>' in place of its '>'"

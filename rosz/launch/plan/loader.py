@@ -1,7 +1,7 @@
-"""From files to a plan: the walk through tags, groups and includes.
+"""Read launch files into a plan: the walk through tags, groups and includes.
 
-The walk keeps its own stack, so neither deep groups nor long chains of includes reach Python's
-limits, and a file that includes itself under a condition works as far as `MAX_INCLUDES`.
+The walk keeps its own stack, so that neither deep groups nor long chains of includes reach Python's
+recursion limit. A file may include itself under a condition, up to `MAX_INCLUDES` deep.
 """
 
 from __future__ import annotations
@@ -13,23 +13,25 @@ from typing import NoReturn
 
 from rosz.errors import LaunchFileError, RoszError, near_miss
 from rosz.launch.plan.context import LaunchContext, LaunchText
-from rosz.launch.plan.document import Document, Element, parse
-from rosz.launch.plan.fault import Fault, TextFault
-from rosz.launch.plan.ledger import Ledger
-from rosz.launch.plan.machine import read_machine
-from rosz.launch.plan.model import ArgDoc, Notice, Place, Plan
-from rosz.launch.plan.node import namespace, read_executable, read_node, read_test
+from rosz.launch.plan.document import Document, Element, TagError, TextError, misplaced, parse
+from rosz.launch.plan.model import ArgDoc, Notice, Place, Plan, PlanBuilder
+from rosz.launch.plan.node import (
+    read_executable,
+    read_machine,
+    read_namespace,
+    read_node,
+    read_test,
+    read_wait,
+)
 from rosz.launch.plan.param import read_param, read_rosparam
 from rosz.launch.plan.scope import Scope, make_global
 from rosz.launch.plan.substitution import Substitution
 from rosz.launch.plan.tag import Tag
-from rosz.launch.plan.tags import misplaced
-from rosz.launch.plan.waiting import read_wait
 
 __all__ = ("MAX_INCLUDES", "describe_args", "plan")
 
 MAX_INCLUDES = 300
-"""How deep includes may nest; roslaunch gives up at about as many."""
+"""Maximum depth of includes, about that of roslaunch."""
 
 _SHOWN_INCLUDES = 12
 
@@ -41,16 +43,16 @@ def plan(
     *,
     ns: str = "",
 ) -> Plan:
-    """Read launch files.
+    """Read launch files into a plan.
 
     Args:
         files: Paths, relative to the context's folder, or texts; read in order into one plan.
         args: Values for ``<arg>`` by name, for all files.
-        context: The outside.
-        ns: Namespace to begin in: ``__ns``, else ``ROS_NAMESPACE``.
+        context: The system around the launch.
+        ns: Namespace to begin in: ``__ns``, otherwise ``ROS_NAMESPACE``.
 
     Raises:
-        LaunchFileError: A file is refused, or cannot be read.
+        LaunchFileError: If a file is refused, or cannot be read.
     """
     loader = _Loader(context, args, ns)
     for file in files:
@@ -65,10 +67,10 @@ def describe_args(
     *,
     ns: str = "",
 ) -> tuple[ArgDoc, ...]:
-    """Return the args that the last file takes, in order; nothing but ``<arg>`` is read.
+    """Return the args that the last file takes, in order, reading only ``<arg>`` tags.
 
     Raises:
-        LaunchFileError: A file is refused, or cannot be read.
+        LaunchFileError: If a file is refused, or cannot be read.
     """
     loader = _Loader(context, args, ns, args_only=True)
     for file in files:
@@ -77,7 +79,7 @@ def describe_args(
 
 
 class _Frame:
-    """A list of tags being walked through."""
+    """A position in a list of sibling tags."""
 
     __slots__ = ("chain", "children", "leave", "root", "scope")
 
@@ -98,13 +100,13 @@ class _Frame:
 
 
 class _Loader:
-    """One reading of some files into one plan."""
+    """Reads files into one plan."""
 
     def __init__(
         self, context: LaunchContext, args: Mapping[str, str], ns: str, *, args_only: bool = False
     ) -> None:
         self.docs: dict[str, ArgDoc] = {}
-        self.ledger = Ledger(context)
+        self.builder = PlanBuilder(context)
         self._context = context
         self._given = dict(args)
         self._ns = ns
@@ -116,18 +118,18 @@ class _Loader:
         self._chain: tuple[tuple[str, str], ...] = ()
 
     def finish(self) -> Plan:
-        used = self._declared | self._substitution.asked
+        used = self._declared | self._substitution.used
         unused = tuple(name for name in self._given if name not in used)
         for name in unused:
             hint = near_miss(name, self._declared)
             text = f"no file declares an arg '{name}', so '{name}:=…' does nothing{hint}"
-            self.ledger.warnings.append(Notice(text, Place("<command line>")))
-        return self.ledger.finish(unused)
+            self.builder.warnings.append(Notice(text, Place("<command line>")))
+        return self.builder.build(unused)
 
     def load(self, file: str | Path | LaunchText) -> None:
         """Read one file into the plan."""
         self._chain = ()
-        self.ledger.default_machine = ""
+        self.builder.default_machine = ""
         if isinstance(file, LaunchText):
             path = file.name
             data = file.text.encode() if isinstance(file.text, str) else file.text
@@ -140,8 +142,8 @@ class _Loader:
                 raise LaunchFileError(f"cannot be read: {error.strerror}", path) from error
         try:
             scope = Scope(make_global(self._ns), path)
-        except TextFault as fault:
-            raise LaunchFileError(fault.reason, "<command line>") from fault
+        except TextError as error:
+            raise LaunchFileError(error.reason, "<command line>") from error
         scope.args = dict(self._given)
         self.docs = {}
         self._launch(document.launch, scope)
@@ -152,7 +154,7 @@ class _Loader:
         if path not in self._documents:
             self._documents[path] = parse(path, self._context.read(path))
         absolute = os.path.normpath(os.path.join(self._context.cwd, path))  # noqa: PTH118  # pure
-        self.ledger.files.setdefault(absolute)
+        self.builder.files.setdefault(absolute)
         return self._documents[path]
 
     def _walk(self) -> None:
@@ -168,8 +170,8 @@ class _Loader:
                 continue
             try:
                 self._read(element, frame)
-            except Fault as fault:
-                self._refuse(fault)
+            except TagError as error:
+                self._refuse(error)
 
     def _read(self, element: Element, frame: _Frame) -> None:
         if self._args_only and element.tag != "arg":
@@ -186,21 +188,21 @@ class _Loader:
 
     def _tag(self, element: Element, scope: Scope) -> Tag:
         places = tuple(place for place, _ in self._chain)
-        return Tag(element, scope, self._substitution, self._notify, places)
+        return Tag(element, scope, self._substitution, self._warn, places)
 
     def _launch(self, element: Element, scope: Scope) -> None:
-        """Look at a ``<launch>`` itself; conditions on it change nothing, as in roslaunch."""
+        """Read the attributes of a ``<launch>``; conditions on it do nothing, as in roslaunch."""
         tag = self._tag(element, scope)
         try:
             tag.check()
             if "if" in element.attributes or "unless" in element.attributes:
                 tag.wanted()
                 tag.warn("conditions on <launch> do nothing; put them on its tags or the <include>")
-        except Fault as fault:
-            self._refuse(fault)
+        except TagError as error:
+            self._refuse(error)
         text = element.attributes.get("deprecated")
         if text:
-            self.ledger.deprecations.append(Notice(text, tag.place))
+            self.builder.deprecations.append(Notice(text, tag.place))
 
     def read_arg(self, tag: Tag) -> None:
         tag.check()
@@ -210,8 +212,8 @@ class _Loader:
         doc = tag.alias("doc", "description")
         try:
             tag.scope.declare(name, value, default)
-        except TextFault as fault:
-            tag.fail(fault.reason, "name")
+        except TextError as error:
+            tag.fail(error.reason, "name")
         self._declared.add(name)
         if len(self._stack) == 1 and not value:
             self.docs[name] = ArgDoc(name, doc, default)
@@ -222,7 +224,7 @@ class _Loader:
 
     def read_group(self, tag: Tag) -> None:
         tag.check()
-        scope = self._open(tag, namespace(tag))
+        scope = self._open(tag, read_namespace(tag))
         scope.private = list(scope.private)
         scope.waits = (*scope.waits, *read_wait(tag, scope.ns))
         self._stack.append(_Frame(tag.element.children, scope, self._chain, root="group"))
@@ -230,26 +232,26 @@ class _Loader:
     def _open(self, tag: Tag, ns: str | None, *, include: bool = False) -> Scope:
         try:
             scope = tag.scope.include(ns) if include else tag.scope.child(ns)
-        except TextFault as fault:
-            tag.fail(fault.reason, "ns")
+        except TextError as error:
+            tag.fail(error.reason, "ns")
         if tag.get("clear_params") and tag.flag("clear_params"):
             if not ns:
                 tag.fail("'clear_params' needs 'ns'", "clear_params")
-            self.ledger.clear(scope.ns)
+            self.builder.clear(scope.ns)
         return scope
 
-    def read_namespace(self, tag: Tag) -> None:
+    def read_push_namespace(self, tag: Tag) -> None:
         tag.check()
         try:
             tag.scope.ns = tag.scope.child(tag.require("namespace")).ns
-        except TextFault as fault:
-            tag.fail(fault.reason, "namespace")
+        except TextError as error:
+            tag.fail(error.reason, "namespace")
 
     def read_include(self, tag: Tag) -> None:
         tag.check()
         path = tag.require("file")
         pass_all = tag.flag("pass_all_args")
-        scope = self._open(tag, namespace(tag), include=True)
+        scope = self._open(tag, read_namespace(tag), include=True)
         if pass_all:
             for name, value in tag.scope.args.items():
                 scope.declare(name, value, None)
@@ -257,8 +259,8 @@ class _Loader:
         self._read_passed(tag, scope)
         try:
             passed = scope.enter()
-        except TextFault as fault:
-            tag.fail(fault.reason)
+        except TextError as error:
+            tag.fail(error.reason)
         document = self._include(tag, path)
         scope.file = path
         chain = self._chain
@@ -272,12 +274,12 @@ class _Loader:
                 hint = near_miss(unknown[0], scope.declared)
                 takes = f"; it takes {', '.join(scope.declared)}" if scope.declared else ""
                 reason = f"'{path}' declares no arg '{unknown[0]}'{hint or takes}"
-                self._refuse(Fault(tag.element, reason))
+                self._refuse(TagError(tag.element, reason))
 
         self._stack.append(_Frame(document.launch.children, scope, self._chain, leave=leave))
 
     def _read_passed(self, tag: Tag, scope: Scope) -> None:
-        """Read the ``<arg>`` and ``<env>`` tags of an include."""
+        """Read the ``<arg>`` and ``<env>`` tags inside an ``<include>``."""
         for element in tag.element.children:
             inner = tag.inside(element, scope)
             if inner.name not in {"arg", "env"}:
@@ -306,31 +308,31 @@ class _Loader:
             tag.fail(f"'{path}' cannot be read: {reason}{hint}", "file")
         except LaunchFileError as error:
             if path.endswith((".py", ".yaml", ".yml")):
-                tag.fail(f"'{path}' is no XML; launch files are read as XML only", "file")
+                tag.fail(f"'{path}' is not XML; launch files are read as XML only", "file")
             places = (*(place for place, _ in self._chain), str(tag.place))
             raise LaunchFileError(
                 error.reason, error.path, error.line, error.column, _shorten(places)
             ) from None
 
-    def _notify(self, element: Element, text: str, attribute: str | None, index: int) -> None:
+    def _warn(self, element: Element, text: str, attribute: str | None, index: int) -> None:
         line, column = element.locate(attribute, index)
         places = tuple(place for place, _ in self._chain)
-        self.ledger.warnings.append(Notice(text, Place(element.file, line, column, places)))
+        self.builder.warnings.append(Notice(text, Place(element.file, line, column, places)))
 
-    def _refuse(self, fault: Fault) -> NoReturn:
+    def _refuse(self, error: TagError) -> NoReturn:
         places = tuple(place for place, _ in self._chain)
-        element = fault.element
-        path, line, column = element.file, *element.locate(fault.attribute, fault.index)
-        if fault.place is not None:
-            if fault.place[0] != path:
+        element = error.element
+        path, line, column = element.file, *element.locate(error.attribute, error.index)
+        if error.place is not None:
+            if error.place[0] != path:
                 places = (*places, f"{path}:{line}:{column}")
-            path, line, column = fault.place
-        cause = fault.__cause__ if isinstance(fault.__cause__, RoszError) else None
-        raise LaunchFileError(fault.reason, path, line, column, _shorten(places)) from cause
+            path, line, column = error.place
+        cause = error.__cause__ if isinstance(error.__cause__, RoszError) else None
+        raise LaunchFileError(error.reason, path, line, column, _shorten(places)) from cause
 
 
 def _shorten(places: tuple[str, ...]) -> tuple[str, ...]:
-    """Leave out the middle of a long chain of includes."""
+    """Return the places of a chain of includes, without the middle of a long one."""
     if len(places) <= _SHOWN_INCLUDES:
         return places
     half = _SHOWN_INCLUDES // 2
@@ -340,17 +342,17 @@ def _shorten(places: tuple[str, ...]) -> tuple[str, ...]:
 _READERS: Mapping[str, Callable[[_Loader, Tag], None]] = {
     "arg": _Loader.read_arg,
     "env": lambda _, tag: tag.env(tag.scope),
-    "executable": lambda loader, tag: read_executable(tag, loader.ledger),
+    "executable": lambda loader, tag: read_executable(tag, loader.builder),
     "group": _Loader.read_group,
     "include": _Loader.read_include,
     "let": _Loader.read_let,
-    "machine": lambda loader, tag: read_machine(tag, loader.ledger),
-    "node": lambda loader, tag: read_node(tag, loader.ledger),
-    "param": lambda loader, tag: read_param(tag, loader.ledger),
-    "push-ros-namespace": _Loader.read_namespace,
-    "push_ros_namespace": _Loader.read_namespace,
+    "machine": lambda loader, tag: read_machine(tag, loader.builder),
+    "node": lambda loader, tag: read_node(tag, loader.builder),
+    "param": lambda loader, tag: read_param(tag, loader.builder),
+    "push-ros-namespace": _Loader.read_push_namespace,
+    "push_ros_namespace": _Loader.read_push_namespace,
     "remap": lambda _, tag: tag.remap(tag.scope),
-    "rosparam": lambda loader, tag: read_rosparam(tag, loader.ledger),
+    "rosparam": lambda loader, tag: read_rosparam(tag, loader.builder),
     "set_env": lambda _, tag: tag.env(tag.scope),
-    "test": lambda loader, tag: read_test(tag, loader.ledger),
+    "test": lambda loader, tag: read_test(tag, loader.builder),
 }

@@ -1,8 +1,8 @@
-"""What a launch comes to once files, arguments and substitutions are settled.
+"""The launch plan: the result of reading launch files, and the builder that collects it.
 
-All of it is frozen, compares by value and can be written as JSON (`Plan.to_json`). Whoever carries
-a plan out needs nothing else: do `Plan.setup`, clear `Plan.clear`, write `Plan.params` in order,
-then start `Plan.nodes`. That is the order of roslaunch.
+A `Plan` is frozen, compares by value and can be written as JSON (`Plan.to_json`). To run one, do
+`Plan.setup`, clear `Plan.clear`, write `Plan.params` in order, then start `Plan.nodes`. That is the
+order of roslaunch.
 """
 
 from __future__ import annotations
@@ -10,8 +10,14 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import msgspec
+from msgspec.structs import replace
 
-from rosz.errors import NotFoundError, near_miss
+from rosz import names
+from rosz.errors import LaunchFileError, NotFoundError, ParamError, near_miss
+from rosz.launch.plan.context import LaunchContext
+from rosz.launch.plan.document import TextError
+from rosz.launch.plan.scope import join
+from rosz.params.values import normalise
 
 __all__ = (
     "ArgDoc",
@@ -22,14 +28,17 @@ __all__ = (
     "ParamPlan",
     "Place",
     "Plan",
+    "PlanBuilder",
     "SetupPlan",
     "TestPlan",
     "Wait",
 )
 
+_RESERVED = "/rosout"
+
 
 class Place(msgspec.Struct, frozen=True):
-    """Where in which file something was written.
+    """A position in a launch file.
 
     Attributes:
         file: Path as it was given or included.
@@ -48,11 +57,11 @@ class Place(msgspec.Struct, frozen=True):
 
 
 class Notice(msgspec.Struct, frozen=True):
-    """Something to tell the user that does not stop the launch.
+    """A message for the user that does not stop the launch.
 
     Attributes:
-        text: What it is, lower case, without its place.
-        place: Where it was found.
+        text: Text in lower case, without the place.
+        place: Position that the message is about.
     """
 
     text: str
@@ -63,16 +72,16 @@ class Notice(msgspec.Struct, frozen=True):
 
 
 class ParamPlan(msgspec.Struct, frozen=True):
-    """One parameter to be set before any node starts.
+    """A parameter to set before any node starts.
 
-    The dicts of ``<rosparam>`` are unrolled into their leaves, and empty ones vanish, as roslaunch
-    has it; a dict of ``<param type="yaml">`` is set whole.
+    A dict of ``<rosparam>`` becomes one parameter for each leaf, and empty dicts vanish, as in
+    roslaunch; a dict of ``<param type="yaml">`` is set whole.
 
     Attributes:
-        name: Global name. One that begins with ``~`` comes from ``<rosparam param="~x">``, which
-            roslaunch keeps so; `target` says where it ends up.
-        value: What a parameter can have, see `rosz.params.values`.
-        place: Where the value was written.
+        name: Global name. A name that begins with ``~`` comes from ``<rosparam param="~x">``, which
+            roslaunch leaves as it is; see `target`.
+        value: A parameter value, see `rosz.params.values`.
+        place: Position of the tag.
     """
 
     name: str
@@ -81,18 +90,18 @@ class ParamPlan(msgspec.Struct, frozen=True):
 
     @property
     def target(self) -> str:
-        """The global name that the value is stored at."""
+        """The global name under which the value is stored."""
         return f"/roslaunch/{self.name[1:].lstrip('/')}" if self.name.startswith("~") else self.name
 
 
 class SetupPlan(msgspec.Struct, frozen=True):
-    """A ``<rosparam command="dump|delete">``, done before parameters are cleared and set.
+    """A ``<rosparam command="dump|delete">``, run before parameters are cleared and set.
 
     Attributes:
         action: ``dump`` writes the subtree to a file, ``delete`` removes it.
-        name: Global name of the subtree, ``/`` for all.
+        name: Global name of the subtree, ``/`` for all parameters.
         file: Path to dump to; empty for ``delete``.
-        place: Where it was written.
+        place: Position of the tag.
     """
 
     action: Literal["dump", "delete"]
@@ -102,10 +111,11 @@ class SetupPlan(msgspec.Struct, frozen=True):
 
 
 class Condition(msgspec.Struct, frozen=True):
-    """Something that a node waits for.
+    """A condition that a node waits for.
 
     Attributes:
-        kind: ``topic`` (is published), ``service``, ``param`` (is set) or ``node`` (lives).
+        kind: ``topic`` (has a publisher), ``service`` (has a server), ``param`` (is set) or
+            ``node`` (is alive).
         name: Global name.
     """
 
@@ -117,12 +127,12 @@ class Condition(msgspec.Struct, frozen=True):
 
 
 class Wait(msgspec.Struct, frozen=True):
-    """A wait before a node starts; it ends when any one of its conditions holds.
+    """A wait before a node starts, which ends when any one of its conditions holds.
 
     Attributes:
         any_of: The conditions, at least one.
-        timeout: Seconds after which the start fails.
-        place: Where it was written.
+        timeout: Time limit in seconds, after which the start fails.
+        place: Position of the tag.
     """
 
     any_of: tuple[Condition, ...]
@@ -134,15 +144,15 @@ class MachinePlan(msgspec.Struct, frozen=True):
     """A ``<machine>``.
 
     Attributes:
-        name: What nodes call it.
+        name: Name that nodes refer to.
         address: Host name or address.
-        env_loader: Path of a script on that machine that sets up the environment, or empty.
-        ssh_port: Port of its ssh server.
-        user: Login name, or empty for the present one.
-        password: As written; keys are better.
-        timeout: Seconds that it may take to come up.
+        env_loader: Path of a script on that machine that sets up the environment, or "".
+        ssh_port: Port of the ssh server.
+        user: Login name, or "" for the current one.
+        password: Password as written; it is not used.
+        timeout: Time limit in seconds for the connection.
         assignable: False for ``default="never"``.
-        place: Where it was written.
+        place: Position of the tag.
     """
 
     name: str
@@ -162,25 +172,25 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         package: Package of the executable; empty for an ``<executable>``.
         type: File name of the executable in the package; empty for an ``<executable>``.
-        command: Program and arguments of an ``<executable>``, which is no ROS node: it gets neither
-            remappings nor ``__name``; empty for a node.
-        name: Base name, anonymous ones already made unique.
-        named: False where the file gave no name and one was made up.
-        namespace: Global, without a trailing slash; ``/`` for the root.
+        command: Program and arguments of an ``<executable>``, which is not a ROS node and gets
+            neither remappings nor ``__name``; empty for a node.
+        name: Base name; anonymous names are already unique.
+        named: False if the file gives no name and one was generated.
+        namespace: Global namespace without a trailing slash; ``/`` for the root.
         machine: Name of one of `Plan.machines`; empty for this machine.
         args: Arguments of the program, split as a shell does.
-        launch_prefix: What stands before the executable, split as a shell does.
-        respawn: Start it again whenever it ends.
-        respawn_delay: Seconds to wait before that.
-        respawn_max: How often at most; None for no limit.
-        required: The launch ends when it ends.
+        launch_prefix: Words before the executable, split as a shell does.
+        respawn: Whether to start the process again whenever it ends.
+        respawn_delay: Delay before a respawn in seconds.
+        respawn_max: Maximum number of respawns, or None for no limit.
+        required: Whether the launch ends when the process ends.
         output: ``screen`` or ``log``.
-        cwd: ``node`` (the executable's folder), ``ROS_HOME``, or for an ``<executable>`` a path.
+        cwd: ``node`` (the executable's folder), ``ROS_HOME``, or a path for an ``<executable>``.
         remaps: (from, to) in order, as written.
-        env: (name, value) in order, later ones win; without ``ROS_NAMESPACE``.
-        wait_for: All of these are awaited before it starts.
-        spawn_delay: Seconds to wait before it starts, after `wait_for`.
-        place: Where it was written.
+        env: (name, value) in order, of which the last one counts; without ``ROS_NAMESPACE``.
+        wait_for: Waits before the start; all of them must end.
+        spawn_delay: Delay before the start in seconds, after `wait_for`.
+        place: Position of the tag.
     """
 
     package: str
@@ -211,13 +221,13 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class TestPlan(msgspec.Struct, frozen=True):
-    """A ``<test>``, which rostest runs and a launch leaves alone.
+    """A ``<test>``, which rostest runs and a launch ignores.
 
     Attributes:
         node: The process.
-        test_name: Name for the result file.
-        time_limit: Seconds after which it has failed.
-        retry: How often to try again.
+        test_name: Name of the result file.
+        time_limit: Time limit in seconds, after which the test has failed.
+        retry: Number of further attempts.
     """
 
     __test__ = False
@@ -232,9 +242,9 @@ class ArgDoc(msgspec.Struct, frozen=True):
     """An ``<arg>`` that the command line may set.
 
     Attributes:
-        name: Its name.
-        doc: Its ``doc``, or None.
-        default: Its default with substitutions made, or None.
+        name: Name.
+        doc: Value of ``doc``, or None.
+        default: Default with substitutions applied, or None.
     """
 
     name: str
@@ -243,18 +253,18 @@ class ArgDoc(msgspec.Struct, frozen=True):
 
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True):
-    """A launch, settled.
+    """A launch plan.
 
     Attributes:
         files: Absolute paths of the files read, in order, each once.
-        clear: Parameter namespaces to delete before `params` are set; none lies below another.
-        setup: ``<rosparam>`` dumps and deletes, in order; done before anything else.
+        clear: Parameter namespaces to delete before `params` are set; none is below another.
+        setup: ``<rosparam>`` dumps and deletes, in order; run before anything else.
         params: Parameters to set, in order; no name twice.
         machines: Machines that the files declare.
         nodes: Processes, in order; no full name twice.
         tests: Tests, in order.
-        unused_args: Arguments given that no file declares.
-        warnings: What roslaunch merely warns about, and what it should.
+        unused_args: Names of the args given that no file declares.
+        warnings: Warnings, including some that roslaunch does not give.
         deprecations: Texts of ``<launch deprecated="…">``.
     """
 
@@ -270,10 +280,10 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     deprecations: tuple[Notice, ...] = ()
 
     def node(self, name: str) -> NodePlan:
-        """Return the node or test of that full name, the node where there are both.
+        """Return the node or test of a full name; the node if there are both.
 
         Raises:
-            NotFoundError: There is none; the message lists what there is.
+            NotFoundError: If there is none.
         """
         known = {node.full_name: node for node in reversed(self.processes)}
         if name in known:
@@ -283,14 +293,14 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def processes(self) -> tuple[NodePlan, ...]:
-        """Nodes, then those of tests."""
+        """The nodes, followed by the nodes of tests."""
         return (*self.nodes, *(test.node for test in self.tests))
 
     def machine(self, name: str) -> MachinePlan | None:
-        """Return a declared machine; None for the empty name, which is this machine.
+        """Return a declared machine, or None for the empty name, which is this machine.
 
         Raises:
-            NotFoundError: No machine of that name is declared.
+            NotFoundError: If no machine of that name is declared.
         """
         if not name:
             return None
@@ -301,5 +311,177 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         raise NotFoundError(f"no machine '{name}' in this launch{near_miss(name, known)}")
 
     def to_json(self) -> bytes:
-        """Write the plan as JSON: fields by name, tuples as lists, bytes as base64."""
+        """Return the plan as JSON: fields by name, tuples as lists, bytes as base64."""
         return msgspec.json.encode(self)
+
+
+class PlanBuilder:
+    """Collects the parts of a plan while tags are read.
+
+    Args:
+        context: The system around the launch.
+
+    Attributes:
+        context: The system around the launch.
+        files: Absolute paths of the files read, as keys in order.
+        setup: ``<rosparam>`` dumps and deletes.
+        warnings: Warnings.
+        deprecations: Texts of ``deprecated``.
+        default_machine: Name of the machine for nodes that name none.
+    """
+
+    def __init__(self, context: LaunchContext) -> None:
+        self.context = context
+        self.files: dict[str, None] = {}
+        self.setup: list[SetupPlan] = []
+        self.warnings: list[Notice] = []
+        self.deprecations: list[Notice] = []
+        self.default_machine = ""
+        self._clear: dict[str, None] = {}
+        self._params: dict[str, ParamPlan] = {}
+        self._child_of: dict[str, str] = {}
+        self._machines: dict[str, MachinePlan] = {}
+        self._nodes: dict[str, NodePlan] = {}
+        self._tests: list[TestPlan] = []
+        self._used: dict[tuple[object, ...], str] = {}
+
+    def clear(self, ns: str) -> None:
+        """Add a parameter namespace to clear."""
+        self._clear.setdefault(names.canonical(ns))
+
+    def add_param(self, name: str, value: Any, place: Place) -> None:
+        """Add a parameter; it replaces an earlier one of the same name, in that one's position.
+
+        Raises:
+            TextError: If the name is the root, or the value is not a parameter value.
+        """
+        name = names.canonical(name)
+        if name == "/":
+            raise TextError("the root of all parameters takes no value; give a name")
+        try:
+            value = normalise(value)
+        except ParamError as error:
+            raise TextError(f"parameter '{name}': {error}") from error
+        parent = name
+        while len(parent) > 1:
+            parent = parent.rpartition("/")[0] or "/"
+            known = self._params.get(parent)
+            if known is not None:
+                text = f"parameter '{name}' turns '{parent}', set at {known.place}, into a dict"
+                self.warnings.append(Notice(text, place))
+            self._child_of[parent] = name
+        if name in self._child_of and name not in self._params:
+            text = f"parameter '{name}' and '{self._child_of[name]}' below it are both set"
+            self.warnings.append(Notice(text, place))
+        if name.startswith("~"):
+            text = f"'{name}' is private to the launcher here, not to a node; write it without '~'"
+            self.warnings.append(Notice(text, place))
+        self._params[name] = ParamPlan(name, value, place)
+
+    def add_params(self, name: str, value: Any, place: Place) -> None:
+        """Add a parameter, or for a dict each of its leaves.
+
+        Raises:
+            TextError: If `add_param` refuses one of them.
+        """
+        if not isinstance(value, dict):
+            self.add_param(name, value, place)
+            return
+        for key, inner in value.items():
+            self.add_params(join(name, key), inner, place)
+
+    def add_machine(self, machine: MachinePlan) -> None:
+        """Add a machine.
+
+        Raises:
+            TextError: If the name is empty, or used by a machine that differs.
+        """
+        known = self._machines.setdefault(machine.name, machine)
+        same = _config(known) == _config(machine) and known.assignable == machine.assignable
+        if not machine.name or not same:
+            where = f", at {known.place}" if machine.name else ""
+            raise TextError(f"machine '{machine.name}' is declared already, and differs{where}")
+
+    def add_node(self, node: NodePlan) -> None:
+        """Add a node.
+
+        Raises:
+            TextError: If another node has the same full name.
+        """
+        name = node.full_name
+        if name == _RESERVED:
+            raise TextError(f"'{name}' is the name of ROS's own log collector; choose another")
+        known = self._nodes.setdefault(name, node)
+        if known is not node:
+            raise TextError(
+                f"two nodes are named '{name}', the other at {known.place}; "
+                "give one another name or namespace"
+            )
+
+    def add_test(self, test: TestPlan) -> None:
+        """Add a test; two tests may have the same name."""
+        self._tests.append(test)
+
+    def unused_name(self, ns: str, base: str) -> str:
+        """Return a base name that no node in a namespace has yet."""
+        name, number = base, 1
+        while f"{ns.rstrip('/')}/{name}" in self._nodes:
+            number += 1
+            name = f"{base}_{number}"
+        return name
+
+    def build(self, unused_args: tuple[str, ...]) -> Plan:
+        """Return the plan, with every node assigned to its machine.
+
+        Raises:
+            LaunchFileError: If a node names a machine that is not declared.
+        """
+        nodes = [self._assign_machine(node) for node in self._nodes.values()]
+        tests = [replace(test, node=self._assign_machine(test.node)) for test in self._tests]
+        return Plan(
+            files=tuple(self.files),
+            clear=tuple(ns for ns in self._clear if not self._parent_cleared(ns)),
+            setup=tuple(self.setup),
+            params=tuple(self._params.values()),
+            machines=tuple(self._machines.values()),
+            nodes=tuple(nodes),
+            tests=tuple(tests),
+            unused_args=unused_args,
+            warnings=tuple(self.warnings),
+            deprecations=tuple(self.deprecations),
+        )
+
+    def _assign_machine(self, node: NodePlan) -> NodePlan:
+        """Assign a node to the first used machine among those configured alike."""
+        if not node.machine:
+            return node
+        machine = self._machines.get(node.machine)
+        if machine is None:
+            hint = near_miss(node.machine, self._machines) or "; declare it with <machine>"
+            place = node.place
+            raise LaunchFileError(
+                f"machine '{node.machine}' is not declared{hint}",
+                place.file,
+                place.line,
+                place.column,
+                place.includes,
+            )
+        return replace(node, machine=self._used.setdefault(_config(machine), machine.name))
+
+    def _parent_cleared(self, ns: str) -> bool:
+        parents = ns.split("/")[1:-1]
+        above = {"/"} if ns != "/" else set()
+        above |= {"/" + "/".join(parents[: count + 1]) for count in range(len(parents))}
+        return any(parent in self._clear for parent in above)
+
+
+def _config(machine: MachinePlan) -> tuple[object, ...]:
+    """Return the settings by which two machines are the same one."""
+    return (
+        machine.address,
+        machine.env_loader,
+        machine.ssh_port,
+        machine.user,
+        machine.password,
+        machine.timeout,
+    )

@@ -1,33 +1,54 @@
-"""``<node>``, ``<test>``, ``<executable>``: the processes of a launch."""
+"""The tags that describe processes: ``<node>``, ``<test>``, ``<executable>`` and ``<machine>``.
+
+``wait_for``, an addition to roslaunch, names what must exist before a node starts:
+``wait_for="topic /scan"`` waits for one thing; a comma adds another, and ``|`` separates
+alternatives, as in ``topic /scan, service /reset | param /ready``. The kinds are topic, service,
+param and node; names are resolved as the node would resolve them. ``wait_timeout`` is in seconds,
+30 by default. On a group, both concern every node in it, and each node may add its own.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Literal
+from typing import Literal, get_args
 
 from msgspec.structs import replace
 
 from rosz import names
-from rosz.launch.plan.fault import TextFault
-from rosz.launch.plan.ledger import Ledger
-from rosz.launch.plan.model import NodePlan, TestPlan
+from rosz.errors import InvalidName, near_miss
+from rosz.launch.plan.document import TextError, misplaced
+from rosz.launch.plan.model import Condition, MachinePlan, NodePlan, PlanBuilder, TestPlan, Wait
 from rosz.launch.plan.param import read_param, read_rosparam
 from rosz.launch.plan.scope import Scope, join
 from rosz.launch.plan.tag import Tag
-from rosz.launch.plan.tags import misplaced
-from rosz.launch.plan.waiting import read_wait
 
-__all__ = ("namespace", "read_executable", "read_node", "read_test")
+__all__ = (
+    "read_executable",
+    "read_machine",
+    "read_namespace",
+    "read_node",
+    "read_test",
+    "read_wait",
+)
 
 _DEFAULT_TIME_LIMIT = 60.0
+_DEFAULT_WAIT = 30.0
+_DEFAULT_CONNECT = 10.0
+_DEFAULT_PORT = 22
+_MAX_PORT = 65535
+_OLD_MACHINE = ("ros-root", "ros-package-path", "ros-ip", "ros-hostname")
+_MACHINE_DEFAULTS = ("true", "false", "never")
+
+_Kind = Literal["topic", "service", "param", "node"]
+_KINDS: dict[str, _Kind] = {kind: kind for kind in get_args(_Kind)}
 
 
-def namespace(tag: Tag) -> str | None:
-    """Return ``ns``, None where it is absent.
+def read_namespace(tag: Tag) -> str | None:
+    """Return the ``ns`` of a tag, or None if it is absent.
 
     Raises:
-        Fault: It is empty.
+        TagError: If it is empty.
     """
     ns = tag.alias("ns", "namespace")
     if ns is not None and not ns:
@@ -35,32 +56,32 @@ def namespace(tag: Tag) -> str | None:
     return ns
 
 
-def read_node(tag: Tag, ledger: Ledger) -> None:
+def read_node(tag: Tag, builder: PlanBuilder) -> None:
     """Read ``<node>``.
 
-    With ROS 2's ``exec`` in place of ``type`` the name may be left out; it is then that of the
-    executable, where ROS 2 leaves it to the program.
+    With ROS 2's ``exec`` in place of ``type`` the name may be left out. It is then the name of the
+    executable; ROS 2 leaves it to the program.
 
     Raises:
-        Fault: An attribute or a tag inside is wrong, or another node has the name.
+        TagError: If an attribute or a child is wrong, or another node has the name.
     """
     tag.check()
     if "name" in tag.element.attributes or "type" in tag.element.attributes:
         name = tag.require("name")
     else:
-        name = _legal(tag.require("type", "exec").partition(".")[0])
-    node = _node(tag, ledger, name)
+        name = _valid_name(tag.require("type", "exec").partition(".")[0])
+    node = _read_node(tag, builder, name)
     try:
-        ledger.add_node(node)
-    except TextFault as fault:
-        tag.fail(fault.reason, "name")
+        builder.add_node(node)
+    except TextError as error:
+        tag.fail(error.reason, "name")
 
 
-def read_test(tag: Tag, ledger: Ledger) -> None:
+def read_test(tag: Tag, builder: PlanBuilder) -> None:
     """Read ``<test>``.
 
     Raises:
-        Fault: An attribute or a tag inside is wrong.
+        TagError: If an attribute or a child is wrong.
     """
     for attribute in ("respawn", "respawn_delay", "output"):
         if attribute in tag.element.attributes:
@@ -70,22 +91,20 @@ def read_test(tag: Tag, ledger: Ledger) -> None:
     name = tag.get("name") or test_name
     limit = _DEFAULT_TIME_LIMIT
     if tag.get("time-limit"):
-        limit = tag.number("time-limit", limit)
-        if limit <= 0:
-            tag.fail(f"'time-limit' is '{limit:g}'; expected more than 0 seconds", "time-limit")
+        limit = _positive(tag, "time-limit", limit)
     retry = tag.whole("retry", 0, -math.inf) or 0
-    # The runner of tests ends with each of them, so 'required' says nothing there.
-    node = replace(_node(tag, ledger, name), required=False)
-    ledger.add_test(TestPlan(node, test_name, limit, retry))
+    # A test run ends with each test, so 'required' has no meaning there.
+    node = replace(_read_node(tag, builder, name), required=False)
+    builder.add_test(TestPlan(node, test_name, limit, retry))
 
 
-def read_executable(tag: Tag, ledger: Ledger) -> None:
-    """Read ROS 2's ``<executable>``: a program that is no ROS node.
+def read_executable(tag: Tag, builder: PlanBuilder) -> None:
+    """Read ROS 2's ``<executable>``, a program that is not a ROS node.
 
-    ``cmd`` is split as a shell does and not given to one. ``shell`` is not supported.
+    ``cmd`` is split as a shell does, but not run by one; ``shell`` is not supported.
 
     Raises:
-        Fault: An attribute or a tag inside is wrong, or another process has the name.
+        TagError: If an attribute or a child is wrong, or another process has the name.
     """
     tag.check()
     tag.require("cmd")
@@ -100,8 +119,7 @@ def read_executable(tag: Tag, ledger: Ledger) -> None:
         elif inner.name != "env":
             inner.warn(misplaced(element.tag, "executable"))
     name = tag.get("name")
-    base = ledger.free_name(scope.ns, _legal(command[0].rpartition("/")[2]))
-    respawn, required = _fates(tag)
+    base = builder.unused_name(scope.ns, _valid_name(command[0].rpartition("/")[2]))
     node = NodePlan(
         package="",
         type="",
@@ -111,91 +129,99 @@ def read_executable(tag: Tag, ledger: Ledger) -> None:
         namespace=names.canonical(scope.ns),
         place=tag.place,
         args=tag.words("args"),
+        cwd=tag.get("cwd") or "ROS_HOME",
+        env=tuple(scope.env),
+        wait_for=(*scope.waits, *read_wait(tag, scope.ns, name or base)),
+    )
+    try:
+        builder.add_node(_with_start(tag, node))
+    except TextError as error:
+        tag.fail(error.reason, "name")
+
+
+def _with_start(tag: Tag, node: NodePlan) -> NodePlan:
+    """Return a node with the attributes that say how it starts and what its end means."""
+    respawn, required = tag.flag("respawn"), tag.flag("required")
+    if respawn and required:
+        tag.fail("'respawn' and 'required' cannot both be true", "required")
+    output = tag.get("output")
+    if output not in {None, "log", "screen"}:
+        tag.fail(f"'output' is '{output}'; expected log or screen", "output")
+    return replace(
+        node,
         launch_prefix=tag.words("launch-prefix"),
         respawn=respawn,
         respawn_delay=tag.number("respawn_delay", 0.0),
         respawn_max=tag.whole("respawn_max", None, 0),
         required=required,
-        output=_output(tag) or "log",
-        cwd=tag.get("cwd") or "ROS_HOME",
-        env=tuple(scope.env),
-        wait_for=(*scope.waits, *read_wait(tag, scope.ns, name or base)),
+        output="screen" if output == "screen" else "log",
         spawn_delay=tag.number("spawn_delay", 0.0, 0.0),
     )
-    try:
-        ledger.add_node(node)
-    except TextFault as fault:
-        tag.fail(fault.reason, "name")
 
 
-def _node(tag: Tag, ledger: Ledger, name: str) -> NodePlan:
+def _read_node(tag: Tag, builder: PlanBuilder, name: str) -> NodePlan:
     if not names.is_valid(name):
-        tag.warn(f"'{name}' is no legal name; other tools will stumble over it", "name")
-    own, params = _scopes(tag, ledger, name)
+        tag.warn(f"'{name}' is not a valid name; other tools will not accept it", "name")
+    own, params = _open_scopes(tag, builder, name)
     package = tag.require("pkg")
     type_name = tag.alias("type", "exec")
     if type_name is None:
         type_name = tag.require("type")
-    _refuse_empty(tag, package, type_name, name)
-    respawn, required = _fates(tag)
-    node = NodePlan(
-        package=package,
-        type=type_name,
-        name=name or ledger.context.anonymous(_legal(type_name)),
-        named=bool(name),
-        namespace=names.canonical(own.ns),
-        place=tag.place,
-        machine=tag.get("machine") or ledger.default_machine,
-        args=tag.split("args", tag.again("args")),
-        launch_prefix=tag.words("launch-prefix"),
-        respawn=respawn,
-        respawn_delay=tag.number("respawn_delay", 0.0),
-        respawn_max=tag.whole("respawn_max", None, 0),
-        required=required,
-        output=_output(tag) or "log",
-        cwd=_cwd(tag),
-        wait_for=(*tag.scope.waits, *read_wait(tag, own.ns, name)),
-        spawn_delay=tag.number("spawn_delay", 0.0, 0.0),
+    _check_words(tag, package, type_name, name)
+    node = _with_start(
+        tag,
+        NodePlan(
+            package=package,
+            type=type_name,
+            name=name or builder.context.anonymous(_valid_name(type_name)),
+            named=bool(name),
+            namespace=names.canonical(own.ns),
+            place=tag.place,
+            machine=tag.get("machine") or builder.default_machine,
+            args=tag.split("args", tag.again("args")),
+            cwd=_read_cwd(tag),
+            wait_for=(*tag.scope.waits, *read_wait(tag, own.ns, name)),
+        ),
     )
     remaps, env = tag.scope.child(), tag.scope.child()
-    _read_inside(tag, ledger, params, remaps, env)
-    _settle_private(tag, ledger, params)
+    _read_children(tag, builder, params, remaps, env)
+    _add_private(tag, builder, params)
     return replace(node, remaps=tuple(remaps.remaps), env=tuple(env.env))
 
 
-def _scopes(tag: Tag, ledger: Ledger, name: str) -> tuple[Scope, Scope]:
-    """Open the scope of a node and that of its params."""
-    ns = namespace(tag)
+def _open_scopes(tag: Tag, builder: PlanBuilder, name: str) -> tuple[Scope, Scope]:
+    """Return the scope of a node and the scope of its params."""
+    ns = read_namespace(tag)
     if name.startswith("~"):
         tag.fail(f"node name '{name}' starts with '~', as only names within a node do", "name")
     try:
         own = tag.scope.child(ns)
         params = own.child(name)
-    except TextFault as fault:
-        tag.fail(fault.reason, "ns" if ns else "name")
+    except TextError as error:
+        tag.fail(error.reason, "ns" if ns else "name")
     params.private = []
     if tag.get("clear_params") and tag.flag("clear_params"):
         if not name:
             tag.fail("'clear_params' needs a node with a name", "clear_params")
-        ledger.clear(join(own.ns, name))
+        builder.clear(join(own.ns, name))
     return own, params
 
 
-def _read_inside(tag: Tag, ledger: Ledger, params: Scope, remaps: Scope, env: Scope) -> None:
+def _read_children(
+    tag: Tag, builder: PlanBuilder, params: Scope, remaps: Scope, env: Scope
+) -> None:
     for element in tag.element.children:
-        outer = tag.inside(element, tag.scope)
+        outer, inner = tag.inside(element, tag.scope), tag.inside(element, params)
         match outer.name:
             case "remap":
                 if outer.wanted():
                     outer.remap(remaps)
             case "param":
-                inner = tag.inside(element, params)
                 if inner.wanted():
-                    read_param(inner, ledger, in_node=True)
+                    read_param(inner, builder, in_node=True)
             case "rosparam":
-                inner = tag.inside(element, params)
                 if inner.wanted():
-                    read_rosparam(inner, ledger)
+                    read_rosparam(inner, builder)
             case "env":
                 inner = tag.inside(element, env)
                 if inner.wanted():
@@ -204,16 +230,16 @@ def _read_inside(tag: Tag, ledger: Ledger, params: Scope, remaps: Scope, env: Sc
                 outer.warn(misplaced(element.tag, tag.name))
 
 
-def _settle_private(tag: Tag, ledger: Ledger, params: Scope) -> None:
-    """Give the node the ``~params`` of its scope, then its own."""
+def _add_private(tag: Tag, builder: PlanBuilder, params: Scope) -> None:
+    """Add the ``~params`` of the scope around a node, then the node's own."""
     for name, value, place in [*tag.scope.private, *params.private]:
         try:
-            ledger.add_param(params.ns + name.removeprefix("~"), value, place)
-        except TextFault as fault:
-            tag.fail(fault.reason)
+            builder.add_param(params.ns + name.removeprefix("~"), value, place)
+        except TextError as error:
+            tag.fail(error.reason)
 
 
-def _refuse_empty(tag: Tag, package: str, type_name: str, name: str) -> None:
+def _check_words(tag: Tag, package: str, type_name: str, name: str) -> None:
     if not package.strip():
         tag.fail("'pkg' is empty", "pkg")
     if not type_name.strip():
@@ -224,26 +250,7 @@ def _refuse_empty(tag: Tag, package: str, type_name: str, name: str) -> None:
         tag.fail(f"node name '{name}' contains '/'{hint}", "name")
 
 
-def _fates(tag: Tag) -> tuple[bool, bool]:
-    """Return respawn and required."""
-    respawn, required = tag.flag("respawn"), tag.flag("required")
-    if respawn and required:
-        tag.fail("'respawn' and 'required' cannot both be true", "required")
-    return respawn, required
-
-
-def _output(tag: Tag) -> Literal["log", "screen"] | None:
-    output = tag.get("output")
-    if output == "log":
-        return "log"
-    if output == "screen":
-        return "screen"
-    if output is not None:
-        tag.fail(f"'output' is '{output}'; expected log or screen", "output")
-    return None
-
-
-def _cwd(tag: Tag) -> str:
+def _read_cwd(tag: Tag) -> str:
     cwd = tag.get("cwd")
     if cwd in {None, "ROS_HOME", "ros_home"}:
         return "ROS_HOME"
@@ -252,7 +259,99 @@ def _cwd(tag: Tag) -> str:
     return "node"
 
 
-def _legal(text: str) -> str:
-    """Make a base name of a text."""
+def _valid_name(text: str) -> str:
+    """Return a valid base name made from a text."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", text)
     return name if re.match("[A-Za-z]", name) else f"node_{name}"
+
+
+def _positive(tag: Tag, attribute: str, default: float) -> float:
+    seconds = tag.number(attribute, default)
+    if seconds <= 0:
+        tag.fail(f"'{attribute}' is '{seconds:g}'; expected more than 0 seconds", attribute)
+    return seconds
+
+
+def read_wait(tag: Tag, ns: str, node: str = "") -> tuple[Wait, ...]:
+    """Read ``wait_for`` and ``wait_timeout``.
+
+    Args:
+        tag: The tag that may have them.
+        ns: Namespace of relative names, with a trailing slash.
+        node: Base name of the node, for private names; empty for a group.
+
+    Raises:
+        TagError: If a condition or the timeout is wrong.
+    """
+    text = tag.get("wait_for")
+    if text is None:
+        if "wait_timeout" in tag.element.attributes:
+            tag.warn("'wait_timeout' does nothing without 'wait_for'", "wait_timeout")
+        return ()
+    timeout = tag.number("wait_timeout", _DEFAULT_WAIT, 0.0)
+    return tuple(
+        Wait(
+            tuple(_read_condition(tag, part.split(), ns, node) for part in group.split("|")),
+            timeout,
+            tag.place,
+        )
+        for group in text.split(",")
+    )
+
+
+def _read_condition(tag: Tag, words: list[str], ns: str, node: str) -> Condition:
+    kind, name = words if len(words) == 2 else ("", "")  # noqa: PLR2004  # a kind and a name
+    if not kind:
+        found = " ".join(words)
+        expected = "expected a kind and a name, as in 'topic /scan'"
+        tag.fail(f"'wait_for' has '{found}'; {expected}", "wait_for")
+    if kind not in _KINDS:
+        hint = near_miss(kind, _KINDS) or f"; there are {', '.join(_KINDS)}"
+        tag.fail(f"'wait_for' has no kind '{kind}'{hint}", "wait_for")
+    if names.is_private(name) and not node:
+        tag.fail(f"'wait_for' has '{name}', and a group has no private names", "wait_for")
+    try:
+        return Condition(_KINDS[kind], names.resolve(name, f"{ns}{node or '_'}"))
+    except InvalidName as error:
+        tag.fail(f"'wait_for': {error}", "wait_for")
+
+
+def read_machine(tag: Tag, builder: PlanBuilder) -> None:
+    """Read ``<machine>``.
+
+    Raises:
+        TagError: If an attribute is missing or wrong, or another machine has the name.
+    """
+    for old in _OLD_MACHINE:
+        if tag.get(old):
+            tag.fail(f"'{old}' is no longer supported; let 'env-loader' set the environment", old)
+    tag.check()
+    name, address = tag.require("name"), tag.require("address")
+    default = (tag.get("default") or "false").lower()
+    if default not in _MACHINE_DEFAULTS:
+        tag.fail(f"'default' is '{default}'; expected {', '.join(_MACHINE_DEFAULTS)}", "default")
+    for element in tag.element.children:
+        inner = tag.inside(element, tag.scope)
+        if element.tag == "env":
+            inner.fail("<machine> no longer takes <env>; let 'env-loader' set the environment")
+        inner.warn(misplaced(element.tag, "machine"))
+    port = tag.whole("ssh-port", _DEFAULT_PORT, 1) or _DEFAULT_PORT
+    if port > _MAX_PORT:
+        tag.fail(f"'ssh-port' is '{port}'; expected {_MAX_PORT} or less", "ssh-port")
+    machine = MachinePlan(
+        name=name,
+        address=address,
+        env_loader=tag.get("env-loader") or "",
+        ssh_port=port,
+        user=tag.get("user") or "",
+        password=tag.get("password") or "",
+        timeout=_positive(tag, "timeout", _DEFAULT_CONNECT),
+        assignable=default != "never",
+        place=tag.place,
+    )
+    try:
+        builder.add_machine(machine)
+    except TextError as error:
+        tag.fail(error.reason, "name")
+    if default == "true":
+        builder.default_machine = name

@@ -1,18 +1,18 @@
-"""``<param>`` and ``<rosparam>``: where values come from and where they go."""
+"""Read ``<param>`` and ``<rosparam>``: the sources, types and names of parameters."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 from rosz import names
 from rosz.errors import LaunchError, YamlError, near_miss
 from rosz.launch.plan.context import LaunchContext
-from rosz.launch.plan.fault import Fault, TextFault
-from rosz.launch.plan.ledger import Ledger
-from rosz.launch.plan.model import SetupPlan
+from rosz.launch.plan.document import TagError, TextError
+from rosz.launch.plan.model import PlanBuilder, SetupPlan
 from rosz.launch.plan.scope import join
+from rosz.launch.plan.substitution import guess_type
 from rosz.launch.plan.tag import Tag
-from rosz.launch.plan.value import TYPES, convert, load_yaml
 
 __all__ = ("read_param", "read_rosparam")
 
@@ -20,13 +20,60 @@ _SOURCES = ("value", "textfile", "binfile", "command")
 _COMMANDS = ("load", "dump", "delete")
 
 
-def read_param(tag: Tag, ledger: Ledger, *, in_node: bool = False) -> None:
-    """Read ``<param>``.
+def _parse_bool(text: str) -> bool:
+    lower = text.lower().strip()
+    if lower not in {"true", "1", "false", "0"}:
+        raise ValueError(f"'{text}' is not a bool; expected true, false, 1 or 0")
+    return lower in {"true", "1"}
 
-    A ``~name``, and any name inside a node, goes to the scope, for the nodes of the scope to take.
+
+def _parse_int(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"'{text}' is not an int") from None
+
+
+def _parse_double(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"'{text}' is not a double") from None
+
+
+def _load_yaml(text: str) -> Any:
+    """Return the value of a YAML text; a text without any value is the empty dict.
 
     Raises:
-        Fault: An attribute is missing or wrong, or the value cannot be had.
+        YamlError: If the text is not YAML, has several documents, or a value that is not allowed.
+    """
+    from rosz.params.yaml import load_all
+
+    documents = load_all(text, "<string>")
+    if len(documents) > 1:
+        raise YamlError(f"it has {len(documents)} documents, expected one", "<string>")
+    return documents[0] if documents else {}
+
+
+_TYPES: Mapping[str, Callable[[str], Any]] = {
+    "auto": guess_type,
+    "bool": _parse_bool,
+    "boolean": _parse_bool,
+    "double": _parse_double,
+    "int": _parse_int,
+    "str": str,
+    "string": str,
+    "yaml": _load_yaml,
+}
+
+
+def read_param(tag: Tag, builder: PlanBuilder, *, in_node: bool = False) -> None:
+    """Read ``<param>``.
+
+    A ``~name``, and any name inside a node, is added to the scope, for the nodes of the scope.
+
+    Raises:
+        TagError: If an attribute is missing or wrong, or the value cannot be read.
     """
     tag.check()
     given = [source for source in _SOURCES if source in tag.element.attributes]
@@ -34,39 +81,39 @@ def read_param(tag: Tag, ledger: Ledger, *, in_node: bool = False) -> None:
         found = f"has {' and '.join(given)}" if given else "has none"
         tag.fail(f"<param> takes one of {', '.join(_SOURCES)}; this one {found}")
     name = tag.require("name").strip()
-    value = _value(tag, ledger.context, given[0])
+    value = _read_value(tag, builder.context, given[0])
     if in_node or name.startswith("~"):
         tag.scope.add_private(names.canonical(name), value, tag.place)
         return
     try:
-        ledger.add_param(join(tag.scope.ns, name), value, tag.place)
-    except TextFault as fault:
-        tag.fail(fault.reason, "name")
+        builder.add_param(join(tag.scope.ns, name), value, tag.place)
+    except TextError as error:
+        tag.fail(error.reason, "name")
 
 
-def _value(tag: Tag, context: LaunchContext, source: str) -> Any:
+def _read_value(tag: Tag, context: LaunchContext, source: str) -> Any:
     type_name = (tag.element.attributes.get("type") or "auto").lower().strip()
-    if type_name not in TYPES and source != "binfile":
-        hint = near_miss(type_name, TYPES) or f"; there are {', '.join(TYPES)}"
-        tag.fail(f"'{type_name}' is no type of <param>{hint}", "type")
+    if type_name not in _TYPES and source != "binfile":
+        hint = near_miss(type_name, _TYPES) or f"; there are {', '.join(_TYPES)}"
+        tag.fail(f"'{type_name}' is not a type of <param>{hint}", "type")
     origin = tag.require(source)
     if source == "binfile":
-        return _read(tag, context, origin, source)
+        return _read_file(tag, context, origin, source)
     if source == "value":
         text = origin.strip()
     elif source == "textfile":
-        text = _text(tag, _read(tag, context, origin, source), source)
+        text = _decode(tag, _read_file(tag, context, origin, source), source)
     else:
-        text = _output(tag, context)
+        text = _read_output(tag, context)
     try:
-        return convert(text, type_name)
+        return _TYPES[type_name](text)
     except ValueError as error:
         tag.fail(str(error), source)
     except YamlError as error:
         tag.fail(error.reason, source)
 
 
-def _read(tag: Tag, context: LaunchContext, path: str, attribute: str) -> bytes:
+def _read_file(tag: Tag, context: LaunchContext, path: str, attribute: str) -> bytes:
     try:
         return context.read(path)
     except (OSError, ValueError) as error:
@@ -74,15 +121,15 @@ def _read(tag: Tag, context: LaunchContext, path: str, attribute: str) -> bytes:
         tag.fail(f"'{path}' cannot be read: {reason}", attribute)
 
 
-def _text(tag: Tag, data: bytes, attribute: str, *, newlines: bool = True) -> str:
+def _decode(tag: Tag, data: bytes, attribute: str, *, newlines: bool = True) -> str:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        tag.fail(f"what '{attribute}' gives is not UTF-8: {error.reason}", attribute)
+        tag.fail(f"the data of '{attribute}' is not UTF-8: {error.reason}", attribute)
     return text.replace("\r\n", "\n").replace("\r", "\n") if newlines else text
 
 
-def _output(tag: Tag, context: LaunchContext) -> str:
+def _read_output(tag: Tag, context: LaunchContext) -> str:
     words = tag.words("command")
     if not words:
         tag.fail("'command' is empty", "command")
@@ -92,14 +139,14 @@ def _output(tag: Tag, context: LaunchContext) -> str:
         tag.fail(f"'{' '.join(words)}' cannot be started: {error.strerror}", "command")
     except LaunchError as error:
         tag.fail(str(error), "command")
-    return _text(tag, data, "command", newlines=False)
+    return _decode(tag, data, "command", newlines=False)
 
 
-def read_rosparam(tag: Tag, ledger: Ledger) -> None:
+def read_rosparam(tag: Tag, builder: PlanBuilder) -> None:
     """Read ``<rosparam>``.
 
     Raises:
-        Fault: An attribute or the YAML is wrong, or a file cannot be read.
+        TagError: If an attribute or the YAML is wrong, or a file cannot be read.
     """
     tag.check()
     command = tag.get("command") or "load"
@@ -111,7 +158,7 @@ def read_rosparam(tag: Tag, ledger: Ledger) -> None:
         hint = near_miss(command, _COMMANDS) or f"; there are {', '.join(_COMMANDS)}"
         tag.fail(f"<rosparam> has no command '{command}'{hint}", "command")
     if command == "load":
-        _load(tag, ledger, name, file, substitute=substitute, named=bool(param))
+        _load(tag, builder, name, file, substitute=substitute, named=bool(param))
         return
     if command == "delete" and file is not None:
         tag.fail("command='delete' takes no file", "file")
@@ -120,41 +167,41 @@ def read_rosparam(tag: Tag, ledger: Ledger) -> None:
     if name.startswith("~"):
         name = f"/rosparam/{name[1:]}"
     action: Literal["dump", "delete"] = "dump" if command == "dump" else "delete"
-    ledger.setup.append(SetupPlan(action, names.canonical(name), file or "", tag.place))
+    builder.setup.append(SetupPlan(action, names.canonical(name), file or "", tag.place))
 
 
 def _load(
-    tag: Tag, ledger: Ledger, name: str, file: str | None, *, substitute: bool, named: bool
+    tag: Tag, builder: PlanBuilder, name: str, file: str | None, *, substitute: bool, named: bool
 ) -> None:
     text = tag.element.text
     if file is not None:
         if not file:
             tag.fail("'file' is empty", "file")
-        text = _text(tag, _read(tag, ledger.context, file, "file"), "file")
+        text = _decode(tag, _read_file(tag, builder.context, file, "file"), "file")
     try:
         text = tag.substitute(text) if substitute else text
-    except TextFault as fault:
-        before = text[: fault.index]
-        line, column = before.count("\n"), fault.index - before.rfind("\n") - 1
-        raise _fault(tag, file, fault.reason, line, column) from fault
+    except TextError as error:
+        before = text[: error.index]
+        line, column = before.count("\n"), error.index - before.rfind("\n") - 1
+        raise _locate(tag, file, error.reason, line, column) from error
     try:
-        value = load_yaml(text)
+        value = _load_yaml(text)
     except YamlError as error:
         line, column = max(error.line - 1, 0), max(error.column - 1, 0)
-        raise _fault(tag, file, error.reason, line, column) from error
+        raise _locate(tag, file, error.reason, line, column) from error
     if not named and not isinstance(value, dict):
         tag.fail(
             f"<rosparam> without 'param' needs a dict, got {type(value).__name__}: {value!r:.60}"
         )
     try:
-        ledger.add_params(name, value, tag.place)
-    except TextFault as fault:
-        raise _fault(tag, file, fault.reason, 0, 0) from fault
+        builder.add_params(name, value, tag.place)
+    except TextError as error:
+        raise _locate(tag, file, error.reason, 0, 0) from error
 
 
-def _fault(tag: Tag, file: str | None, reason: str, line: int, column: int) -> Fault:
+def _locate(tag: Tag, file: str | None, reason: str, line: int, column: int) -> TagError:
+    """Return the error at a 0-based line and column of the YAML."""
     if file is not None:
-        return Fault(tag.element, reason, place=(file, line + 1, column + 1))
-    return Fault(
-        tag.element, reason, place=(tag.element.file, *tag.element.locate_text(line, column))
-    )
+        return TagError(tag.element, reason, place=(file, line + 1, column + 1))
+    place = (tag.element.file, *tag.element.locate_text(line, column))
+    return TagError(tag.element, reason, place=place)

@@ -1,7 +1,6 @@
-"""Answers that need nothing more than a plan: roslaunch's ``--nodes``, ``--args`` and the like.
+"""The texts that roslaunch prints about a plan, such as for ``--nodes`` or ``--dump-params``.
 
-Each returns the text that roslaunch would print, without the newline at its end where roslaunch
-ends with just one.
+Each function returns the text of roslaunch without the newline at its end.
 """
 
 from __future__ import annotations
@@ -25,35 +24,35 @@ __all__ = (
 
 
 def dump_params(plan: Plan) -> str:
-    """Write all parameters as YAML (``--dump-params``), sorted, by full name."""
+    """Return all parameters as YAML, sorted by full name (``--dump-params``)."""
     import yaml
 
     return str(yaml.safe_dump({param.name: param.value for param in plan.params}))
 
 
 def list_nodes(plan: Plan) -> str:
-    """List the full names of nodes and tests, in order (``--nodes``); unnamed ones are left out."""
+    """Return the full names of the named nodes and tests, in order (``--nodes``)."""
     return "\n".join(node.full_name for node in plan.processes if node.named)
 
 
 def list_files(plan: Plan) -> str:
-    """List the files read, in order (``--files``)."""
+    """Return the paths of the files read, in order (``--files``)."""
     return "\n".join(plan.files)
 
 
 def node_file(plan: Plan, name: str, *, ns: str = "/") -> str:
-    """Name the file that a node is written in (``--find-node``).
+    """Return the path of the file that declares a node (``--find-node``).
 
     Args:
         plan: The plan.
         name: Name of the node; a relative one is in ``ns``.
-        ns: ``ROS_NAMESPACE``.
+        ns: Value of ``ROS_NAMESPACE``.
 
     Raises:
-        NotFoundError: There is no such node.
-        LaunchError: A node and a test share the name, or two tests.
+        NotFoundError: If there is no such node.
+        LaunchError: If a node and a test, or two tests, have the name.
     """
-    return _one(plan, name, ns).place.file
+    return _find_node(plan, name, ns).place.file
 
 
 def node_args(
@@ -64,20 +63,20 @@ def node_args(
     *,
     ns: str = "/",
 ) -> str:
-    """Write the command that starts a node, with what it changes in the environment (``--args``).
+    """Return the command that starts a node, with the variables that it sets (``--args``).
 
     Args:
         plan: The plan.
         name: Name of the node; a relative one is in ``ns``.
-        find: Package and type to the path of the executable.
-        environ: The environment that the command would be typed in.
-        ns: ``ROS_NAMESPACE``.
+        find: Function from package and type to the path of the executable.
+        environ: Environment in which the command would be typed.
+        ns: Value of ``ROS_NAMESPACE``.
 
     Raises:
-        NotFoundError: There is no such node, or ``find`` does not find its executable.
-        LaunchError: A node and a test share the name, or two tests.
+        NotFoundError: If there is no such node, or ``find`` does not find its executable.
+        LaunchError: If a node and a test, or two tests, have the name.
     """
-    node = _one(plan, name, ns)
+    node = _find_node(plan, name, ns)
     changed = {key: value for key, value in environment(node).items() if environ.get(key) != value}
     words = [f'{key}="{value}"' for key, value in changed.items()]
     return " ".join([*words, *command_line(node, find)])
@@ -86,21 +85,21 @@ def node_args(
 def environment(node: NodePlan) -> dict[str, str]:
     """Return the variables that a launch sets for a node.
 
-    ``ROS_NAMESPACE`` is not among them for a node at the root, whose environment must not have it.
+    A node at the root gets no ``ROS_NAMESPACE``.
     """
     namespace = {} if node.namespace == "/" or node.command else {"ROS_NAMESPACE": node.namespace}
     return {**namespace, **dict(node.env)}
 
 
 def command_line(node: NodePlan, find: Callable[[str, str], str]) -> list[str]:
-    """Return the arguments that start a node: prefix, executable, its own, remappings, name.
+    """Return the command line of a node: prefix, executable, arguments, remappings, name.
 
     Args:
         node: The node.
-        find: Package and type to the path of the executable.
+        find: Function from package and type to the path of the executable.
 
     Raises:
-        NotFoundError: ``find`` does not find it.
+        NotFoundError: If ``find`` does not find the executable.
     """
     if node.command:
         return [*node.launch_prefix, *node.command, *node.args]
@@ -110,7 +109,7 @@ def command_line(node: NodePlan, find: Callable[[str, str], str]) -> list[str]:
 
 
 def describe(docs: Iterable[ArgDoc]) -> str:
-    """Describe what a launch file takes (``--ros-args``): required args, then optional ones."""
+    """Return the list of required and optional args of a launch file (``--ros-args``)."""
     required = sorted((doc.name, doc.doc or "undocumented") for doc in docs if not doc.default)
     optional = sorted(
         (doc.name, doc.doc or "undocumented", doc.default) for doc in docs if doc.default
@@ -124,8 +123,8 @@ def describe(docs: Iterable[ArgDoc]) -> str:
     return "\n".join(lines) or "No arguments."
 
 
-def _one(plan: Plan, name: str, ns: str) -> NodePlan:
-    """Return the node or test of a name that a person typed."""
+def _find_node(plan: Plan, name: str, ns: str) -> NodePlan:
+    """Return the node or test of a name from a command line."""
     if names.is_private(name):
         resolved = names.canonical(f"{ns}/roslaunch/{name[1:]}")
     else:
@@ -133,5 +132,5 @@ def _one(plan: Plan, name: str, ns: str) -> NodePlan:
     node = plan.node(resolved)
     places = [str(other.place) for other in plan.processes if other.full_name == resolved]
     if len(places) > 1:
-        raise LaunchError(f"'{resolved}' is not one but several: {', '.join(places)}")
+        raise LaunchError(f"there are several nodes '{resolved}': {', '.join(places)}")
     return node

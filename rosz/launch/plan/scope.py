@@ -1,10 +1,10 @@
-"""The nested scopes of a launch file, with roslaunch's rules of what a part sees of the others.
+"""The nested scopes of a launch file, by roslaunch's rules.
 
-A scope begins with each file, group and node. It sees what was declared before it, and what is
+Each file, group and node has its own scope. A scope sees what was declared before it, and what is
 declared in it stays in it, with two exceptions:
 
-- ``~params`` of an included file reach the includer if there were some before (`Scope.private`).
-- An include sees only the args passed to it; anonymous names start anew in it.
+- ``~params`` of an included file reach the includer if it already had some (`Scope.private`).
+- An included file sees only the args passed to it, and has its own anonymous names.
 """
 
 from __future__ import annotations
@@ -12,30 +12,30 @@ from __future__ import annotations
 from typing import Any
 
 from rosz import names
-from rosz.launch.plan.fault import TextFault
+from rosz.launch.plan.document import TextError
 
 __all__ = ("Scope", "join", "make_global")
 
 
 class Scope:
-    """What is declared at one point of a launch file.
+    """The declarations visible at one point of a launch file.
 
     Args:
         ns: Namespace, relative or global.
-        file: The file, as it was given or included.
+        file: Path of the file, as it was given or included.
 
     Attributes:
         ns: Global namespace with a trailing slash.
         args: Values of args by name.
-        declared: Names of the args declared, in order.
-        anonymous: Names made by ``$(anon)``, by what was asked for.
-        env: (name, value) in order.
-        private: ``~params`` for nodes to come: (name, value, origin).
-        waits: Conditions for nodes to come.
+        declared: Names of the declared args, in order.
+        anonymous: Names made by ``$(anon)``, by base name.
+        env: (name, value) of environment variables, in order.
+        private: ``~params`` for the following nodes: (name, value, origin).
+        waits: Conditions that the following nodes wait for.
         remaps: (from, to) in order, those of outer scopes first; no name twice.
-        included: The file was included by another.
-        incoming: Args for an include while its tag is read, else None.
-        lenient: Args may be set twice, which ``pass_all_args`` allows.
+        included: Whether the file was included by another.
+        incoming: Args passed to an include while its tag is read, otherwise None.
+        lenient: Whether args may be set twice, as ``pass_all_args`` allows.
     """
 
     def __init__(self, ns: str, file: str) -> None:
@@ -56,17 +56,17 @@ class Scope:
         """Return a scope inside this one.
 
         Args:
-            ns: Its namespace, None for that of this scope.
+            ns: Namespace of the new scope, or None for the namespace of this one.
 
         Raises:
-            TextFault: The namespace is private.
+            TextError: If the namespace is private.
         """
         scope = Scope(join(self.ns, ns) if ns else self.ns, self.file)
         scope.args = dict(self.args)
         scope.declared = list(self.declared)
         scope.anonymous = dict(self.anonymous)
         scope.env = list(self.env)
-        # the list itself, unless it is empty: roslaunch's nodes see such params from included files
+        # Not a copy unless empty: in roslaunch, nodes see such params from included files.
         scope.private = self.private or []
         scope.waits = self.waits
         scope.included = self.included
@@ -74,22 +74,22 @@ class Scope:
         return scope
 
     def include(self, ns: str | None) -> Scope:
-        """Return the scope of a file included here, ready to take its args."""
+        """Return the scope of a file included here, before its args are passed."""
         scope = self.child(ns)
         scope.declared = []
         scope.incoming = {}
         return scope
 
     def enter(self) -> list[str]:
-        """Swap the args taken for an include in, and return the names passed.
+        """Make the args passed to an include its args, and return their names.
 
         Raises:
-            TextFault: An arg was given no value.
+            TextError: If an arg was passed without a value.
         """
         incoming = self.incoming or {}
         for name in self.declared:
             if name not in incoming:
-                raise TextFault(f"<arg name='{name}'> of an include needs a value")
+                raise TextError(f"<arg name='{name}'> of an include needs a value")
         self.args = incoming
         self.incoming = None
         self.included = True
@@ -98,19 +98,24 @@ class Scope:
         return list(incoming)
 
     def declare(self, name: str, value: str | None, default: str | None) -> None:
-        """Declare an arg; a value fixes it, a default gives way to what was passed.
+        """Declare an arg.
+
+        Args:
+            name: Name of the arg.
+            value: Fixed value, or None.
+            default: Value if none was passed, or None.
 
         Raises:
-            TextFault: It is declared already, or a value was passed for a fixed one.
+            TextError: If the arg is already declared, or a value was passed for a fixed arg.
         """
         if name not in self.declared:
             self.declared.append(name)
         elif not self.lenient:
-            raise TextFault(f"arg '{name}' is declared twice in this scope")
+            raise TextError(f"arg '{name}' is declared twice in this scope")
         args = self.args if self.incoming is None else self.incoming
         if value is not None:
             if name in args and not self.lenient:
-                raise TextFault(
+                raise TextError(
                     f"arg '{name}' has a fixed value, and '{args[name]}' was passed for it"
                 )
             args[name] = value
@@ -121,12 +126,12 @@ class Scope:
         """Add a remapping; it replaces an earlier one of the same name.
 
         Raises:
-            TextFault: A side is empty.
-            InvalidName: A side is not a legal name.
+            TextError: If a name is empty.
+            InvalidName: If a name is invalid.
         """
         pair = names.canonical(old), names.canonical(new)
         if not all(pair):
-            raise TextFault("a remap needs two names, and one is empty")
+            raise TextError("a remap needs two names, and one is empty")
         for name in pair:
             names.check(name)
         self.remaps = [known for known in self.remaps if known[0] != pair[0]]
@@ -143,16 +148,16 @@ def make_global(ns: str) -> str:
     """Return a namespace with a slash at both ends.
 
     Raises:
-        TextFault: It is private.
+        TextError: If the namespace is private.
     """
     if ns.startswith("~"):
-        raise TextFault(f"namespace '{ns}' is private; only names of a node can be")
+        raise TextError(f"namespace '{ns}' is private; only names of a node can be")
     ns = ns if ns.startswith("/") else f"/{ns}"
     return ns if ns.endswith("/") else f"{ns}/"
 
 
 def join(ns: str, name: str) -> str:
-    """Put a name into a namespace as roslaunch does: plain text, no slash dropped."""
+    """Join a namespace and a name as text, keeping every slash, as roslaunch does."""
     if not ns or name.startswith(("/", "~")):
         return name
     if ns == "~":

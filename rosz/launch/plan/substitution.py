@@ -1,11 +1,11 @@
 """Substitution args: ``$(arg x)``, ``$(find pkg)/file``, ``$(eval …)`` and the others.
 
-A value is worked through twice, as roslaunch does: first all but ``find``, then ``find``, which
-needs the path behind it settled. The second pass sees what the first one put in. Substitutions do
-not nest, there is no escape, and an unclosed one stays as it is.
+A value takes two passes, as in roslaunch: first every substitution except ``find``, then ``find``,
+which needs the path that follows it. The second pass sees the results of the first one.
+Substitutions do not nest, there is no escape, and an unclosed one stays as it is.
 
-Beyond roslaunch, as ROS 2 has it: ``$(var x)`` is ``$(arg x)``, and ``$(find-pkg-share pkg)`` is
-the folder of a package without anything done to what follows it.
+Two substitutions of ROS 2 are understood too: ``$(var x)`` is ``$(arg x)``, and
+``$(find-pkg-share pkg)`` is the folder of a package; the path that follows is left alone.
 """
 
 from __future__ import annotations
@@ -16,36 +16,52 @@ from typing import Any
 
 from rosz.errors import RoszError, near_miss
 from rosz.launch.plan.context import LaunchContext
-from rosz.launch.plan.fault import TextFault
+from rosz.launch.plan.document import TextError
 from rosz.launch.plan.scope import Scope
-from rosz.launch.plan.value import automatic
 
-__all__ = ("Substitution",)
+__all__ = ("Substitution", "guess_type")
 
 _EVAL = "$(eval "
 _SUGGESTED = ("anon", "arg", "dirname", "env", "eval", "find", "optenv")
 _COMMANDS = ("anon", "arg", "dirname", "env", "find", "find-pkg-share", "optenv", "var")
 
 
+def guess_type(text: str) -> bool | int | float | str:
+    """Convert a text to the type that roslaunch guesses.
+
+    A text with a dot is a float if it can be, one without is an int if it can be (``1e5`` is
+    neither, nor is ``1_000``); ``true`` and ``false`` in any case are bool; the rest is text.
+    """
+    try:
+        if "." in text:
+            return float(text)
+        if "_" not in text:
+            return int(text)
+    except ValueError:
+        pass
+    lower = text.lower()
+    return lower == "true" if lower in {"true", "false"} else text
+
+
 class Substitution:
-    """Substitution with the outside that it asks.
+    """Applies substitutions.
 
     Args:
-        context: The outside.
+        context: Source of variables, packages and anonymous names.
 
     Attributes:
-        asked: Names of all args that were asked for.
+        used: Names of all args that were looked up.
     """
 
     def __init__(self, context: LaunchContext) -> None:
         self._context = context
-        self.asked: set[str] = set()
+        self.used: set[str] = set()
 
     def __call__(self, text: str, scope: Scope) -> str:
-        """Return a text with all substitutions made.
+        """Return a text with all substitutions applied.
 
         Raises:
-            TextFault: A substitution is malformed or has no value.
+            TextError: If a substitution is malformed or has no value.
         """
         if "$" not in text:
             return text
@@ -62,13 +78,13 @@ class Substitution:
     def _value(self, command: str, words: list[str], scope: Scope, index: int) -> str:
         if command == "optenv":
             if not words:
-                raise TextFault("$(optenv NAME DEFAULT…) needs the name of a variable", index)
+                raise TextError("$(optenv NAME DEFAULT…) needs the name of a variable", index)
             return self._context.environ.get(words[0], " ".join(words[1:]))
         if command == "dirname":
             return self._dirname(scope)
         if len(words) != 1:
             noun = {"env": "variable", "find-pkg-share": "package"}.get(command, "name")
-            raise TextFault(
+            raise TextError(
                 f"$({command} …) takes one {noun}, got {len(words)}: '{' '.join(words)}'", index
             )
         try:
@@ -81,15 +97,15 @@ class Substitution:
                     return self._find(words[0])
                 case _:
                     return self._arg(words[0], scope)
-        except TextFault as fault:
-            raise TextFault(fault.reason, index) from None
+        except TextError as error:
+            raise TextError(error.reason, index) from None
 
     def _env(self, name: str) -> str:
         environ = self._context.environ
         if name in environ:
             return environ[name]
         hint = near_miss(name, environ) or f"; set it, or write $(optenv {name} DEFAULT)"
-        raise TextFault(f"environment variable '{name}' is not set{hint}")
+        raise TextError(f"environment variable '{name}' is not set{hint}")
 
     def _anon(self, base: str, scope: Scope) -> str:
         if base not in scope.anonymous:
@@ -97,7 +113,7 @@ class Substitution:
         return scope.anonymous[base]
 
     def _arg(self, name: str, scope: Scope) -> str:
-        self.asked.add(name)
+        self.used.add(name)
         if name in scope.args:
             return scope.args[name]
         hint = near_miss(name, scope.args)
@@ -108,20 +124,20 @@ class Substitution:
             hint = f"; it has no default, so {how}"
         elif not hint:
             hint = f"; declare it before: <arg name='{name}' default='…'/>"
-        raise TextFault(f"arg '{name}' is not set{hint}")
+        raise TextError(f"arg '{name}' is not set{hint}")
 
     def _dirname(self, scope: Scope) -> str:
-        folder = os.path.dirname(scope.file)  # noqa: PTH120  # pure text work, no file is meant
-        return os.path.normpath(os.path.join(self._context.cwd, folder))  # noqa: PTH118  # dito
+        folder = os.path.dirname(scope.file)  # noqa: PTH120  # text only, no file is opened
+        return os.path.normpath(os.path.join(self._context.cwd, folder))  # noqa: PTH118  # text
 
     def _find(self, package: str) -> str:
         try:
             return self._context.find(package)
         except RoszError as error:
-            raise TextFault(str(error)) from error
+            raise TextError(str(error)) from error
 
     def _find_all(self, text: str, source: str) -> str:
-        """Settle ``$(find PKG)`` with the path that follows, up to the first space."""
+        """Replace each ``$(find PKG)`` and the path that follows it, up to the first space."""
         resolved = text
         for inner, index in _collect(text):
             command, words = _split(inner, index)
@@ -130,13 +146,13 @@ class Substitution:
             written = f"$({inner})"
             place = max(source.find(written), 0)
             if len(words) != 1:
-                raise TextFault(f"$(find …) takes one package, got {len(words)}", place)
+                raise TextError(f"$(find …) takes one package, got {len(words)}", place)
             before, _, after = resolved.partition(written)
             path, space, rest = after.partition(" ")
             try:
                 resolved = before + self._path(words[0], path) + space + rest
-            except TextFault as fault:
-                raise TextFault(fault.reason, place) from None
+            except TextError as error:
+                raise TextError(error.reason, place) from None
         return resolved
 
     def _path(self, package: str, path: str) -> str:
@@ -145,17 +161,17 @@ class Substitution:
         if not path:
             return folder
         built = self._context.built(package, path.rpartition("/")[2])
-        return built or os.path.join(folder, path)  # noqa: PTH118  # an absolute path wins, as ever
+        return built or os.path.join(folder, path)  # noqa: PTH118  # an absolute path wins
 
     def _evaluate(self, text: str, scope: Scope) -> str:
         from rosz.launch.plan.expression import evaluate
 
         def arg(name: str) -> Any:
-            return automatic(self._arg(name, scope))
+            return guess_type(self._arg(name, scope))
 
         def variable(name: str) -> Any | None:
-            self.asked.add(name)
-            return automatic(scope.args[name]) if name in scope.args else None
+            self.used.add(name)
+            return guess_type(scope.args[name]) if name in scope.args else None
 
         own: Mapping[str, Callable[..., Any]] = {
             "anon": lambda base: self._anon(base, scope),
@@ -168,8 +184,8 @@ class Substitution:
         }
         try:
             return evaluate(text, own, variable, scope.args)
-        except TextFault as fault:
-            raise TextFault(f"$(eval …): {fault.reason}", len(_EVAL) + fault.index) from None
+        except TextError as error:
+            raise TextError(f"$(eval …): {error.reason}", len(_EVAL) + error.index) from None
 
 
 def _split(inner: str, index: int) -> tuple[str, list[str]]:
@@ -177,12 +193,12 @@ def _split(inner: str, index: int) -> tuple[str, list[str]]:
     if words and words[0] in _COMMANDS:
         return words[0], words[1:]
     if words and words[0] == "eval":
-        raise TextFault(
+        raise TextError(
             "$(eval …) must be the whole value, from the first character to the last", index
         )
     name = words[0] if words else ""
     hint = near_miss(name, _SUGGESTED) or f"; there are {', '.join(_COMMANDS)}, eval"
-    raise TextFault(f"unknown substitution '$({inner})'{hint}", index)
+    raise TextError(f"unknown substitution '$({inner})'{hint}", index)
 
 
 _NEXT = {
@@ -193,7 +209,7 @@ _NEXT = {
 
 
 def _collect(text: str) -> list[tuple[str, int]]:
-    """Find all substitutions: what stands inside, and where they start."""
+    """Return the content and the start of every substitution in a text."""
     found: list[tuple[str, int]] = []
     state = ""
     start = 0
@@ -201,7 +217,7 @@ def _collect(text: str) -> list[tuple[str, int]]:
         if state in {"$(", "in"}:
             if character in "$(":
                 reason = "they do not nest, $(eval …) can combine values"
-                raise TextFault(f"'{character}' inside a substitution; {reason}", index)
+                raise TextError(f"'{character}' inside a substitution; {reason}", index)
             if character == ")":
                 if state == "in":
                     found.append((text[start + 2 : index], start))

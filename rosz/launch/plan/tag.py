@@ -1,4 +1,4 @@
-"""A tag read in a scope: attributes with substitutions made, complaints with a place."""
+"""One tag in its scope: attributes with substitutions applied, errors and warnings with places."""
 
 from __future__ import annotations
 
@@ -7,32 +7,29 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from rosz.errors import InvalidName
-from rosz.launch.plan.document import Element
-from rosz.launch.plan.fault import Fault, TextFault
+from rosz.launch.plan.document import TAGS, Element, TagError, TextError, unknown_attribute
 from rosz.launch.plan.model import Place
 from rosz.launch.plan.scope import Scope
 from rosz.launch.plan.substitution import Substitution
-from rosz.launch.plan.tags import TAGS, unknown_attribute
-from rosz.launch.plan.value import boolean
 
-__all__ = ("Notify", "Tag")
+__all__ = ("Tag", "Warn")
 
-Notify = Callable[[Element, str, str | None, int], None]
-"""Takes a warning: the tag, the text, the attribute or None, an index in its value."""
+Warn = Callable[[Element, str, str | None, int], None]
+"""Takes a warning: element, text, attribute name or None, index in the attribute's value."""
 
 
 class Tag:
-    """A tag in a scope.
+    """An element in a scope.
 
     Args:
-        element: The tag.
-        scope: What its substitutions see.
-        substitution: Makes them.
-        notify: Takes warnings.
+        element: The element.
+        scope: The scope that substitutions look names up in.
+        substitution: Applies the substitutions.
+        warn: Function that takes warnings.
         includes: Places of the ``<include>`` tags that led here, outermost first.
 
     Attributes:
-        element: The tag.
+        element: The element.
         scope: The scope.
         name: Name of the tag in lower case.
     """
@@ -42,28 +39,28 @@ class Tag:
         element: Element,
         scope: Scope,
         substitution: Substitution,
-        notify: Notify,
+        warn: Warn,
         includes: tuple[str, ...],
     ) -> None:
         self.element = element
         self.scope = scope
         self.name = element.tag.lower()
         self._substitution = substitution
-        self._notify = notify
+        self._warn = warn
         self._includes = includes
 
     def inside(self, element: Element, scope: Scope) -> Tag:
-        """Return a tag inside this one."""
-        return Tag(element, scope, self._substitution, self._notify, self._includes)
+        """Return the tag for a child element."""
+        return Tag(element, scope, self._substitution, self._warn, self._includes)
 
     @property
     def place(self) -> Place:
-        """Where it stands."""
+        """The position of the tag."""
         element = self.element
         return Place(element.file, element.line, element.column, self._includes)
 
     def check(self) -> None:
-        """Warn about attributes that it does not have."""
+        """Warn about attributes that the tag does not have."""
         known = TAGS[self.name].attributes
         for attribute in self.element.attributes:
             foreign = ":" in attribute and self.name == "launch"  # a schema for editors
@@ -71,40 +68,43 @@ class Tag:
                 self.warn(unknown_attribute(self.name, attribute), attribute)
 
     def wanted(self) -> bool:
-        """Evaluate ``if`` and ``unless``.
+        """Return whether ``if`` and ``unless`` let the tag take part.
 
         Raises:
-            Fault: There are both, or one is no bool.
+            TagError: If both are present, or one is not a bool.
         """
         attributes = self.element.attributes
         if "if" not in attributes and "unless" not in attributes:
             return True
-        wish, veto = self.get("if"), self.get("unless")
-        if wish is not None and veto is not None:
+        condition, exclusion = self.get("if"), self.get("unless")
+        if condition is not None and exclusion is not None:
             self.fail(f"<{self.name}> has both 'if' and 'unless'; keep one", "unless")
-        if wish is not None:
-            return self._condition(wish, "if")
-        return not self._condition(veto or "", "unless")
+        if condition is not None:
+            return self._condition(condition, "if")
+        return not self._condition(exclusion or "", "unless")
 
     def _condition(self, text: str, attribute: str) -> bool:
-        try:
-            return boolean(text)
-        except ValueError as error:
-            self.fail(f"'{attribute}': {error}", attribute)
+        lower = text.lower().strip()
+        if lower in {"true", "1"}:
+            return True
+        if lower not in {"false", "0"}:
+            reason = f"'{text}' is not a bool; expected true, false, 1 or 0"
+            self.fail(f"'{attribute}': {reason}", attribute)
+        return False
 
     def get(self, attribute: str) -> str | None:
-        """Return an attribute with substitutions made; None where it is absent.
+        """Return an attribute with substitutions applied, or None if it is absent.
 
         Raises:
-            Fault: A substitution fails.
+            TagError: If a substitution fails.
         """
         text = self.element.attributes.get(attribute)
         if text is None or "$" not in text:
             return text
         try:
             resolved = self._substitution(text, self.scope)
-        except TextFault as fault:
-            raise Fault(self.element, fault.reason, attribute, fault.index) from fault
+        except TextError as error:
+            raise TagError(self.element, error.reason, attribute, error.index) from error
         if "$(" in resolved and "$(" in text:
             start = text.rfind("$(")
             if ")" not in text[start:]:
@@ -112,33 +112,37 @@ class Tag:
         return resolved
 
     def substitute(self, text: str) -> str:
-        """Make the substitutions in a text that belongs to the tag.
+        """Apply the substitutions in a text that belongs to the tag.
 
         Raises:
-            TextFault: One fails.
+            TextError: If a substitution fails.
         """
         return self._substitution(text, self.scope)
 
     def require(self, attribute: str, *others: str) -> str:
-        """Return an attribute that must be there, under this name or, failing that, another.
+        """Return a required attribute.
+
+        Args:
+            attribute: Name of the attribute.
+            *others: Names to try in turn if the attribute is absent.
 
         Raises:
-            Fault: It is absent, or a substitution fails.
+            TagError: If the attribute is absent, or a substitution fails.
         """
         texts = (self.get(name) for name in (attribute, *others))
         found = next((text for text in texts if text is not None), None)
         if found is None:
             known = TAGS[self.name].attributes
             strangers = [name for name in self.element.attributes if name not in known]
-            hint = f", and '{strangers[0]}' is none of its attributes" if strangers else ""
+            hint = f", and '{strangers[0]}' is not one of its attributes" if strangers else ""
             self.fail(f"<{self.name}> needs the attribute '{attribute}'{hint}")
         return found
 
     def alias(self, attribute: str, other: str) -> str | None:
-        """Return an attribute, or what ROS 2 calls it where it is absent.
+        """Return an attribute, or if it is absent, the attribute that ROS 2 uses for it.
 
         Raises:
-            Fault: A substitution fails.
+            TagError: If a substitution fails.
         """
         if attribute not in self.element.attributes:
             return self.get(other)
@@ -147,10 +151,10 @@ class Tag:
         return self.get(attribute)
 
     def flag(self, attribute: str) -> bool:
-        """Return a bool attribute, False where it is absent.
+        """Return a bool attribute, or False if it is absent.
 
         Raises:
-            Fault: It is neither ``true`` nor ``false``.
+            TagError: If the value is neither ``true`` nor ``false``.
         """
         text = self.get(attribute)
         if text is None:
@@ -160,10 +164,15 @@ class Tag:
         return text.lower() == "true"
 
     def number(self, attribute: str, default: float, least: float = -math.inf) -> float:
-        """Return a finite number attribute.
+        """Return an attribute that is a finite number.
+
+        Args:
+            attribute: Name of the attribute.
+            default: Value to return if the attribute is absent.
+            least: Least value allowed.
 
         Raises:
-            Fault: It is none, or below the least allowed.
+            TagError: If the value is not a number, or is below the least value.
         """
         text = self.get(attribute)
         if text is None:
@@ -178,10 +187,15 @@ class Tag:
         return value
 
     def whole(self, attribute: str, default: int | None, least: float) -> int | None:
-        """Return a whole-number attribute; the default where it is absent or empty.
+        """Return an attribute that is a whole number.
+
+        Args:
+            attribute: Name of the attribute.
+            default: Value to return if the attribute is absent or empty.
+            least: Least value allowed.
 
         Raises:
-            Fault: It is none, or below the least allowed.
+            TagError: If the value is not a whole number, or is below the least value.
         """
         text = self.get(attribute)
         if not text:
@@ -195,18 +209,18 @@ class Tag:
         return value
 
     def words(self, attribute: str) -> tuple[str, ...]:
-        """Return an attribute split as a shell does; empty where it is absent.
+        """Return an attribute split into words as a shell does, or () if it is absent.
 
         Raises:
-            Fault: Its quotes do not match.
+            TagError: If the quotes do not match.
         """
         return self.split(attribute, self.get(attribute) or "")
 
     def split(self, attribute: str, text: str) -> tuple[str, ...]:
-        """Split the value of an attribute as a shell does.
+        """Split the value of an attribute into words as a shell does.
 
         Raises:
-            Fault: Its quotes do not match.
+            TagError: If the quotes do not match.
         """
         if not text:
             return ()
@@ -218,39 +232,39 @@ class Tag:
             self.fail(f"'{attribute}' cannot be split: {str(error).lower()}: {text}", attribute)
 
     def again(self, attribute: str) -> str:
-        """Return an attribute with substitutions made, then made again in what came of them.
+        """Return an attribute with substitutions applied twice, as roslaunch does for ``args``.
 
-        The second time no args and no anonymous names are known.
+        The second time, no args and no anonymous names are known.
 
         Raises:
-            Fault: A substitution fails.
+            TagError: If a substitution fails.
         """
         text = self.get(attribute) or ""
         try:
             return self._substitution(text, Scope("/", "")) if "$(" in text else text
-        except TextFault as fault:
-            self.fail(f"in '{text}', which '{attribute}' came to: {fault.reason}", attribute)
+        except TextError as error:
+            self.fail(f"in '{text}', which '{attribute}' came to: {error.reason}", attribute)
 
     def remap(self, into: Scope) -> None:
-        """Read ``<remap>`` into a scope.
+        """Add the remapping of a ``<remap>`` to a scope.
 
         Raises:
-            Fault: A name is missing or not legal.
+            TagError: If a name is missing or invalid.
         """
         self.check()
         old, new = self.require("from"), self.require("to")
         try:
             into.remap(old, new)
-        except TextFault as fault:
-            raise Fault(self.element, fault.reason) from fault
+        except TextError as error:
+            raise TagError(self.element, error.reason) from error
         except InvalidName as error:
             self.fail(str(error), "from" if error.name in {old, old.strip("/")} else "to")
 
     def env(self, into: Scope) -> None:
-        """Read ``<env>`` or ROS 2's ``<set_env>`` into a scope.
+        """Add the variable of an ``<env>`` or ``<set_env>`` to a scope.
 
         Raises:
-            Fault: Name or value is missing.
+            TagError: If the name or the value is missing.
         """
         self.check()
         name, value = self.require("name"), self.require("value")
@@ -262,10 +276,10 @@ class Tag:
         """Refuse the file.
 
         Raises:
-            Fault: Always.
+            TagError: Always.
         """
-        raise Fault(self.element, reason, attribute, index)
+        raise TagError(self.element, reason, attribute, index)
 
     def warn(self, text: str, attribute: str | None = None, index: int = 0) -> None:
         """Warn the user."""
-        self._notify(self.element, text, attribute, index)
+        self._warn(self.element, text, attribute, index)

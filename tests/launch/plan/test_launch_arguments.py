@@ -26,12 +26,12 @@ def test_the_last_value_of_a_name_wins() -> None:
     ("argument", "reason"),
     [
         ("x:=", "it gives no value, so a default stays"),
-        ("x:=a:=b", "':=' stands in it twice"),
+        ("x:=a:=b", "it contains ':=' twice"),
         ("_x:=1", "it is for a node, not for a launch"),
-        ("9x:=1", "'9x' is no name of an arg"),
-        ("a-b:=1", "'a-b' is no name of an arg"),
-        (":=1", "'' is no name of an arg"),
-        ("x:=one\ntwo", "'x' is no name of an arg"),
+        ("9x:=1", "'9x' is not the name of an arg"),
+        ("a-b:=1", "'a-b' is not the name of an arg"),
+        (":=1", "'' is not the name of an arg"),
+        ("x:=one\ntwo", "'x' is not the name of an arg"),
     ],
 )
 def test_what_roslaunch_drops_is_dropped_aloud(argument: str, reason: str) -> None:

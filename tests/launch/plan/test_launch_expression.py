@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rosz.launch.plan.document import TextError
 from rosz.launch.plan.expression import evaluate
-from rosz.launch.plan.fault import TextFault
 
 ARGS: dict[str, Any] = {"n": 3, "rate": 0.5, "flag": True, "name": "Marvin", "max": 7}
 OWN: dict[str, Callable[..., Any]] = {"arg": ARGS.__getitem__, "env": lambda name: f"<{name}>"}
@@ -81,20 +81,20 @@ def test_values_are_those_of_python(text: str, result: str) -> None:
 @pytest.mark.parametrize(
     ("text", "reason", "index"),
     [
-        ("", "no expression", 0),
-        ("1 +", "no expression", None),
-        ("x = 1", "no expression", None),
-        ("import os", "no expression", None),
-        ("1\n2", "no expression", None),
-        ("\0", "no expression", None),
+        ("", "not an expression", 0),
+        ("1 +", "not an expression", None),
+        ("x = 1", "not an expression", None),
+        ("import os", "not an expression", None),
+        ("1\n2", "not an expression", None),
+        ("\0", "not an expression", None),
         ("().__class__", "may not contain '__'", 3),
-        ("nam", "'nam' is no arg of this file and no function; did you mean 'name'", 0),
-        ("1 + math.pi", "the names of math stand alone", 4),
-        ("open('/etc/passwd')", "'open' is no arg", 0),
-        ("eval('1')", "'eval' is no arg", 0),
-        ("getattr(n, 'real')", "'getattr' is no arg", 0),
-        ("type(n)", "'type' is no arg", 0),
-        ("globals()", "'globals' is no arg", 0),
+        ("nam", "'nam' is not an arg of this file and not a function; did you mean 'name'", 0),
+        ("1 + math.pi", "the names of math alone", 4),
+        ("open('/etc/passwd')", "'open' is not an arg", 0),
+        ("eval('1')", "'eval' is not an arg", 0),
+        ("getattr(n, 'real')", "'getattr' is not an arg", 0),
+        ("type(n)", "'type' is not an arg", 0),
+        ("globals()", "'globals' is not an arg", 0),
         ("n.real", "'.real' of a int is not available", None),
         ("name.encode()", "'.encode' of a str is not available", None),
         ("'{0.x}'.format(n)", "reaches for an attribute", None),
@@ -106,7 +106,7 @@ def test_values_are_those_of_python(text: str, result: str) -> None:
         ("...", "Ellipsis is not available", 0),
         ("[1] @ [2]", "'@' is not available", 0),
         ("lambda: 1", "the result is a function", 0),
-        ("n(1)", "3 is no function", 0),
+        ("n(1)", "3 is not a function", 0),
         ("[abs][0]", "the result is a function", 0),
         ("(lambda *a: a)(1)", "a lambda takes plain parameters", None),
         ("(lambda a: a)()", "a lambda of 1 parameters got 0", None),
@@ -122,7 +122,7 @@ def test_values_are_those_of_python(text: str, result: str) -> None:
     ],
 )
 def test_what_is_no_value_is_refused(text: str, reason: str, index: int | None) -> None:
-    with pytest.raises(TextFault) as caught:
+    with pytest.raises(TextError) as caught:
         run(text)
     assert reason in caught.value.reason
     if index is not None:
@@ -172,7 +172,7 @@ def test_what_is_no_value_is_refused(text: str, reason: str, index: int | None) 
 )
 def test_what_would_take_too_much_is_refused_at_once(text: str) -> None:
     start = time.process_time()
-    with pytest.raises(TextFault):
+    with pytest.raises(TextError):
         run(text)
     assert time.process_time() - start < 2
 
@@ -203,7 +203,7 @@ def test_random_expressions_agree_with_python(text: str) -> None:
         wanted = "fault"
     try:
         found = evaluate(text, OWN, names.get)
-    except TextFault as fault:
+    except TextError as fault:
         found = wanted if " than " in fault.reason else "fault"  # the bounds are not Python's
     assert found == wanted
 
@@ -215,6 +215,6 @@ def test_random_expressions_agree_with_python(text: str) -> None:
 def test_any_text_is_a_value_or_a_fault(text: str) -> None:
     try:
         index = len(run(text)) * 0
-    except TextFault as fault:
+    except TextError as fault:
         index = fault.index
     assert 0 <= index <= len(text) + 1

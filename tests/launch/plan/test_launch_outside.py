@@ -92,7 +92,7 @@ READING = [
 def test_what_is_no_regular_file_is_refused(tmp_path: Path, text: str, name: str) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "a.launch").write_text(f"<launch>{text.format(name)}</launch>")
-    where = rf"a\.launch:1:\d+: '{name}' cannot be read: it is no regular file"
+    where = rf"a\.launch:1:\d+: '{name}' cannot be read: it is not a regular file"
     with pytest.raises(LaunchFileError, match=where):
         plan(["a.launch"], {}, outside(tmp_path))
 

@@ -50,7 +50,7 @@ def test_respawn_max_is_a_whole_number() -> None:
         ),
         ('wait_for="topic a,"', "f:1:51: 'wait_for' has ''; expected a kind and a name"),
         ('wait_for="/scan"', "f:1:51: 'wait_for' has '/scan'; expected a kind and a name"),
-        ('wait_for="topik /scan"', "f:1:51: 'wait_for' knows no 'topik'; did you mean 'topic'?"),
+        ('wait_for="topik /scan"', "f:1:51: 'wait_for' has no kind 'topik'; did you mean 'topic'?"),
         ('wait_for="x /scan"', "'x'; there are topic, service, param, node"),
         ('wait_for="topic 0"', "'wait_for': '0' is not a valid name"),
         (
@@ -152,7 +152,7 @@ def test_executables_are_no_nodes() -> None:
     assert first.env == (("A", "1"), ("B", "2"))
     assert (second.full_name, third.full_name, third.named) == ("/g/echo_2", "/g/view", True)
     assert [warning.text for warning in found.warnings] == [
-        "<param> means nothing in <executable>; it may stand in <group>, <launch>, <node>, <test>"
+        "<param> means nothing in <executable>; it is allowed in <group>, <launch>, <node>, <test>"
     ]
 
 
@@ -195,7 +195,7 @@ def test_warnings_stand_where_the_cause_does() -> None:
         "f:1:35: <arg> has no attribute 'nam'; did you mean 'name'?",
         "f:1:72: <group> has no attribute 'foo'; it has clear_params, if, namespace, ns, unless, "
         "wait_for, wait_timeout",
-        "f:1:76: <bogus> is no tag of launch files; <launch> may hold <arg>, <env>, <executable>, "
+        "f:1:76: <bogus> is not a launch file tag; <launch> may hold <arg>, <env>, <executable>, "
         "<group>, <include>, <let>, <machine>, <node>, <param>, <push-ros-namespace>, "
         "<push_ros_namespace>, <remap>, <rosparam>, <set_env>, <test>",
         "f:1:132: '$(' is never closed, so it stays as it is",
@@ -251,7 +251,7 @@ def test_long_chains_of_includes_are_shortened() -> None:
         ({}, "f:1:24: '/x.py' cannot be read: No such file or directory; launch files in Python"),
         (
             {"/x.py": "import launch"},
-            "f:1:24: '/x.py' is no XML; launch files are read as XML only",
+            "f:1:24: '/x.py' is not XML; launch files are read as XML only",
         ),
     ],
 )

@@ -51,7 +51,7 @@ def test_the_file_of_a_node() -> None:
 
 
 def test_a_name_that_is_not_unique_is_refused() -> None:
-    with pytest.raises(LaunchError, match="'/twin' is not one but several: f:1:189, f:1:225"):
+    with pytest.raises(LaunchError, match="there are several nodes '/twin': f:1:189, f:1:225"):
         report.node_args(plan_of(NODES), "/twin", find, {})
 
 
