@@ -48,7 +48,7 @@ def interview(session: Session, domain: int) -> dict[_Node, Answer]:
     question = msgspec.msgpack.encode(Request("info"))
     asked, began = time.time_ns(), time.monotonic_ns()
     key = control_key(domain, "*", "*")
-    for reply in session.ask(key, timeout=_SECONDS, payload=question):
+    for reply in session.query(key, timeout=_SECONDS, payload=question):
         if not reply.ok:
             continue
         journey = time.monotonic_ns() - began

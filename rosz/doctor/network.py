@@ -127,7 +127,7 @@ def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, b
     """Return the digest of every replica that answers, by session; all are asked at once."""
     question = encode(Sync())
     asked = [
-        (member.zid, session.ask(keys.sync(member.zid), timeout=_SECONDS, payload=question))
+        (member.zid, session.query(keys.sync(member.zid), timeout=_SECONDS, payload=question))
         for member in members
     ]
     return {

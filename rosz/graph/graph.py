@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, DecodeError, WaitTimeout, near_miss
 from rosz.graph.view import View
-from rosz.session.waiting import patience
+from rosz.session import clamp_timeout
 from rosz.wire import (
     OWN_SPACE,
     ProcessToken,
@@ -81,7 +81,7 @@ class Graph:
             for key in session.live_tokens(space, _LOOK_TIMEOUT):
                 self._apply(key, alive=True)
         self._watches = [
-            session.tokens(key, lambda key, alive: self._events.put((key, alive)))
+            session.watch_tokens(key, lambda key, alive: self._events.put((key, alive)))
             for key in (tokens_key(domain), processes_key(domain))
         ]
 
@@ -113,7 +113,7 @@ class Graph:
             WaitTimeout: No end of answers.
             UsageError: The timeout is no number.
         """
-        timeout = patience(timeout)
+        timeout = clamp_timeout(timeout)
         asked = [
             *self._session.live_tokens(tokens_key(self.domain), timeout),
             *self._session.live_tokens(processes_key(self.domain), timeout),
@@ -186,7 +186,7 @@ class Graph:
             ClosedError: The graph was closed meanwhile.
             UsageError: The timeout is no number.
         """
-        deadline = time.monotonic() + patience(timeout)
+        deadline = time.monotonic() + clamp_timeout(timeout)
         wait = self._apply_next if threading.current_thread() is self._thread else self._sleep
         while not condition(view := self.view()):
             left = deadline - time.monotonic()

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.session import Session, SessionConfig, is_listening, places_of
+from rosz.session import MeshReadiness, Session, SessionConfig, is_listening, places_of
 from rosz.session.presence import is_anybody_awake, is_router_stopped, marks, why_unanswered
-from rosz.session.settle import Settling
 
 if TYPE_CHECKING:
     from rosz.node import Context
@@ -144,7 +143,7 @@ def _meet(session: Session, environment: Environment) -> None:
         if time.monotonic() > deadline:
             raise _nobody(environment)
         time.sleep(_LOOK_SECONDS)
-    Settling(session, _SETTLE_SECONDS, threading.Event()).settled.wait(_SETTLE_SECONDS)
+    MeshReadiness(session, _SETTLE_SECONDS, threading.Event()).ready.wait(_SETTLE_SECONDS)
 
 
 def _nobody(environment: Environment) -> TransportError:

@@ -264,7 +264,7 @@ def kill(session: Session, node: Token, reason: str) -> None:
         if not alive and key.startswith(prefix):
             gone.set()
 
-    watch = session.tokens(f"{prefix}{node.node_id}/NN/**", changed)
+    watch = session.watch_tokens(f"{prefix}{node.node_id}/NN/**", changed)
     try:
         query_node(session, node, Request("shutdown", reason=reason), bool)
         if not gone.wait(_KILL_TIMEOUT):

@@ -18,8 +18,7 @@ from rosz.errors import (
 from rosz.node.endpoint import Endpoint
 from rosz.node.mismatch import mismatch
 from rosz.qos import QoS
-from rosz.session import Cancellation
-from rosz.session.waiting import patience
+from rosz.session import Cancellation, clamp_timeout
 from rosz.wire import Kind, pack
 
 if TYPE_CHECKING:
@@ -53,14 +52,14 @@ class Client(Endpoint):
             node, Kind.CLIENT, name, service_type._type_name, service_type._type_hash, qos
         )
         self.service_type = service_type
-        self.timeout = patience(timeout)
+        self.timeout = clamp_timeout(timeout)
         self._numbers = itertools.count(1)
         self._cancel = Cancellation()
         self._known: tuple[View | None, bool] = None, False
-        self._asker = node.context.session.asker(
+        self._querier = node.context.session.querier(
             self.key, timeout=self.timeout, target="all_complete"
         )
-        self._declared.append(self._asker)
+        self._declared.append(self._querier)
         self.announce()
 
     def __call__(self, *args: Any, timeout: float | None = None, **fields: Any) -> Any:
@@ -93,7 +92,7 @@ class Client(Endpoint):
             ClosedError: The client or its context was closed meanwhile.
             UsageError: The timeout is no number.
         """
-        limit = self.timeout if timeout is None else patience(timeout)
+        limit = self.timeout if timeout is None else clamp_timeout(timeout)
         deadline = time.monotonic() + limit
         payload = self.service_type.Request._encode(request)
         if not self._is_served():
@@ -117,10 +116,10 @@ class Client(Endpoint):
             raise self._late(limit)
         self.ensure_open("call")
         attachment = pack(next(self._numbers), time.time_ns(), self.gid)
-        if abs(self._asker.timeout - left) < _SAME:
-            answers = self._asker.ask(payload, attachment, self._cancel)
+        if abs(self._querier.timeout - left) < _SAME:
+            replies = self._querier.query(payload, attachment, self._cancel)
         else:
-            answers = self.node.context.session.ask(
+            replies = self.node.context.session.query(
                 self.key,
                 timeout=left,
                 payload=payload,
@@ -128,7 +127,7 @@ class Client(Endpoint):
                 target="all_complete",
                 cancel=self._cancel,
             )
-        first = answers.first()
+        first = replies.receive()
         if first is None and self.closed:
             raise ClosedError(f"the call of '{self.name}' was cancelled: shutting down")
         return first

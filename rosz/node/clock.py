@@ -20,7 +20,7 @@ from collections.abc import Callable
 import msgspec
 
 from rosz.errors import TimeMovedBackwards, UsageError
-from rosz.session.waiting import LONGEST
+from rosz.session import LONGEST_WAIT
 
 __all__ = ("Clock", "TimeJump", "nanoseconds")
 
@@ -274,7 +274,7 @@ class Clock:
                 left = (end - time.monotonic_ns()) / 1e9
                 if left <= 0:
                     return True
-                sleeper.lock.acquire(timeout=min(left, LONGEST))
+                sleeper.lock.acquire(timeout=min(left, LONGEST_WAIT))
         finally:
             sleepers.discard(sleeper)
         return False

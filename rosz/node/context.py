@@ -20,10 +20,8 @@ from rosz.node import signals
 from rosz.node.clock import Clock
 from rosz.node.inbox import Inbox
 from rosz.node.mismatch import MismatchWatch
-from rosz.session import Session, SessionConfig
+from rosz.session import MeshReadiness, Session, SessionConfig, clamp_timeout, serve_links
 from rosz.session.presence import is_anybody_awake
-from rosz.session.settle import Settling, serve_links
-from rosz.session.waiting import patience
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -119,15 +117,15 @@ class Context:
         self.graph = Graph(self.session, self.domain)
         self._mismatches = MismatchWatch(self.graph, self.session.zid)
         self.inbox = Inbox(self.session, self.domain)
-        settling = Settling(
+        mesh = MeshReadiness(
             self.session,
             0 if alone or self.passing else self.SETTLED_BY,
             self._flushed,
             mesh=config.mode == "peer",
             everywhere=config.multicast,
         )
-        self.settled = settling.settled
-        self.when_settled = settling.when_settled
+        self.settled = mesh.ready
+        self.when_settled = mesh.when_ready
         if config.mode == "peer":
             self._links = serve_links(self.session)
 
@@ -274,7 +272,7 @@ class Context:
 
     def _disconnect(self) -> None:
         try:
-            with self.session.parting():
+            with self.session.close_links():
                 if self._params is not None:
                     self._params.close()
                 self.graph.close()
@@ -314,7 +312,7 @@ class Context:
             UsageError: The timeout is no number.
         """
         self.cooperative = self.cooperative or threading.current_thread() is threading.main_thread()
-        return self._stopping.wait(None if timeout is None else patience(timeout))
+        return self._stopping.wait(None if timeout is None else clamp_timeout(timeout))
 
     def close(self) -> None:
         """Shut down; the same as `shutdown` without a reason."""

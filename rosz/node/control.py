@@ -100,9 +100,9 @@ def attach(node: Node) -> None:
             if not contests:
                 contests.append(Pool(_THREADS, f"rosz-rivals{node.name}", rivals.take, contend))
 
-    questions = context.session.questions(key)
+    questions = context.session.pull_queryable(key)
     node.keep(questions)
-    Pool(_THREADS, f"rosz-control{node.name}", questions.take, serve)
+    Pool(_THREADS, f"rosz-control{node.name}", questions.receive, serve)
     node.keep(rivals)
     node.keep(Withdrawal(context.graph.listen_to_processes(appeared)))
 

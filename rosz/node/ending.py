@@ -10,7 +10,7 @@ from rosz.errors import ClosedError
 from rosz.node.log import NodeLog
 
 if TYPE_CHECKING:
-    from rosz.session import Closable
+    from rosz.lifecycle import Closable
 
 __all__ = ("Ending", "Hook")
 

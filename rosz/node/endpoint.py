@@ -15,9 +15,9 @@ from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from rosz.lifecycle import Closable
     from rosz.node.node import Node
     from rosz.qos import QoS
-    from rosz.session import Closable
 
 __all__ = ("OPPOSITE", "Endpoint", "Withdrawal", "definite")
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.node.channel import Taken
-from rosz.session.waiting import LONGEST, patience
+from rosz.session import LONGEST_WAIT, clamp_timeout
 
 if TYPE_CHECKING:
     from rosz.session import Reply, Sample
@@ -87,7 +87,7 @@ class Feed:
             ClosedError: The feed was closed meanwhile.
             UsageError: The timeout is no number.
         """
-        deadline = time.monotonic() + patience(timeout)
+        deadline = time.monotonic() + clamp_timeout(timeout)
         while True:
             while self._ring and not self.closed:
                 taken = self._pop()
@@ -107,7 +107,7 @@ class Feed:
         """Yield messages until closed."""
         while True:
             try:
-                message = self.get(LONGEST)
+                message = self.get(LONGEST_WAIT)
             except ClosedError:
                 return
             yield message

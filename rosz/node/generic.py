@@ -19,9 +19,10 @@ from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid, ros
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from rosz.lifecycle import Closable
     from rosz.message import Message
     from rosz.node.node import Node
-    from rosz.session import Closable, Reply, Sample
+    from rosz.session import Reply, Sample
 
 __all__ = ("GenericSubscription",)
 

@@ -6,7 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rosz.session import Closable, Sample, Session
+from rosz.lifecycle import Closable
+from rosz.session import Sample, Session
 from rosz.wire import Token, own_key
 
 if TYPE_CHECKING:

@@ -30,10 +30,10 @@ from rosz.wire import Token
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from rosz.lifecycle import Closable
     from rosz.message import Message
     from rosz.message import Service as ServiceType
     from rosz.params.api import Params
-    from rosz.session import Closable
 
 __all__ = ("Node",)
 
@@ -378,7 +378,7 @@ class Node:
         if context.forked:
             return
         leaving = self._owns_context or context.is_shutdown
-        with context.session.parting() if leaving else nullcontext():
+        with context.session.close_links() if leaving else nullcontext():
             self._ending.come(reason or context.reason, self._stop)
 
     def _stop(self) -> None:

@@ -16,9 +16,10 @@ from rosz.node.feed import Feed, Take
 from rosz.session.starting import start
 
 if TYPE_CHECKING:
+    from rosz.lifecycle import Closable
     from rosz.node.node import Node
     from rosz.qos import QoS
-    from rosz.session import Closable, Reply, Ring, Sample
+    from rosz.session import PullSubscriber, Reply, Sample
 
 __all__ = ("Reader",)
 
@@ -74,7 +75,7 @@ class Reader(Generic[M]):
             return session.subscriber(
                 key, lambda sample: self._put(take, sample), history=history, recover=recover
             )
-        ring = session.ring(key, self._depth, history=history, recover=recover)
+        ring = session.pull_subscriber(key, self._depth, history=history, recover=recover)
         threading.Thread(
             target=self._run, args=(ring, take), name=f"rosz-sub{self._topic}", daemon=True
         ).start()
@@ -94,10 +95,10 @@ class Reader(Generic[M]):
                     )
                     start(self._thread)
 
-    def _run(self, ring: Ring, take: Take) -> None:
+    def _run(self, ring: PullSubscriber, take: Take) -> None:
         while not self._feed.closed:
             try:
-                sample = ring.take()
+                sample = ring.receive()
             except ClosedError:
                 return
             self._handle(take, sample)

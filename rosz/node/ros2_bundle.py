@@ -82,9 +82,9 @@ class Bundle:
         services = self._services()
         for package in sorted({kind._type_name.partition("/")[0] for kind, _ in services.values()}):
             key = _ANY_HERE.format(domain=domain, node=node.name, package=package)
-            questions = session.questions(key, complete=True)
+            questions = session.pull_queryable(key, complete=True)
             self._open.append(questions)
-            Pool(_THREADS, f"rosz-ros2{node.name}", questions.take, self._serve)
+            Pool(_THREADS, f"rosz-ros2{node.name}", questions.receive, self._serve)
         for name, (kind, handler) in services.items():
             self._open.append(_Part(self, f"{node.name}/{name}", kind, handler))
 

@@ -67,9 +67,9 @@ class Service(Endpoint):
         """
         if not isinstance(threads, int) or threads < 1:
             raise UsageError(f"threads is {threads!r}: expected 1 or more")
-        questions = self.node.context.session.questions(self.key, complete=True)
+        questions = self.node.context.session.pull_queryable(self.key, complete=True)
         self._declared.append(questions)
-        Pool(threads, f"rosz-srv{self.name}", questions.take, self.serve)
+        Pool(threads, f"rosz-srv{self.name}", questions.receive, self.serve)
 
     def serve(self, query: Query) -> None:
         """Answer a question, and close it."""

@@ -12,7 +12,7 @@ import msgspec
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock
 from rosz.node.rate import Pace
-from rosz.session.waiting import patience
+from rosz.session import clamp_timeout
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -114,7 +114,7 @@ class Timer:
         """
         if threading.current_thread() is self._thread:
             return False
-        self._thread.join(None if timeout is None else patience(timeout))
+        self._thread.join(None if timeout is None else clamp_timeout(timeout))
         return not self._thread.is_alive()
 
     def __enter__(self) -> Self:

@@ -16,8 +16,7 @@ from rosz.params.paths import joined, split
 from rosz.params.values import Value, normalise
 from rosz.params.wire import Answer, Batch, Question, decode, encode
 from rosz.params.writes import DELETED
-from rosz.session import Session, Stamp
-from rosz.session.waiting import patience
+from rosz.session import Session, Stamp, clamp_timeout
 
 if TYPE_CHECKING:
     from rosz.params.replica import Outcome
@@ -52,7 +51,7 @@ class ParamClient:
         self._domain = domain
         self._keys = Keys(domain, scoped=session.secured)
         self._origin = origin
-        self._timeout = patience(timeout)
+        self._timeout = clamp_timeout(timeout)
         self._members: list[Member] = []
         self._silent: dict[str, Member] = {}
 

@@ -1,49 +1,49 @@
-"""What is declared on a session, and how Zenoh's errors are told."""
+"""What is declared on a session: publishers, subscribers, and the threads that call back."""
 
 from __future__ import annotations
 
 import logging
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, Protocol
+from typing import Any
 
 import zenoh
+import zenoh.ext
 
 from rosz.errors import ClosedError, TransportError
-from rosz.session.answers import Answers, Cancellation
-from rosz.session.calls import ENDING, keep
-from rosz.session.samples import Query, Sample
-from rosz.session.starting import start
+from rosz.session.at_exit import ENDING, leak_at_exit
+from rosz.session.samples import Sample
+from rosz.worker import Worker
 
 __all__ = (
-    "Asker",
-    "Closable",
+    "CallbackThread",
     "Declared",
-    "Pumped",
-    "Questions",
+    "PullSubscriber",
     "RawPublisher",
-    "Ring",
-    "channel",
-    "mapped",
+    "caching_publisher",
+    "history_subscriber",
+    "open_channel",
+    "translate_errors",
 )
 
-_CHANNEL = 1 << 20
-"""Items that a channel holds: more than ever come before a thread of ours gets its turn."""
+_CHANNEL_SIZE = 1 << 20
+"""Capacity of a channel: more items than ever arrive before a thread of Python receives them."""
+_HEARTBEAT_SECONDS = 0.5
 
 _log = logging.getLogger("rosz.session")
 
 
-class Closable(Protocol):
-    """Something declared on the session."""
-
-    def close(self) -> None:
-        """Undeclare it; again is no error."""
-
-
 @contextmanager
-def mapped(what: str) -> Iterator[None]:
-    """Turn Zenoh's errors into ours, naming what was attempted."""
+def translate_errors(what: str) -> Iterator[None]:
+    """Turn errors of Zenoh into those of rosz.
+
+    Args:
+        what: The operation, as a verb with its object.
+
+    Raises:
+        ClosedError: The session is closed, or the operation was cancelled.
+        TransportError: Zenoh reported another error.
+    """
     try:
         yield
     except zenoh.ZError as error:
@@ -55,35 +55,41 @@ def mapped(what: str) -> Iterator[None]:
         raise TransportError(f"cannot {what}: {text}") from error
 
 
-def channel() -> Any:
-    """Have what comes wait in a channel, so that Zenoh never waits for Python.
+def open_channel() -> Any:
+    """Return a channel for what arrives, so that Zenoh never waits for Python.
 
-    To undeclare an advanced publisher Zenoh holds Python's lock, and waits for its inner work; and
-    an interpreter that ends aborts when a thread which is not its own asks for its lock.
+    A callback would run on a thread of Zenoh. To undeclare an advanced publisher, Zenoh waits for
+    its own threads while it holds Python's lock, and the interpreter aborts at its end when a
+    foreign thread asks for that lock.
     """
-    return zenoh.handlers.FifoChannel(_CHANNEL)
+    return zenoh.handlers.FifoChannel(_CHANNEL_SIZE)
 
 
 class Declared:
-    """One declaration, undeclared at most once."""
+    """One declaration, which is undeclared at most once.
+
+    Args:
+        what: The name of the declaration in error texts.
+        entity: The object of Zenoh that was declared.
+    """
 
     def __init__(self, what: str, entity: Any) -> None:
         self._what = what
         self._entity: Any = entity
 
     def close(self) -> None:
-        """Undeclare it; again, or after the session, is no error.
+        """Undeclare it; a second call, or one after the end of the session, has no effect.
 
-        Nobody may be inside another method of it meanwhile.
+        No other thread may be inside another method of it meanwhile.
         """
         entity, self._entity = self._entity, None
         if entity is None:
             return
         if ENDING.is_set():
-            keep(entity)
+            leak_at_exit(entity)
         else:
-            # The session may end right now and take the declaration along.
-            with suppress(ClosedError), mapped(f"undeclare {self._what}"):
+            # The session may close at this very moment, and undeclares everything.
+            with suppress(ClosedError), translate_errors(f"undeclare {self._what}"):
                 entity.undeclare()
         del entity
 
@@ -93,51 +99,61 @@ class Declared:
             self.close()
 
 
-class Pumped(Declared):
-    """A declaration with a `channel`, and a thread that calls back for what comes.
+class CallbackThread(Declared):
+    """A declaration with a channel, and a thread that calls back for each item of it.
 
     Args:
-        what: Name for errors.
-        entity: What was declared.
-        deliver: Gets each item, on the thread; what it raises is logged.
+        what: The name of the declaration in error texts.
+        entity: The object of Zenoh that was declared with `open_channel`.
+        callback: Function called with each item on the thread; exceptions are logged.
     """
 
-    def __init__(self, what: str, entity: Any, deliver: Callable[[Any], None]) -> None:
+    def __init__(self, what: str, entity: Any, callback: Callable[[Any], None]) -> None:
         super().__init__(what, entity)
-        receive = entity.handler.recv
-        start(
-            threading.Thread(
-                target=_pump, args=(what, receive, deliver), name=f"rosz {what}", daemon=True
-            )
-        )
+        # The thread must not refer to this object, else nobody would undeclare it.
+        items = _Items(what, entity.handler, callback)
+        Worker(f"rosz {what}", items.handle, receive=items.receive, logger=_log)
 
 
-def _pump(what: str, receive: Callable[[], Any], deliver: Callable[[Any], None]) -> None:
-    while not ENDING.is_set():
+class _Items:
+    """The items of a channel, which never leave this package: see `rosz.session.at_exit`."""
+
+    def __init__(self, what: str, handler: Any, callback: Callable[[Any], None]) -> None:
+        self._what = what
+        self._recv = handler.recv
+        self._callback = callback
+        self._item: Any = None
+
+    def receive(self) -> bool | None:
+        if ENDING.is_set():
+            return None
         try:
-            item = receive()
+            self._item = self._recv()
         except zenoh.ZError:  # undeclared, or the session is closed
-            return
+            return None
+        return True
+
+    def handle(self, _: bool) -> None:
         try:
-            deliver(item)
-        except Exception:  # noqa: BLE001  # the callback boundary: the next item may fare better
-            _log.exception("the callback of the %s failed", what)
-        del item
+            self._callback(self._item)
+        except Exception:  # noqa: BLE001  # the callback boundary: the next item may succeed
+            _log.exception("the callback of the %s failed", self._what)
+        self._item = None
 
 
-class Ring(Declared):
-    """A subscriber that keeps the newest samples until they are taken."""
+class PullSubscriber(Declared):
+    """A subscriber that keeps the newest samples until a thread receives them."""
 
     def __init__(self, key: str, entity: Any) -> None:
         super().__init__(f"subscriber '{key}'", entity)
         self._key = key
         self._recv = entity.handler.recv
 
-    def take(self) -> Sample:
-        """Return the oldest sample that is kept, waiting for one until the ring is closed.
+    def receive(self) -> Sample:
+        """Wait for a sample and return the oldest one.
 
         Raises:
-            ClosedError: The ring or the session was closed.
+            ClosedError: The subscriber or the session was closed.
         """
         if ENDING.is_set():
             raise ClosedError(f"the subscriber of '{self._key}' is closed")
@@ -147,63 +163,12 @@ class Ring(Declared):
             raise ClosedError(f"the subscriber of '{self._key}' is closed") from error
 
 
-class Asker(Declared):
-    """A question that is declared once and asked often.
-
-    Args:
-        key: Key expression.
-        entity: What was declared.
-        timeout: Seconds that were declared with it.
+class RawPublisher(Declared):
+    """A declared publisher of bytes.
 
     Attributes:
-        timeout: As given.
+        key: The key expression that it publishes on.
     """
-
-    def __init__(self, key: str, entity: Any, timeout: float) -> None:
-        super().__init__(f"querier '{key}'", entity)
-        self._key = key
-        self._get = entity.get
-        self.timeout = timeout
-
-    def ask(self, payload: bytes, attachment: bytes, cancel: Cancellation) -> Answers:
-        """Ask, and have the answers to wait for; see `Session.ask`.
-
-        Raises:
-            ClosedError: The session is closed, or questions of this kind are cancelled.
-        """
-        try:
-            handler = self._get(
-                channel(), payload=payload, attachment=attachment, cancellation_token=cancel.token
-            )
-        except zenoh.ZError:
-            with mapped(f"ask '{self._key}'"):
-                raise
-        return Answers(handler)
-
-
-class Questions(Declared):
-    """A queryable whose questions wait until they are taken."""
-
-    def __init__(self, key: str, entity: Any) -> None:
-        super().__init__(f"queryable '{key}'", entity)
-        self._recv = entity.handler.recv
-
-    def take(self) -> Query | None:
-        """Return the oldest question, waiting for one; any number of threads may.
-
-        Returns:
-            The question, which whoever takes it closes; ``None`` when this is closed.
-        """
-        if ENDING.is_set():
-            return None
-        try:
-            return Query(self._recv())
-        except zenoh.ZError:
-            return None
-
-
-class RawPublisher(Declared):
-    """A declared publisher of bytes."""
 
     def __init__(self, key: str, entity: Any) -> None:
         super().__init__(f"publisher '{key}'", entity)
@@ -215,24 +180,70 @@ class RawPublisher(Declared):
 
         Raises:
             ClosedError: The publisher or the session is closed.
-            TransportError: It cannot be sent.
+            TransportError: Zenoh cannot send the sample.
         """
         if self._entity is None:
             raise ClosedError(f"cannot publish on '{self.key}': the publisher is closed")
         try:
             self._put(payload, attachment=attachment)
         except zenoh.ZError:
-            with mapped(f"publish on '{self.key}'"):
+            with translate_errors(f"publish on '{self.key}'"):
                 raise
 
     @property
     def matched(self) -> bool:
-        """Whether anybody is known to subscribe to what a publisher without cache sends.
+        """Whether a subscriber of this publisher is known; only for publishers without a cache.
 
         Raises:
             ClosedError: The publisher or the session is closed.
         """
         if self._entity is None:
             raise ClosedError(f"nobody hears '{self.key}': the publisher is closed")
-        with mapped(f"look for subscribers of '{self.key}'"):
+        with translate_errors(f"look for subscribers of '{self.key}'"):
             return bool(self._entity.matching_status.matching)
+
+
+def caching_publisher(raw: Any, key: str, cache: int, **qos: Any) -> Any:
+    """Declare a publisher that keeps its newest samples for late joiners, as rmw_zenoh does.
+
+    Args:
+        raw: The session of Zenoh.
+        key: The key expression to publish on.
+        cache: The number of samples to keep.
+        qos: The options ``congestion_control`` and ``reliability`` of Zenoh.
+    """
+    # Zenoh requires both arguments.
+    heartbeat = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_SECONDS)
+    return zenoh.ext.declare_advanced_publisher(
+        raw,
+        key,
+        cache=zenoh.ext.CacheConfig(cache),
+        publisher_detection=True,
+        sample_miss_detection=heartbeat
+        if qos.get("reliability") == zenoh.Reliability.RELIABLE
+        else None,
+        **qos,
+    )
+
+
+def history_subscriber(raw: Any, key: str, handler: Any, history: int, **options: Any) -> Any:
+    """Declare a subscriber that queries the caches of publishers, as rmw_zenoh does.
+
+    Args:
+        raw: The session of Zenoh.
+        key: The key expression to subscribe to.
+        handler: A channel. A callback would run while Zenoh holds a lock that closing needs.
+        history: The number of samples to ask each publisher for.
+        options: Zenoh's ``allowed_origin``, and ``recover``: whether to notice and fetch samples
+            that were missed.
+    """
+    recovery = zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
+    return zenoh.ext.declare_advanced_subscriber(
+        raw,
+        key,
+        handler,
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history),
+        recovery=recovery if options.pop("recover") else None,
+        subscriber_detection=True,
+        **options,
+    )

@@ -17,7 +17,8 @@ from typing import Any
 
 import zenoh
 
-from rosz.session.declared import Closable, Pumped, channel
+from rosz.lifecycle import Closable
+from rosz.session.declared import CallbackThread, open_channel
 from rosz.session.sockets import connections
 
 __all__ = ("never_linger",)
@@ -35,8 +36,8 @@ def never_linger(raw: Any) -> Closable:
     Returns:
         What does so, for as long as it is kept.
     """
-    listener = raw.info.declare_link_events_listener(channel(), history=True)
-    return Pumped("watch of links", listener, _meet)
+    listener = raw.info.declare_link_events_listener(open_channel(), history=True)
+    return CallbackThread("watch of links", listener, _meet)
 
 
 def _meet(event: Any) -> None:

@@ -21,7 +21,7 @@ from rosz.session.config import (
     overrides,
     zenoh_settings,
 )
-from rosz.session.declared import mapped
+from rosz.session.declared import translate_errors
 from rosz.session.meeting import open_at
 from rosz.session.memory import keep_freed_memory
 from rosz.session.presence import Presence, marks, stopped_holder, why_unanswered
@@ -63,7 +63,7 @@ def open_raw(config: SessionConfig, presence: Presence | None = None) -> Any:
     keep_freed_memory()
     tell_refusals(config)
     try:
-        with mapped(f"open a session ({_places(config)})"), _receivers(config.mode):
+        with translate_errors(f"open a session ({_places(config)})"), _receivers(config.mode):
             if config.mode == "peer" and config.hold_rendezvous:
                 return open_at(settings, config.rendezvous, lambda: _open(settings, config))
             return _open(settings, config)
@@ -100,7 +100,7 @@ def _of_mode(endpoints: Any, mode: str) -> tuple[str, ...]:
 
 
 def _settings(config: SessionConfig) -> zenoh.Config:
-    with mapped("read the Zenoh configuration"):
+    with translate_errors("read the Zenoh configuration"):
         if config.config_file:
             settings = zenoh.Config.from_file(config.config_file)
         else:

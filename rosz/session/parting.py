@@ -22,9 +22,9 @@ import zenoh
 
 from rosz.session.presence import marks, stopped_holder
 from rosz.session.sockets import connections
-from rosz.session.starting import start
 from rosz.session.stopped import peer_of, ports_of
 from rosz.wire import Endpoint
+from rosz.worker import start_thread
 
 __all__ = ("close", "parting_from_stopped")
 
@@ -109,7 +109,7 @@ def _giving_up(stopped: _Stopped) -> Iterator[None]:
             pause = _AGAIN_SECONDS
 
     helper = threading.Thread(target=give_up, name="rosz-parting", daemon=True)
-    helps = start(helper)
+    helps = start_thread(helper)
     if not helps:
         _change(stopped, lambda one: one.shutdown(socket.SHUT_RDWR))
     try:

@@ -1,23 +1,60 @@
-"""What arrives: thin views on Zenoh's samples, queries and replies, read only when asked."""
+"""What arrives on a session: samples, and the time stamps that order writes.
+
+`Sample` is a thin view of Zenoh's object, which decodes an attribute when it is read.
+
+Stamps come from a hybrid logical clock. Zenoh's own timestamps come from one as well, but a router
+may replace a timestamp that lies in its future, and Zenoh cannot rebuild one from its number. So
+rosz keeps the clock itself, in whole nanoseconds, which Zenoh's 64-bit NTP times carry without
+loss. A stamp that has to arrive unchanged is also written into the payload or the attachment.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Self
+import threading
+import time
 
+import msgspec
 import zenoh
 
-from rosz.errors import TransportError
-from rosz.session.calls import ENDING, keep
-from rosz.session.ending import ClosedSession
-from rosz.session.stamp import Stamp
-
-if TYPE_CHECKING:
-    from types import TracebackType
-
-__all__ = ("Query", "Reply", "Sample", "stamp_of", "to_timestamp")
+__all__ = ("HybridClock", "Sample", "Stamp", "stamp_of", "to_timestamp")
 
 _SECOND = 1_000_000_000
-_ANSWERED: Final = ClosedSession("the question is closed")
+
+
+class Stamp(msgspec.Struct, frozen=True, order=True):
+    """A moment that no two writes share; ordered by time, then by clock.
+
+    Attributes:
+        time: Nanoseconds since the Unix epoch, moved forward where the order requires it.
+        id: The clock that it was taken from: a session id in lower-case hex.
+    """
+
+    time: int
+    id: str
+
+
+class HybridClock:
+    """A clock whose stamps grow, and are later than every stamp that it has observed.
+
+    Args:
+        clock_id: The name of this clock: the session id.
+    """
+
+    def __init__(self, clock_id: str) -> None:
+        self._id = clock_id
+        self._last = 0
+        self._lock = threading.Lock()
+
+    def now(self) -> Stamp:
+        """Return a new stamp."""
+        with self._lock:
+            self._last = max(self._last + 1, time.time_ns())
+            return Stamp(self._last, self._id)
+
+    def observe(self, stamp: Stamp) -> None:
+        """Make all further stamps later than this one."""
+        with self._lock:
+            self._last = max(self._last, stamp.time)
 
 
 def stamp_of(timestamp: zenoh.Timestamp | None) -> Stamp | None:
@@ -34,13 +71,8 @@ def to_timestamp(stamp: Stamp) -> zenoh.Timestamp:
     """Return a stamp as a Zenoh timestamp."""
     seconds, nanoseconds = divmod(stamp.time, _SECOND)
     digits = stamp.id if len(stamp.id) % 2 == 0 else "0" + stamp.id
-    # Zenoh prints an id as one number, and takes it as little-endian bytes.
+    # Zenoh prints an id as one number, but takes it as little-endian bytes.
     return zenoh.Timestamp(zenoh.NTP64(seconds, nanoseconds), bytes.fromhex(digits)[::-1])
-
-
-def _check_end() -> None:
-    if ENDING.is_set():
-        raise TransportError("cannot answer: the program ends")
 
 
 class Sample:
@@ -53,162 +85,31 @@ class Sample:
 
     @property
     def key(self) -> str:
-        """Key it was written to."""
+        """The key that was written."""
         return str(self._raw.key_expr)
 
     @property
     def payload(self) -> bytes:
-        """What was written."""
+        """The bytes that were written."""
         return self._raw.payload.to_bytes()
 
     @property
     def size(self) -> int:
-        """Bytes of the payload, without copying it."""
+        """The size of the payload in bytes; reading it does not copy the payload."""
         return len(self._raw.payload)
 
     @property
     def attachment(self) -> bytes | None:
-        """What came beside the payload."""
+        """The bytes sent beside the payload."""
         raw = self._raw.attachment
         return None if raw is None else raw.to_bytes()
 
     @property
     def stamp(self) -> Stamp | None:
-        """When it was written, by the network's clock."""
+        """The time of the write, by the clock of the network."""
         return stamp_of(self._raw.timestamp)
 
     @property
     def deleted(self) -> bool:
         """Whether it is a delete."""
         return self._raw.kind == zenoh.SampleKind.DELETE
-
-
-class Query:
-    """One question that arrived; close it after the last reply, or the asker waits for more."""
-
-    __slots__ = ("_raw",)
-
-    def __init__(self, raw: zenoh.Query) -> None:
-        self._raw: Any = raw
-
-    @property
-    def key(self) -> str:
-        """Key expression asked for."""
-        return str(self._raw.key_expr)
-
-    @property
-    def parameters(self) -> str:
-        """What follows the ``?`` of the selector."""
-        return str(self._raw.parameters)
-
-    @property
-    def payload(self) -> bytes | None:
-        """What was sent along."""
-        raw = self._raw.payload
-        return None if raw is None else raw.to_bytes()
-
-    @property
-    def attachment(self) -> bytes | None:
-        """What came beside the payload."""
-        raw = self._raw.attachment
-        return None if raw is None else raw.to_bytes()
-
-    def reply(
-        self,
-        key: str,
-        payload: bytes,
-        *,
-        attachment: bytes | None = None,
-        stamp: Stamp | None = None,
-    ) -> None:
-        """Send one answer.
-
-        Raises:
-            TransportError: The session is closed, or the program is about to end.
-        """
-        _check_end()
-        try:
-            self._raw.reply(
-                key,
-                payload,
-                attachment=attachment,
-                timestamp=None if stamp is None else to_timestamp(stamp),
-            )
-        except zenoh.ZError as error:
-            raise TransportError(f"cannot answer on '{key}': {error}") from error
-
-    def reply_error(self, text: str) -> None:
-        """Send an error as the answer.
-
-        Raises:
-            TransportError: The session is closed, or the program is about to end.
-        """
-        _check_end()
-        try:
-            self._raw.reply_err(text.encode())
-        except zenoh.ZError as error:
-            raise TransportError(f"cannot answer: {error}") from error
-
-    def close(self) -> None:
-        """Tell the asker that no more answers come; again is no error."""
-        raw, self._raw = self._raw, _ANSWERED
-        if raw is _ANSWERED:
-            return
-        if ENDING.is_set():
-            keep(raw)
-        else:
-            raw.drop()
-        del raw
-
-    def __del__(self) -> None:
-        """Close what nobody closed."""
-        self.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
-
-class Reply:
-    """One answer that arrived; when not ``ok`` the payload is the text of the error."""
-
-    __slots__ = ("_raw", "_sample", "ok")
-
-    def __init__(self, raw: zenoh.Reply) -> None:
-        self._raw = raw
-        self._sample = sample = raw.ok  # anew with every look
-        self.ok = sample is not None
-
-    @property
-    def key(self) -> str:
-        """Key that the answer is for; empty for an error."""
-        return "" if self._sample is None else str(self._sample.key_expr)
-
-    @property
-    def payload(self) -> bytes:
-        """The answer, or the text of the error."""
-        result = self._sample or self._raw.result
-        return result.payload.to_bytes()
-
-    @property
-    def attachment(self) -> bytes | None:
-        """What came beside the payload."""
-        raw = None if self._sample is None else self._sample.attachment
-        return None if raw is None else raw.to_bytes()
-
-    @property
-    def stamp(self) -> Stamp | None:
-        """When the value was written, by the network's clock."""
-        return None if self._sample is None else stamp_of(self._sample.timestamp)
-
-    @property
-    def deleted(self) -> bool:
-        """Whether the answer is that the key was deleted."""
-        return self._sample is not None and self._sample.kind == zenoh.SampleKind.DELETE

@@ -15,7 +15,7 @@ from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.sensor_msgs.msg import PointCloud2
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import MessageInfo, Node
-from rosz.session.settle import place
+from rosz.session.mesh import place
 
 from .plain import Plain, plain_session
 

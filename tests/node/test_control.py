@@ -49,7 +49,7 @@ def test_many_questions_take_few_threads(network: Network, monkeypatch: pytest.M
         return info(*args)
 
     monkeypatch.setattr(control, "_info", slowly)
-    asked = [session.ask(key, timeout=PATIENCE, payload=_INFO) for _ in range(200)]
+    asked = [session.query(key, timeout=PATIENCE, payload=_INFO) for _ in range(200)]
     for _ in range(control._THREADS):
         at_work.get(timeout=PATIENCE)
     assert len(threads("rosz-control/busy")) == control._THREADS

@@ -11,7 +11,7 @@ from network import PATIENCE, Network, repeats
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Context, standard
-from rosz.session.settle import Settling
+from rosz.session import MeshReadiness
 
 ONE_SHOT = """
     import sys
@@ -89,7 +89,9 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)  # waits for the same as we do
     linked = threading.Event()
     strangers = {"somebody who is linked late"}
-    monkeypatch.setattr(Settling, "_neighbours", lambda *_: set() if linked.is_set() else strangers)
+    monkeypatch.setattr(
+        MeshReadiness, "_neighbours", lambda *_: set() if linked.is_set() else strangers
+    )
     monkeypatch.setattr(Context, "SETTLED_BY", PATIENCE)
     publisher = network.node("talker").publisher("chatter", String)
     for number in range(1500):
@@ -103,7 +105,7 @@ def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.Monkey
     network.context()
     subscription = network.node("listener").subscription("chatter", String)
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)
-    monkeypatch.setattr(Settling, "_neighbours", lambda *_: {"somebody who is never linked"})
+    monkeypatch.setattr(MeshReadiness, "_neighbours", lambda *_: {"somebody who is never linked"})
     monkeypatch.setattr(Context, "SETTLED_BY", 1.0)
     began = time.monotonic()
     network.node("talker").publisher("chatter", String).publish("hello")

@@ -9,7 +9,7 @@ import pytest
 from network import PATIENCE, Network
 
 from rosz.msgs.std_msgs.msg import String
-from rosz.session.settle import Settling
+from rosz.session import MeshReadiness
 
 
 def in_time(call: Any) -> None:
@@ -54,17 +54,17 @@ def test_learning_a_type(network: Network, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_waiting_for_neighbours(network: Network) -> None:
-    settling = Settling(network.session(), 0, threading.Event())
+    mesh = MeshReadiness(network.session(), 0, threading.Event())
     asked: list[int] = []
 
     class Interrupted(threading.Event):
         def is_set(self) -> bool:
             if not asked:
                 asked.append(1)
-                settling.when_settled(lambda: asked.append(2))
+                mesh.when_ready(lambda: asked.append(2))
             return super().is_set()
 
-    settling.settled = Interrupted()
-    in_time(lambda: settling.when_settled(lambda: asked.append(3)))
+    mesh.ready = Interrupted()
+    in_time(lambda: mesh.when_ready(lambda: asked.append(3)))
     assert asked == [1]
-    assert len(settling._waiting) == 2
+    assert len(mesh._waiting) == 2

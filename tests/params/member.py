@@ -18,8 +18,15 @@ from typing import Any
 from rosz.params.api import Params
 from rosz.params.replica import Changed, Replica
 from rosz.params.store import Store
-from rosz.session import HybridClock, Sample, Session, SessionConfig, Stamp
-from rosz.session.settle import Settling, serve_links
+from rosz.session import (
+    HybridClock,
+    MeshReadiness,
+    Sample,
+    Session,
+    SessionConfig,
+    Stamp,
+    serve_links,
+)
 
 
 class SkewedClock(HybridClock):
@@ -63,7 +70,7 @@ class Member:
         settled = None
         if mode == "peer":
             serve_links(self._session)
-            settled = Settling(self._session, 0.5, threading.Event()).settled
+            settled = MeshReadiness(self._session, 0.5, threading.Event()).ready
         keep = Store(Path(file)) if file else None
         self.replica = Replica(
             self._session, label=f"member {os.getpid()}", settled=settled, keep=keep

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from rosz.lifecycle import Closable
 from rosz.params.replica import Replica
-from rosz.session import Closable, Session, SessionConfig
-from rosz.session.settle import Settling, serve_links
+from rosz.session import MeshReadiness, Session, SessionConfig, serve_links
 
 PATIENCE = 10.0
 
@@ -30,7 +30,7 @@ class Network:
         session = Session.open(SessionConfig(rendezvous=self.rendezvous))
         self._open += [session, serve_links(session)]
         if self.sessions:
-            assert Settling(session, PATIENCE, threading.Event()).settled.wait(PATIENCE)
+            assert MeshReadiness(session, PATIENCE, threading.Event()).ready.wait(PATIENCE)
         self.sessions.append(session)
         return session
 

@@ -10,8 +10,7 @@ from queue import SimpleQueue
 import pytest
 from network import PATIENCE, Network, eventually
 
-from rosz.session import Sample
-from rosz.session.settle import Settling
+from rosz.session import MeshReadiness, Sample
 
 
 def test_callback_that_raises_hears_what_comes_next(
@@ -46,9 +45,9 @@ def test_who_waited_for_neighbours_is_not_kept(network: Network) -> None:
     kept = weakref.ref(waiting)
     network.session()
     session = network.session()
-    settling = Settling(session, 0.1, threading.Event())
-    settling.when_settled(waiting.call)
+    mesh = MeshReadiness(session, 0.1, threading.Event())
+    mesh.when_ready(waiting.call)
     del waiting
-    assert settling.settled.wait(PATIENCE)
+    assert mesh.ready.wait(PATIENCE)
     eventually(lambda: kept() is None, "it is let go")
     assert Waiting.called

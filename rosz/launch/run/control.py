@@ -19,7 +19,8 @@ from rosz.launch.run.loop import Loop, Timer
 from rosz.launch.run.process import Process
 from rosz.launch.run.summary import exit_reason
 from rosz.launch.run.supervisor import Supervisor
-from rosz.session import Closable, Query, Reply, Session
+from rosz.lifecycle import Closable
+from rosz.session import Query, Reply, Session
 from rosz.wire import own_key
 
 __all__ = ("LaunchStatus", "NodeStatus", "Order", "Panel", "order", "statuses")

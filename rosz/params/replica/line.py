@@ -10,6 +10,7 @@ from functools import partial
 from typing import Final
 
 from rosz.errors import DecodeError, RoszError
+from rosz.lifecycle import Closable
 from rosz.params.keys import Keys
 from rosz.params.merge import Change
 from rosz.params.paths import ROOT, Path, joined
@@ -19,7 +20,7 @@ from rosz.params.replica.members import Members
 from rosz.params.replica.state import State
 from rosz.params.replica.worker import Worker
 from rosz.params.wire import Batch, encode, seal, unseal
-from rosz.session import Closable, Query, RawPublisher, Reply, Sample, Session, Stamp
+from rosz.session import Query, RawPublisher, Reply, Sample, Session, Stamp
 
 __all__ = ("Line",)
 

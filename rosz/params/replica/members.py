@@ -6,8 +6,9 @@ import logging
 from collections.abc import Callable
 
 from rosz.errors import DecodeError
+from rosz.lifecycle import Closable
 from rosz.params.keys import Keys, Member
-from rosz.session import Closable, Session
+from rosz.session import Session
 
 __all__ = ("Members",)
 
@@ -48,7 +49,7 @@ class Members:
         # In this order: once tokens are watched, Zenoh answers from what the watch has seen so far.
         self.look(timeout)
         self._changed = changed
-        self._watch = self._session.tokens(self._keys.tokens, self._on_watched)
+        self._watch = self._session.watch_tokens(self._keys.tokens, self._on_watched)
 
     def look(self, timeout: float) -> None:
         """Ask for those that are there now.

@@ -21,6 +21,7 @@ from typing import Final, Self
 import msgspec
 
 from rosz.errors import ClosedError, ParamError
+from rosz.lifecycle import Closable
 from rosz.params.keys import Keys, Member
 from rosz.params.merge import Change, condense, spread
 from rosz.params.paths import split
@@ -37,8 +38,7 @@ from rosz.params.replica.worker import Worker
 from rosz.params.tree import MISSING, lookup
 from rosz.params.values import normalise
 from rosz.params.writes import DELETED
-from rosz.session import Closable, Session, Stamp
-from rosz.session.waiting import patience
+from rosz.session import Session, Stamp, clamp_timeout
 
 __all__ = ("ACKNOWLEDGED_BY", "Outcome", "Replica", "process_label")
 
@@ -199,7 +199,7 @@ class Replica(Reading):
             ClosedError: The replica or the session is closed.
             UsageError: The timeout is no number; nothing has changed then.
         """
-        timeout = patience(timeout)
+        timeout = clamp_timeout(timeout)
         if self._closed:
             raise ClosedError("the parameter store of this process is closed")
         batch = list(changes)
@@ -225,7 +225,7 @@ class Replica(Reading):
         Returns:
             Whether all of them answered in time.
         """
-        timeout = patience(timeout)
+        timeout = clamp_timeout(timeout)
         answers: SimpleQueue[bool] = SimpleQueue()
         expected = self._sync.compare_with_all(answers.put)
         try:

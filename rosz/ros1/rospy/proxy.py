@@ -24,7 +24,7 @@ from rosz.ros1.rospy.names import resolve_name
 from rosz.ros1.rospy.service import ServiceEnd, ServiceException
 from rosz.ros1.rospy.state import context, helper
 from rosz.ros1.rospy.state import is_shutdown as ended
-from rosz.session.waiting import patience
+from rosz.session import clamp_timeout
 from rosz.time import DurationValue
 
 __all__ = ("ServiceProxy", "wait_for_message", "wait_for_service")
@@ -196,7 +196,7 @@ def _deadline(timeout: float | DurationValue | None) -> float:
     if timeout is None:
         return time.monotonic() + _FOREVER
     seconds = timeout.to_sec() if isinstance(timeout, DurationValue) else timeout
-    return time.monotonic() + patience(seconds)
+    return time.monotonic() + clamp_timeout(seconds)
 
 
 def _check_running() -> None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from rosz.errors import RoszError
 from rosz.ros2.rclpy import state
 from rosz.ros2.rclpy.task import Future, Task
-from rosz.session.waiting import patience
+from rosz.session import clamp_timeout
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -286,4 +286,4 @@ class MultiThreadedExecutor(Executor):
 
 def _deadline(timeout: float | None) -> float | None:
     """Return when a wait ends; negative and missing timeouts mean never, as in rclpy."""
-    return None if timeout is None or timeout < 0 else time.monotonic() + patience(timeout)
+    return None if timeout is None or timeout < 0 else time.monotonic() + clamp_timeout(timeout)

@@ -2,7 +2,7 @@
 
 A peer hears of the other peers from the one it meets first, and connects to them in the background.
 What it publishes before that is done misses those it is not linked to yet. So it asks whom it
-meets for *their* links, and is settled once it has all of them itself. Those of other machines, to
+meets for *their* links, and is ready once it has all of them itself. Those of other machines, to
 whom routers carry what it says, listen where it cannot reach them, and are left out; and so are
 those that are stopped, who answer nobody until they go on.
 """
@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from rosz.errors import RoszError
-from rosz.session.samples import Query
+from rosz.session.queries import Query
 
 if TYPE_CHECKING:
-    from rosz.session.declared import Closable
+    from rosz.lifecycle import Closable
     from rosz.session.session import Session
 
-__all__ = ("Settling", "place", "serve_links")
+__all__ = ("MeshReadiness", "place", "serve_links")
 
 _SPACE = "@rosz/links"
 _POLL = 0.002
@@ -36,18 +36,18 @@ _ASK_TIMEOUT = 0.5
 _log = logging.getLogger("rosz.session")
 
 
-class Settling:
+class MeshReadiness:
     """A session on its way to all its neighbours; others are told of its own links meanwhile.
 
     Args:
         session: It.
-        timeout: Seconds after which it counts as settled, come what may; 0 if it is already.
+        timeout: Seconds after which it counts as ready, come what may; 0 if it is already.
         stop: Ends the waiting when set.
         mesh: Whether it links to all its neighbours, rather than to one as a client does.
         everywhere: Whether peers of other machines can be reached as well, as by multicast.
 
     Attributes:
-        settled: Set in the end.
+        ready: Set in the end.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Settling:
         mesh: bool = True,
         everywhere: bool = False,
     ) -> None:
-        self.settled = threading.Event()
+        self.ready = threading.Event()
         self._session = session
         self._timeout = timeout
         self._stop = stop
@@ -70,12 +70,12 @@ class Settling:
         if timeout:
             threading.Thread(target=self._run, name="rosz-settle", daemon=True).start()
         else:
-            self.settled.set()
+            self.ready.set()
 
-    def when_settled(self, callback: Callable[[], None]) -> None:
+    def when_ready(self, callback: Callable[[], None]) -> None:
         """Have a function called when it is, or at once if it is already."""
         with self._lock:
-            if not self.settled.is_set():
+            if not self.ready.is_set():
                 self._waiting.append(callback)
                 return
         callback()
@@ -88,7 +88,7 @@ class Settling:
                 _log.warning("cannot tell whether all peers are linked: %s", error)
         finally:
             with self._lock:
-                self.settled.set()
+                self.ready.set()
                 waiting, self._waiting = self._waiting, []
             for callback in waiting:
                 _attempt(callback)

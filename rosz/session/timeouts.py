@@ -6,14 +6,14 @@ import threading
 
 from rosz.errors import UsageError
 
-__all__ = ("LONGEST", "patience")
+__all__ = ("LONGEST_WAIT", "clamp_timeout")
 
-LONGEST = threading.TIMEOUT_MAX / 2
+LONGEST_WAIT = threading.TIMEOUT_MAX / 2
 """Seconds, more than a century, that stand for "forever": no wait of the system takes more."""
 
 
-def patience(timeout: float) -> float:
-    """Return how long to wait, for those who are told: from 0, for less, to `LONGEST`.
+def clamp_timeout(timeout: float) -> float:
+    """Return how long to wait, for those who are told: from 0, for less, to `LONGEST_WAIT`.
 
     Args:
         timeout: Seconds; may be infinite.
@@ -23,4 +23,4 @@ def patience(timeout: float) -> float:
     """
     if timeout != timeout:  # noqa: PLR0124  # nan
         raise UsageError(f"timeout is '{timeout}': expected a number of seconds")
-    return min(max(timeout, 0.0), LONGEST)
+    return min(max(timeout, 0.0), LONGEST_WAIT)

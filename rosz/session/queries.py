@@ -1,0 +1,282 @@
+"""Queries, their replies, and what is declared for either side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final, Literal, Self, TypedDict
+
+import zenoh
+
+from rosz.errors import TransportError
+from rosz.session.at_exit import ENDING, ClosedSession, leak_at_exit
+from rosz.session.declared import Declared, open_channel, translate_errors
+from rosz.session.samples import Stamp, stamp_of, to_timestamp
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+__all__ = (
+    "TARGETS",
+    "Cancellation",
+    "Querier",
+    "Query",
+    "QueryOptions",
+    "Queryable",
+    "Replies",
+    "Reply",
+    "Target",
+)
+
+Target = Literal["all", "all_complete", "best"]
+"""Who gets a query: all queryables, those that have all there is, or the best of these."""
+
+TARGETS: Final = {
+    "all": zenoh.QueryTarget.ALL,
+    "all_complete": zenoh.QueryTarget.ALL_COMPLETE,
+    "best": zenoh.QueryTarget.BEST_MATCHING,
+}
+_CLOSED_QUERY: Final = ClosedSession("the query is closed")
+
+
+class QueryOptions(TypedDict, total=False):
+    """Options of a query; see `Session.query`."""
+
+    payload: bytes | None
+    attachment: bytes | None
+    parameters: str
+    target: Target
+    any_key: bool
+    cancel: Cancellation | None
+
+
+class Cancellation:
+    """Ends all queries that were made with it, and makes further ones raise `ClosedError`.
+
+    Attributes:
+        token: The cancellation token of Zenoh.
+    """
+
+    def __init__(self) -> None:
+        self.token = zenoh.CancellationToken()
+
+    def cancel(self) -> None:
+        """End the queries, so that nobody waits for their replies; a second call has no effect."""
+        self.token.cancel()  # type: ignore[no-untyped-call]  # missing in zenoh's stub
+
+
+class Reply:
+    """One reply that arrived; when not ``ok`` the payload is the text of the error."""
+
+    __slots__ = ("_raw", "_sample", "ok")
+
+    def __init__(self, raw: zenoh.Reply) -> None:
+        self._raw = raw
+        self._sample = sample = raw.ok  # each access makes a new object
+        self.ok = sample is not None
+
+    @property
+    def key(self) -> str:
+        """The key that the reply is for; empty for an error."""
+        return "" if self._sample is None else str(self._sample.key_expr)
+
+    @property
+    def payload(self) -> bytes:
+        """The value, or the text of the error."""
+        result = self._sample or self._raw.result
+        return result.payload.to_bytes()
+
+    @property
+    def attachment(self) -> bytes | None:
+        """The bytes sent beside the payload."""
+        raw = None if self._sample is None else self._sample.attachment
+        return None if raw is None else raw.to_bytes()
+
+    @property
+    def stamp(self) -> Stamp | None:
+        """The time of the write, by the clock of the network."""
+        return None if self._sample is None else stamp_of(self._sample.timestamp)
+
+    @property
+    def deleted(self) -> bool:
+        """Whether the reply says that the key was deleted."""
+        return self._sample is not None and self._sample.kind == zenoh.SampleKind.DELETE
+
+
+class Replies:
+    """The replies to a query; iterating over them ends after the last one or at the timeout.
+
+    Args:
+        handler: The channel of Zenoh that the replies come from.
+    """
+
+    def __init__(self, handler: Any) -> None:
+        self._recv = handler.recv
+
+    def __iter__(self) -> Iterator[Reply]:
+        while (reply := self.receive()) is not None:
+            yield reply
+
+    def receive(self) -> Reply | None:
+        """Wait for the next reply and return it; ``None`` when there are no more."""
+        if ENDING.is_set():
+            return None
+        try:
+            return Reply(self._recv())
+        except zenoh.ZError:  # the channel is empty and closed
+            return None
+
+
+class Querier(Declared):
+    """A declared query, for a key that is queried often.
+
+    Args:
+        key: The key expression to query.
+        entity: The querier of Zenoh.
+        timeout: The time limit that was declared, in seconds.
+
+    Attributes:
+        timeout: The time limit that was declared, in seconds.
+    """
+
+    def __init__(self, key: str, entity: Any, timeout: float) -> None:
+        super().__init__(f"querier '{key}'", entity)
+        self._key = key
+        self._get = entity.get
+        self.timeout = timeout
+
+    def query(self, payload: bytes, attachment: bytes, cancel: Cancellation) -> Replies:
+        """Send the query, and return the replies as they come; see `Session.query`.
+
+        Raises:
+            ClosedError: The session is closed, or ``cancel`` was cancelled.
+        """
+        try:
+            handler = self._get(
+                open_channel(),
+                payload=payload,
+                attachment=attachment,
+                cancellation_token=cancel.token,
+            )
+        except zenoh.ZError:
+            with translate_errors(f"query '{self._key}'"):
+                raise
+        return Replies(handler)
+
+
+class Query:
+    """One query that arrived; close it after the last reply, else the querier waits for more."""
+
+    __slots__ = ("_raw",)
+
+    def __init__(self, raw: zenoh.Query) -> None:
+        self._raw: Any = raw
+
+    @property
+    def key(self) -> str:
+        """The key expression that is queried."""
+        return str(self._raw.key_expr)
+
+    @property
+    def parameters(self) -> str:
+        """The part of the selector after the ``?``."""
+        return str(self._raw.parameters)
+
+    @property
+    def payload(self) -> bytes | None:
+        """The payload of the query."""
+        raw = self._raw.payload
+        return None if raw is None else raw.to_bytes()
+
+    @property
+    def attachment(self) -> bytes | None:
+        """The bytes sent beside the payload."""
+        raw = self._raw.attachment
+        return None if raw is None else raw.to_bytes()
+
+    def reply(
+        self,
+        key: str,
+        payload: bytes,
+        *,
+        attachment: bytes | None = None,
+        stamp: Stamp | None = None,
+    ) -> None:
+        """Send one reply.
+
+        Raises:
+            TransportError: The session is closed, or the program is about to end.
+        """
+        _check_not_ending()
+        try:
+            self._raw.reply(
+                key,
+                payload,
+                attachment=attachment,
+                timestamp=None if stamp is None else to_timestamp(stamp),
+            )
+        except zenoh.ZError as error:
+            raise TransportError(f"cannot reply on '{key}': {error}") from error
+
+    def reply_error(self, text: str) -> None:
+        """Send an error as the reply.
+
+        Raises:
+            TransportError: The session is closed, or the program is about to end.
+        """
+        _check_not_ending()
+        try:
+            self._raw.reply_err(text.encode())
+        except zenoh.ZError as error:
+            raise TransportError(f"cannot reply: {error}") from error
+
+    def close(self) -> None:
+        """Tell the querier that there are no more replies; a second call has no effect."""
+        raw, self._raw = self._raw, _CLOSED_QUERY
+        if raw is _CLOSED_QUERY:
+            return
+        if ENDING.is_set():
+            leak_at_exit(raw)
+        else:
+            raw.drop()
+        del raw
+
+    def __del__(self) -> None:
+        """Close a query that nobody closed."""
+        self.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class Queryable(Declared):
+    """A declared queryable that keeps its queries until a thread receives them."""
+
+    def __init__(self, key: str, entity: Any) -> None:
+        super().__init__(f"queryable '{key}'", entity)
+        self._recv = entity.handler.recv
+
+    def receive(self) -> Query | None:
+        """Wait for a query and return the oldest one; several threads may call this.
+
+        Returns:
+            The query, which the caller has to close; ``None`` when the queryable is closed.
+        """
+        if ENDING.is_set():
+            return None
+        try:
+            return Query(self._recv())
+        except zenoh.ZError:
+            return None
+
+
+def _check_not_ending() -> None:
+    if ENDING.is_set():
+        raise TransportError("cannot reply: the program ends")
