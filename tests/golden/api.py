@@ -184,8 +184,9 @@ def _of(field: Any) -> str:
 def _constructor(value: type) -> str:
     """Return the signature of a class whose constructor is ours."""
     if issubclass(value, msgspec.Struct) and "__init__" not in vars(value):
-        options = value.__struct_config__
-        return f" struct, frozen={options.frozen}, kw_only from {_first_keyword(value)}"
+        frozen = "frozen " if value.__struct_config__.frozen else ""
+        keyword = _first_keyword(value)
+        return f" {frozen}struct" + (f", by keyword from {keyword}" if keyword else "")
     for name in ("__init__", "__new__"):
         method = getattr(value, name)
         if inspect.isfunction(method) and _is_ours(method) and not issubclass(value, Enum):
