@@ -23,10 +23,15 @@ import rosz.idl
 import rosz.message
 import rosz.msgs
 from rosz.errors import PackageNotFound, TypeNotFound, near_miss
-from rosz.idl.catalog import Catalog, Definition
-from rosz.idl.generate import Folders, generate, shipped_module
-from rosz.idl.keep import Keep
-from rosz.idl.module import MARKER, message_module, service_module
+from rosz.idl import Catalog, Definition, Folders
+from rosz.idl.cache import SourceCache
+from rosz.idl.generate import (
+    MARKER,
+    generate,
+    message_module,
+    service_module,
+    shipped_module,
+)
 from rosz.message import Message, Service
 from rosz.packages import PackageIndex
 
@@ -52,7 +57,7 @@ class TypeStore:
 
     def __init__(self, packages: PackageIndex | None = None, cache: Path | None = None) -> None:
         self._packages = packages
-        self._keep = Keep(cache)
+        self._cache = SourceCache(cache)
         self._modules: dict[tuple[str, Kind], ModuleType] = {}
         self._folders = Folders(self._folder)
         self._catalog = Catalog(self.definition)
@@ -267,10 +272,10 @@ class TypeStore:
 
         namespace = {"_type_of": type_of, "_made_of": (stem, needs)}
         bases = [name.rpartition("/")[2] for name in names]
-        module = self._keep.find(module_name, stem, namespace, bases)
+        module = self._cache.load(module_name, stem, namespace, bases)
         if module is None:
             source = self._source(package, kind, names)
-            module = self._keep.run(module_name, stem, namespace, source)
+            module = self._cache.add(module_name, stem, namespace, source)
         sys.modules.setdefault(module_name, module)  # where pickle looks for the classes
         return module
 

@@ -14,7 +14,7 @@ from rosz.errors import EncodeError, UsageError
 from rosz.introspect.arguments import list_arguments, read_arguments, read_stream, with_arguments
 from rosz.introspect.services import call as send_call
 from rosz.introspect.services import server, wait_for_server
-from rosz.message.values import to_jsonable
+from rosz.message.convert import to_jsonable
 from rosz.node import Client, Node
 
 __all__ = ("CallOptions", "call_service")

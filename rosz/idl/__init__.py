@@ -1,17 +1,24 @@
-"""Interface definitions: .msg and .srv text → spec → hashes → Python source. Pure.
+"""Interface definitions: .msg, .srv and .action texts, their specs, hashes and Python source.
 
-``grammar`` reads one text, ``catalog`` joins texts by the names in them, ``typehash`` and ``md5``
-identify the result to ROS 2 and ROS 1, ``encode``, ``decode`` and ``classes`` write Python, and
-``generate`` writes whole packages.
+``grammar`` parses one text, ``catalog`` finds the types that it refers to, ``hashes`` identifies
+the result to ROS 1 and ROS 2. ``classes``, ``encode`` and ``decode`` write Python. The modules
+``generate``, which writes the modules of packages, and ``cache``, which runs and stores generated
+sources, are public as well. Pure; may import floor 0.
 """
 
 from __future__ import annotations
 
-from rosz.idl.catalog import Catalog, Definition
+from rosz.idl.catalog import Catalog, Definition, Folders, read_definition
 from rosz.idl.grammar import parse_action, parse_message, parse_service
-from rosz.idl.md5 import message_md5, service_md5
+from rosz.idl.hashes import (
+    describe,
+    message_hash,
+    message_md5,
+    service_hash,
+    service_md5,
+    service_parts,
+)
 from rosz.idl.spec import ActionSpec, Constant, Field, FieldType, MessageSpec, ServiceSpec
-from rosz.idl.typehash import message_hash, service_hash
 
 __all__ = (
     "ActionSpec",
@@ -20,13 +27,17 @@ __all__ = (
     "Definition",
     "Field",
     "FieldType",
+    "Folders",
     "MessageSpec",
     "ServiceSpec",
+    "describe",
     "message_hash",
     "message_md5",
     "parse_action",
     "parse_message",
     "parse_service",
+    "read_definition",
     "service_hash",
     "service_md5",
+    "service_parts",
 )

@@ -1,8 +1,9 @@
-"""Specs by name: reads definitions when they are needed and checks what they refer to."""
+"""Definitions by name: where they are found, and their specs, read when needed and checked."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import msgspec
 
@@ -10,22 +11,68 @@ from rosz.errors import DefinitionError, TypeNotFound, near_miss
 from rosz.idl.grammar import parse_message, parse_service
 from rosz.idl.spec import PRIMITIVES, Field, MessageSpec, ServiceSpec
 
-__all__ = ("Catalog", "Definition")
+__all__ = (
+    "Catalog",
+    "Definition",
+    "Folders",
+    "action_messages",
+    "read_definition",
+)
+
+_PARTS = ("Goal", "Result", "Feedback")
+_ENVELOPES = {
+    "ActionGoal": "Header header\nactionlib_msgs/GoalID goal_id\n{name}Goal goal\n",
+    "ActionResult": "Header header\nactionlib_msgs/GoalStatus status\n{name}Result result\n",
+    "ActionFeedback": "Header header\nactionlib_msgs/GoalStatus status\n{name}Feedback feedback\n",
+    "Action": (
+        "{name}ActionGoal action_goal\n"
+        "{name}ActionResult action_result\n"
+        "{name}ActionFeedback action_feedback\n"
+    ),
+}
+
+
+def _action_parts(name: str) -> list[str]:
+    """Return the names of the messages that are made of an action."""
+    return [name + suffix for suffix in (*_PARTS, *_ENVELOPES)]
+
+
+def action_messages(name: str, text: str) -> dict[str, str]:
+    """Return the definitions of the messages that ROS 1 makes of an action, by their names.
+
+    ``Do.action`` gives ``DoGoal``, ``DoResult`` and ``DoFeedback``, the three that carry them over
+    topics, and ``DoAction``, which holds those three (ROS wiki, actionlib, "Action files").
+
+    Args:
+        name: Name of the action, ``Do``.
+        text: Text of the file; missing parts are empty.
+    """
+    parts: list[list[str]] = [[]]
+    for line in text.splitlines(keepends=True):
+        if line.strip() == "---":
+            parts.append([])
+        else:
+            parts[-1].append(line)
+    # Text after a third line of dashes stays in the last part, whose parser refuses it.
+    texts = ["".join(part) for part in parts[:2]] + ["---\n".join(map("".join, parts[2:]))]
+    found = {name + suffix: part for suffix, part in zip(_PARTS, texts, strict=False)}
+    found |= {name + suffix: form.format(name=name) for suffix, form in _ENVELOPES.items()}
+    return {one: found.get(one, "") for one in _action_parts(name)}
 
 
 class Definition(msgspec.Struct, frozen=True):
-    """A text and where it was read."""
+    """The text of a definition, and the path that it was read from."""
 
     text: str
     path: str
 
 
 class Catalog:
-    """All definitions that can be reached, parsed once each.
+    """Specs of types by full name; each definition is parsed once.
 
     Args:
-        find: Gives the definition of a full name (``std_msgs/msg/String``, ``std_srvs/srv/Empty``);
-            raises TypeNotFound.
+        find: Function that returns the definition of a full name (``std_msgs/msg/String``,
+            ``std_srvs/srv/Empty``) or raises TypeNotFound.
     """
 
     def __init__(self, find: Callable[[str], Definition]) -> None:
@@ -35,22 +82,22 @@ class Catalog:
         self._checked: set[str] = set()
 
     def message(self, name: str) -> MessageSpec:
-        """Return the spec of a message, all types in it known to exist.
+        """Return the spec of a message, checked to refer to existing types only.
 
         Raises:
             TypeNotFound: There is no such type.
-            DefinitionError: It, or a type in it, is not well-formed, is missing, or holds itself.
+            DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
         """
         spec = self._message(name)
         self._check(spec, ())
         return spec
 
     def service(self, name: str) -> ServiceSpec:
-        """Return the spec of a service, all types in it known to exist.
+        """Return the spec of a service, checked to refer to existing types only.
 
         Raises:
             TypeNotFound: There is no such type.
-            DefinitionError: It, or a type in it, is not well-formed, is missing, or holds itself.
+            DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
         """
         if name not in self._services:
             definition = self._find(name)
@@ -72,7 +119,7 @@ class Catalog:
         return found
 
     def nested(self, spec: MessageSpec) -> Iterator[MessageSpec]:
-        """Yield the specs of the fields that are messages."""
+        """Yield the spec of each field that is a message."""
         return (self._message(field.type.base) for field in spec.fields if not field.type.primitive)
 
     def _message(self, name: str) -> MessageSpec:
@@ -100,11 +147,84 @@ class Catalog:
             return self._message(base)
         except TypeNotFound as error:
             written = field.type.written
-            told = "/" in written or str(error).endswith("?")
-            hint = "" if told else near_miss(written.lower(), PRIMITIVES)
+            explained = "/" in written or str(error).endswith("?")
+            hint = "" if explained else near_miss(written.lower(), PRIMITIVES)
             raise DefinitionError(
                 f"type '{written}' of field '{field.name}': {error}{hint}",
                 spec.path,
                 field.line,
                 field.column,
             ) from error
+
+
+def read_definition(file: Path) -> Definition:
+    """Read a definition file.
+
+    Raises:
+        DefinitionError: The file cannot be read, or is not UTF-8.
+    """
+    try:
+        return Definition(file.read_text("utf-8"), str(file))
+    except UnicodeDecodeError as error:
+        before = error.object[: error.start]
+        line = before.count(b"\n") + 1
+        column = error.start - before.rfind(b"\n")
+        raise DefinitionError("not UTF-8", str(file), line, column) from error
+    except OSError as error:
+        raise DefinitionError(f"cannot be read: {error.strerror}", str(file)) from error
+
+
+class Folders:
+    """Definitions in the folders of packages: ``<package>/msg/*.msg`` and ``srv/*.srv``.
+
+    The messages that ROS 1 makes of ``<package>/action/*.action`` are among them.
+
+    Args:
+        folder: Function that returns the folder of a package by its name, or None.
+        actions: Whether to include the messages of actions.
+    """
+
+    def __init__(self, folder: Callable[[str], Path | None], *, actions: bool = True) -> None:
+        self._folder = folder
+        self._actions = actions
+
+    def names(self, package: str, kind: str) -> list[str]:
+        """Return the full names of a package's types of one kind, sorted."""
+        folder = self._folder(package)
+        if folder is None:
+            return []
+        bases = {file.stem for file in (folder / kind).glob(f"*.{kind}")}
+        if kind == "msg" and self._actions:
+            actions = (folder / "action").glob("*.action")
+            bases.update(part for file in actions for part in _action_parts(file.stem))
+        return [f"{package}/{kind}/{base}" for base in sorted(bases)]
+
+    def find(self, name: str) -> Definition:
+        """Return the definition of a full name.
+
+        Raises:
+            TypeNotFound: There is no such package, or no such type in it.
+            DefinitionError: The file cannot be read.
+        """
+        package, kind, base = name.split("/")
+        folder = self._folder(package)
+        if folder is None:
+            raise TypeNotFound(name, f"there is no package '{package}'")
+        file = folder / kind / f"{base}.{kind}"
+        if not file.is_file():
+            made = self._of_action(folder, base) if kind == "msg" and self._actions else None
+            if made is not None:
+                return made
+            known = [one.rpartition("/")[2] for one in self.names(package, kind)]
+            raise TypeNotFound(
+                name, f"'{folder / kind}' has no '{base}.{kind}'{near_miss(base, known)}"
+            )
+        return read_definition(file)
+
+    def _of_action(self, folder: Path, base: str) -> Definition | None:
+        """Return the definition of a message that is made of an action, if there is one."""
+        for file in (folder / "action").glob("*.action"):
+            if base in _action_parts(file.stem):
+                found = read_definition(file)
+                return Definition(action_messages(file.stem, found.text)[base], found.path)
+        return None

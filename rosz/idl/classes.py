@@ -1,22 +1,24 @@
-"""Writes the Python of message and service classes."""
+"""Writes the source of message and service classes."""
 
 from __future__ import annotations
 
 import json
 import math
+import re
 
 from rosz.idl.catalog import Catalog
 from rosz.idl.decode import Decoder
 from rosz.idl.encode import Encoder
-from rosz.idl.layout import ARRAYS, OCTETS
-from rosz.idl.md5 import message_md5, service_md5
-from rosz.idl.names import Module, attribute, class_name
+from rosz.idl.hashes import message_hash, message_md5, service_hash, service_md5
+from rosz.idl.names import ModuleNames, attribute, class_name
 from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec
-from rosz.idl.typehash import message_hash, service_hash
-from rosz.idl.wrap import wrap
+from rosz.message import ARRAY_CODES, OCTETS
 from rosz.names import short_type
 
-__all__ = ("message_class", "service_class")
+__all__ = (
+    "message_class",
+    "service_class",
+)
 
 _TIME = "builtin_interfaces/msg/Time"
 _DURATION = "builtin_interfaces/msg/Duration"
@@ -27,13 +29,13 @@ BASES = {
     _DURATION: "_DurationValue, _Message",
     _HEADER: "_Sequenced",
 }
-"""Base classes of types that have more in ROS 1 than their fields."""
+"""Base classes of types that ROS 1 gives more than their fields."""
 
 _ROS1_FIELDS = {
     "sensor_msgs/msg/CameraInfo": {"D": "d", "K": "k", "R": "r", "P": "p"},
     "stereo_msgs/msg/DisparityImage": {"T": "t"},
 }
-"""Fields that ROS 1 spells in another way: its name to ours."""
+"""Fields that ROS 1 spells in another way, from its name to ours."""
 
 _PYTHON = {
     "bool": "bool",
@@ -43,14 +45,19 @@ _PYTHON = {
     "wstring": "str",
 }
 
+_WIDTH = 100
+_TOKEN = re.compile(r'"(?:\\.|[^"\\])*"|[\[\](){}]|, |[^"\[\](){},]+|,')
+_TARGETS = re.compile(r"( *)(\w+(?:, \w+)+) = (.+)")
+_CONDITION = re.compile(r"( *)if (.+ or .+):")
 
-def message_class(spec: MessageSpec, catalog: Catalog, module: Module) -> str:
+
+def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> str:
     """Return the source of a message class.
 
     Args:
         spec: The message.
-        catalog: Where the types in it are.
-        module: The module that the class will stand in.
+        catalog: Specs of the types in it.
+        module: Names of the module that the class will be part of.
     """
     name = class_name(spec.name)
     base = BASES.get(spec.name, "_Message")
@@ -74,7 +81,7 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: Module) -> str:
 
 
 def service_class(spec: ServiceSpec, catalog: Catalog) -> str:
-    """Return the source of a service class; those of its two messages stand before it."""
+    """Return the source of a service class, which refers to those of its two messages."""
     name = class_name(spec.name)
     body = _docstring(spec.text)
     body += [f"Request = {name}Request", f"Response = {name}Response"]
@@ -83,11 +90,11 @@ def service_class(spec: ServiceSpec, catalog: Catalog) -> str:
 
 
 def _indented(lines: list[str]) -> list[str]:
-    return [each for line in lines for each in wrap(f"    {line}" if line else "")]
+    return [each for line in lines for each in _wrap(f"    {line}" if line else "")]
 
 
 def _docstring(text: str) -> list[str]:
-    """Turn the comment at the head of a definition into a docstring."""
+    """Return the comment at the head of a definition as a docstring."""
     head: list[str] = []
     for line in text.splitlines():
         if not line.startswith("#") or not line.strip("# "):
@@ -111,7 +118,7 @@ def _names(name: str, type_hash: str, md5: str, text: str) -> list[str]:
 
 
 def _text(text: str) -> list[str]:
-    """Write a definition as a literal that can be read."""
+    """Return the lines of a readable literal of a definition."""
     parts = [_literal(line) for line in text.splitlines(keepends=True)]
     if len(parts) <= 1:
         return [f"_text = {parts[0] if parts else _literal('')}"]
@@ -137,7 +144,7 @@ def _ros1_fields(spec: MessageSpec) -> list[str]:
     return [*lines, ""] if lines else []
 
 
-def _schema(spec: MessageSpec, module: Module) -> str:
+def _schema(spec: MessageSpec, module: ModuleNames) -> str:
     entries = []
     for field in spec.fields:
         kind = field.type
@@ -147,20 +154,20 @@ def _schema(spec: MessageSpec, module: Module) -> str:
     return f"({', '.join(entries)}{',' * (len(entries) == 1)})"
 
 
-def _field(field: Field, module: Module) -> str:
+def _field(field: Field, module: ModuleNames) -> str:
     return f"{attribute(field.name)}: {_annotation(field.type, module)} = {_default(field, module)}"
 
 
-def _annotation(kind: FieldType, module: Module) -> str:
+def _annotation(kind: FieldType, module: ModuleNames) -> str:
     element = _python(kind) if kind.primitive else module.cls(kind.base)
     if kind.shape == "one":
         return element
     if kind.base in OCTETS:
         return "_Bytes"
-    return f"_Array[{element}]" if kind.base in ARRAYS else f"list[{element}]"
+    return f"_Array[{element}]" if kind.base in ARRAY_CODES else f"list[{element}]"
 
 
-def _default(field: Field, module: Module) -> str:
+def _default(field: Field, module: ModuleNames) -> str:
     if isinstance(field.default, tuple):
         return _default_list(field.type, field.default)
     if field.default is not None:
@@ -170,19 +177,19 @@ def _default(field: Field, module: Module) -> str:
     return _zeros(field.type, module)
 
 
-def _zero(kind: FieldType, module: Module) -> str:
+def _zero(kind: FieldType, module: ModuleNames) -> str:
     if not kind.primitive:
         return f"_field(default_factory={module.cls(kind.base)})"
     return {"str": '""', "float": "0.0", "bool": "False", "int": "0"}[_python(kind)]
 
 
-def _zeros(kind: FieldType, module: Module) -> str:
+def _zeros(kind: FieldType, module: ModuleNames) -> str:
     fixed = kind.size if kind.shape == "fixed" else 0
     if kind.base in OCTETS:
         return module.define("_z", f"bytes({fixed})") if fixed else 'b""'
-    if kind.base in ARRAYS:
+    if kind.base in ARRAY_CODES:
         maker, size = ("zeros", f", {fixed}") if fixed else ("empty", "")
-        make = f'{module.use(maker)}("{ARRAYS[kind.base]}"{size})'
+        make = f'{module.use(maker)}("{ARRAY_CODES[kind.base]}"{size})'
         return f"_field(default_factory={module.define('_d', make)})"
     if not fixed:
         return "[]"
@@ -199,8 +206,8 @@ def _default_list(kind: FieldType, values: tuple[Scalar, ...]) -> str:
     listed = f"[{', '.join(_literal(value) for value in values)}]"
     if kind.base in OCTETS:
         return repr(bytes(int(value) & 0xFF for value in values))
-    if kind.base in ARRAYS:
-        return f'_field(default_factory=lambda: _array("{ARRAYS[kind.base]}", {listed}))'
+    if kind.base in ARRAY_CODES:
+        return f'_field(default_factory=lambda: _array("{ARRAY_CODES[kind.base]}", {listed}))'
     return f"_field(default_factory=lambda: {listed})"
 
 
@@ -208,3 +215,51 @@ def _literal(value: object) -> str:
     if isinstance(value, float) and not math.isfinite(value):
         return "_nan" if math.isnan(value) else "_inf" if value > 0 else "-_inf"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def _wrap(line: str) -> list[str]:
+    """Break a line that is too long, at ``or`` or at commas inside brackets."""
+    if len(line) <= _WIDTH or line.lstrip().startswith(('"', "#")):
+        return [line]
+    condition = _CONDITION.fullmatch(line)
+    if condition:
+        first, *rest = condition[2].split(" or ")
+        indent = condition[1]
+        parts = [f"{indent}    {first}", *(f"{indent}    or {part}" for part in rest)]
+        return [f"{indent}if (", *parts, f"{indent}):"]
+    targets = _TARGETS.fullmatch(line)
+    if targets:  # a tuple without brackets gets some
+        line = f"{targets[1]}({targets[2]}) = {targets[3]}"
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    lines: list[str] = []
+    current: list[tuple[str, int]] = []
+    for chunk in _chunks(line):
+        current.append(chunk)
+        while len(current) > 1 and sum(len(text) for text, _ in current) > _WIDTH:
+            cut = _best_cut(current)
+            lines.append("".join(text for text, _ in current[:cut]).rstrip())
+            current = [(indent, 99), *current[cut:]]
+            if len(current) == 2:  # noqa: PLR2004  # the indentation and one piece: as it is
+                break
+    return [*lines, "".join(text for text, _ in current)]
+
+
+def _chunks(line: str) -> list[tuple[str, int]]:
+    """Return the pieces of a line between commas, each with the bracket depth at its end."""
+    chunks: list[tuple[str, int]] = []
+    current = ""
+    depth = 0
+    for part in _TOKEN.findall(line):
+        current += part
+        if len(part) == 1:
+            depth += (part in "([{") - (part in ")]}")
+        elif part == ", " and depth:
+            chunks.append((current, depth))
+            current = ""
+    return [*chunks, (current, 99)]
+
+
+def _best_cut(chunks: list[tuple[str, int]]) -> int:
+    """Return the piece to break behind: as far outside as possible, then the last."""
+    cuts = range(1, len(chunks))
+    return min(cuts, key=lambda cut: (chunks[cut - 1][1], -cut))

@@ -1,53 +1,53 @@
 """Writes the straight-line code that decodes one message type.
 
-``p`` is the position in the bytes, header included; as far as it is a constant it is not even a
-variable. Fields of fixed size, counts and lengths gather in *runs*, each unpacked by one call of
-``struct``. A slice may run over the end of damaged bytes without notice, so the position is
-compared with their length once, at the end.
+``p`` is the position in the bytes, header included; where it is constant there is no variable.
+Fields of fixed size, counts and lengths gather in *runs*, each unpacked by one call of ``struct``.
+A slice does not fail at the end of damaged bytes, so the position is compared with their length
+once, at the end.
 """
 
 from __future__ import annotations
 
 from rosz.idl.catalog import Catalog
-from rosz.idl.layout import ALIGNED, ARRAYS, CODES, OCTETS, Layout, Phase, in_run, size_of
-from rosz.idl.names import Locals, Module
-from rosz.idl.pieces import merge
+from rosz.idl.layout import MAX_ALIGNMENT, Layout, Phase, in_run, join_codes, size_of
+from rosz.idl.names import LocalNames, ModuleNames
 from rosz.idl.spec import Field, FieldType, MessageSpec, element_of
+from rosz.message import ARRAY_CODES, OCTETS, SCALAR_CODES
 
 __all__ = ("Decoder",)
 
 _STAMPED = "std_msgs/msg/Header"
-"""It has a running number in front, which is not sent."""
+"""Its first field is a sequence number that is not sent."""
 
 _HEADER = 256
 _HEADER_SIZE = 4
-_MUCH = 8192
+_LARGE = 8192
 
 
 class Decoder:
-    """The body of one ``_decode``.
+    """Writes the body of one ``_decode``.
 
     Args:
         spec: The message.
-        catalog: Where the types in it are.
-        module: The module that the code will stand in.
+        catalog: Specs of the types in it.
+        module: Names of the module that the code will be part of.
     """
 
-    def __init__(self, spec: MessageSpec, catalog: Catalog, module: Module) -> None:
+    def __init__(self, spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> None:
         self._spec = spec
         self._catalog = catalog
         self._module = module
         self._lines: list[str] = []
         self._indent = ""
-        self._phase = Phase(ALIGNED, -_HEADER_SIZE % ALIGNED)
+        self._phase = Phase(MAX_ALIGNMENT, -_HEADER_SIZE % MAX_ALIGNMENT)
         self._base = ""
         self._constant = 0
         self._run: list[tuple[str, str]] = []
         self._layout: list[str] = []
         self._size = 0
         self._numbers = 0
-        self._memories = 0
-        self._locals = Locals()
+        self._string_lists = 0
+        self._locals = LocalNames()
         self._sliced = False
         self._checked = False
 
@@ -66,16 +66,16 @@ class Decoder:
         self._lines.append(self._indent + line)
 
     def _place(self) -> str:
-        """Name the next field of strings, counted as the encoder counts them."""
-        self._memories += 1
-        return f"{self._spec.name} {self._memories}"
+        """Return a key of the next field of strings, counted as the encoder counts them."""
+        self._string_lists += 1
+        return f"{self._spec.name} {self._string_lists}"
 
     def _fresh(self, prefix: str) -> str:
         self._numbers += 1
         return f"{prefix}{self._numbers}"
 
     def _at(self, more: int = 0) -> str:
-        """Return an expression for the position, or a little behind it."""
+        """Return an expression of the position, plus a number of bytes."""
         constant = self._constant + more
         if not self._base:
             return str(constant)
@@ -99,14 +99,14 @@ class Decoder:
         self._phase = self._phase.plus(padding + size_of(code))
 
     def _flush(self) -> None:
-        """Unpack what has gathered."""
+        """Emit the unpacking of the run."""
         if not self._layout:
             return
         names = [name for _, name in self._run]
         if self._layout == ["B"] and names:
             self._emit(f"{names[0]} = data[{self._at()}]")
         elif names:
-            form = merge(["<", *self._layout])
+            form = join_codes(["<", *self._layout])
             unpack = self._module.define("_u", f'_Struct("{form}").unpack_from')
             where = self._at()
             targets = f"({names[0]},)" if len(names) == 1 else ", ".join(names)
@@ -117,23 +117,23 @@ class Decoder:
         self._run, self._layout, self._size = [], [], 0
 
     def _align(self, alignment: int) -> None:
-        """Move to an alignment that is not known beforehand."""
+        """Advance to an alignment where the padding depends on the position."""
         self._emit(f"p = {self._aligned(alignment)}")
         self._base, self._constant = "p", 0
         self._phase = Phase(alignment, 0)
 
     def _aligned(self, alignment: int) -> str:
-        if alignment == ALIGNED:  # counted from behind the header: 4, 12, 20, …
+        if alignment == MAX_ALIGNMENT:  # counted from behind the header: 4, 12, 20, …
             return f"({self._at(3)} | 7) - 3"
         return f"{self._at(alignment - 1)} & {-alignment}"
 
-    def _sweep(self, start: str, size: str) -> None:
-        """Move behind something whose size is known at run time."""
+    def _skip(self, start: str, size: str) -> None:
+        """Advance behind bytes whose size is known at run time."""
         self._emit(f"p = {start} + {size}" if start != "0" else f"p = {size}")
         self._base, self._constant = "p", 0
         self._sliced = True
 
-    # Fields. Each returns the expression of its value.
+    # Fields: each method returns the expression of a value, or stores it in a local.
 
     def _message(self, spec: MessageSpec) -> str:
         if not spec.fields:
@@ -141,7 +141,7 @@ class Decoder:
         return self._made(spec, [self._field(field) for field in spec.fields])
 
     def _made(self, spec: MessageSpec, values: list[str]) -> str:
-        """Return the expression of a message that has its fields' values."""
+        """Return the expression of a message, by the expressions of its fields."""
         unsent = ["0"] if spec.name == _STAMPED else []
         return f"{self._module.cls(spec.name)}({', '.join(unsent + values)})"
 
@@ -154,7 +154,7 @@ class Decoder:
             self._scalar(f"{kind.size}s", local)
         elif kind.base == "string":
             self._strings(kind, local)
-        elif kind.base in CODES:
+        elif kind.base in SCALAR_CODES:
             self._block(kind, local)
         else:
             self._elements(kind, local)
@@ -169,25 +169,25 @@ class Decoder:
         elif kind.base == "wstring":
             self._wide(kind, local)
         else:
-            self._scalar(CODES[kind.base], local)
+            self._scalar(SCALAR_CODES[kind.base], local)
         return local
 
     def _string(self, kind: FieldType, local: str) -> None:
         count = self._length(kind.bound + 1 if kind.bound else 0)
         start = self._start()
-        self._sweep(start, count)
+        self._skip(start, count)
         self._emit(f"{local} = data[{start} : p - 1].decode()")
         self._phase = Phase(1, 0)
 
     def _wide(self, kind: FieldType, local: str) -> None:
         count = self._length(kind.bound)
         start = self._start()
-        self._sweep(start, f"{count} * 4")
+        self._skip(start, f"{count} * 4")
         self._emit(f"{local} = {self._module.use('read_wide')}(data[{start} : p])")
         self._phase = self._phase.plus_multiple(4)
 
     def _length(self, most: int) -> str:
-        """Read a count or a length, at most so large where that is not 0."""
+        """Read a count or a length, and refuse one above the limit unless that is 0."""
         count = self._fresh("n")
         self._scalar("I", count)
         self._flush()
@@ -196,7 +196,7 @@ class Decoder:
         return count
 
     def _start(self) -> str:
-        """Return the position as an expression that stays valid when ``p`` moves."""
+        """Return an expression of the position that stays valid when ``p`` changes."""
         where = self._at()
         if not self._base:
             return where
@@ -210,7 +210,7 @@ class Decoder:
         return self._length(kind.size if kind.shape == "bounded" else 0)
 
     def _start_of_elements(self, count: str, alignment: int) -> str:
-        """Return where elements start; without elements there is no padding."""
+        """Return an expression of the start of elements; without any there is no padding."""
         padding = self._phase.padding(alignment)
         before = self._phase
         if padding == 0:
@@ -221,33 +221,33 @@ class Decoder:
             self._emit(f"q = {aligned}")
         else:
             self._emit(f"q = {aligned} if {count} else {self._at()}")
-            self._phase = self._phase.meet(before)
+            self._phase = self._phase.common(before)
         return "q"
 
-    def _sweep_elements(self, start: str, count: str, size: int) -> None:
+    def _skip_elements(self, start: str, count: str, size: int) -> None:
         if count.isdigit():
             self._phase = self._phase.plus(int(count) * size)
-            self._sweep(start, str(int(count) * size))
+            self._skip(start, str(int(count) * size))
         else:
             self._phase = self._phase.plus_multiple(size)
-            self._sweep(start, f"{count} * {size}" if size > 1 else count)
+            self._skip(start, f"{count} * {size}" if size > 1 else count)
 
     def _block(self, kind: FieldType, local: str) -> None:
         count = self._count(kind)
-        size = size_of(CODES[kind.base])
+        size = size_of(SCALAR_CODES[kind.base])
         start = self._start_of_elements(count, size)
-        self._sweep_elements(start, count, size)
+        self._skip_elements(start, count, size)
         block = f"data[{start} : p]"
         if kind.base == "bool":
             self._emit(f"{local} = {self._module.use('read_flags')}({block})")
         elif kind.base in OCTETS:
             self._emit(f"{local} = {block}")
         else:
-            code = ARRAYS[kind.base]
+            code = ARRAY_CODES[kind.base]
             small = f'_array("{code}", {block})'
             if not count.isdigit():
                 large = f'{self._module.use("read_block")}("{code}", data, {start}, p)'
-                small += f" if {count} < {_MUCH} else {large}"
+                small += f" if {count} < {_LARGE} else {large}"
             self._emit(f"{local} = {small}")
 
     def _strings(self, kind: FieldType, local: str) -> None:
@@ -283,8 +283,8 @@ class Decoder:
         """Read elements that all have the same layout."""
         alignment = size_of(layout.leaves[0][1]) if layout.leaves else 1
         start = self._start_of_elements(count, alignment)
-        self._sweep_elements(start, count, layout.size)
-        unpack = self._module.define("_i", f'_Struct("{merge([layout.form])}").iter_unpack')
+        self._skip_elements(start, count, layout.size)
+        unpack = self._module.define("_i", f'_Struct("{join_codes([layout.form])}").iter_unpack')
         elements = f"{unpack}(data[{start} : p])"
         if all(len(leaf) == 1 for leaf, _ in layout.leaves):
             self._emit(f"{local} = list(_starmap({self._module.cls(spec.name)}, {elements}))")
@@ -317,7 +317,7 @@ class Decoder:
         self._flush()
         if self._constant:
             self._emit(f"p += {self._constant}")
-        if not self._checked:  # or a count out of the blue keeps the loop busy
+        if not self._checked:  # a damaged count must not keep the loop busy
             self._emit("if p > len(data): raise ValueError")
         self._checked = outside
         self._emit(f"{local}.append({value})")
@@ -326,13 +326,13 @@ class Decoder:
         self._sliced = True
 
     def _steady(self, kind: FieldType) -> Phase:
-        """Find what is known at the head of a loop: both at first and after any element."""
+        """Return what is known at the head of a loop, before the first and after any element."""
         phase = self._phase
         while True:
-            trial = Decoder(self._spec, self._catalog, Module([]))
+            trial = Decoder(self._spec, self._catalog, ModuleNames([]))
             trial._base, trial._phase = "p", phase
             trial._one(element_of(kind), "e")
-            met = phase.meet(trial._phase)
+            met = phase.common(trial._phase)
             if met == phase:
                 return phase
             phase = met

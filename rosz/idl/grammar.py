@@ -1,9 +1,9 @@
 """The grammar of .msg, .srv and .action texts, ROS 1's and ROS 2's together.
 
 A line is blank, a comment, a constant ``TYPE NAME=VALUE``, or a field ``TYPE NAME [DEFAULT]``.
-Names of types are resolved here as far as one text allows: ``time``, ``duration`` and ``Header``
-stand for the types they mean, and a bare name for one of the same package. Whether they exist is
-the catalog's business.
+Type names are resolved as far as one text allows: ``time``, ``duration`` and ``Header`` stand for
+the types they mean, and a bare name for a type of the same package. The catalog checks that the
+types exist.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import re
 from typing import NoReturn
 
 from rosz.errors import DefinitionError
-from rosz.idl.literals import LiteralError, read_constant, read_default
 from rosz.idl.spec import (
     PRIMITIVES,
     ActionSpec,
@@ -20,11 +19,17 @@ from rosz.idl.spec import (
     Field,
     FieldType,
     MessageSpec,
+    Scalar,
     ServiceSpec,
     Shape,
+    Value,
 )
 
-__all__ = ("parse_action", "parse_message", "parse_service")
+__all__ = (
+    "parse_action",
+    "parse_message",
+    "parse_service",
+)
 
 _TYPE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
@@ -33,6 +38,19 @@ _DIGITS = re.compile(r"[0-9]+", re.ASCII)
 _BLANK = re.compile(r"[ \t]*")
 _SEPARATOR = "---"
 _MOST = (1 << 32) - 1
+_INTEGER = re.compile(r"[+-]?(?:0[xX][0-9a-fA-F]+|0[bB][01]+|0[oO][0-7]+|[0-9]+)")
+_FLOAT = re.compile(
+    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?|nan)", re.IGNORECASE
+)
+_QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
+_BARE = re.compile(r"[^\s,\]#]+")
+_BARE_TEXT = re.compile(r"[^#]*[^#\s]")
+_ESCAPE = re.compile(r"\\(?:u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|(.))")
+_ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "a": "\a", "b": "\b", "f": "\f", "v": "\v"}
+_BOOLEANS = {"true": True, "false": False, "1": True, "0": False}
+_RANGES = {f"int{n}": (-(1 << (n - 1)), (1 << (n - 1)) - 1) for n in (8, 16, 32, 64)}
+_RANGES |= {f"uint{n}": (0, (1 << n) - 1) for n in (8, 16, 32, 64)}
+_RANGES |= {"byte": (-0x80, 0xFF), "char": (0, 0xFF)}
 
 _MEANING = {
     "time": "builtin_interfaces/msg/Time",
@@ -48,7 +66,7 @@ def parse_message(name: str, text: str, path: str = "<string>") -> MessageSpec:
     Args:
         name: Full name of the type, ``std_msgs/msg/String``.
         text: The definition.
-        path: Where it was read, for errors.
+        path: Path that it was read from, for errors.
 
     Raises:
         DefinitionError: The text does not follow the grammar.
@@ -71,7 +89,7 @@ def parse_service(name: str, text: str, path: str = "<string>") -> ServiceSpec:
     Args:
         name: Full name of the type, ``std_srvs/srv/SetBool``.
         text: The definition.
-        path: Where it was read, for errors.
+        path: Path that it was read from, for errors.
 
     Raises:
         DefinitionError: The text does not follow the grammar.
@@ -88,7 +106,7 @@ def parse_action(name: str, text: str, path: str = "<string>") -> ActionSpec:
     Args:
         name: Full name of the type, ``example_interfaces/action/Fibonacci``.
         text: The definition.
-        path: Where it was read, for errors.
+        path: Path that it was read from, for errors.
 
     Raises:
         DefinitionError: The text does not follow the grammar.
@@ -115,7 +133,7 @@ def _split(
             found[-1][1].append(line)
             continue
         if len(found) > separators:
-            raise DefinitionError(f"one '---' too many; {what} has {parts}", path, number, 1)
+            raise DefinitionError(f"one '---' too many: {what} has {parts}", path, number, 1)
         found.append((number + 1, []))
     if len(found) <= separators:
         last = len(found[-1][1]) + found[-1][0] - 1
@@ -133,7 +151,7 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
             continue
         if parsed.name in taken:
             raise DefinitionError(
-                f"'{parsed.name}' is declared already, in line {taken[parsed.name]}",
+                f"'{parsed.name}' is already declared in line {taken[parsed.name]}",
                 path,
                 number,
                 _name_column(line, parsed.name),
@@ -153,7 +171,7 @@ def _name_column(line: str, name: str) -> int:
 
 
 class _Line:
-    """One line and how far it has been read."""
+    """One line, and the offset up to which it has been read."""
 
     def __init__(self, text: str, number: int, path: str, package: str) -> None:
         self._text = text
@@ -167,14 +185,14 @@ class _Line:
         raise DefinitionError(reason, self._path, self._number, column)
 
     def _skip(self) -> bool:
-        """Skip blanks; tell whether there were any."""
+        """Skip blanks, and return whether there were any."""
         before = self._at
         match = _BLANK.match(self._text, before)
         self._at = match.end() if match else before
         return self._at > before
 
     def _done(self) -> bool:
-        """Tell whether nothing but a comment is left."""
+        """Return whether nothing but a comment is left."""
         return self._at >= len(self._text) or self._text[self._at] == "#"
 
     def _rest(self) -> str:
@@ -296,12 +314,12 @@ class _Line:
     def _constant(self, kind: FieldType, name: str, column: int) -> Constant:
         if not kind.primitive or kind.shape != "one":
             self._fail(
-                f"a constant has a primitive type; '{kind.written}{kind.suffix}' is none",
+                f"a constant has a primitive type; '{kind.written}{kind.suffix}' is not one",
                 column - 1,
             )
         try:
-            value, text = read_constant(kind.base, self._text, self._at + 1)
-        except LiteralError as error:
+            value, text = _read_constant(kind.base, self._text, self._at + 1)
+        except _LiteralError as error:
             self._fail(str(error), error.offset)
         return Constant(name, kind.base, value, text)
 
@@ -313,10 +331,180 @@ class _Line:
                 f"only fields of primitive types have defaults; '{kind.written}' is a message"
             )
         try:
-            value, self._at = read_default(kind, self._text, self._at)
-        except LiteralError as error:
+            value, self._at = _read_default(kind, self._text, self._at)
+        except _LiteralError as error:
             self._fail(str(error), error.offset)
         self._skip()
         if not self._done():
             self._fail(f"expected the end of the line after the default, got '{self._rest()}'")
         return value
+
+
+class _LiteralError(Exception):
+    """A value that does not fit its type; it becomes a DefinitionError with a place.
+
+    Attributes:
+        offset: Offset of the value in the line.
+    """
+
+    def __init__(self, offset: int, reason: str) -> None:
+        self.offset = offset
+        super().__init__(reason)
+
+
+class _RangeError(_LiteralError):
+    """A number of the right kind that is too large or too small."""
+
+
+def _read_constant(kind: str, line: str, start: int) -> tuple[Scalar, str]:
+    """Read the value of a constant: what is right of its ``=``.
+
+    Args:
+        kind: Name of the constant's type.
+        line: The whole line.
+        start: Offset of the value.
+
+    Returns:
+        The value, and its text, which ROS 1 hashes.
+
+    Raises:
+        _LiteralError: The text is not a value of the type.
+    """
+    if kind in ("string", "wstring"):
+        # ROS 1 takes the rest of the line, quotes and # included; ROS 2 quotes its strings.
+        text = line[start:].strip()
+        quoted = _QUOTED.match(text)
+        if quoted and (quoted.end() == len(text) or text[quoted.end() :].lstrip().startswith("#")):
+            return _unquote(quoted[0]), text
+        return text, text
+    text = line[start:].partition("#")[0]
+    lead = len(text) - len(text.lstrip())
+    text = text.strip()
+    return _scalar(kind, text, start + lead), text
+
+
+def _read_default(field: FieldType, line: str, start: int) -> tuple[Value, int]:
+    """Read the default of a field.
+
+    Returns:
+        The value, and the offset of its end.
+
+    Raises:
+        _LiteralError: The text is not a value of the type.
+    """
+    if field.shape != "one":
+        return _list(field, line, start)
+    if field.base in ("string", "wstring"):
+        value, end = _text(line, start, _BARE_TEXT)
+        _check_bound(field, value, start)
+        return value, end
+    bare = _BARE.match(line, start)
+    if bare is None:
+        raise _LiteralError(start, f"expected a default of type {field.base}")
+    try:
+        return _scalar(field.base, bare[0], start), bare.end()
+    except _RangeError:
+        raise
+    except _LiteralError as error:
+        reason = f"expected a default of type {field.base}, or a comment after '#', got '{bare[0]}'"
+        raise _LiteralError(start, reason) from error
+
+
+def _list(field: FieldType, line: str, start: int) -> tuple[Value, int]:
+    if not line.startswith("[", start):
+        raise _LiteralError(
+            start, f"expected a list '[…]' as default of an array, got '{line[start:].strip()}'"
+        )
+    values: list[Scalar] = []
+    at = _skip(line, start + 1)
+    while not line.startswith("]", at):
+        if values:
+            if not line.startswith(",", at):
+                _unclosed(line, start, at)
+            at = _skip(line, at + 1)
+        value, end = _element(field, line, at)
+        values.append(value)
+        at = _skip(line, end)
+    if field.shape == "fixed" and len(values) != field.size:
+        raise _LiteralError(start, f"expected {field.size} elements, got {len(values)}")
+    if field.shape == "bounded" and len(values) > field.size:
+        raise _LiteralError(start, f"expected at most {field.size} elements, got {len(values)}")
+    return tuple(values), at + 1
+
+
+def _unclosed(line: str, start: int, at: int) -> NoReturn:
+    if at >= len(line) or line[at] == "#":
+        raise _LiteralError(start, "the list is not closed; expected ']'")
+    raise _LiteralError(at, f"expected ',' or ']' in the list, got '{line[at]}'")
+
+
+def _element(field: FieldType, line: str, at: int) -> tuple[Scalar, int]:
+    if field.base in ("string", "wstring"):
+        value, end = _text(line, at, _BARE)
+        _check_bound(field, value, at)
+        return value, end
+    bare = _BARE.match(line, at)
+    if bare is None:
+        if at >= len(line) or line[at] == "#":
+            raise _LiteralError(at, "the list is not closed; expected ']'")
+        raise _LiteralError(at, f"expected a value of type {field.base}, got '{line[at]}'")
+    return _scalar(field.base, bare[0], at), bare.end()
+
+
+def _text(line: str, at: int, bare: re.Pattern[str]) -> tuple[str, int]:
+    if line[at : at + 1] in ("'", '"'):
+        quoted = _QUOTED.match(line, at)
+        if quoted is None:
+            raise _LiteralError(at, f"the string is not closed; expected {line[at]}")
+        return _unquote(quoted[0]), quoted.end()
+    plain = bare.match(line, at)
+    if plain is None:
+        raise _LiteralError(at, "expected a string")
+    return plain[0], plain.end()
+
+
+def _check_bound(field: FieldType, value: str, at: int) -> None:
+    if field.bound and len(value.encode()) > field.bound:
+        raise _LiteralError(at, f"'{value}' is longer than the {field.bound} bytes of its type")
+
+
+def _unquote(text: str) -> str:
+    def replace(escape: re.Match[str]) -> str:
+        code = escape[1] or escape[2]
+        return chr(int(code, 16)) if code else _ESCAPED.get(escape[3], escape[3])
+
+    return _ESCAPE.sub(replace, text[1:-1])
+
+
+def _skip(line: str, at: int) -> int:
+    while line[at : at + 1] in (" ", "\t"):
+        at += 1
+    return at
+
+
+def _scalar(kind: str, text: str, at: int) -> Scalar:
+    if not text:
+        raise _LiteralError(at, f"expected a value of type {kind}")
+    if kind == "bool":
+        if text.lower() not in _BOOLEANS:
+            raise _LiteralError(at, f"expected true or false, got '{text}'")
+        return _BOOLEANS[text.lower()]
+    if kind in ("float32", "float64"):
+        if _INTEGER.fullmatch(text):
+            return float(_integer(text))
+        if not _FLOAT.fullmatch(text):
+            raise _LiteralError(at, f"expected a number of type {kind}, got '{text}'")
+        return float(text)
+    if not _INTEGER.fullmatch(text):
+        raise _LiteralError(at, f"expected an integer of type {kind}, got '{text}'")
+    value = _integer(text)
+    low, high = _RANGES[kind]
+    if not low <= value <= high:
+        raise _RangeError(at, f"{text} is outside the range of {kind} ({low} to {high})")
+    return value
+
+
+def _integer(text: str) -> int:
+    digits = text.lstrip("+-")
+    base = {"x": 16, "b": 2, "o": 8}.get(digits[1:2].lower(), 10)
+    return int(text, base)

@@ -1,8 +1,8 @@
-"""What is known about offsets when code is generated.
+"""What the code generator knows about offsets and layouts.
 
 XCDR1 aligns a primitive to its own size, at most 8, counted from the first byte after the header. A
-:class:`Phase` is what is known about an offset modulo a power of two; behind a string little is
-known, behind an aligned double all that matters.
+:class:`Phase` is what is known about an offset modulo a power of two: little behind a string,
+everything behind an aligned double.
 """
 
 from __future__ import annotations
@@ -14,28 +14,12 @@ import msgspec
 
 from rosz.idl.catalog import Catalog
 from rosz.idl.spec import FieldType, MessageSpec
+from rosz.message import OCTETS, SCALAR_CODES
 
-__all__ = ("ALIGNED", "ARRAYS", "CODES", "OCTETS", "Layout", "Phase", "in_run", "size_of", "widest")
+__all__ = ("MAX_ALIGNMENT", "Layout", "Phase", "in_run", "join_codes", "size_of", "widest")
 
-CODES = {
-    "bool": "?",
-    "byte": "B",
-    "char": "B",
-    "int8": "b",
-    "uint8": "B",
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-    "float32": "f",
-    "float64": "d",
-}
-OCTETS = frozenset({"byte", "char", "uint8"})
-ARRAYS = {kind: code for kind, code in CODES.items() if kind not in OCTETS and kind != "bool"}
-ALIGNED = 8
-"""What alignments repeat after."""
+MAX_ALIGNMENT = 8
+"""The largest alignment; what is known of an offset repeats after it."""
 
 _SHORT = 64
 
@@ -43,7 +27,7 @@ Leaf: TypeAlias = tuple[tuple[str, ...], str]
 
 
 def size_of(code: str) -> int:
-    """Return the size in bytes of one primitive, which is its alignment too."""
+    """Return the size of a primitive in bytes, which is also its alignment."""
     return struct.calcsize("<" + code)
 
 
@@ -54,11 +38,11 @@ class Phase(msgspec.Struct, frozen=True):
     rest: int
 
     def padding(self, alignment: int) -> int | None:
-        """Return the padding to an alignment, or None where it is only known at run time."""
+        """Return the padding to an alignment; None where only the run time knows it."""
         return -self.rest % alignment if alignment <= self.modulus else None
 
     def plus(self, size: int) -> Phase:
-        """Return the phase so many bytes on."""
+        """Return the phase a number of bytes later."""
         return Phase(self.modulus, (self.rest + size) % self.modulus)
 
     def aligned(self, alignment: int) -> Phase:
@@ -71,8 +55,8 @@ class Phase(msgspec.Struct, frozen=True):
         modulus = min(self.modulus, size & -size)
         return Phase(modulus, self.rest % modulus)
 
-    def meet(self, other: Phase) -> Phase:
-        """Return what is known when either may be the case."""
+    def common(self, other: Phase) -> Phase:
+        """Return what is known when either phase may be true."""
         modulus = min(self.modulus, other.modulus)
         while (self.rest - other.rest) % modulus:
             modulus //= 2
@@ -80,12 +64,12 @@ class Phase(msgspec.Struct, frozen=True):
 
 
 class Layout(msgspec.Struct, frozen=True):
-    """How elements of a sequence lie that all look alike.
+    """The layout of the elements of a sequence that all have the same one.
 
     Attributes:
-        leaves: The primitives in an element: the attributes that lead to it, and its code.
-        form: Format of one element.
-        size: Bytes of one element.
+        leaves: The primitives of an element, each as its attribute path and its struct code.
+        form: Struct format of one element.
+        size: Size of one element in bytes.
     """
 
     leaves: tuple[Leaf, ...]
@@ -94,15 +78,12 @@ class Layout(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, spec: MessageSpec, catalog: Catalog, start: Phase) -> Layout | None:
-        """Lay out a message.
+        """Return the layout of a message, or None where elements differ in size or padding.
 
         Args:
             spec: The message.
-            catalog: Where the types in it are.
-            start: What is known about the offset of the first element.
-
-        Returns:
-            None where elements differ in size or padding.
+            catalog: Specs of the types in it.
+            start: Phase of the first element.
         """
         leaves = _leaves(spec, catalog, ())
         if leaves is None:
@@ -132,7 +113,7 @@ def _leaves(spec: MessageSpec, catalog: Catalog, path: tuple[str, ...]) -> list[
         if kind.shape != "one" or kind.base in ("string", "wstring"):
             return None
         if kind.primitive:
-            leaves.append(((*path, field.name), CODES[kind.base]))
+            leaves.append(((*path, field.name), SCALAR_CODES[kind.base]))
             continue
         below = _leaves(catalog.message(kind.base), catalog, (*path, field.name))
         if not below:
@@ -148,13 +129,31 @@ def widest(spec: MessageSpec, catalog: Catalog) -> int:
         kind = field.type
         if kind.counted or kind.base in ("string", "wstring"):
             largest = max(largest, 4)
-        if kind.base in CODES:
-            largest = max(largest, size_of(CODES[kind.base]))
+        if kind.base in SCALAR_CODES:
+            largest = max(largest, size_of(SCALAR_CODES[kind.base]))
         elif not kind.primitive:
             largest = max(largest, widest(catalog.message(kind.base), catalog))
     return largest
 
 
 def in_run(kind: FieldType) -> bool:
-    """Tell whether a field is a short block of octets that one ``struct`` code holds."""
+    """Return whether a field is a short array of octets, which one struct code holds."""
     return kind.shape == "fixed" and kind.base in OCTETS and kind.size <= _SHORT
+
+
+def join_codes(layout: list[str]) -> str:
+    """Return a format with equal neighbours as a count: ``<ddd`` becomes ``<3d``."""
+    merged: list[tuple[int, str]] = []
+    for part in layout:
+        number = ""
+        for character in part:
+            if character.isdigit():
+                number += character
+                continue
+            count = int(number or 1)
+            number = ""
+            if merged and merged[-1][1] == character and character not in "sx<":
+                merged[-1] = (merged[-1][0] + count, character)
+            else:
+                merged.append((count, character))
+    return "".join(c if n == 1 and c != "s" else f"{n}{c}" for n, c in merged)

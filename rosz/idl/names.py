@@ -1,4 +1,4 @@
-"""Names in generated modules: of attributes, classes, variables, module-level values."""
+"""Names in generated modules: attributes, classes, variables, module-level values."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import re
 
 from rosz.idl.spec import FieldType
 
-__all__ = ("Locals", "Module", "attribute", "class_name", "module_of")
+__all__ = ("LocalNames", "ModuleNames", "attribute", "class_name")
 
 
 _RESERVED = re.compile(r"[befhkmnpq][0-9]*")
-"""What generated code calls its own variables."""
+"""Names that generated code uses for its own variables."""
 
 
 def attribute(name: str) -> str:
-    """Return the attribute of a field or constant: its name, or ``name_`` for Python's words."""
+    """Return the attribute of a field or constant; a keyword of Python gets a ``_``."""
     return f"{name}_" if keyword.iskeyword(name) else name
 
 
 def class_name(name: str) -> str:
-    """Return the class of a full type name: ``Twist``, ``SetBoolRequest``, ``SetBool``."""
+    """Return the class name of a full type name: ``Twist``, ``SetBoolRequest``, ``SetBool``."""
     _, kind, base = name.split("/")
     for part in ("Request", "Response"):
         if kind == "srv" and base.endswith(f"_{part}"):
@@ -29,24 +29,18 @@ def class_name(name: str) -> str:
     return attribute(base)
 
 
-def module_of(name: str) -> tuple[str, str]:
-    """Return package and kind (``msg`` or ``srv``) of a full type name."""
-    package, kind, _ = name.split("/")
-    return package, kind
-
-
-class Locals:
-    """Names of local variables in one generated function, short and distinct."""
+class LocalNames:
+    """Names of the local variables in one generated function, short and distinct."""
 
     def __init__(self) -> None:
         self._taken = {*dir(builtins), *keyword.kwlist, *keyword.softkwlist, "data", "m", "out"}
 
     def name(self, base: str) -> str:
-        """Return a name like that of a field."""
+        """Return a new name that resembles the name of a field."""
         name = base
         number = 1
         while name in self._taken or name[0].isupper() or _RESERVED.fullmatch(name):
-            if name[0].isupper():  # might be a class
+            if name[0].isupper():  # classes have such names
                 base = name = f"the_{base}"
                 continue
             number += 1
@@ -55,8 +49,8 @@ class Locals:
         return name
 
 
-class Module:
-    """What a generated module defines and imports besides its classes.
+class ModuleNames:
+    """The names that a generated module imports and defines, besides its own classes.
 
     Args:
         own: Full names of the types whose classes the module defines.
@@ -72,11 +66,11 @@ class Module:
 
     @property
     def imports(self) -> dict[str, str]:
-        """Classes of other modules: full name to the name it has here."""
+        """Classes of other modules, from full type name to name in this module."""
         return dict(self._imports)
 
     def cls(self, name: str) -> str:
-        """Return the name that a message class has in this module."""
+        """Return the name of a message class in this module."""
         plain = class_name(name)
         if self._own.get(plain) == name:
             return plain
@@ -86,12 +80,12 @@ class Module:
         return self._imports[name]
 
     def use(self, name: str) -> str:
-        """Import a name of ``rosz.message.runtime``; return how it is called here."""
+        """Import a name of ``rosz.message.runtime``, and return its name in this module."""
         self.runtime.add(name)
         return f"_{name}"
 
     def define(self, prefix: str, value: str) -> str:
-        """Return the name of a module-level value, defining it at its first use."""
+        """Return the name of a module-level value, defined at its first use."""
         if value not in self._defined:
             number = sum(name.startswith(prefix) for name in self._defined.values()) + 1
             self._defined[value] = f"{prefix}{number}"
@@ -99,7 +93,7 @@ class Module:
         return self._defined[value]
 
     def string_list(self, kind: FieldType, place: str) -> str:
-        """Define the memory of one field of strings, shared by its two codecs; return its name."""
+        """Return the name of the StringList of a field, which its encoder and decoder share."""
         if place not in self._lists:
             limits = []
             if kind.shape == "fixed":
@@ -113,6 +107,6 @@ class Module:
         return self._lists[place]
 
     def fresh(self) -> list[str]:
-        """Return the definitions made since the last call."""
+        """Return the definitions that are new since the last call."""
         lines, self._fresh = self._fresh, []
         return lines

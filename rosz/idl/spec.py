@@ -1,4 +1,4 @@
-"""What a definition says, free of its text's form."""
+"""Specs: the content of definitions, independent of how their text is written."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class FieldType(msgspec.Struct, frozen=True):
     """Type of a field.
 
     Attributes:
-        base: A primitive, or the full name of a message type (``geometry_msgs/msg/Point``).
-        bound: Most units of a bounded string, 0 where there is no bound.
+        base: Primitive type, or full name of a message type (``geometry_msgs/msg/Point``).
+        bound: Largest length of a bounded string; 0 for no bound.
         shape: One value, a fixed array, a bounded or an unbounded sequence.
-        size: Elements of a fixed array, most elements of a bounded sequence.
-        written: The type as the text has it, without the array part.
+        size: Number of elements of a fixed array; largest number of a bounded sequence.
+        written: The type as the text spells it, without the array part.
     """
 
     base: str
@@ -64,7 +64,7 @@ class FieldType(msgspec.Struct, frozen=True):
 
     @property
     def primitive(self) -> bool:
-        """Whether it is made of primitives, not of messages."""
+        """Whether the base is a primitive type, not a message type."""
         return self.base in PRIMITIVES
 
     @property
@@ -74,7 +74,7 @@ class FieldType(msgspec.Struct, frozen=True):
 
     @property
     def suffix(self) -> str:
-        """The array part as a definition spells it."""
+        """The array part as a definition spells it, such as ``[3]``."""
         if self.shape == "one":
             return ""
         return {"fixed": f"[{self.size}]", "bounded": f"[<={self.size}]"}.get(self.shape, "[]")
@@ -89,11 +89,11 @@ class Field(msgspec.Struct, frozen=True):
     """A field of a message.
 
     Attributes:
-        name: Its name on the wire's side.
-        type: Its type.
-        default: Its default where the text gives one.
-        line: Line of the text, 1-based.
-        column: Column of the type in it, 1-based.
+        name: Name of the field.
+        type: Type of the field.
+        default: Default value, if the text has one.
+        line: Line of the text, from 1.
+        column: Column of the type in that line, from 1.
     """
 
     name: str
@@ -107,10 +107,10 @@ class Constant(msgspec.Struct, frozen=True):
     """A constant of a message.
 
     Attributes:
-        name: Its name.
-        type: A primitive.
-        value: Its value.
-        text: The value as the text has it, which ROS 1's hash is made of.
+        name: Name of the constant.
+        type: Primitive type.
+        value: Value.
+        text: The value as the text spells it, which ROS 1 hashes.
     """
 
     name: str
@@ -124,10 +124,10 @@ class MessageSpec(msgspec.Struct, frozen=True):
 
     Attributes:
         name: Full name, ``std_msgs/msg/String`` or ``std_srvs/srv/SetBool_Request``.
-        fields: In the order of the wire.
-        constants: In the order of the text.
-        text: The definition.
-        path: Where it was read.
+        fields: Fields in the order of the text, which is that of the wire.
+        constants: Constants in the order of the text.
+        text: Text of the definition.
+        path: Path that it was read from.
     """
 
     name: str
@@ -138,7 +138,7 @@ class MessageSpec(msgspec.Struct, frozen=True):
 
 
 class ServiceSpec(msgspec.Struct, frozen=True):
-    """A service definition: two messages, the text of both, and where it was read."""
+    """A service definition: its two messages, their text, and the path it was read from."""
 
     name: str
     request: MessageSpec
@@ -148,7 +148,7 @@ class ServiceSpec(msgspec.Struct, frozen=True):
 
 
 class ActionSpec(msgspec.Struct, frozen=True):
-    """An action definition: three messages, their text, and where it was read."""
+    """An action definition: its three messages, their text, and the path it was read from."""
 
     name: str
     goal: MessageSpec

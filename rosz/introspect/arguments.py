@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from rosz.errors import EncodeError, NotFoundError, UsageError, YamlError
-from rosz.message.fill import fill_message_args
-from rosz.message.schema import slots
+from rosz.message import slots
+from rosz.message.convert import fill_message_args
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.params.nodes import read_plain
 from rosz.time import DurationValue, TimeValue

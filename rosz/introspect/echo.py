@@ -15,7 +15,7 @@ import msgspec
 
 from rosz.introspect.fields import FieldPath, Filter
 from rosz.message import Message
-from rosz.message.values import to_jsonable
+from rosz.message.convert import to_jsonable
 from rosz.time import DurationValue, TimeValue
 
 __all__ = ("Echo", "EchoOptions", "dump_bytes")
@@ -96,7 +96,7 @@ class Echo:
         return self._yaml(value)
 
     def _yaml(self, value: Any) -> str:
-        from rosz.message.text import strify_message
+        from rosz.message.convert import strify_message
 
         offset = None
         if self._options.offset:

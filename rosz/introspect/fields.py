@@ -15,8 +15,7 @@ from typing import Any
 import msgspec
 
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
-from rosz.message import Message
-from rosz.message.schema import Slot, slot_type, slots
+from rosz.message import Message, Slot, slot_type, slots
 from rosz.names import short_type
 
 __all__ = ("FieldPath", "Filter", "Target", "find_target")

@@ -95,7 +95,7 @@ class Suggestions:
 
     def fields(self, word: str) -> list[str]:
         """Return the fields of a topic that a word names, with a part of a field or without."""
-        from rosz.message.schema import slots
+        from rosz.message import slots
 
         survey = self._survey()
         for topic, types in ({} if survey is None else survey.view.topics()).items():

@@ -1,17 +1,20 @@
-"""What every message and service class is built on.
+"""Base classes of messages and services, and the schema by which a class describes its fields.
 
 A generated class holds only what differs from type to type: fields, constants, names, hashes, its
-definition, and its codec as straight-line code. The rest is derived here from the class's schema,
+definition, and its codec as straight-line code. The rest is derived here from the class's schema
 when it is asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
+from struct import calcsize
 from typing import (
     Any,
     ClassVar,
     Generic,
+    Literal,
     Protocol,
     Self,
     SupportsIndex,
@@ -22,9 +25,136 @@ from typing import (
 
 import msgspec
 
-from rosz.message.schema import Schema, rclpy_type, slot_type, slots
+__all__ = (
+    "ARRAY_CODES",
+    "OCTETS",
+    "SCALAR_CODES",
+    "SCALAR_SIZES",
+    "Array",
+    "Bytes",
+    "Message",
+    "Schema",
+    "Sequenced",
+    "Service",
+    "Slot",
+    "Writable",
+    "rclpy_type",
+    "slot_type",
+    "slots",
+)
 
-__all__ = ("Array", "Bytes", "Message", "Sequenced", "Service", "Writable")
+Schema: TypeAlias = tuple[tuple[str, "str | type[Any]", str], ...]
+"""Fields as (attribute, type, array suffix): a primitive such as ``string<=8`` or a message class,
+and ``""``, ``"[]"``, ``"[36]"`` or ``"[<=3]"``."""
+
+SCALAR_CODES = {
+    "bool": "?",
+    "byte": "B",
+    "char": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+}
+"""Codes of the ``struct`` module for the primitive types of fixed size."""
+
+SCALAR_SIZES = {name: calcsize(f"<{code}") for name, code in SCALAR_CODES.items()}
+"""Sizes of these types in bytes, which are their alignments too."""
+
+OCTETS = frozenset({"byte", "char", "uint8"})
+"""Types whose sequences are ``bytes``."""
+
+ARRAY_CODES = {
+    name: code for name, code in SCALAR_CODES.items() if name not in OCTETS and name != "bool"
+}
+"""Type codes of the ``array`` module for types whose sequences are arrays."""
+
+_RCLPY = {
+    "bool": "boolean",
+    "byte": "octet",
+    "char": "uint8",
+    "float32": "float",
+    "float64": "double",
+}
+_STAMPS = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
+
+
+class Slot(msgspec.Struct, frozen=True):
+    """One field.
+
+    Attributes:
+        name: Attribute of the class.
+        kind: Message class, or name of a primitive type.
+        bound: Largest length of a bounded string in bytes; 0 for no bound.
+        shape: One value, a fixed array, a bounded or an unbounded sequence.
+        size: Number of elements of a fixed array; largest number of a bounded sequence.
+    """
+
+    name: str
+    kind: type[Any] | str
+    bound: int
+    shape: Literal["one", "fixed", "bounded", "sequence"]
+    size: int
+
+    @property
+    def counted(self) -> bool:
+        """Whether the number of elements is on the wire."""
+        return self.shape in ("bounded", "sequence")
+
+
+def slots(cls: Any) -> tuple[Slot, ...]:
+    """Return the fields of a message class in the order of the wire."""
+    return _slots(cls)
+
+
+@lru_cache(maxsize=4096)
+def _slots(cls: Any) -> tuple[Slot, ...]:
+    return tuple(_slot(*entry) for entry in cls._schema)
+
+
+def _slot(name: str, kind: str | type[Any], suffix: str) -> Slot:
+    bound = 0
+    if isinstance(kind, str) and "<=" in kind:
+        kind, _, limit = kind.partition("<=")
+        bound = int(limit)
+    inside = suffix[1:-1]
+    if not suffix:
+        return Slot(name, kind, bound, "one", 0)
+    if not inside:
+        return Slot(name, kind, bound, "sequence", 0)
+    if inside.startswith("<="):
+        return Slot(name, kind, bound, "bounded", int(inside[2:]))
+    return Slot(name, kind, bound, "fixed", int(inside))
+
+
+def slot_type(slot: Slot) -> str:
+    """Return the type of a field as ROS 1 spells it, such as ``geometry_msgs/Point[]``."""
+    if isinstance(slot.kind, str):
+        base = slot.kind + (f"<={slot.bound}" if slot.bound else "")
+    else:
+        base = _STAMPS.get(slot.kind._type, slot.kind._type)
+    suffix = {"one": "", "fixed": f"[{slot.size}]", "bounded": f"[<={slot.size}]", "sequence": "[]"}
+    return base + suffix[slot.shape]
+
+
+def rclpy_type(slot: Slot) -> str:
+    """Return the type of a field as rclpy spells it, such as ``sequence<double>``."""
+    if isinstance(slot.kind, str):
+        base = _RCLPY.get(slot.kind, slot.kind) + (f"<{slot.bound}>" if slot.bound else "")
+    else:
+        base = slot.kind._type
+    if slot.shape == "fixed":
+        return f"{base}[{slot.size}]"
+    if slot.shape == "bounded":
+        return f"sequence<{base}, {slot.size}>"
+    return f"sequence<{base}>" if slot.shape == "sequence" else base
+
 
 _T = TypeVar("_T")
 
@@ -32,7 +162,7 @@ _RULE = "=" * 80
 
 
 class Array(Protocol[_T]):
-    """What a numeric sequence may be: a list, an ``array.array``, a numpy array."""
+    """A numeric sequence: a list, an ``array.array`` or a numpy array."""
 
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[_T]: ...
@@ -44,18 +174,18 @@ class Array(Protocol[_T]):
 
 
 Bytes: TypeAlias = bytes | bytearray | memoryview | Array[int]
-"""What a sequence of octets may be; decoding gives ``bytes``."""
+"""A sequence of octets; decoding gives ``bytes``."""
 
 
 class Writable(Protocol):
-    """What :meth:`Message.serialize` writes to."""
+    """A stream that :meth:`Message.serialize` writes to."""
 
     def write(self, data: bytes, /) -> object:
-        """Take bytes."""
+        """Write bytes."""
 
 
 class _Derived(Generic[_T]):
-    """An attribute of a class that is computed from it at each access."""
+    """A class attribute that is computed from the class at each access."""
 
     def __init__(self, compute: Callable[[type[Any]], _T]) -> None:
         self._compute = compute
@@ -83,7 +213,7 @@ def _full_text(cls: type[Message | Service]) -> str:
 
 
 def _below(cls: type[Message | Service]) -> list[type[Message]]:
-    """List the message types that a definition needs, each once, as genmsg orders them."""
+    """Return the message types in a definition, each once, in genmsg's order."""
     tops = (cls.Request, cls.Response) if issubclass(cls, Service) else (cls,)
     found: dict[type[Message], None] = {}
     rest = [kind for top in tops for _, kind, _ in top._schema if isinstance(kind, type)]
@@ -98,18 +228,18 @@ def _below(cls: type[Message | Service]) -> list[type[Message]]:
 class Message(msgspec.Struct, gc=False):
     """Base of all message classes.
 
-    Construction takes fields by position or name; missing ones have their defaults. Instances
-    compare by value, copy and pickle.
+    Fields are given by position or name; missing ones get their defaults. Instances are compared by
+    value, and can be copied and pickled.
 
     Attributes:
         _type: ROS 1 name, ``geometry_msgs/Twist``.
         _type_name: ROS 2 name, ``geometry_msgs/msg/Twist``.
         _type_hash: RIHS01 hash, part of the key that the type is published under.
         _md5sum: Hash that ROS 1 identifies the definition by.
-        _text: The definition.
-        _full_text: The definition, followed by those of all types in it, as ROS 1 bags hold it.
+        _text: Text of the definition.
+        _full_text: Text of the definition and of all types in it, as ROS 1 bags hold it.
         _slot_types: ROS 1 types of the fields, in the order of ``__slots__``.
-        _has_header: Whether the first field is a ``std_msgs/Header`` called header.
+        _has_header: Whether the first field is a ``std_msgs/Header`` named header.
     """
 
     _type: ClassVar[str] = ""
@@ -140,7 +270,7 @@ class Message(msgspec.Struct, gc=False):
         """Return the message as XCDR1 little-endian bytes, with the 4-byte header.
 
         Raises:
-            EncodeError: A value does not fit its field; it names type, field, value and reason.
+            EncodeError: A value does not fit its field; the error names type, field and value.
         """
         return self._encode(self)
 
@@ -149,14 +279,14 @@ class Message(msgspec.Struct, gc=False):
         """Return the message in CDR bytes of either byte order.
 
         Raises:
-            DecodeError: The bytes are no message of this type; it tells where and why.
+            DecodeError: The bytes are not a message of this type; the error says where and why.
         """
         message: Self = cls._decode(data if type(data) is bytes else bytes(data))
         return message
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
-        """Return names and types of the fields, spelled as rclpy does."""
+        """Return the types of the fields by name, as rclpy spells them."""
         return {slot.name: rclpy_type(slot) for slot in slots(cls)}
 
     def serialize(self, buff: Writable) -> None:
@@ -171,7 +301,7 @@ class Message(msgspec.Struct, gc=False):
         """Fill this message from CDR bytes and return it (genpy's spelling).
 
         Raises:
-            DecodeError: The bytes are no message of this type.
+            DecodeError: The bytes are not a message of this type.
         """
         other = self.from_cdr(data)
         for name in self.__struct_fields__:
@@ -182,7 +312,7 @@ class Message(msgspec.Struct, gc=False):
         return self._slot_types
 
     def __str__(self) -> str:
-        from rosz.message.text import strify_message
+        from rosz.message.convert import strify_message
 
         return strify_message(self)
 
@@ -190,8 +320,8 @@ class Message(msgspec.Struct, gc=False):
 class Sequenced(Message):
     """A header with ROS 1's sequence number.
 
-    The number is not on the wire; a receiver fills it from what every sample carries. Two headers
-    are equal when all but this number is. As in ROS 1 it comes first: ``Header(0, stamp, "map")``.
+    The number is not on the wire; a receiver takes it from the attachment of the sample. It is not
+    compared. As in ROS 1 it is the first argument: ``Header(0, stamp, "map")``.
     """
 
     seq: int = 0

@@ -1,8 +1,8 @@
-"""What generated codecs call: conversions of odd values, caches, and the way out of trouble.
+"""The functions that generated codecs call: conversions, caches, and the fallback for errors.
 
-The generated code trusts its values and lets ``struct`` and the attribute look-ups object. Whatever
-they raise (``FAULTS``) leads to the plain codec, which is slow, accepts what can be accepted (an
-int8 list for a byte sequence, big-endian bytes, …) and otherwise says exactly what is wrong.
+Generated code does not check its values; ``struct`` and attribute look-ups raise where they are
+wrong. Any such exception (``FAULTS``) leads to the schema codec, which is slow, accepts what is
+valid (an int8 list for a byte sequence, big-endian bytes, …) and otherwise says what is wrong.
 """
 
 from __future__ import annotations
@@ -13,21 +13,23 @@ from collections.abc import Callable
 from struct import Struct
 from typing import Any, TypeVar
 
-from rosz.message.base import Message, Sequenced, Service
-from rosz.message.numbers import flags, numbers, octets
-from rosz.message.plain import decode_plainly, encode_plainly
-from rosz.message.texts import StringList, Texts, pack_wide, put_text, read_wide
+from rosz.message.schema_codec import decode_plainly, encode_plainly
+from rosz.message.sequences import (
+    StringList,
+    Texts,
+    flags,
+    numbers,
+    octets,
+    pack_wide,
+    read_wide,
+)
 
 __all__ = (
     "FAULTS",
     "PADDING",
-    "Message",
-    "Sequenced",
-    "Service",
     "Stride",
     "StringList",
     "Template",
-    "Texts",
     "decode_plainly",
     "empty",
     "encode_plainly",
@@ -35,7 +37,6 @@ __all__ = (
     "numbers",
     "octets",
     "pack_wide",
-    "put_text",
     "read_block",
     "read_flags",
     "read_wide",
@@ -52,14 +53,14 @@ FAULTS = (
     ArithmeticError,
     BufferError,
 )
-"""What wrong values and damaged bytes make the generated code raise."""
+"""Exceptions that wrong values and damaged bytes raise in generated code."""
 
 _T = TypeVar("_T")
 
 PADDING = tuple(bytes(n) for n in range(8))
 
 texts = Texts()
-"""Shared by all types: the same frame names turn up in many."""
+"""Cache shared by all types, since the same frame names occur in many."""
 
 _MOST_SHAPES = 4096
 _LONGEST_SHAPE = 1024
@@ -68,13 +69,13 @@ _LONGEST_SHAPE = 1024
 class _Shapes(dict[Any, _T]):
     """Packers of one run of fields with strings in it, by the lengths of these strings.
 
-    With the lengths known, the whole run has a fixed layout, so one call of ``struct`` packs it.
+    Once the lengths are known, the run has a fixed layout, so that one call of ``struct`` packs it.
 
     Args:
         codes: Codes of ``struct`` in order, separated by blanks; ``$`` for a string's bytes,
             ``|4`` for padding.
         start: Offset of the run from the end of the header modulo 8, -4 for the header itself, or
-            None where it varies: then it leads the key.
+            None where it varies; then it is the first part of the key.
     """
 
     __slots__ = ("_codes", "_start")
@@ -109,7 +110,7 @@ class _Shapes(dict[Any, _T]):
 
 
 class Template(_Shapes[Callable[..., bytes]]):
-    """Packers alone; the offset behind the run does not matter, or is known."""
+    """Packers alone, where the offset behind the run is known or does not matter."""
 
     __slots__ = ()
 
@@ -121,9 +122,9 @@ class Stride(_Shapes[tuple[Callable[..., bytes], int]]):
     """Packers with the offset behind the run, modulo the largest alignment in the message.
 
     Args:
-        codes: As of any run.
-        start: As of any run.
-        full: The modulus.
+        codes: Codes of the run, as in `_Shapes`.
+        start: Offset of the run, as in `_Shapes`.
+        full: Largest alignment in the message.
     """
 
     __slots__ = ("_full",)
@@ -142,10 +143,10 @@ def read_flags(octets: bytes) -> list[bool]:
 
 
 def read_block(code: str, data: bytes, start: int, end: int) -> array[Any]:
-    """Return many numbers, with one copy less than the plain way makes.
+    """Return many numbers, with one copy less than ``array(code, data)`` makes.
 
     Raises:
-        ValueError: The bytes end before, or in the middle of a number.
+        ValueError: The bytes end too early, or in the middle of a number.
     """
     block = array(code)
     block.frombytes(memoryview(data)[start:end])
@@ -153,10 +154,10 @@ def read_block(code: str, data: bytes, start: int, end: int) -> array[Any]:
 
 
 def empty(code: str) -> Callable[[], array[Any]]:
-    """Return a maker of empty arrays."""
+    """Return a function that makes empty arrays."""
     return array(code).__copy__
 
 
 def zeros(code: str, size: int) -> Callable[[], array[Any]]:
-    """Return a maker of arrays of zeros."""
+    """Return a function that makes arrays of zeros."""
     return array(code, bytes(size * array(code).itemsize)).__copy__

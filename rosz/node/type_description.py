@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from rosz.errors import RoszError
-from rosz.idl.catalog import Catalog
-from rosz.idl.spec import MessageSpec
-from rosz.idl.typehash import describe, message_hash, service_hash, service_parts
+from rosz.idl import (
+    Catalog,
+    MessageSpec,
+    describe,
+    message_hash,
+    service_hash,
+    service_parts,
+)
 from rosz.msgs.type_description_interfaces.msg import (
     Field,
     FieldType,

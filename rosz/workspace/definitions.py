@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rosz.errors import DefinitionError, RoszError, TypeNotFound
-from rosz.idl import Catalog, parse_action
-from rosz.idl.generate import read_definition
+from rosz.idl import Catalog, parse_action, read_definition
 from rosz.workspace.problem import Problem, from_error
 
 __all__ = ("KINDS", "check_definitions")

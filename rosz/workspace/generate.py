@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rosz.errors import NotFoundError, PackageNotFound, TypeNotFound, UsageError
-from rosz.idl.generate import shipped_sources, stale, write
-from rosz.idl.module import MARKER
+from rosz.idl.generate import MARKER, shipped_sources, stale, write
 from rosz.packages import MANIFEST, Package, PackageIndex
 from rosz.typestore import TypeStore, shipped_packages
 

@@ -81,9 +81,9 @@ MESSAGES: list[tuple[str, str]] = [
     ("float32 X=1,5", "bad.msg:1:11: expected a number of type float32, got '1,5'"),
     ("float64 X=one", "bad.msg:1:11: expected a number of type float64, got 'one'"),
     ("float64 X=", "bad.msg:1:11: expected a value of type float64"),
-    ("int32[] X=[1, 2]", "bad.msg:1:1: a constant has a primitive type; 'int32[]' is none"),
-    ("Foo X=1", "bad.msg:1:1: a constant has a primitive type; 'Foo' is none"),
-    ("time X=0", "bad.msg:1:1: a constant has a primitive type; 'time' is none"),
+    ("int32[] X=[1, 2]", "bad.msg:1:1: a constant has a primitive type; 'int32[]' is not one"),
+    ("Foo X=1", "bad.msg:1:1: a constant has a primitive type; 'Foo' is not one"),
+    ("time X=0", "bad.msg:1:1: a constant has a primitive type; 'time' is not one"),
     ("int32 x 1 2", "bad.msg:1:11: expected the end of the line after the default, got '2'"),
     (
         "int32 x one",
@@ -118,10 +118,10 @@ MESSAGES: list[tuple[str, str]] = [
     ('string<=1[] s ["ab"]', "bad.msg:1:16: 'ab' is longer than the 1 bytes of its type"),
     ("Foo x 1", "bad.msg:1:7: only fields of primitive types have defaults; 'Foo' is a message"),
     ("time t 0", "bad.msg:1:8: only fields of primitive types have defaults; 'time' is a message"),
-    ("int32 x\nint32 x", "bad.msg:2:7: 'x' is declared already, in line 1"),
-    ("int32 X=1\nint32 X=2", "bad.msg:2:7: 'X' is declared already, in line 1"),
-    ("int32 x\nint32 x=2", "bad.msg:2:7: 'x' is declared already, in line 1"),
-    ("int32 x\n\n\n  float64 x", "bad.msg:4:11: 'x' is declared already, in line 1"),
+    ("int32 x\nint32 x", "bad.msg:2:7: 'x' is already declared in line 1"),
+    ("int32 X=1\nint32 X=2", "bad.msg:2:7: 'X' is already declared in line 1"),
+    ("int32 x\nint32 x=2", "bad.msg:2:7: 'x' is already declared in line 1"),
+    ("int32 x\n\n\n  float64 x", "bad.msg:4:11: 'x' is already declared in line 1"),
     (
         "int32 a\n---\nint32 b",
         "bad.msg:2:1: '---' has no meaning in a message; a service belongs in a .srv file",
@@ -146,7 +146,7 @@ SERVICES: list[tuple[str, str]] = [
     ("int32 a", "bad.srv:1:1: expected '---': a service has a request and a response"),
     (
         "int32 a\n---\nint32 b\n---\nint32 c",
-        "bad.srv:4:1: one '---' too many; a service has a request and a response",
+        "bad.srv:4:1: one '---' too many: a service has a request and a response",
     ),
     (
         "int32 a\n---\nint32 b c",
@@ -154,8 +154,8 @@ SERVICES: list[tuple[str, str]] = [
     ),
     ("---\nfoo", "bad.srv:2:4: expected a name after type 'foo'"),
     ("a\n---", "bad.srv:1:2: expected a name after type 'a'"),
-    ("int32 x\nint32 x\n---\n", "bad.srv:2:7: 'x' is declared already, in line 1"),
-    ("---\nint32 x\nint32 x\n", "bad.srv:3:7: 'x' is declared already, in line 2"),
+    ("int32 x\nint32 x\n---\n", "bad.srv:2:7: 'x' is already declared in line 1"),
+    ("---\nint32 x\nint32 x\n", "bad.srv:3:7: 'x' is already declared in line 2"),
 ]
 
 ACTIONS: list[tuple[str, str]] = [
@@ -166,7 +166,7 @@ ACTIONS: list[tuple[str, str]] = [
     ),
     (
         "int32 a\n---\nint32 b\n---\nint32 c\n---\n",
-        "bad.action:6:1: one '---' too many; an action has a goal, a result and a feedback",
+        "bad.action:6:1: one '---' too many: an action has a goal, a result and a feedback",
     ),
     ("int32 a\n---\nint32 b\n---\nint32", "bad.action:5:6: expected a name after type 'int32'"),
 ]

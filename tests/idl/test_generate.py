@@ -8,7 +8,8 @@ import pytest
 
 import rosz.msgs
 from rosz.errors import DefinitionError, PackageNotFound, TypeNotFound
-from rosz.idl.generate import Folders, read_definition, shipped_sources, stale, write
+from rosz.idl import Folders, read_definition
+from rosz.idl.generate import shipped_sources, stale, write
 from rosz.packages import PackageIndex
 from rosz.typestore import TypeStore
 
@@ -31,7 +32,7 @@ def package(root: Path, name: str, **files: str) -> Path:
 def test_committed_modules_are_those_of_the_definitions() -> None:
     sources = shipped_sources(INTERFACES)
     wrong = [line for name, files in sources.items() for line in stale(files, MSGS / name)]
-    assert not wrong, "run: python -m rosz.idl"
+    assert not wrong, "run: rosz gen"
     folders = {folder.name for folder in MSGS.iterdir() if (folder / "__init__.py").is_file()}
     assert folders == set(sources)
 

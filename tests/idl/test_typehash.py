@@ -79,7 +79,7 @@ def test_services(name: str, expected: str) -> None:
 def test_bounds_and_shapes() -> None:
     text = "string<=8[] a\nwstring<=3 b\nQ[<=1] c\nfloat64[] d\nbyte[2] e"
     catalog = catalog_of({"p/msg/A": text, "p/msg/Q": "int32 x"})
-    from rosz.idl.typehash import describe
+    from rosz.idl import describe
 
     fields = describe(catalog.message("p/msg/A"))["fields"]
     kinds = [field["type"] for field in fields]

@@ -8,8 +8,7 @@ from typing import Any
 
 from rosz.errors import TypeNotFound
 from rosz.idl import Catalog, Definition
-from rosz.idl.generate import shipped_module
-from rosz.idl.module import message_module
+from rosz.idl.generate import message_module, shipped_module
 from rosz.message import Message
 from rosz.typestore import TypeStore
 

@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rosz.idl import MessageSpec
-from rosz.message import Message
-from rosz.message.plain import decode_plainly, encode_plainly
-from rosz.message.schema import slots
+from rosz.message import Message, slots
+from rosz.message.schema_codec import decode_plainly, encode_plainly
 from rosz.typestore import TypeStore
 
 from . import reference, values

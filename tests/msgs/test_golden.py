@@ -7,7 +7,7 @@ from array import array
 import pytest
 
 from rosz.message import Message
-from rosz.message.plain import encode_plainly
+from rosz.message.schema_codec import encode_plainly
 from rosz.msgs.action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.example_interfaces.srv import AddTwoInts

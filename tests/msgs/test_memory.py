@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from rosz.message.runtime import Stride, StringList, Template, Texts
+from rosz.message.runtime import Stride, Template
+from rosz.message.sequences import StringList, Texts
 from rosz.msgs.diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosz.msgs.sensor_msgs.msg import JointState
 from rosz.msgs.std_msgs.msg import Header, String

@@ -12,7 +12,7 @@ import pytest
 
 from rosz.errors import EncodeError
 from rosz.message import Message
-from rosz.message.values import from_json, from_plain, from_yaml, to_json, to_plain, to_yaml
+from rosz.message.convert import from_json, from_plain, from_yaml, to_json, to_plain, to_yaml
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Point, PoseStamped, Twist, Vector3
 from rosz.msgs.rcl_interfaces.msg import ParameterValue
@@ -110,10 +110,10 @@ def test_other_ways_to_write_a_value() -> None:
 BAD: list[tuple[type[Message], str, str]] = [
     (Twist, "{linear: {y: a}}", "geometry_msgs/Twist.linear.y: expected float64, got str 'a'"),
     (Twist, "{linear: {y: true}}", "geometry_msgs/Twist.linear.y: expected float64, got bool True"),
-    (Twist, "{a: [}", "geometry_msgs/Twist: no YAML: while parsing a flow node"),
-    (Float64, "data: " + "[" * 20_000, "std_msgs/Float64: no YAML: maximum recursion depth"),
-    (Float64, "2001-13-45", "std_msgs/Float64: no YAML: month must be in 1..12"),
-    (Float64, "!!timestamp x", "std_msgs/Float64: no YAML: "),
+    (Twist, "{a: [}", "geometry_msgs/Twist: not YAML: while parsing a flow node"),
+    (Float64, "data: " + "[" * 20_000, "std_msgs/Float64: not YAML: maximum recursion depth"),
+    (Float64, "2001-13-45", "std_msgs/Float64: not YAML: month must be in 1..12"),
+    (Float64, "!!timestamp x", "std_msgs/Float64: not YAML: "),
     (
         Float64,
         "1" + "0" * 400,
@@ -159,9 +159,9 @@ def test_errors_name_the_field(cls: type[Message], text: str, expected: str) -> 
 
 
 def test_no_json() -> None:
-    with pytest.raises(EncodeError, match=r"std_msgs/String: no JSON: Expecting value: line 1"):
+    with pytest.raises(EncodeError, match=r"std_msgs/String: not JSON: Expecting value: line 1"):
         from_json(String, "{'a'}"[2:])
     bad: Any = b"\xff"
     for text in (bad, "[" * 100_000):
-        with pytest.raises(EncodeError, match="no JSON"):
+        with pytest.raises(EncodeError, match="not JSON"):
             from_json(String, text)

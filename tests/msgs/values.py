@@ -10,8 +10,7 @@ from array import array
 from typing import Any
 
 from rosz.idl import Catalog, FieldType, MessageSpec
-from rosz.message import Message
-from rosz.message.schema import slots
+from rosz.message import Message, slots
 
 from .reference import CODES, OCTETS
 

@@ -11,8 +11,7 @@ from rosz.errors import DefinitionError, TypeNotFound
 from rosz.errors import EncodeError as SerializationError
 from rosz.errors import MessageError as MessageException
 from rosz.message import Message
-from rosz.message.fill import fill_message_args
-from rosz.message.text import strify_message
+from rosz.message.convert import fill_message_args, strify_message
 from rosz.ros1.genpy.rostime import Duration, Time
 from rosz.ros1.importer import type_store
 from rosz.time import DurationValue, StampValue, TimeValue

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 from rosz.errors import EncodeError
-from rosz.message.base import Writable
+from rosz.message import Writable
 from rosz.ros1.rospy.absent import attribute
 from rosz.time import DurationValue, TimeValue
 

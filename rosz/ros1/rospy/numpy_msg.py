@@ -6,8 +6,7 @@ from functools import cache
 from typing import Any
 
 from rosz.errors import UsageError
-from rosz.message import Message
-from rosz.message.schema import ARRAY_CODES, slots
+from rosz.message import ARRAY_CODES, Message, slots
 from rosz.ros1.rospy.absent import attribute
 
 __all__ = ("numpy_msg",)

@@ -10,8 +10,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, Protocol
 
-from rosz.message import Message
-from rosz.message.schema import slots
+from rosz.message import Message, slots
 from rosz.typestore import TypeStore
 
 Plain = dict[str, Any]

@@ -1,48 +1,73 @@
-"""Setting fields of messages from what a person wrote: on a command line, in a launch file.
+"""Messages from and to plain values, JSON, YAML, and the text that ``rostopic`` shows.
 
-Lenient where a person writes and strict where a mistake hides: fields may be left out and stand
-positionally in a list, times may be ``now``, headers ``auto``; but a name that is no field, or a
-value of another sort, is an error that names the field.
+Filling a message is lenient where a person writes and strict where a mistake hides: fields may be
+left out or stand in a list by position, times may be ``now`` and headers ``auto``; but an unknown
+field, or a value of another kind, is an error that names the field. The text of a message is line
+for line that of genpy's ``strify_message``, so that scripts which read it keep working.
 """
 
 from __future__ import annotations
 
 import base64
 import binascii
+import json
 import keyword
 import math
-from collections.abc import Mapping
-from typing import Any, NoReturn
+import re
+from array import array
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NoReturn, TypeAlias, TypeVar
+
+import yaml
 
 from rosz.errors import EncodeError, near_miss
-from rosz.message.base import Message, Sequenced
-from rosz.message.numbers import numbers
-from rosz.message.schema import ARRAY_CODES, OCTETS, SCALAR_CODES, Slot, slots
+from rosz.message.base import (
+    ARRAY_CODES,
+    OCTETS,
+    SCALAR_SIZES,
+    Message,
+    Sequenced,
+    Slot,
+    slots,
+)
+from rosz.message.sequences import numbers
 from rosz.time import DurationValue, TimeValue, normal
 
-__all__ = ("fill_message_args", "shown_name")
+__all__ = (
+    "FieldFilter",
+    "Now",
+    "fill_message_args",
+    "from_json",
+    "from_plain",
+    "from_yaml",
+    "shown_name",
+    "strify_message",
+    "to_json",
+    "to_jsonable",
+    "to_plain",
+    "to_yaml",
+)
 
 _NOT_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 _FLOATS = frozenset({"float32", "float64"})
 _TEXTS = frozenset({"string", "wstring"})
-_SIZES = {"?": 1, "b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8}
 _FEW = 60
 _SEQ = Slot("seq", "uint32", 0, "one", 0)
 
 
 def fill_message_args(msg: Message, msg_args: Any, keys: Mapping[str, Any] | None = None) -> None:
-    """Set fields of a message from what a command line gave, as genpy's function does.
+    """Set fields of a message from the values of a command line, as genpy's function does.
 
     Args:
         msg: The message.
         msg_args: A dict of fields; a list with one such dict; a list of all fields in order; or
             None, which is an empty list.
-        keys: Values that names in the arguments stand for where a time, a duration or a message is
-            expected. With a ``now`` among them, ``auto`` is a header with that time.
+        keys: Values by the names that stand for them where a time, a duration or a message is
+            expected. With ``now`` among them, ``auto`` is a header with that time.
 
     Raises:
-        EncodeError: A name is no field of its message, a value does not fit its field, or there are
-            too many or too few.
+        EncodeError: A name is not a field of its message, a value does not fit its field, or the
+            number of values is wrong.
     """
     if isinstance(msg_args, list) and len(msg_args) == 1 and isinstance(msg_args[0], dict):
         msg_args = msg_args[0]
@@ -56,6 +81,8 @@ def shown_name(name: str) -> str:
 
 
 class _Filler:
+    """Sets fields of one message, and names the field where a value does not fit."""
+
     def __init__(self, type_name: str, keys: Mapping[str, Any]) -> None:
         self._type = type_name
         self._keys = keys
@@ -159,7 +186,7 @@ class _Filler:
         if not hasattr(value, "__index__"):
             self._refuse(path, kind, value)
         number: int = value.__index__()
-        bits = 8 * _SIZES[SCALAR_CODES[kind]]
+        bits = 8 * SCALAR_SIZES[kind]
         signed = kind.startswith("int") or kind == "byte"
         low = -(1 << bits - 1) if signed else 0
         high = (1 << (bits if kind[0] == "u" or kind in OCTETS else bits - 1)) - 1
@@ -169,7 +196,7 @@ class _Filler:
 
     def _float(self, kind: str, value: Any, path: str) -> float:
         if isinstance(value, str):
-            try:  # YAML 1.1 takes 1e-5 and inf for texts
+            try:  # YAML 1.1 reads 1e-5 and inf as strings
                 return _NOT_FINITE[value] if value in _NOT_FINITE else float(value)
             except ValueError:
                 self._refuse(path, kind, value)
@@ -201,7 +228,7 @@ class _Filler:
         return message
 
     def _named(self, cls: Any, name: str, path: str) -> Message:
-        """Return what a name stands for where a message is expected."""
+        """Return the message that a name stands for."""
         now = self._keys.get("now")
         if name == "now" and now is not None and issubclass(cls, TimeValue):
             return self._time(cls, now)
@@ -229,3 +256,214 @@ class _Filler:
 def _kind(slot: Slot) -> str:
     kind: str = slot.kind if isinstance(slot.kind, str) else slot.kind._type
     return kind
+
+
+FieldFilter = Callable[[Any], Iterable[str]]
+"""Function that returns the names of the fields of a message to show."""
+
+_PLAIN = re.compile(r"[ !#-\[\]-~]{1,60}")
+_TIME = "builtin_interfaces/Time"
+_STAMPS = frozenset({_TIME, "builtin_interfaces/Duration"})
+
+
+def strify_message(
+    val: Any,
+    indent: str = "",
+    time_offset: Any = None,
+    current_time: Any = None,  # noqa: ARG001  # genpy ignores it too
+    field_filter: FieldFilter | None = None,
+    fixed_numeric_width: int | None = None,
+) -> str:
+    """Return a message, or a value of a field, as text.
+
+    Args:
+        val: The value.
+        indent: Indentation of the lines.
+        time_offset: A Time that times are shown relative to.
+        current_time: Not used.
+        field_filter: Function that returns the names of the fields of a message to show.
+        fixed_numeric_width: Width of numbers in characters; their own when not given.
+    """
+    return _Writer(time_offset, field_filter, fixed_numeric_width).value(val, indent)
+
+
+class _Writer:
+    def __init__(
+        self, time_offset: Any, field_filter: FieldFilter | None, width: int | None
+    ) -> None:
+        self._offset = time_offset
+        self._filter = field_filter
+        self._width = width
+
+    def value(self, value: Any, indent: str) -> str:  # noqa: PLR0911  # one per kind of value
+        if isinstance(value, bool):
+            return str(value)
+        if isinstance(value, int | float):
+            return self._number(value)
+        if isinstance(value, str):
+            return _quoted(value)
+        if getattr(value, "_type", None) in _STAMPS:
+            return self._stamp(value, indent)
+        if hasattr(value, "_schema"):
+            return self._message(value, indent)
+        if isinstance(value, bytes | bytearray | array | list | tuple) or hasattr(value, "tolist"):
+            return self._list(_plain_list(value), indent)
+        return str(value)
+
+    def _number(self, value: float) -> str:
+        if self._width is None:
+            return str(value)
+        if isinstance(value, float):
+            text = f"{value:.{self._width}f}"
+            return text[: max(text.find("."), self._width)]
+        return f"{value:{self._width}d}"
+
+    def _stamp(self, value: Any, indent: str) -> str:
+        if self._offset is not None and value._type == _TIME:
+            value = value - self._offset
+        width = self._width
+        secs = str(value.sec) if width is None else f"{value.sec:{width}d}"
+        nsecs = f"{value.nanosec:{9 if width is None else width}d}"
+        return f"\n{indent}secs: {secs}\n{indent}nsecs: {nsecs}"
+
+    def _list(self, values: list[Any], indent: str) -> str:
+        if not values:
+            return "[]"
+        first = values[0]
+        if isinstance(first, str):
+            text = yaml.dump(values).rstrip("\n")
+            return "\n" + "\n".join(indent + line for line in text.splitlines())
+        if self._width is not None and type(first) in (int, float):
+            return f"[{', '.join(self._number(number) for number in values)}]"
+        if isinstance(first, int | float):
+            return str(values)
+        return "\n" + "\n".join(f"{indent}- {self.value(one, indent + '  ')}" for one in values)
+
+    def _message(self, value: Any, indent: str) -> str:
+        names = type(value).__slots__
+        if self._filter is not None:
+            wanted = set(self._filter(value))
+            names = tuple(name for name in names if name in wanted)
+        lines = (
+            f"{indent}{name}: {self.value(getattr(value, name), '  ' + indent)}" for name in names
+        )
+        return ("\n" if indent else "") + "\n".join(lines)
+
+
+def _plain_list(value: Any) -> list[Any]:
+    plain: list[Any] = value.tolist() if hasattr(value, "tolist") else list(value)
+    return plain
+
+
+def _quoted(value: str) -> str:
+    if not value:
+        return "''"
+    if _PLAIN.fullmatch(value):
+        return f'"{value}"'
+    text: str = yaml.dump(value, default_style='"')
+    return text.rstrip("\n")
+
+
+_M = TypeVar("_M", bound=Message)
+
+_NO_YAML = (yaml.YAMLError, ValueError, AttributeError, RecursionError)
+"""What PyYAML raises: its own errors, and those of the constructors that it calls."""
+
+Now: TypeAlias = "TimeValue | Callable[[], TimeValue]"
+"""The meaning of ``now``: a time, or a function that returns it."""
+
+
+def to_plain(message: Message) -> dict[str, Any]:
+    """Return a message as a dict by field name, of dicts, lists, numbers, strings and bytes."""
+    return {
+        shown_name(slot.name): _plain(getattr(message, slot.name)) for slot in slots(type(message))
+    }
+
+
+def to_json(message: Message) -> str:
+    """Return a message as JSON.
+
+    Sequences of octets are Base64 strings; numbers that JSON lacks are ``"NaN"``, ``"Infinity"``
+    and ``"-Infinity"``. :func:`from_json` reads all of them.
+    """
+    return json.dumps(to_jsonable(to_plain(message)), ensure_ascii=False, allow_nan=False)
+
+
+def to_jsonable(value: Any) -> Any:
+    """Return a message, or any value of a field, as values that JSON has; see `to_json`."""
+    if hasattr(value, "_schema"):
+        value = {shown_name(name): getattr(value, name) for name in type(value).__slots__}
+    if isinstance(value, dict):
+        return {name: to_jsonable(one) for name, one in value.items()}
+    if isinstance(value, bytes | bytearray):
+        return base64.b64encode(value).decode()
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [to_jsonable(one) for one in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
+
+
+def to_yaml(message: Message) -> str:
+    """Return a message as YAML, as ``rostopic echo`` shows it."""
+    return strify_message(message)
+
+
+def from_plain(cls: type[_M], value: Any, now: Now | None = None) -> _M:
+    """Build a message from plain values.
+
+    Args:
+        cls: Class of the message.
+        value: A dict of some fields, a list of all fields in order, or None for the defaults.
+        now: Meaning of ``now`` and ``auto``; none when not given.
+
+    Raises:
+        EncodeError: A name is not a field of its message, or a value does not fit its field.
+    """
+    message = cls()
+    if value is not None:
+        fill_message_args(message, value, {} if now is None else {"now": now})
+    return message
+
+
+def from_json(cls: type[_M], text: str | bytes) -> _M:
+    """Build a message from JSON.
+
+    Raises:
+        EncodeError: The text is not JSON, or does not fit the class.
+    """
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise EncodeError(cls._type, "", f"not JSON: {error}") from error
+    return from_plain(cls, value)
+
+
+def from_yaml(cls: type[_M], text: str, now: Now | None = None) -> _M:
+    """Build a message from YAML: a dict, a list of all fields, or the value of the only field.
+
+    Raises:
+        EncodeError: The text is not YAML, or does not fit the class.
+    """
+    try:
+        value = yaml.safe_load(text)
+    except _NO_YAML as error:
+        reason = " ".join(str(error).split())
+        raise EncodeError(cls._type, "", f"not YAML: {reason}") from error
+    if value is not None and not isinstance(value, dict | list):
+        value = [value]
+    return from_plain(cls, value, now)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Message):
+        return to_plain(value)
+    if isinstance(value, bytes | bytearray | memoryview):
+        return bytes(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return value

@@ -1,7 +1,12 @@
-"""RIHS01, the hash that ROS 2 identifies a type by (REP 2016).
+"""The hashes that ROS 1 (md5) and ROS 2 (RIHS01) identify a definition by.
 
-SHA-256 over a JSON text that describes the fields of the type and of all types in it. Constants,
-defaults and comments are not in it.
+ROS 1's is genmsg's: constants first, then fields, each on a line without comments and blanks; a
+field that is a message stands as the hash of that message. ROS 2's spellings of what is built into
+ROS 1 count as ROS 1's: ``builtin_interfaces/Time`` as ``time``, and any ``std_msgs/Header`` as the
+one with ``seq``. So a text that means the same in both has the hash that ROS 1 gives it.
+
+ROS 2's (REP 2016) is SHA-256 over a JSON text that describes the fields of the type and of all
+types in it; constants, defaults and comments are not part of it.
 """
 
 from __future__ import annotations
@@ -14,7 +19,47 @@ from typing import Any
 from rosz.idl.catalog import Catalog
 from rosz.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
 
-__all__ = ("describe", "message_hash", "service_event", "service_hash", "service_parts")
+__all__ = (
+    "describe",
+    "message_hash",
+    "message_md5",
+    "service_event",
+    "service_hash",
+    "service_md5",
+    "service_parts",
+)
+
+_BUILTIN = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}
+_HEADER = "std_msgs/msg/Header"
+_HEADER_MD5 = "2176decaecbce78abc3b96ef049fabed"
+
+
+def message_md5(spec: MessageSpec, catalog: Catalog) -> str:
+    """Return the md5 of a message, 32 hexadecimal digits."""
+    if spec.name == _HEADER:
+        return _HEADER_MD5
+    return hashlib.md5(_md5_text(spec, catalog).encode(), usedforsecurity=False).hexdigest()
+
+
+def service_md5(spec: ServiceSpec, catalog: Catalog) -> str:
+    """Return the md5 of a service, 32 hexadecimal digits."""
+    text = _md5_text(spec.request, catalog) + _md5_text(spec.response, catalog)
+    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+
+
+def _md5_text(spec: MessageSpec, catalog: Catalog) -> str:
+    lines = [f"{one.type} {one.name}={one.text}" for one in spec.constants]
+    lines += [f"{_md5_type(field.type, catalog)} {field.name}" for field in spec.fields]
+    return "\n".join(lines).strip()
+
+
+def _md5_type(kind: FieldType, catalog: Catalog) -> str:
+    if kind.primitive:
+        return kind.written + kind.suffix
+    if kind.base in _BUILTIN:
+        return _BUILTIN[kind.base] + kind.suffix
+    return message_md5(catalog.message(kind.base), catalog)
+
 
 _IDS = {
     "int8": 2,
@@ -41,22 +86,22 @@ _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 
 
 def message_hash(spec: MessageSpec, catalog: Catalog) -> str:
-    """Return ``RIHS01_`` and 64 hexadecimal digits for a message."""
-    return _hash(spec, catalog.below(spec).values())
+    """Return the type hash of a message, ``RIHS01_`` and 64 hexadecimal digits."""
+    return _type_hash(spec, catalog.below(spec).values())
 
 
 def service_hash(spec: ServiceSpec, catalog: Catalog) -> str:
-    """Return the hash of a service."""
+    """Return the type hash of a service."""
     whole, below = service_parts(spec, catalog)
-    return _hash(whole, below.values())
+    return _type_hash(whole, below.values())
 
 
 def service_parts(
     spec: ServiceSpec, catalog: Catalog
 ) -> tuple[MessageSpec, dict[str, MessageSpec]]:
-    """Return a service as the type that it is hashed as, and all types in that by name.
+    """Return the type that a service is hashed as, and all types in it by name.
 
-    It holds request, response and event.
+    That type holds the request, the response and the event.
     """
     event = service_event(spec)
     info = catalog.message(_EVENT_INFO)
@@ -108,7 +153,7 @@ def _describe_type(kind: FieldType) -> dict[str, Any]:
     }
 
 
-def _hash(spec: MessageSpec, below: Iterable[MessageSpec]) -> str:
+def _type_hash(spec: MessageSpec, below: Iterable[MessageSpec]) -> str:
     text = json.dumps(
         {
             "type_description": describe(spec),

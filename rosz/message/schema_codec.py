@@ -1,7 +1,7 @@
-"""The plain codec: slow, tolerant, exact about what is wrong.
+"""The slow codec, which follows a class's schema field by field.
 
-It walks a class's schema field by field. The generated code falls back on it for values that are
-acceptable but unusual, for big-endian bytes, and to say what is wrong and where.
+Generated code falls back on it for values that are valid but unusual, for big-endian bytes, and for
+an error that says what is wrong and where.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from array import array
 from typing import Any, NoReturn, TypeVar
 
 from rosz.errors import DecodeError, EncodeError
-from rosz.message.numbers import flags, numbers, octets
-from rosz.message.schema import ARRAY_CODES, OCTETS, SCALAR_CODES, Slot, slots
-from rosz.message.texts import pack_wide, put_text, read_wide
+from rosz.message.base import ARRAY_CODES, OCTETS, SCALAR_CODES, SCALAR_SIZES, Slot, slots
+from rosz.message.sequences import flags, numbers, octets, pack_wide, put_text, read_wide
 
 __all__ = ("decode_plainly", "encode_plainly")
 
@@ -22,7 +21,6 @@ _T = TypeVar("_T")
 
 _HEADER = b"\0\1\0\0"
 _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
-_SIZES = {name: struct.calcsize(code) for name, code in SCALAR_CODES.items()}
 _BYTES = frozenset({"byte", "char"})
 _FEW = 60
 _LEAST_BYTE = -0x80
@@ -31,10 +29,10 @@ _FAULTS = (struct.error, AttributeError, TypeError, ValueError, LookupError, Ari
 
 
 def encode_plainly(message: Any, cls: type[Any]) -> bytes:
-    """Return a message as CDR, or say what is wrong with it.
+    """Return a message as CDR, or raise an error that says what is wrong with it.
 
     Args:
-        message: The value.
+        message: The message.
         cls: The message class whose schema it must fit.
 
     Raises:
@@ -46,10 +44,10 @@ def encode_plainly(message: Any, cls: type[Any]) -> bytes:
 
 
 def decode_plainly(data: bytes, cls: type[_T]) -> _T:
-    """Return the message in CDR bytes of either byte order, or say what is wrong with them.
+    """Return the message in CDR bytes of either byte order.
 
     Raises:
-        DecodeError: They are no message of that class.
+        DecodeError: The bytes are not a message of that class.
     """
     type_name: str = cls._type  # type: ignore[attr-defined]
     order = _ORDERS.get(data[:2])
@@ -69,7 +67,7 @@ def _shown(value: object) -> str:
 
 
 class _Writer:
-    """The bytes so far; alignment counts from the first byte after the header."""
+    """The encoded bytes; alignment counts from the first byte after the header."""
 
     def __init__(self, type_name: str) -> None:
         self._type = type_name
@@ -140,7 +138,7 @@ class _Writer:
             self._put("I", count)
 
     def _block(self, slot: Slot, value: Any, path: str) -> None:
-        """Write a sequence of numbers, which goes to the wire in one piece."""
+        """Write a sequence of numbers as one block."""
         kind = str(slot.kind)
         try:
             if kind == "bool":
@@ -153,11 +151,11 @@ class _Writer:
             block = self._by_number(kind, value, path, error)
         self._count(slot, value, len(block), path)
         if len(block):
-            self.data += bytes(-len(self.data) % _SIZES[kind])
+            self.data += bytes(-len(self.data) % SCALAR_SIZES[kind])
             self.data += block if isinstance(block, bytes) else block.tobytes()
 
     def _by_number(self, kind: str, value: Any, path: str, error: Exception) -> bytes:
-        """Find the number that is wrong in a sequence; take what one at a time is acceptable."""
+        """Convert a sequence number by number, and name the one that is wrong."""
         if isinstance(value, str | bytes | bytearray | dict | set) or not hasattr(value, "__len__"):
             self._refuse(path, f"a sequence of {kind}", value)
         try:
@@ -188,17 +186,17 @@ _BLOCKS = frozenset({*ARRAY_CODES, *OCTETS, "bool"})
 
 
 def _number(kind: str, value: Any) -> Any:
-    """Turn a value into what struct packs for the type.
+    """Return a value as ``struct`` packs it for a type.
 
     Raises:
-        TypeError: It is not of such a kind.
-        OverflowError: It is outside the range of the type.
+        TypeError: The value is of another kind.
+        OverflowError: The value is outside the range of the type.
     """
     if kind == "bool":
         return bool(value)
     if kind in ("float32", "float64"):
         if isinstance(value, str | bytes | bytearray):
-            raise TypeError(f"'{type(value).__name__}' is no number")
+            raise TypeError(f"'{type(value).__name__}' is not a number")
         try:
             struct.pack("<" + SCALAR_CODES[kind], value)
         except OverflowError:
@@ -208,10 +206,10 @@ def _number(kind: str, value: Any) -> Any:
         return value[0]
     number = value.__index__() if hasattr(value, "__index__") else None
     if number is None:
-        raise TypeError(f"'{type(value).__name__}' is no integer")
+        raise TypeError(f"'{type(value).__name__}' is not an integer")
     if kind == "byte" and _LEAST_BYTE <= number < 0:  # ROS 1's byte is an int8
         number += 0x100
-    bits = 8 * _SIZES[kind]
+    bits = 8 * SCALAR_SIZES[kind]
     low, high = (-1 << bits - 1, (1 << bits - 1) - 1) if kind[0] == "i" else (0, (1 << bits) - 1)
     if not low <= number <= high:
         raise OverflowError(f"the range of the type is {low} to {high}")
@@ -241,7 +239,7 @@ class _Reader:
         return self._data[start : self._at]
 
     def _scalar(self, kind: str, path: str) -> Any:
-        size = _SIZES[kind]
+        size = SCALAR_SIZES[kind]
         packed = self._take(size, path, kind, size)
         return struct.unpack(self._order + SCALAR_CODES[kind], packed)[0]
 
@@ -260,7 +258,7 @@ class _Reader:
             count = self._scalar("uint32", path)
             if slot.shape == "bounded" and count > slot.size:
                 self._refuse(path, f"expected at most {slot.size} elements, got {count}")
-        if isinstance(slot.kind, str) and slot.kind in _SIZES:
+        if isinstance(slot.kind, str) and slot.kind in SCALAR_SIZES:
             return self._block(slot.kind, count, path)
         left = len(self._data) - self._at
         if count > left:
@@ -287,13 +285,13 @@ class _Reader:
                 return packed[:-1].decode()
             return read_wide(self._swapped("I", packed).tobytes())
         except (UnicodeDecodeError, OverflowError) as error:
-            self._refuse(path, f"no valid {slot.kind}: {error}")
+            self._refuse(path, f"not a valid {slot.kind}: {error}")
 
     def _block(self, kind: str, count: int, path: str) -> Any:
         if not count:
             packed = b""
         else:
-            size = _SIZES[kind]
+            size = SCALAR_SIZES[kind]
             packed = self._take(count * size, path, f"{count} elements of {kind}", size)
         if kind in OCTETS:
             return packed

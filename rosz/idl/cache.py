@@ -1,8 +1,7 @@
-"""Runs generated sources, and keeps them in a folder for other processes.
+"""A cache of generated sources in a folder, which other processes use too.
 
-A source lies there under a name made of what it was generated from, so it never goes stale under
-its name. Where the folder cannot be written, the source lives in memory; tracebacks show its lines
-either way.
+The name of a source is made of what it was generated from, so a cached source is never stale. Where
+the folder cannot be written, the source stays in memory; tracebacks show its lines either way.
 """
 
 from __future__ import annotations
@@ -15,47 +14,47 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-__all__ = ("Keep",)
+__all__ = ("SourceCache",)
 
 
-class Keep:
+class SourceCache:
     """A folder of generated sources.
 
     Args:
-        folder: The folder, made when it is needed; nothing is kept when not given.
+        folder: The folder, made when needed; None to keep sources in memory only.
     """
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
 
-    def find(
+    def load(
         self, name: str, stem: str, namespace: dict[str, Any], members: list[str]
     ) -> ModuleType | None:
-        """Run a kept source, if there is one and it does.
+        """Run a cached source and return its module; None where there is none that works.
 
         Args:
-            name: Name for the module.
-            stem: What the source is kept as.
-            namespace: What the source finds in its module.
-            members: What must be in the module afterwards.
+            name: Name of the module.
+            stem: Name of the source in the cache.
+            namespace: Values that the source finds in its module.
+            members: Names that the module must have afterwards.
         """
         file = self._folder / f"{stem}.py" if self._folder is not None else None
         if file is None or not file.is_file():
             return None
         try:
             module = _run(name, SourceFileLoader(name, str(file)), namespace)
-        except Exception:  # noqa: BLE001  # whatever ails a kept file, it is generated anew
+        except Exception:  # noqa: BLE001  # a damaged file is generated again
             return None
         return module if all(hasattr(module, member) for member in members) else None
 
-    def run(self, name: str, stem: str, namespace: dict[str, Any], source: str) -> ModuleType:
-        """Keep a source and run it; arguments as :meth:`find`."""
+    def add(self, name: str, stem: str, namespace: dict[str, Any], source: str) -> ModuleType:
+        """Run a source and keep it; arguments as `load`."""
         file = self._write(stem, source)
         loader = SourceFileLoader(name, str(file)) if file else _TextLoader(source, f"<{stem}>")
         return _run(name, loader, namespace)
 
     def _write(self, stem: str, source: str) -> Path | None:
-        """Write a source, whole or not at all: others may do so at the same time."""
+        """Write a source atomically, since other processes may write the same one."""
         if self._folder is None:
             return None
         import tempfile
@@ -84,14 +83,14 @@ def _run(name: str, loader: Loader, namespace: dict[str, Any]) -> ModuleType:
 
 
 class _TextLoader(Loader):
-    """Runs a source that has no file; tracebacks find its lines in ``linecache``."""
+    """Runs a source without a file; tracebacks find its lines in ``linecache``."""
 
     def __init__(self, source: str, name: str) -> None:
         self._source = source
         self._name = name
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """Leave the making of the module to the import system."""
+        """Let the import system make the module."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Run the source in the module."""

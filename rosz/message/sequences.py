@@ -1,0 +1,277 @@
+"""Strings and numeric sequences on the wire.
+
+Numeric sequences become buffers of the right element type, whatever sequence a caller gives.
+"""
+
+from __future__ import annotations
+
+from array import array
+from math import inf
+from struct import Struct
+from struct import error as struct_error
+from typing import Any
+
+__all__ = (
+    "StringList",
+    "Texts",
+    "flags",
+    "numbers",
+    "octets",
+    "pack_wide",
+    "put_text",
+    "read_wide",
+)
+
+_OCTET_FORMATS = frozenset({"B", "b", "c", "?"})
+
+
+def numbers(value: Any, code: str, size: int = -1) -> array[Any] | memoryview:
+    """Return the numbers as a flat buffer whose ``len`` is their count.
+
+    Buffers of the right type (``array.array``, numpy arrays of any shape) are not copied; other
+    sequences are converted, number by number.
+
+    Args:
+        value: The sequence.
+        code: Element type, as the ``array`` module spells it.
+        size: Number of elements that it must have; -1 for any.
+
+    Raises:
+        TypeError: The value is not a sequence of such numbers.
+        OverflowError: A number is outside the range of the type.
+        ValueError: The number of elements is wrong.
+    """
+    found = _view(value, code)
+    if found is None:
+        if isinstance(value, str | bytes | bytearray | dict | set):
+            raise TypeError(f"'{type(value).__name__}' is not a sequence of numbers")
+        _refuse_iterator(value)
+        plain = _flat(value.tolist()) if hasattr(value, "tolist") else list(value)
+        found = array(code, plain)
+        if code == "f":
+            _refuse_overflow(found, plain)
+    if len(found) != size >= 0:
+        raise ValueError(f"expected {size} elements, got {len(found)}")
+    return found
+
+
+def _view(value: Any, code: str) -> array[Any] | memoryview | None:
+    """Return a buffer that has just that type; None for any other value."""
+    if type(value) is array and value.typecode == code:
+        return value
+    try:
+        view = memoryview(value)
+    except TypeError:
+        return None
+    if not view.c_contiguous or view.itemsize != array(code).itemsize:
+        return None
+    given = view.format.lstrip("@=<")
+    if given != code and given not in _SAME.get(code, ""):
+        return None
+    if view.nbytes == 0:
+        return array(code)
+    flat: memoryview = view.cast("B").cast(code)  # type: ignore[call-overload]
+    return flat
+
+
+_SAME = {"q": "l", "Q": "L", "i": "l", "I": "L"}
+"""Other formats of the same meaning where the size is equal: C's long."""
+
+
+def _flat(values: Any) -> list[Any]:
+    """Return the numbers of nested lists, which a numpy array of several dimensions gives."""
+    if values and isinstance(values[0], list):
+        return [number for row in values for number in _flat(row)]
+    plain: list[Any] = values
+    return plain
+
+
+def _listed(value: Any) -> list[Any]:
+    """Return the elements of a buffer of another element type."""
+    try:
+        numbers: list[Any] = value.tolist()
+    except NotImplementedError as error:  # a memoryview of a format that only numpy reads
+        raise TypeError(str(error)) from None
+    return numbers
+
+
+def _refuse_iterator(value: Any) -> None:
+    """Refuse an iterator: a message may be encoded more than once."""
+    if not hasattr(value, "__len__"):
+        raise TypeError(f"'{type(value).__name__}' is not a sequence")
+
+
+def _refuse_overflow(found: array[float], given: list[Any]) -> None:
+    """Refuse float32 values that became infinite by the conversion."""
+    if inf in found or -inf in found:
+        for before, after in zip(given, found, strict=True):
+            if after in (inf, -inf) and before not in (inf, -inf):
+                raise OverflowError(f"{before!r} is outside the range of float32")
+
+
+def octets(value: Any, size: int = -1) -> bytes | memoryview:
+    """Return octets as a buffer.
+
+    Raises:
+        TypeError: The value is not a sequence of integers.
+        ValueError: A number is not in 0..255, or the number of elements is wrong.
+    """
+    found: bytes | memoryview
+    if type(value) is bytes:
+        found = value
+    else:
+        try:
+            view = memoryview(value)
+        except TypeError:
+            if isinstance(value, str | int | dict | set):
+                raise
+            _refuse_iterator(value)
+            found = bytes(value)
+        else:
+            if view.format in _OCTET_FORMATS and view.c_contiguous:
+                found = view.cast("B") if view.nbytes else b""
+            else:
+                found = bytes(_flat(_listed(value)))
+    if len(found) != size >= 0:
+        raise ValueError(f"expected {size} elements, got {len(found)}")
+    return found
+
+
+def flags(value: Any, size: int = -1) -> bytes:
+    """Return truth values as octets, 0 and 1.
+
+    Raises:
+        TypeError: The value is not a sequence.
+        ValueError: The number of elements is wrong.
+    """
+    if isinstance(value, str | dict | set):
+        raise TypeError(f"'{type(value).__name__}' is not a sequence of truth values")
+    _refuse_iterator(value)
+    found = bytes(map(bool, value))
+    if len(found) != size >= 0:
+        raise ValueError(f"expected {size} elements, got {len(found)}")
+    return found
+
+
+_count = Struct("<I")
+_pack_count = _count.pack
+_read_count = _count.unpack_from
+
+_MOST_TEXTS = 4096
+_LONGEST_TEXT = 128
+_LARGEST_LIST = 1 << 14
+
+
+def put_text(value: Any) -> bytes:
+    """Return the UTF-8 bytes of a string, with its NUL.
+
+    Raises:
+        ValueError: The string has U+0000, which the wire cannot carry, or half a surrogate pair.
+        AttributeError: The value is not a string.
+    """
+    octets: bytes = value.encode()
+    if 0 in octets:
+        raise ValueError("it holds a NUL character")
+    return octets + b"\0"
+
+
+class Texts(dict[str, tuple[int, bytes]]):
+    """Cache of the encoded forms (length, bytes) of strings that repeat: frames, names, keys.
+
+    Long strings are not cached, and a full cache is emptied.
+    """
+
+    def __missing__(self, value: str) -> tuple[int, bytes]:
+        octets = put_text(value)
+        entry = len(octets), octets
+        if len(octets) <= _LONGEST_TEXT:
+            if len(self) >= _MOST_TEXTS:
+                self.clear()
+            self[value] = entry
+        return entry
+
+
+class StringList:
+    """Codec of the lists of strings of one field, such as joint names, which hardly ever change.
+
+    It keeps the last list that was written and the last one that was read, each with its bytes
+    from the count on, so that the next equal one costs one comparison.
+
+    Args:
+        size: Number of elements of a fixed array, which has no count on the wire; -1 if variable.
+        most: Largest number of elements of a bounded sequence; -1 for no bound.
+        bound: Largest length of each string in bytes; -1 for no bound.
+    """
+
+    __slots__ = ("_bound", "_most", "_size", "read", "written")
+
+    def __init__(self, size: int = -1, most: int = -1, bound: int = -1) -> None:
+        self._size = size
+        self._most = most
+        self._bound = bound
+        empty = b"" if size >= 0 else bytes(4)
+        self.written: tuple[list[str] | None, bytes] = ([], empty) if size < 0 else (None, b"")
+        self.read: tuple[bytes, list[str]] = (bytes(4), []) if size < 0 else (b"\xff" * 8, [])
+
+    def put(self, values: list[str]) -> bytes:
+        """Return the bytes of a list that starts at a multiple of four."""
+        if type(values) is not list:
+            values = list(_strings(values))
+        self._check(len(values))
+        parts = [] if self._size >= 0 else [_pack_count(len(values))]
+        length = 0
+        for value in values:
+            octets = put_text(value)
+            if len(octets) > self._bound + 1 > 0:
+                raise ValueError("a string is longer than its bound")
+            parts.append(bytes(-length & 3) + _pack_count(len(octets)) + octets)
+            length = len(octets)
+        data = b"".join(parts)
+        if len(data) <= _LARGEST_LIST:
+            self.written = values[:], data
+        return data
+
+    def take(self, data: bytes, offset: int) -> tuple[list[str], int]:
+        """Return the list at an offset, a multiple of four, and the offset after it."""
+        start = offset
+        count = self._size
+        if count < 0:
+            (count,) = _read_count(data, offset)
+            offset += 4
+            self._check(count)
+        values: list[str] = []
+        end = offset
+        for _ in range(count):
+            end = (end + 3) & -4
+            (length,) = _read_count(data, end)
+            if length > self._bound + 1 > 0:
+                raise ValueError("a string is longer than its bound")
+            offset = end + 4
+            end = offset + length
+            values.append(data[offset : end - 1].decode())
+        if end > len(data):
+            raise struct_error("a string ends after the bytes do")
+        if end - start <= _LARGEST_LIST:
+            self.read = data[start:end], values[:]
+        return values, end
+
+    def _check(self, count: int) -> None:
+        if (self._size >= 0 and count != self._size) or count > self._most >= 0:
+            raise ValueError(f"{count} strings are not what the type holds")
+
+
+def _strings(values: Any) -> Any:
+    if isinstance(values, str | bytes):
+        raise TypeError("a string is not a list of strings")
+    return values
+
+
+def pack_wide(value: Any) -> bytes:
+    """Return a wide string as UTF-16 code units of four bytes each, without a terminator."""
+    units = array("H", value.encode("utf-16-le"))
+    return array("I", units.tolist()).tobytes()
+
+
+def read_wide(octets: bytes) -> str:
+    """Return the string in code units of four bytes each."""
+    return array("H", array("I", octets).tolist()).tobytes().decode("utf-16-le")
