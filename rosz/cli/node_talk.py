@@ -70,7 +70,7 @@ def _row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> dict[
     for kind, title in kinds.items():
         ends[title] = [
             {"name": token.name, "type": short_type(token.type_name), "hash": token.type_hash}
-            for token in survey.view.endpoints(kind)
+            for token in survey.view.entities(kind)
             if (token.zid, token.node_id) == (node.zid, node.node_id)
         ]
     row: dict[str, Any] = {"name": node.node_name, "session": node.zid, **ends}

@@ -33,7 +33,7 @@ def _by_name(survey: Survey) -> Iterator[tuple[str, str, list[Token]]]:
     """Yield what it is, the name, and the ends, of every topic and service."""
     for word, kinds in zip(("topic", "service"), _BOTH_SIDES, strict=True):
         groups: defaultdict[str, list[Token]] = defaultdict(list)
-        for token in survey.view.endpoints(*kinds):
+        for token in survey.view.entities(*kinds):
             groups[token.name].append(token)
         for name, tokens in sorted(groups.items()):
             yield word, name, tokens
@@ -85,7 +85,7 @@ def check_hashless(survey: Survey, distro: str) -> Iterator[Finding]:
         survey: Who is there.
         distro: ``ROS_DISTRO`` here.
     """
-    old = [token for token in survey.view.endpoints() if token.type_hash == NO_HASH]
+    old = [token for token in survey.view.entities() if token.type_hash == NO_HASH]
     if old and distro != "humble":
         yield error(
             "old-rmw-zenoh",
@@ -153,7 +153,7 @@ def check_one_sided(survey: Survey) -> Iterator[Finding]:
 
 def check_clock(survey: Survey) -> Iterator[Finding]:
     """Find nodes whose time stands still: they wait for a /clock that nobody publishes."""
-    ends = [end for end in survey.view.endpoints(*_BOTH_SIDES[0]) if end.name == _CLOCK]
+    ends = [end for end in survey.view.entities(*_BOTH_SIDES[0]) if end.name == _CLOCK]
     if ends and all(end.kind is Kind.SUBSCRIPTION for end in ends):
         yield error(
             "no-clock",
@@ -186,7 +186,7 @@ def check_packages(
         distro: ``ROS_DISTRO`` here.
     """
     users: defaultdict[tuple[str, str], list[Token]] = defaultdict(list)
-    for token in survey.view.endpoints():
+    for token in survey.view.entities():
         if "/action/" not in token.type_name:
             users[token.type_name, token.type_hash].append(token)
     for (type_name, type_hash), tokens in sorted(users.items()):

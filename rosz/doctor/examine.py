@@ -28,8 +28,7 @@ from rosz.environment import Environment, package_index
 from rosz.errors import TransportError
 from rosz.introspect.connect import open_session
 from rosz.introspect.survey import take_survey
-from rosz.session import Session
-from rosz.session.segments import SEGMENTS
+from rosz.session import SEGMENTS, Session
 from rosz.typestore import TypeStore
 from rosz.wire import Kind
 

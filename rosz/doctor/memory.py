@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rosz.doctor.finding import Finding, error, warning
-from rosz.session.segments import SEGMENTS
+from rosz.session import SEGMENTS
 
 __all__ = ("LEAST_FREE", "check_room", "check_segments")
 

@@ -82,9 +82,9 @@ def _by_domain(tokens: list[Token]) -> list[str]:
 
 def _lacking(survey: Survey, token: Token) -> list[Token]:
     """Return the ends here that a token of another domain would be the missing other side of."""
-    if survey.view.endpoints(token.kind, name=token.name):
+    if survey.view.entities(token.kind, name=token.name):
         return []
-    found = survey.view.endpoints(_OTHER[token.kind], name=token.name)
+    found = survey.view.entities(_OTHER[token.kind], name=token.name)
     return [mate for mate in found if mate.type_name == token.type_name]
 
 

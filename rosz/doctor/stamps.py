@@ -46,7 +46,7 @@ def check_stamps(session: Session, survey: Survey, seconds: float) -> Iterator[F
         seconds: How long, at most.
     """
     mine = {zid for zid, _ in survey.processes}
-    foreign = [token for token in survey.view.endpoints(Kind.PUBLISHER) if token.zid not in mine]
+    foreign = [token for token in survey.view.entities(Kind.PUBLISHER) if token.zid not in mine]
     heard = _listen(session, foreign, seconds) if seconds > 0 else []
     off = [
         f"{_who(survey, token)}: its stamps are {abs(first.age) / _SECOND:.2f} s"

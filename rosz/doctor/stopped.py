@@ -7,8 +7,7 @@ from collections.abc import Iterator
 
 from rosz.doctor.finding import Finding, error
 from rosz.environment import Environment
-from rosz.session.presence import marks, stopped_holder
-from rosz.session.stopped import describe, is_stopped
+from rosz.session import LocalPeers, describe_process, is_stopped
 from rosz.wire import ProcessToken
 
 __all__ = ("check_stopped", "state")
@@ -16,17 +15,19 @@ __all__ = ("check_stopped", "state")
 
 def check_stopped(environment: Environment) -> Iterator[Finding]:
     """Find processes that are stopped, before anybody waits for their answers."""
-    there = marks(environment.rendezvous)
-    stopped = sorted({mark.pid for mark in there if mark.is_stopped})
+    peers = LocalPeers.read(environment.rendezvous)
+    stopped = sorted({peer.pid for peer in peers.stopped})
     if not stopped:
         return
-    holder = stopped_holder(environment.rendezvous, there)
     held = f", which holds the meeting point {environment.rendezvous}"
     ids = " ".join(map(str, stopped))
     yield error(
         "stopped-process",
         "what is stopped, as by Ctrl-Z, hears nothing and answers nobody",
-        (f"{describe(pid)}{held if pid == holder else ''}" for pid in stopped),
+        (
+            f"{describe_process(pid)}{held if pid == peers.stopped_holder else ''}"
+            for pid in stopped
+        ),
         f"let it go on with 'fg' in its terminal or 'kill -CONT {ids}', or end it with"
         f" 'kill -9 {ids}'",
     )

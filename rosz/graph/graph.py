@@ -1,9 +1,9 @@
-"""The live view of a domain.
+"""The live view of a domain: its nodes and their entities.
 
-Zenoh's thread only queues what it sees. One thread of the graph applies it, wakes waiters and runs
-listeners. A listener that waits for the graph applies what comes meanwhile itself, so it may call
-anything; but all listeners are told of that only when it returns, so that each is told of things in
-their order, and what takes long belongs on another thread.
+Zenoh only queues the tokens that appear and disappear. One thread of the graph applies them, wakes
+waiters and calls listeners. A listener that waits for the graph applies further tokens itself, so
+it may call anything. But listeners hear of these only after it has returned, so that each is told
+of changes in their order. Long work therefore belongs on another thread.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, DecodeError, WaitTimeout, near_miss
 from rosz.graph.view import View
+from rosz.lifecycle import Lifecycle
 from rosz.session import clamp_timeout
 from rosz.wire import (
     OWN_SPACE,
@@ -37,24 +38,27 @@ if TYPE_CHECKING:
 __all__ = ("Graph", "GraphListener", "ProcessListener")
 
 GraphListener = Callable[[Token, bool], None]
-"""Gets a token, and whether it appeared (true) or went (false)."""
+"""Function called with a token, and whether it appeared (true) or disappeared (false)."""
 
 ProcessListener = Callable[[ProcessToken, bool], None]
-"""Gets a rosz node as a process, and whether it appeared (true) or went (false)."""
+"""Function called with a rosz node as a process, and whether it appeared or disappeared."""
 
-_Telling = Callable[[], object]
-"""What is done when all that came before has been told."""
+_Report = Callable[[], object]
+"""Function that tells listeners of one change."""
 
-_LOOK_TIMEOUT = 2.0
-_CLOSED_POLL = 0.1
+_QUERY_TIMEOUT = 2.0
+_POLL_SECONDS = 0.1
 _log = logging.getLogger("rosz.graph")
 
 
 class Graph:
-    """Nodes and endpoints of a domain, followed as they come and go.
+    """The nodes and entities of a domain, followed as they come and go.
 
     Args:
-        session: Where to look.
+        session: The session to watch tokens with.
+        domain: The ROS domain.
+
+    Attributes:
         domain: The ROS domain.
     """
 
@@ -68,17 +72,17 @@ class Graph:
         self._numbers = itertools.count()
         self._listeners: dict[int, GraphListener] = {}
         self._process_listeners: dict[int, ProcessListener] = {}
-        self._complained: set[str] = set()
-        self._events: SimpleQueue[tuple[str, bool] | Callable[[], _Telling | None] | None]
+        self._reported_damage: set[str] = set()
+        self._events: SimpleQueue[tuple[str, bool] | Callable[[], _Report | None] | None]
         self._events = SimpleQueue()
-        self._untold: deque[_Telling] = deque()
-        self._telling = False
-        self._closed = False
+        self._reports: deque[_Report] = deque()
+        self._reporting = False
+        self._lifecycle = Lifecycle("the graph", log=_log, on_fork=self._replace_lock)
         self._thread = threading.Thread(target=self._run, name="rosz-graph", daemon=True)
         self._thread.start()
-        # In this order: once tokens are watched, Zenoh answers from what the watch has seen so far.
+        # In this order: once tokens are watched, Zenoh replies from what the watch has seen so far.
         for space in (tokens_key(domain), processes_key(domain)):
-            for key in session.live_tokens(space, _LOOK_TIMEOUT):
+            for key in session.live_tokens(space, _QUERY_TIMEOUT):
                 self._apply(key, alive=True)
         self._watches = [
             session.watch_tokens(key, lambda key, alive: self._events.put((key, alive)))
@@ -96,62 +100,62 @@ class Graph:
             return self._view
 
     def processes(self) -> list[ProcessToken]:
-        """Return the rosz nodes with their processes, sorted by name; ROS 2 tells none."""
+        """Return the rosz nodes with their processes, sorted by name; ROS 2 announces none."""
         return self.view().processes()
 
     def refresh(self, timeout: float = 2.0) -> View:
-        """Ask the network for all tokens, for who cannot wait for them to come by themselves.
+        """Query the network for all tokens, for callers that cannot wait until these arrive.
 
         Args:
-            timeout: Seconds.
+            timeout: Time limit in seconds.
 
         Returns:
-            What is known, with what the answers add.
+            What is known, with what the replies add.
 
         Raises:
             ClosedError: The session is closed.
-            WaitTimeout: No end of answers.
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
         timeout = clamp_timeout(timeout)
-        asked = [
+        found = [
             *self._session.live_tokens(tokens_key(self.domain), timeout),
             *self._session.live_tokens(processes_key(self.domain), timeout),
         ]
-        self._catch_up(timeout)
+        self._apply_pending(timeout)
         with self._changed:
             tokens, processes = dict(self._tokens), dict(self._processes)
-        # Not for good: one that ended meanwhile may never be told to have gone.
-        for key in asked:
+        # Only in the result: nothing may report the end of a token that was never watched.
+        for key in found:
             known: dict[str, Any] = processes if key.startswith(OWN_SPACE) else tokens
             if key not in known and (token := self._parse(key)) is not None:
                 known[key] = token
         return View(tokens.values(), processes.values())
 
     def listen(self, listener: GraphListener, *, history: bool = True) -> Callable[[], None]:
-        """Have every change told, in order, on the graph's thread.
+        """Call a function for every change, in order, on the graph's thread.
 
         Args:
-            listener: Gets each token that appears or goes; what it raises is logged.
-            history: Whether to tell what is alive already, first.
+            listener: Function called with each token that appears or disappears; exceptions are
+                logged.
+            history: Whether to call it for existing tokens first.
 
         Returns:
-            A function that ends it.
+            A function that unregisters the listener.
         """
-        return self._enlist(self._listeners, listener, self._tokens if history else {})
+        return self._register(self._listeners, listener, self._tokens if history else {})
 
     def listen_to_processes(self, listener: ProcessListener) -> Callable[[], None]:
-        """Have rosz nodes told as they come and go, those that are alive first.
+        """Call a function for every rosz node that exists, appears or disappears.
 
         Args:
-            listener: Gets each on the graph's thread; what it raises is logged.
+            listener: Function called on the graph's thread; exceptions are logged.
 
         Returns:
-            A function that ends it.
+            A function that unregisters the listener.
         """
-        return self._enlist(self._process_listeners, listener, self._processes)
+        return self._register(self._process_listeners, listener, self._processes)
 
-    def _enlist(
+    def _register(
         self,
         listeners: dict[int, Any],
         listener: Callable[[Any, bool], None],
@@ -159,10 +163,10 @@ class Graph:
     ) -> Callable[[], None]:
         number = next(self._numbers)
 
-        def begin(alive: list[Any]) -> None:
+        def begin(tokens: list[Any]) -> None:
             listeners[number] = listener
-            for token in alive:
-                self._tell(listeners, number, token, alive=True)
+            for token in tokens:
+                self._notify(listeners, number, token, alive=True)
 
         self._events.put(lambda: partial(begin, list(known.values())))
         return lambda: self._events.put(lambda: partial(listeners.pop, number, None))
@@ -170,27 +174,27 @@ class Graph:
     def wait_for(
         self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
     ) -> View:
-        """Wait until the graph is as wished.
+        """Wait until the graph meets a condition.
 
         Args:
-            condition: Tells whether it is.
-            timeout: Seconds.
-            what: Name of the thing waited for, for the error.
+            condition: Function that tells whether a view meets it.
+            timeout: Time limit in seconds.
+            what: The name of what is waited for, for the error.
             hint: What to do when it does not come, for the error.
 
         Returns:
             The view that met the condition.
 
         Raises:
-            WaitTimeout: It did not become so in time.
+            WaitTimeout: The time limit was reached.
             ClosedError: The graph was closed meanwhile.
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
         deadline = time.monotonic() + clamp_timeout(timeout)
         wait = self._apply_next if threading.current_thread() is self._thread else self._sleep
         while not condition(view := self.view()):
             left = deadline - time.monotonic()
-            if self._closed:
+            if self._lifecycle.closing:
                 raise ClosedError(f"the wait for {what} ended: shutting down")
             if left <= 0:
                 raise WaitTimeout(what, timeout, hint)
@@ -198,12 +202,14 @@ class Graph:
         return view
 
     def _sleep(self, seen: View, timeout: float) -> None:
-        """Wait until the view is another than the one that was looked at."""
+        """Wait until there is another view than the one that was seen."""
         with self._changed:
-            self._changed.wait_for(lambda: self._view is not seen or self._closed, timeout)
+            self._changed.wait_for(
+                lambda: self._view is not seen or self._lifecycle.closing, timeout
+            )
 
     def _apply_next(self, _seen: View, timeout: float) -> None:
-        """Do the graph thread's work on that very thread, which is in a listener that waits."""
+        """Handle an event on the graph's thread, while a listener on that thread waits."""
         try:
             event = self._events.get(timeout=timeout)
         except Empty:
@@ -211,13 +217,13 @@ class Graph:
         if event is None:
             self._events.put(None)
         else:
-            self._do(event)
+            self._handle(event)
 
     def wait_for_node(self, name: str, timeout: float) -> View:
-        """Wait for a node of that full name.
+        """Wait for the node of a full name.
 
         Raises:
-            WaitTimeout: It did not appear in time.
+            WaitTimeout: The node did not appear in time.
             ClosedError: The graph was closed meanwhile.
         """
         return self._wait_for_name(
@@ -225,10 +231,10 @@ class Graph:
         )
 
     def wait_for_topic(self, name: str, timeout: float) -> View:
-        """Wait for a publisher of that topic.
+        """Wait for a publisher of a topic.
 
         Raises:
-            WaitTimeout: None appeared in time.
+            WaitTimeout: No publisher appeared in time.
             ClosedError: The graph was closed meanwhile.
         """
         return self._wait_for_name(
@@ -240,10 +246,10 @@ class Graph:
         )
 
     def wait_for_service(self, name: str, timeout: float) -> View:
-        """Wait for somebody who serves that service.
+        """Wait for a server of a service.
 
         Raises:
-            WaitTimeout: Nobody did in time.
+            WaitTimeout: No server appeared in time.
             ClosedError: The graph was closed meanwhile.
         """
         return self._wait_for_name(
@@ -255,10 +261,10 @@ class Graph:
         )
 
     def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> View:
-        """Wait until a topic has at least so many subscriptions.
+        """Wait until a topic has at least a number of subscriptions.
 
         Raises:
-            WaitTimeout: It had fewer when the time was over.
+            WaitTimeout: It had fewer in time.
             ClosedError: The graph was closed meanwhile.
         """
         return self.wait_for(
@@ -273,44 +279,44 @@ class Graph:
         timeout: float,
         what: str,
         name: str,
-        kin: Callable[[View], Iterable[str]],
+        names: Callable[[View], Iterable[str]],
     ) -> View:
         try:
             return self.wait_for(condition, timeout, what)
         except WaitTimeout as error:
-            hint = near_miss(name, kin(self.view())).removeprefix("; ")
+            hint = near_miss(name, names(self.view())).removeprefix("; ")
             raise WaitTimeout(what, timeout, hint) from error
 
     def _run(self) -> None:
         while (event := self._events.get()) is not None:
-            self._do(event)
+            self._handle(event)
 
-    def _do(self, event: tuple[str, bool] | Callable[[], _Telling | None]) -> None:
-        """Take an event in, and tell of it unless a listener is being told of another one."""
-        telling = self._apply(event[0], alive=event[1]) if isinstance(event, tuple) else event()
-        if telling is None:
+    def _handle(self, event: tuple[str, bool] | Callable[[], _Report | None]) -> None:
+        """Apply an event, and report it unless a listener is running that was told of another."""
+        report = self._apply(event[0], alive=event[1]) if isinstance(event, tuple) else event()
+        if report is None:
             return
-        self._untold.append(telling)
-        if self._telling:
+        self._reports.append(report)
+        if self._reporting:
             return
-        self._telling = True
-        while self._untold:
-            self._untold.popleft()()
-        self._telling = False
+        self._reporting = True
+        while self._reports:
+            self._reports.popleft()()
+        self._reporting = False
 
-    def _catch_up(self, timeout: float) -> None:
-        """Wait until what came so far is applied."""
+    def _apply_pending(self, timeout: float) -> None:
+        """Wait until the events that are queued now have been applied."""
         if threading.current_thread() is self._thread:
-            return  # it is in a listener, which is told of things in their order
+            return  # in a listener, which is told of changes in their order
         applied = threading.Event()
         self._events.put(applied.set)
-        while not (self._closed or applied.wait(min(timeout, _CLOSED_POLL))):
-            timeout -= _CLOSED_POLL
+        while not (self._lifecycle.closing or applied.wait(min(timeout, _POLL_SECONDS))):
+            timeout -= _POLL_SECONDS
             if timeout <= 0:
                 return
 
-    def _apply(self, key: str, *, alive: bool) -> _Telling | None:
-        """Take note of a token that appeared or went, and return what tells of it if it is news."""
+    def _apply(self, key: str, *, alive: bool) -> _Report | None:
+        """Add or remove a token, and return the report of it if that is a change."""
         ours = key.startswith(OWN_SPACE)
         known: dict[str, Any] = self._processes if ours else self._tokens
         if alive == (key in known):
@@ -326,22 +332,16 @@ class Graph:
             self._view = None
             self._changed.notify_all()
         return partial(
-            self._tell_all, self._process_listeners if ours else self._listeners, token, alive
+            self._notify_all, self._process_listeners if ours else self._listeners, token, alive
         )
 
-    def _tell_all(
-        self, listeners: dict[int, Any], token: Token | ProcessToken, alive: bool
-    ) -> None:
-        for number in list(listeners):
-            self._tell(listeners, number, token, alive=alive)
-
     def _parse(self, key: str) -> Token | ProcessToken | None:
-        """Read a token; one that is damaged is told of, once per kind of damage."""
+        """Parse a token; each kind of damage is logged once."""
         try:
             return parse_process(key) if key.startswith(OWN_SPACE) else parse_token(key)
         except DecodeError as error:
-            if error.type_name not in self._complained:
-                self._complained.add(error.type_name)
+            if error.type_name not in self._reported_damage:
+                self._reported_damage.add(error.type_name)
                 _log.warning(
                     "ignoring foreign tokens with a damaged %s (told once): %.300s",
                     error.type_name,
@@ -349,7 +349,13 @@ class Graph:
                 )
             return None
 
-    def _tell(
+    def _notify_all(
+        self, listeners: dict[int, Any], token: Token | ProcessToken, alive: bool
+    ) -> None:
+        for number in list(listeners):
+            self._notify(listeners, number, token, alive=alive)
+
+    def _notify(
         self,
         listeners: dict[int, Callable[[Any, bool], None]],
         number: int,
@@ -363,24 +369,23 @@ class Graph:
         try:
             listener(token, alive)
         except ClosedError as error:
-            # What a listener tries while all is being shut down is no fault of its.
-            if not self._closed:
+            # A listener cannot know that the graph is being closed.
+            if not self._lifecycle.closing:
                 _log.exception("a graph listener failed", exc_info=error)
         except BaseException:  # noqa: BLE001  # the graph outlives what a listener raises
             _log.exception("a graph listener failed on %s", token)
 
-    def disown(self) -> None:
-        """Know nothing and wait for nothing from now on: after a fork, in the child."""
-        self._changed = threading.Condition()
-        self._closed = True
-
     def close(self) -> None:
-        """Stop following; waiters are woken with `ClosedError`. Again is no error."""
+        """Stop following, and wake waiters with `ClosedError`; a second call has no effect."""
+        self._lifecycle.close(self._finish)
+
+    def _finish(self) -> None:
         with self._changed:
-            if self._closed:
-                return
-            self._closed = True
             self._changed.notify_all()
         for watch in self._watches:
             watch.close()
         self._events.put(None)
+
+    def _replace_lock(self) -> None:
+        """Replace the lock in a forked child: a thread of the parent may hold it for ever."""
+        self._changed = threading.Condition()

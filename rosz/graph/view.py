@@ -1,4 +1,4 @@
-"""A set of liveliness tokens, and the questions that people ask of it; pure."""
+"""A set of liveliness tokens, and what can be read from it; pure."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ("View",)
 
 
 class View:
-    """The nodes and endpoints of one domain at one moment.
+    """The nodes and entities of one domain at one moment.
 
     Args:
-        tokens: The tokens that are alive; several may describe one node.
-        processes: The rosz nodes among them, as processes; ROS 2 tells none.
+        tokens: The live tokens; several may describe one node.
+        processes: The tokens of the processes of rosz nodes; ROS 2 announces none.
     """
 
     def __init__(self, tokens: Iterable[Token], processes: Iterable[ProcessToken] = ()) -> None:
@@ -25,7 +25,7 @@ class View:
 
     def nodes(self) -> list[str]:
         """Return the full names of all nodes, sorted; two nodes of one name appear twice."""
-        # An endpoint's token alone makes its node known: tokens may arrive in any order.
+        # The token of an entity alone makes its node known: tokens may arrive in any order.
         found = {(t.zid, t.node_id, t.node_name) for t in self.tokens}
         return sorted(name for _, _, name in found)
 
@@ -33,7 +33,7 @@ class View:
         """Return the rosz nodes as processes, the oldest of each name first.
 
         Args:
-            node: Only those of this full name.
+            node: The full name of the nodes to return; all when not given.
         """
         return sorted(
             (p for p in self._processes if node is None or p.node == node),
@@ -44,12 +44,12 @@ class View:
         """Tell whether a session belongs to rosz nodes."""
         return zid in self._own_sessions
 
-    def endpoints(self, *kinds: Kind, name: str | None = None) -> list[Token]:
-        """Return endpoints of some kinds, sorted by name, node and number.
+    def entities(self, *kinds: Kind, name: str | None = None) -> list[Token]:
+        """Return the entities of some kinds, sorted by name, node and number.
 
         Args:
-            kinds: What to return; every kind of endpoint when none is given.
-            name: Only those of this topic or service.
+            kinds: The kinds to return; all kinds when none is given.
+            name: The topic or service to return entities of; all when not given.
         """
         candidates = self.tokens if name is None else self._by_name.get(name, ())
         return sorted(
@@ -59,26 +59,26 @@ class View:
 
     def publishers(self, topic: str) -> list[Token]:
         """Return the publishers of a topic."""
-        return self.endpoints(Kind.PUBLISHER, name=topic)
+        return self.entities(Kind.PUBLISHER, name=topic)
 
     def subscriptions(self, topic: str) -> list[Token]:
         """Return the subscriptions of a topic."""
-        return self.endpoints(Kind.SUBSCRIPTION, name=topic)
+        return self.entities(Kind.SUBSCRIPTION, name=topic)
 
     def servers(self, service: str) -> list[Token]:
-        """Return who serves a service."""
-        return self.endpoints(Kind.SERVICE, name=service)
+        """Return the servers of a service."""
+        return self.entities(Kind.SERVICE, name=service)
 
     def clients(self, service: str) -> list[Token]:
         """Return the clients of a service."""
-        return self.endpoints(Kind.CLIENT, name=service)
+        return self.entities(Kind.CLIENT, name=service)
 
     def topics(self) -> dict[str, list[str]]:
         """Return every topic with the names of its types, both sorted."""
         return self._types(Kind.PUBLISHER, Kind.SUBSCRIPTION)
 
     def services(self) -> dict[str, list[str]]:
-        """Return every service that is served, with the names of its types, both sorted."""
+        """Return every service that has a server, with the names of its types, both sorted."""
         return self._types(Kind.SERVICE)
 
     @cached_property

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.session import MeshReadiness, Session, SessionConfig, is_listening, places_of
-from rosz.session.presence import is_anybody_awake, is_router_stopped, marks, why_unanswered
+from rosz.session import LocalPeers, MeshReadiness, Session, SessionConfig, is_listening, places_of
 
 if TYPE_CHECKING:
     from rosz.node import Context
@@ -38,10 +37,11 @@ def open_session(environment: Environment) -> Session:
     Raises:
         TransportError: Nobody answers; the text says what to start.
     """
-    _check_awake(environment)
-    if _may_answer(environment):
+    peers = LocalPeers.read(environment.rendezvous)
+    _check_awake(environment, peers)
+    if _may_answer(environment, peers):
         try:
-            return Session.open(command_config(environment))
+            return Session.open(command_config(environment, peers), peers)
         except TransportError as error:
             _check_free(environment, error)
     session = Session.open(SessionConfig.node(environment))
@@ -68,10 +68,11 @@ def open_context(
     """
     from rosz.node import Context
 
-    _check_awake(environment)
-    if not lasting and _may_answer(environment):
+    peers = LocalPeers.read(environment.rendezvous)
+    _check_awake(environment, peers)
+    if not lasting and _may_answer(environment, peers):
         try:
-            return Context(environment, argv, command_config(environment))
+            return Context(environment, argv, command_config(environment, peers))
         except TransportError as error:
             _check_free(environment, error)
     context = Context(environment, argv)
@@ -84,13 +85,13 @@ def open_context(
     return context
 
 
-def command_config(environment: Environment) -> SessionConfig:
+def command_config(environment: Environment, peers: LocalPeers | None = None) -> SessionConfig:
     """Return what the session of a command that asks and ends is to be.
 
     It waits longer where a session of rosz is awake: whatever listens there will answer.
     """
-    rendezvous = environment.rendezvous
-    awake = not _reaches_beyond(environment) and any(not m.is_stopped for m in marks(rendezvous))
+    peers = peers or LocalPeers.read(environment.rendezvous)
+    awake = not _reaches_beyond(environment) and peers.is_any_running
     return SessionConfig.command(environment, _BUSY_SECONDS if awake else _ANSWER_SECONDS)
 
 
@@ -98,24 +99,22 @@ def _reaches_beyond(environment: Environment) -> bool:
     return bool(environment.connect or environment.multicast or environment.zenoh_config)
 
 
-def _check_awake(environment: Environment) -> None:
+def _check_awake(environment: Environment, peers: LocalPeers) -> None:
     """See that not all who are there are stopped.
 
     Raises:
         TransportError: They are.
     """
-    if not _reaches_beyond(environment) and not is_anybody_awake(environment.rendezvous):
-        stopped = why_unanswered(environment.rendezvous)
-        if stopped:
-            raise TransportError(stopped)
+    if not _reaches_beyond(environment) and not peers.is_anybody_there and peers.why_unanswered:
+        raise TransportError(peers.why_unanswered)
 
 
-def _may_answer(environment: Environment) -> bool:
+def _may_answer(environment: Environment, peers: LocalPeers) -> bool:
     """Tell whether it is worth the wait to try as a client."""
     return bool(
         _reaches_beyond(environment)
         or environment.mode == "client"
-        or (is_listening(environment.rendezvous) and not is_router_stopped(environment.rendezvous))
+        or (is_listening(environment.rendezvous) and not peers.is_router_stopped)
     )
 
 
@@ -126,7 +125,7 @@ def _check_free(environment: Environment, error: TransportError) -> None:
         TransportError: Somebody listens there, and does not speak; or a setting is refused.
     """
     places_of(SessionConfig.command(environment))
-    stopped = why_unanswered(environment.rendezvous)
+    stopped = LocalPeers.read(environment.rendezvous).why_unanswered
     if stopped:
         raise TransportError(stopped) from error
     if is_listening(environment.rendezvous):
@@ -147,7 +146,7 @@ def _meet(session: Session, environment: Environment) -> None:
 
 
 def _nobody(environment: Environment) -> TransportError:
-    stopped = why_unanswered(environment.rendezvous)
+    stopped = LocalPeers.read(environment.rendezvous).why_unanswered
     if stopped:
         return TransportError(stopped)
     where = ", ".join((environment.rendezvous, *environment.connect))

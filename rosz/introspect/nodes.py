@@ -120,7 +120,7 @@ def describe(survey: Survey, node: Token) -> str:
 def _endpoints(survey: Survey, node: Token, *kinds: Kind) -> list[Token]:
     return [
         token
-        for token in survey.view.endpoints(*kinds)
+        for token in survey.view.entities(*kinds)
         if (token.zid, token.node_id) == (node.zid, node.node_id)
     ]
 

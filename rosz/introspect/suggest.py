@@ -148,7 +148,7 @@ class Suggestions:
     def request(self, service: str) -> list[str]:
         """Return a request of a service with all its defaults, as a line of YAML."""
         survey = self._survey()
-        servers = [] if survey is None else survey.view.endpoints(Kind.SERVICE, name=service)
+        servers = [] if survey is None else survey.view.entities(Kind.SERVICE, name=service)
         if not servers:
             return []
         return [_prototype(self._types.service(servers[0].type_name).Request)]

@@ -20,8 +20,14 @@ from rosz.node import signals
 from rosz.node.clock import Clock
 from rosz.node.inbox import Inbox
 from rosz.node.mismatch import MismatchWatch
-from rosz.session import MeshReadiness, Session, SessionConfig, clamp_timeout, serve_links
-from rosz.session.presence import is_anybody_awake
+from rosz.session import (
+    LocalPeers,
+    MeshReadiness,
+    Session,
+    SessionConfig,
+    clamp_timeout,
+    serve_links,
+)
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -83,11 +89,9 @@ class Context:
         config = config or SessionConfig.node(self.environment)
         self.passing = config.must_connect
         self.leave = _leave(config)
+        peers = LocalPeers.read(config.rendezvous)
         alone = config.mode == "peer" and not (
-            config.connect
-            or config.listen
-            or config.multicast
-            or is_anybody_awake(config.rendezvous)
+            config.connect or config.listen or config.multicast or peers.is_anybody_there
         )
         self.clock = Clock()
         self._ids = itertools.count()
@@ -104,7 +108,7 @@ class Context:
         self.cooperative = False
         self.forked = False
         self._endpoints: weakref.WeakSet[Endpoint] = weakref.WeakSet()
-        self.session = Session.open(config)
+        self.session = Session.open(config, peers)
         try:
             self._look_around(config, alone=alone)
         except BaseException:  # Ctrl-C comes anywhere
@@ -292,8 +296,6 @@ class Context:
         self._stopping.set()
         self._closer = threading.current_thread()
         self._hooks = []
-        self.session.disown(_FORKED)
-        self.graph.disown()
         if self._params is not None:
             self._params.disown()
         for endpoint in self._endpoints:

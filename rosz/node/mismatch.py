@@ -100,7 +100,7 @@ class MismatchWatch:
         newcomer = own.get(token.entity_id) if token.zid == self._zid else None
         if newcomer is not None:
             # One of this process appears as all others do, and is held against those before it.
-            for other in self._graph.view().endpoints(OPPOSITE[token.kind], name=token.name):
+            for other in self._graph.view().entities(OPPOSITE[token.kind], name=token.name):
                 self._compare(newcomer, other)
         for endpoint in own.values():
             if endpoint is not newcomer and token.kind is OPPOSITE[endpoint.token.kind]:

@@ -1,9 +1,9 @@
-"""How a session is opened: rosz's settings as a Zenoh configuration.
+"""The settings of a session, and the Zenoh configuration made from them.
 
-A *peer* listens on an ephemeral loopback port, tries to hold the rendezvous as well, and keeps
-trying to connect there, so whoever comes first is the meeting point and anyone can follow it. A
-*client* hangs on one router or peer. Neither listens beyond the machine unless told to, and
-multicast is off unless asked for.
+A *peer* listens on an ephemeral loopback port, tries to listen at the rendezvous as well, and keeps
+trying to connect there. So the first session holds the rendezvous, and any other can take its
+place. A *client* is linked to one router or peer. Neither listens beyond the machine unless told
+to, and multicast is off unless asked for.
 """
 
 from __future__ import annotations
@@ -28,55 +28,52 @@ __all__ = ("EPHEMERAL", "SessionConfig", "keys_of", "new_id", "zenoh_settings")
 
 _RETRY_MS = 200
 _LEASE_MS = 60_000
-"""How long others wait for a word: a process that was stopped for a while is not given up."""
+"""How long others keep a link that is silent: a process that was stopped for a while keeps its own.
+"""
 _LEASE_BEYOND_MS = 8_000
-"""The same beyond the machine. A link that was cut is opened anew when this is over; TCP by itself
-tries again ever more rarely, so that after a minute's cut it may rest for another one."""
+"""The same beyond the machine. A link that was cut is opened again after this time. TCP by itself
+tries ever more rarely, so that after a minute without connection it may pause for another one."""
 _LOCAL_LINKS = {"open_timeout": 10_000, "accept_timeout": 60_000, "accept_pending": 1000}
-"""How long either end tries to open a link, and how many may try: where many start at once answers
-take long, and Zenoh tries those that it heard of only once."""
+"""How long either end tries to open a link, and how many links may be opened at a time. Answers
+take long when many processes start at once, and Zenoh tries each peer that it heard of only once.
+"""
 _OPEN_BEYOND_MS = 3_000
-"""The same beyond the machine, where what the network swallowed gives way to the next attempt."""
-_ROUTER_BY = 10.0
+"""The same beyond the machine, where an attempt that the network lost should soon be repeated."""
+_ROUTER_TIMEOUT = 10.0
 """Seconds that a node waits for its router, which may have been started just before it."""
 
-_BATCHES = 8
-"""Batches of 64 kB that a link queues for data; of Zenoh's two, a megabyte soon waits for either.
-
-Measured: with eight of them two fifths more images of 1 MB come through, and as many in each run.
-"""
-
 EPHEMERAL = "tcp/127.0.0.1:0"
-"""Where a peer listens for those of its machine: at any port."""
+"""Where a peer listens for sessions of its machine: at any port."""
 _AUTOCONNECT = {"router": ["router"], "peer": ["router", "peer"], "client": ["router"]}
-"""To whom each connects that it finds by multicast; Zenoh's own routers connect to nobody."""
+"""The sessions found by multicast that each mode connects to; Zenoh's routers connect to none."""
 _ONE_DIALS = {"autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}}}
-"""Of two that hear of each other, that with the greater id connects. If both do, their links get in
-each other's way, and of eighty that start at once some never are linked."""
+"""Of two peers that hear of each other, the one with the greater id connects. If both did, their
+links would disturb each other, and of eighty peers that start at once some would never be linked.
+"""
 _GREATEST = b"\xff\xff"
-"""How ids end of sessions that stay on the machine: who reaches beyond may not reach them, so it is
-they who connect. Zenoh compares ends first."""
+"""The end of the ids of sessions that stay on the machine, which Zenoh compares first. A session
+that reaches beyond the machine may be unreachable for these, so it connects to them."""
 _COUNTDOWN_BYTES, _RANDOM_BYTES = 6, 8
 _EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
-"""Who looks for others by multicast has to be reached by those it finds."""
+"""Where a peer listens that others find by multicast."""
 
 
 class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
-    """What a session is to be.
+    """The settings of a session.
 
     Attributes:
         mode: ``peer``, ``client`` or ``router``.
-        rendezvous: Endpoint where the sessions of this machine meet.
+        rendezvous: The endpoint where the sessions of this machine meet.
         connect: Further endpoints to connect to.
-        listen: Further endpoints to listen on.
-        hold_rendezvous: Whether a peer may become the meeting point; short-lived ones should not.
+        listen: Further endpoints to listen at.
+        hold_rendezvous: Whether a peer may listen at the rendezvous; short-lived ones should not.
         must_connect: Whether opening fails, after ``open_timeout``, when nobody answers.
-        open_timeout: Seconds that a client, or who must connect, waits for somebody to be there.
+        open_timeout: Seconds that a client, or a session that must connect, waits for an answer.
         multicast: Whether to look for others on the local network.
-        keys: What links beyond the machine need; anybody may link to it when not given.
-        shared_memory: Payloads of at least so many bytes go by shared memory; 0 is off.
-        config_file: Zenoh configuration file to start from.
-        override: ``path/to/key=json;…`` applied last.
+        keys: The keys that links beyond the machine need; none are needed when not given.
+        shared_memory: The size in bytes from which payloads go by shared memory; 0 turns it off.
+        config_file: A Zenoh configuration file to start from.
+        override: Settings applied last, as ``path/to/key=json;…``.
     """
 
     mode: Literal["peer", "client", "router"] = "peer"
@@ -94,7 +91,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def endpoints(self) -> list[str]:
-        """All endpoints that opening a session involves, each once."""
+        """All endpoints of the session, each once."""
         return list(dict.fromkeys((self.rendezvous, *self.connect, *self.listen)))
 
     @property
@@ -106,7 +103,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
 
     @classmethod
     def node(cls, env: Environment) -> SessionConfig:
-        """Return what a node's session is by the environment."""
+        """Return the settings of a node's session."""
         client = env.mode == "client"
         return cls(
             mode=env.mode,
@@ -116,18 +113,18 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
             multicast=env.multicast,
             shared_memory=env.shared_memory,
             keys=keys_of(env),
-            open_timeout=_ROUTER_BY,
+            open_timeout=_ROUTER_TIMEOUT,
             config_file=env.zenoh_config,
             override=env.zenoh_override,
         )
 
     @classmethod
     def command(cls, env: Environment, timeout: float = 1.0) -> SessionConfig:
-        """Return what a command's session is: a client of whoever is at the rendezvous.
+        """Return the settings of a command's session, a client of whoever holds the rendezvous.
 
         Args:
             env: The settings of the process.
-            timeout: Seconds to wait for somebody to be there.
+            timeout: Time limit for connecting, in seconds.
         """
         return cls(
             mode="client",
@@ -143,11 +140,11 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def keys_of(env: Environment) -> KeyFolder | None:
-    """Return the keys of this machine, if it is to use any.
+    """Return the keys that this machine uses, if any.
 
     Raises:
-        UsageError: There are none where they should be, or others may read them.
-        YamlError: The rules beside them are no rules.
+        UsageError: The folder has no keys, or others may read them.
+        YamlError: The access rules beside the keys cannot be read.
     """
     if env.keys is None:
         return None
@@ -157,17 +154,17 @@ def keys_of(env: Environment) -> KeyFolder | None:
 
 
 def new_id(config: SessionConfig) -> str:
-    """Return an id for a session, if it matters how that compares; empty for any.
+    """Return the id for a session; empty if any will do.
 
-    It is smaller the later it is made. So who is there connects to who comes: one that is stopped
-    does so when it goes on, and nobody waits for its answer meanwhile.
+    A later id is smaller. So existing sessions connect to new ones: one that is stopped does so
+    when it resumes, and nobody waits for its answer meanwhile.
     """
     if config.mode != "peer" or config.reaches_beyond:
         return ""
     left = (1 << 8 * _COUNTDOWN_BYTES) - time.time_ns() // 1_000_000
-    some = bytearray(os.urandom(_RANDOM_BYTES))
-    some[0] |= 0x10  # no id begins with 0
-    return (some + left.to_bytes(_COUNTDOWN_BYTES, "little") + _GREATEST).hex()
+    random = bytearray(os.urandom(_RANDOM_BYTES))
+    random[0] |= 0x10  # an id cannot begin with 0
+    return (random + left.to_bytes(_COUNTDOWN_BYTES, "little") + _GREATEST).hex()
 
 
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
@@ -224,7 +221,7 @@ def _listen(config: SessionConfig) -> list[str]:
 
 
 def key_settings(config: SessionConfig) -> dict[str, Any]:
-    """Return what keys add to a Zenoh configuration, by path in it."""
+    """Return the parts of a Zenoh configuration that depend on keys, by path."""
     if config.keys is None:
         return {}
     from rosz.security import access_control
@@ -236,10 +233,10 @@ def key_settings(config: SessionConfig) -> dict[str, Any]:
 
 
 def overrides(text: str) -> Mapping[str, str]:
-    """Read ``ZENOH_CONFIG_OVERRIDE``: key path to JSON text.
+    """Parse ``ZENOH_CONFIG_OVERRIDE`` into JSON texts by path.
 
     Raises:
-        UsageError: A part is not ``path=json``.
+        UsageError: A part is not of the form ``path=json``.
     """
     found: dict[str, str] = {}
     for part in filter(None, (piece.strip() for piece in text.split(";"))):

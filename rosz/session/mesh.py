@@ -1,10 +1,10 @@
-"""Finding out when a young session is linked to everybody that the others are linked to.
+"""Finding out when a new session is linked to all its neighbours.
 
-A peer hears of the other peers from the one it meets first, and connects to them in the background.
-What it publishes before that is done misses those it is not linked to yet. So it asks whom it
-meets for *their* links, and is ready once it has all of them itself. Those of other machines, to
-whom routers carry what it says, listen where it cannot reach them, and are left out; and so are
-those that are stopped, who answer nobody until they go on.
+A peer hears of other peers from the first one that it meets, and connects to them in the
+background. Until it has done so, what it publishes does not reach those that it is not linked to.
+So it asks the sessions that it meets for *their* links, and is ready once it has all of these
+itself. Sessions on other machines are left out, because routers carry what it publishes to them and
+it cannot connect to them; so are those that are stopped, which answer nothing until they resume.
 """
 
 from __future__ import annotations
@@ -21,33 +21,34 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from rosz.errors import RoszError
-from rosz.session.queries import Query
 
 if TYPE_CHECKING:
     from rosz.lifecycle import Closable
+    from rosz.session.queries import Query
     from rosz.session.session import Session
 
-__all__ = ("MeshReadiness", "place", "serve_links")
+__all__ = ("MeshReadiness", "machine_id", "serve_links")
 
 _SPACE = "@rosz/links"
-_POLL = 0.002
-_ASK_TIMEOUT = 0.5
+_POLL_SECONDS = 0.002
+_QUERY_TIMEOUT = 0.5
 
 _log = logging.getLogger("rosz.session")
 
 
 class MeshReadiness:
-    """A session on its way to all its neighbours; others are told of its own links meanwhile.
+    """Tells when a session is linked to all its neighbours.
 
     Args:
-        session: It.
-        timeout: Seconds after which it counts as ready, come what may; 0 if it is already.
-        stop: Ends the waiting when set.
-        mesh: Whether it links to all its neighbours, rather than to one as a client does.
-        everywhere: Whether peers of other machines can be reached as well, as by multicast.
+        session: The session.
+        timeout: Time in seconds after which the session counts as ready in any case; 0 if it is
+            ready now.
+        stop: Event that ends the waiting.
+        mesh: Whether the session links to all its neighbours, rather than to one as a client does.
+        everywhere: Whether it also links to peers of other machines, as with multicast.
 
     Attributes:
-        ready: Set in the end.
+        ready: Set when the session is ready.
     """
 
     def __init__(
@@ -64,50 +65,50 @@ class MeshReadiness:
         self._timeout = timeout
         self._stop = stop
         self._mesh = mesh
-        self._asked = f"{_SPACE}/{'*' if everywhere else place()}/*"
-        self._lock = threading.RLock()  # a signal handler may ask in between
-        self._waiting: list[Callable[[], None]] = []
+        self._key = f"{_SPACE}/{'*' if everywhere else machine_id()}/*"
+        self._lock = threading.RLock()  # a signal handler may call `when_ready` meanwhile
+        self._callbacks: list[Callable[[], None]] = []
         if timeout:
-            threading.Thread(target=self._run, name="rosz-settle", daemon=True).start()
+            threading.Thread(target=self._run, name="rosz-mesh", daemon=True).start()
         else:
             self.ready.set()
 
     def when_ready(self, callback: Callable[[], None]) -> None:
-        """Have a function called when it is, or at once if it is already."""
+        """Call a function when the session is ready, or now if it is."""
         with self._lock:
             if not self.ready.is_set():
-                self._waiting.append(callback)
+                self._callbacks.append(callback)
                 return
         callback()
 
     def _run(self) -> None:
         try:
-            self._settle()
+            self._wait()
         except RoszError as error:
             if not self._stop.is_set():
                 _log.warning("cannot tell whether all peers are linked: %s", error)
         finally:
             with self._lock:
                 self.ready.set()
-                waiting, self._waiting = self._waiting, []
-            for callback in waiting:
-                _attempt(callback)
+                callbacks, self._callbacks = self._callbacks, []
+            for callback in callbacks:
+                _call(callback)
 
-    def _settle(self) -> None:
+    def _wait(self) -> None:
         deadline = time.monotonic() + self._timeout
-        while (left := deadline - time.monotonic()) > 0 and not self._stop.wait(_POLL):
+        while (left := deadline - time.monotonic()) > 0 and not self._stop.wait(_POLL_SECONDS):
             if self._session.peers() and (not self._mesh or not self._missing(left)):
                 return
 
     def _missing(self, timeout: float) -> set[str]:
-        """Return those that it could be linked to, and is not."""
+        """Return the neighbours that the session is not linked to yet."""
         missing = self._neighbours(timeout) - {self._session.zid, *self._session.peers()}
         return missing - self._session.out_of_reach() if missing else missing
 
     def _neighbours(self, timeout: float) -> set[str]:
-        """Return everybody that those who are linked to this session are linked to."""
+        """Return all sessions that those linked to this one are linked to."""
         found: set[str] = set()
-        for reply in self._session.get(self._asked, timeout=min(timeout, _ASK_TIMEOUT)):
+        for reply in self._session.get(self._key, timeout=min(timeout, _QUERY_TIMEOUT)):
             if reply.ok:
                 try:
                     found.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
@@ -116,7 +117,7 @@ class MeshReadiness:
         return found
 
 
-def _attempt(callback: Callable[[], None]) -> None:
+def _call(callback: Callable[[], None]) -> None:
     try:
         callback()
     except RoszError as error:
@@ -124,27 +125,24 @@ def _attempt(callback: Callable[[], None]) -> None:
 
 
 def serve_links(session: Session) -> Closable:
-    """Tell others whom a session is linked to."""
+    """Reply to queries for the links of a session, until closed."""
+    key = f"{_SPACE}/{machine_id()}/{session.zid}"
 
-    def answer(query: Query) -> None:
+    def reply(query: Query) -> None:
         with query:
             try:
-                query.reply(_own_key(session), msgspec.msgpack.encode(session.peers()))
+                query.reply(key, msgspec.msgpack.encode(session.peers()))
             except RoszError:
-                return  # the session closed meanwhile; whoever asked sees that it is gone
+                return  # the session closed meanwhile, and the querier will notice
 
-    return session.queryable(_own_key(session), answer)
-
-
-def _own_key(session: Session) -> str:
-    return f"{_SPACE}/{place()}/{session.zid}"
+    return session.queryable(key, reply)
 
 
 @cache
-def place() -> str:
-    """Return what all have in common who can reach each other by loopback."""
+def machine_id() -> str:
+    """Return an id that all processes share that can reach each other by loopback."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
         return f"{boot}-{Path('/proc/self/ns/net').stat().st_ino}"
-    except OSError:  # another system than Linux: no namespaces either
+    except OSError:  # not Linux: there are no namespaces either
         return socket.gethostname().lower() or "localhost"

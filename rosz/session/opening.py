@@ -1,13 +1,12 @@
-"""How a session comes about: where to, by which configuration, and what is said if it does not."""
+"""Opening a session: its Zenoh configuration, and the errors when it does not open."""
 
 from __future__ import annotations
 
 import json
 import logging
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+import threading
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import zenoh
@@ -22,50 +21,59 @@ from rosz.session.config import (
     zenoh_settings,
 )
 from rosz.session.declared import translate_errors
-from rosz.session.meeting import open_at
-from rosz.session.memory import keep_freed_memory
-from rosz.session.presence import Presence, marks, stopped_holder, why_unanswered
-from rosz.session.probe import first_listening
-from rosz.session.refusals import refusals, tell_refusals
-from rosz.session.segments import SEGMENTS, sweep
-from rosz.session.stopped import describe, remedy
+from rosz.session.endpoints import connect_endpoint
+from rosz.session.zenoh_workarounds import (
+    SEGMENTS,
+    connect_to_running,
+    open_and_listen,
+    prepare_process,
+    reachable_config,
+    remove_abandoned_segments,
+)
+from rosz.wire import Endpoint
+
+if TYPE_CHECKING:
+    from rosz.security import KeyFolder
+    from rosz.session.local_peers import LocalPeer, LocalPeers
 
 __all__ = ("open_raw", "places_of")
 
 _NOBODY = "Unable to connect to any of"
-_RUNTIME = "ZENOH_RUNTIME"
-_ROUTER_RECEIVERS = 16
-_BUSY_BY = 60.0
+_BUSY_TIMEOUT = 60.0
 """Seconds that a node waits for a busy router."""
-_RARER = "retry_period_init_ms=100;retry_period_max_ms=86400000;retry_period_increase_factor=4"
 
 _log = logging.getLogger("rosz.session")
 
 
-def open_raw(config: SessionConfig, presence: Presence | None = None) -> Any:
-    """Open a session of Zenoh's.
+def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = None) -> Any:
+    """Open a session of Zenoh.
 
     Args:
-        config: What it is to be.
-        presence: Its mark, if it leaves one.
+        config: The configuration.
+        peers: The other sessions of this machine.
+        own: How this session is registered among them, if it is.
 
     Raises:
-        TransportError: Nobody answers where one must, or who does is stopped, an endpoint is
-            occupied or malformed, or a configuration value is refused.
+        TransportError: Nobody answers although the configuration requires a link, the process that
+            should answer is stopped, an endpoint is occupied or malformed, or a configuration value
+            is refused.
         UsageError: The override text is malformed.
     """
-    config = _sharing_if_possible(_within_reach(_patient(config)))
+    config = _wait_for_busy_router(config, peers)
+    reachable = reachable_config(config, peers)
+    if reachable is None:
+        raise _nobody(config)
+    config = _without_impossible_sharing(reachable)
     settings = _settings(config)
-    if presence is not None:
-        _listen_where_marked(settings, presence)
-        _go_round_stopped(settings, presence)
-    sweep()
-    keep_freed_memory()
-    tell_refusals(config)
+    if own is not None:
+        _listen_as_registered(settings, own)
+        connect_to_running(settings, peers)
+    remove_abandoned_segments()
+    _log_refused_links(config)
     try:
-        with translate_errors(f"open a session ({_places(config)})"), _receivers(config.mode):
+        with translate_errors(f"open a session ({_quoted(config)})"), prepare_process(config.mode):
             if config.mode == "peer" and config.hold_rendezvous:
-                return open_at(settings, config.rendezvous, lambda: _open(settings, config))
+                return open_and_listen(settings, config.rendezvous, lambda: _open(settings, config))
             return _open(settings, config)
     except TransportError as error:
         if _NOBODY not in str(error):
@@ -73,18 +81,12 @@ def open_raw(config: SessionConfig, presence: Presence | None = None) -> Any:
         raise _nobody(config) from error
 
 
-def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
-    if "id" not in overrides(config.override) and (zid := new_id(config)):
-        settings.insert_json5("id", json.dumps(zid))
-    return zenoh.open(settings)
-
-
 def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return where a session is to listen and to connect, by all that configures it.
+    """Return where a session would listen and connect, by everything that configures it.
 
     Raises:
         TransportError: A configuration value is refused.
-        UsageError: The override text is malformed, or a protocol knows no keys.
+        UsageError: The override text is malformed, or a protocol cannot use keys.
     """
     settings = _settings(config)
     listen, connect = (
@@ -94,9 +96,15 @@ def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _of_mode(endpoints: Any, mode: str) -> tuple[str, ...]:
-    """Return the endpoints of a mode, which a configuration file may tell apart."""
+    """Return the endpoints of a mode; a configuration file may list them by mode."""
     found = endpoints.get(mode) if isinstance(endpoints, dict) else endpoints
     return tuple(found or ())
+
+
+def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
+    if "id" not in overrides(config.override) and (zid := new_id(config)):
+        settings.insert_json5("id", json.dumps(zid))
+    return zenoh.open(settings)
 
 
 def _settings(config: SessionConfig) -> zenoh.Config:
@@ -112,114 +120,77 @@ def _settings(config: SessionConfig) -> zenoh.Config:
     return settings
 
 
-@contextmanager
-def _receivers(mode: str) -> Iterator[None]:
-    """Have Zenoh receive on one thread, or on several in a router, unless the user says otherwise.
-
-    Two hand a link's data to each other from core to core, which makes a round trip a quarter
-    longer. But a link that is given up holds its thread for seconds, and all links with it: to a
-    router that loses several at once, that matters more. Zenoh reads this once, when the first
-    session of the process opens.
-    """
-    given = _RUNTIME in os.environ
-    if not given:
-        count = _ROUTER_RECEIVERS if mode == "router" else 1
-        os.environ[_RUNTIME] = f"(rx: (worker_threads: {count}))"
-    try:
-        yield
-    finally:
-        if not given:
-            os.environ.pop(_RUNTIME, None)
-
-
-def _sharing_if_possible(config: SessionConfig) -> SessionConfig:
-    """Go without shared memory where there can be none, as in some containers."""
+def _without_impossible_sharing(config: SessionConfig) -> SessionConfig:
+    """Turn shared memory off where it cannot be used, as in some containers."""
     if not config.shared_memory or not SEGMENTS.exists() or os.access(SEGMENTS, os.W_OK):
         return config
     _log.warning("no shared memory, for %s cannot be written to: samples go by links", SEGMENTS)
     return msgspec.structs.replace(config, shared_memory=0)
 
 
-def _patient(config: SessionConfig) -> SessionConfig:
-    """Have a node wait longer for who is there: of many that start at once some come last."""
-    if config.mode != "client" or config.must_connect:
+def _wait_for_busy_router(config: SessionConfig, peers: LocalPeers) -> SessionConfig:
+    """Give a node more time to connect: when many start at once, some come last."""
+    if config.mode != "client" or config.must_connect or not peers.is_any_running:
         return config
-    if all(mark.is_stopped for mark in marks(config.rendezvous)):
-        return config
-    return msgspec.structs.replace(config, open_timeout=max(config.open_timeout, _BUSY_BY))
+    return msgspec.structs.replace(config, open_timeout=max(config.open_timeout, _BUSY_TIMEOUT))
 
 
-def _within_reach(config: SessionConfig) -> SessionConfig:
-    """Have a client of several places go to the first that answers: Zenoh stays at the very first.
-
-    A command asks where it was told to ask rather than at home; a node is a client of its own hub.
-
-    Raises:
-        TransportError: Nobody answers at any of them.
-    """
-    if config.mode != "client" or config.config_file:
-        return config
-    home = _awake_at_home(config)
-    wanted = (*config.connect, *home) if config.must_connect else (*home, *config.connect)
-    if wanted == (config.rendezvous,):
-        return config
-    place = first_listening(wanted, config.open_timeout)
-    if not place:
-        raise _nobody(config)
-    return msgspec.structs.replace(config, rendezvous=place, connect=())
-
-
-def _awake_at_home(config: SessionConfig) -> tuple[str, ...]:
-    """Return the meeting point; if who holds it is stopped, all other places of this machine.
-
-    Raises:
-        TransportError: There are none, and nowhere else to go.
-    """
-    there = marks(config.rendezvous)
-    if stopped_holder(config.rendezvous, there) is None:
-        return (config.rendezvous,)
-    awake = tuple(mark.endpoint for mark in there if mark.port and not mark.is_stopped)
-    if not awake and not config.connect:
-        raise TransportError(why_unanswered(config.rendezvous))
-    return awake
+def _listen_as_registered(settings: zenoh.Config, own: LocalPeer) -> None:
+    """Listen at the port that others read in the registration."""
+    listen = json.loads(settings.get_json("listen/endpoints"))
+    if own.endpoint and EPHEMERAL in listen:
+        listen[listen.index(EPHEMERAL)] = own.endpoint
+        settings.insert_json5("listen/endpoints", json.dumps(listen))
 
 
 def _nobody(config: SessionConfig) -> TransportError:
-    reasons = "".join(f"; no link to {reason}" for reason in refusals(config))
+    reasons = "".join(f"; no link to {reason}" for reason in _refused_links(config))
     return TransportError(
-        f"nobody answers at {_places(config)} within {config.open_timeout:g} s{reasons}: start"
+        f"nobody answers at {_quoted(config)} within {config.open_timeout:g} s{reasons}: start"
         " 'rosz core', a launch or a node there first, or name another place in ROSZ_RENDEZVOUS"
     )
 
 
-def _listen_where_marked(settings: zenoh.Config, presence: Presence) -> None:
-    """Have a session listen at the port that its mark tells."""
-    listen = json.loads(settings.get_json("listen/endpoints"))
-    if presence.mark.endpoint and EPHEMERAL in listen:
-        listen[listen.index(EPHEMERAL)] = presence.mark.endpoint
-        settings.insert_json5("listen/endpoints", json.dumps(listen))
-
-
-def _go_round_stopped(settings: zenoh.Config, presence: Presence) -> None:
-    """Link a session to all that it is not introduced to, as who would do that is stopped.
-
-    The others are tried ever more rarely, as nobody knows who will listen there in an hour.
-    """
-    others = presence.others()
-    pid = stopped_holder(presence.rendezvous, others)
-    if pid is None:
-        return
-    _log.warning(
-        "%s holds the meeting point %s and is stopped: it is not reached until it goes on (%s)",
-        describe(pid),
-        presence.rendezvous,
-        remedy(pid),
-    )
-    awake = [f"{mark.endpoint}#{_RARER}" for mark in others if mark.port and not mark.is_stopped]
-    connect = [*awake, *json.loads(settings.get_json("connect/endpoints"))]
-    settings.insert_json5("connect/endpoints", json.dumps(connect))
-    settings.insert_json5("connect/timeout_ms", "-1")  # in the background
-
-
-def _places(config: SessionConfig) -> str:
+def _quoted(config: SessionConfig) -> str:
     return ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
+
+
+def _refused_links(config: SessionConfig) -> list[str]:
+    """Return the endpoints that refuse links for want of the right keys, each with the reason.
+
+    This connects to each endpoint, which takes seconds where nobody answers.
+    """
+    endpoints = list(dict.fromkeys((config.rendezvous, *config.connect)))
+    if config.keys is not None:
+        endpoints = [connect_endpoint(endpoint) for endpoint in endpoints]
+    reasons = {endpoint: _why_refused(Endpoint(endpoint), config.keys) for endpoint in endpoints}
+    return [f"'{endpoint}': {reason}" for endpoint, reason in reasons.items() if reason]
+
+
+def _why_refused(endpoint: Endpoint, keys: KeyFolder | None) -> str:
+    if endpoint.is_local or not endpoint.is_tcp:
+        return ""
+    from rosz.security.handshake import refusal, wants_keys
+
+    if keys is not None:
+        return refusal(endpoint, keys)
+    return "it wants keys, and there are none here: set ROSZ_KEYS" if wants_keys(endpoint) else ""
+
+
+def _log_refused_links(config: SessionConfig) -> None:
+    """Log which links are refused, by this machine or by the other end, from now on.
+
+    Zenoh decides which links this machine accepts, and its own log says which it refuses.
+    """
+    if config.keys is not None and config.listen:
+        zenoh.init_log_from_env_or("zenoh_link_tls=warn")
+    if config.connect and not config.must_connect and config.mode != "client":
+        thread = threading.Thread(
+            target=_log_refusals_of_others, args=(config,), name="rosz-refusals", daemon=True
+        )
+        thread.start()
+
+
+def _log_refusals_of_others(config: SessionConfig) -> None:
+    for reason in _refused_links(config):
+        _log.warning("no link to %s", reason)

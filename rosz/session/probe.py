@@ -1,4 +1,4 @@
-"""Looking whether anybody listens at an endpoint, without Zenoh."""
+"""Finding out whether somebody listens at an endpoint, without Zenoh."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ __all__ = ("first_listening", "is_listening", "why_refused")
 _TIMEOUT = 0.5
 _AGAIN_SECONDS = 0.1
 _GRACE_SECONDS = 0.3
-"""How long an endpoint that is less wanted waits for word of one that is wanted more."""
+"""Seconds that a less preferred endpoint waits for the result of a more preferred one."""
 
 
 def first_listening(endpoints: Sequence[str], timeout: float) -> str:
     """Return the first of some endpoints where somebody accepts connections; empty for none.
 
-    All are tried at once, so that one that is out of reach holds up nothing for long.
+    All are tried at once, so that one that cannot be reached does not delay the others for long.
 
     Args:
-        endpoints: The most wanted one first.
-        timeout: Seconds to go on trying.
+        endpoints: The endpoints, the most preferred one first.
+        timeout: Time limit in seconds.
     """
     began = time.monotonic()
     answers: dict[str, bool] = {}
     changed = threading.Condition()
     over = threading.Event()
 
-    def look(endpoint: str) -> None:
+    def try_endpoint(endpoint: str) -> None:
         while not over.is_set():
             answer = is_listening(endpoint, timeout)
             with changed:
@@ -51,8 +51,8 @@ def first_listening(endpoints: Sequence[str], timeout: float) -> str:
         return ""
 
     for endpoint in endpoints:
-        name = f"rosz looks at {endpoint}"
-        threading.Thread(target=look, args=(endpoint,), name=name, daemon=True).start()
+        name = f"rosz-probe {endpoint}"
+        threading.Thread(target=try_endpoint, args=(endpoint,), name=name, daemon=True).start()
     with changed:
         changed.wait_for(first, min(_GRACE_SECONDS, timeout))
         changed.wait_for(first, max(0.0, timeout - _GRACE_SECONDS))

@@ -7,6 +7,7 @@ that asks for that lock while the interpreter ends would abort the process.
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -14,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import zenoh
 
-from rosz.lifecycle import Closable
-from rosz.session import parting
+from rosz.lifecycle import Closable, Lifecycle
 from rosz.session.at_exit import ENDING, ClosedSession, still_open
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
@@ -28,10 +28,8 @@ from rosz.session.declared import (
     open_channel,
     translate_errors,
 )
-from rosz.session.lingering import never_linger
+from rosz.session.local_peers import LocalPeers, LocalRegistration
 from rosz.session.opening import open_raw
-from rosz.session.parting import parting_from_stopped
-from rosz.session.presence import Presence, marks, why_silent
 from rosz.session.queries import (
     TARGETS,
     Cancellation,
@@ -44,8 +42,12 @@ from rosz.session.queries import (
     Target,
 )
 from rosz.session.samples import HybridClock, Sample, Stamp, to_timestamp
-from rosz.session.segments import sweep
 from rosz.session.timeouts import clamp_timeout
+from rosz.session.zenoh_workarounds import (
+    close_links,
+    close_links_at_once,
+    remove_abandoned_segments,
+)
 from rosz.worker import start_thread
 
 if TYPE_CHECKING:
@@ -56,52 +58,65 @@ __all__ = ("Session",)
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 """What to do when a link is full, by whether to wait for it."""
 
+_log = logging.getLogger("rosz.session")
+
 
 class Session:
     """One connection to the network.
 
     Args:
-        raw: The open Zenoh session.
+        raw: The open session of Zenoh.
         secured: Whether links beyond the machine need keys.
-        rendezvous: Endpoint where the sessions of this machine meet.
+        rendezvous: The endpoint where the sessions of this machine meet.
+
+    Attributes:
+        secured: Whether links beyond the machine need keys.
+        zid: The id of the session, in lower-case hex.
+        clock: The clock that stamps its writes.
     """
 
     def __init__(self, raw: zenoh.Session, *, secured: bool = False, rendezvous: str = "") -> None:
         self.secured = secured
-        self._rendezvous = rendezvous
-        self._raw: Any = raw
-        self._closing = threading.Lock()
-        self._presence: Presence | None = None
-        self._links: Closable | None = None
         self.zid = str(raw.zid())
         self.clock = HybridClock(self.zid)
+        self._raw: Any = raw
+        self._rendezvous = rendezvous
+        self._lifecycle = Lifecycle("the session", log=_log, on_fork=self._close_in_child)
+        self._registration: LocalRegistration | None = None
+        self._link_watch: Closable | None = None
 
     @classmethod
-    def open(cls, config: SessionConfig) -> Session:
+    def open(cls, config: SessionConfig, peers: LocalPeers | None = None) -> Session:
         """Open a session.
 
+        Args:
+            config: The configuration.
+            peers: The sessions of this machine, if the caller has read them just now.
+
         Raises:
-            TransportError: Nobody answers where one must, an endpoint is occupied or malformed, or
-                a configuration value is refused.
+            TransportError: Nobody answers although the configuration requires a link, an endpoint
+                is occupied or malformed, or a configuration value is refused.
             UsageError: The override text is malformed.
         """
-        presence = _presence_of(config)
+        if peers is None:
+            peers = LocalPeers.read(config.rendezvous)
+        registration = _register(config)
         try:
-            raw = open_raw(config, presence)
+            raw = open_raw(config, peers, None if registration is None else registration.peer)
         except BaseException:
-            if presence is not None:
-                presence.close()
+            if registration is not None:
+                registration.close()
             raise
         session = cls(raw, secured=config.keys is not None, rendezvous=config.rendezvous)
-        if presence is not None:
-            presence.tell(session.zid)
-            session._presence = presence
+        if registration is not None:
+            registration.opened(session.zid)
+            session._registration = registration
         if config.mode != "client" or config.reaches_beyond:
-            session._links = never_linger(session._raw)
+            session._link_watch = close_links_at_once(raw)
         return session
 
     def stamp(self) -> Stamp:
-        """Return a new stamp, later than all that this session gave or was shown."""
+        """Return a new stamp, later than all that this session made or observed."""
         return self.clock.now()
 
     def put(
@@ -113,7 +128,14 @@ class Session:
         stamp: Stamp | None = None,
         block: bool = True,
     ) -> None:
-        """Write a value; unless told not to ``block``, wait for a slow link rather than drop it.
+        """Write a value.
+
+        Args:
+            key: The key to write.
+            payload: The value.
+            attachment: The bytes to send beside the payload.
+            stamp: The time of the write.
+            block: Whether to wait for a slow link instead of dropping the write.
 
         Raises:
             ClosedError: The session is closed.
@@ -131,7 +153,7 @@ class Session:
     def delete(
         self, key: str, *, attachment: bytes | None = None, stamp: Stamp | None = None
     ) -> None:
-        """Delete a value; waits for a slow link rather than drop the deletion.
+        """Delete a value, waiting for a slow link rather than dropping the deletion.
 
         Raises:
             ClosedError: The session is closed.
@@ -156,10 +178,10 @@ class Session:
         """Declare a publisher.
 
         Args:
-            key: Key expression.
-            reliable: Which kind of link to prefer.
+            key: The key expression to publish on.
+            reliable: Whether links should be reliable.
             block: Whether a full link makes ``put`` wait instead of dropping the sample.
-            cache: Samples kept for late joiners (transient local); 0 for none.
+            cache: The number of samples kept for late joiners (transient local); 0 for none.
 
         Raises:
             ClosedError: The session is closed.
@@ -173,14 +195,11 @@ class Session:
                     key, congestion_control=congestion, reliability=reliability
                 )
                 return RawPublisher(key, plain)
-            keeping = caching_publisher(
-                still_open(self._raw),
-                key,
-                cache,
-                congestion_control=congestion,
-                reliability=reliability,
+            raw = still_open(self._raw)
+            caching = caching_publisher(
+                raw, key, cache, congestion_control=congestion, reliability=reliability
             )
-            return RawPublisher(key, keeping)
+            return RawPublisher(key, caching)
 
     def subscriber(
         self,
@@ -191,39 +210,35 @@ class Session:
         recover: bool = False,
         remote_only: bool = False,
     ) -> Closable:
-        """Declare a subscriber.
+        """Declare a subscriber that calls back.
 
         Args:
-            key: Key expression.
-            callback: Gets every sample, on a thread that must not be kept.
-            history: Samples per publisher to ask the caches of transient-local publishers for.
+            key: The key expression to subscribe to.
+            callback: Function called with each sample on the subscriber's thread; it should return
+                soon.
+            history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
-            remote_only: Whether to leave out what this very session publishes.
+            remote_only: Whether to ignore what this session itself publishes.
 
         Raises:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
         origin = zenoh.Locality.REMOTE if remote_only else None
-        what = f"subscriber '{key}'"
-
-        def deliver(raw: zenoh.Sample) -> None:
-            callback(Sample(raw))
-
         entity = self._subscribe(key, open_channel(), history, recover, origin)
-        return CallbackThread(what, entity, deliver)
+        return CallbackThread(f"subscriber '{key}'", entity, lambda raw: callback(Sample(raw)))
 
     def pull_subscriber(
         self, key: str, depth: int, *, history: int = 0, recover: bool = False
     ) -> PullSubscriber:
-        """Declare a subscriber that keeps the newest samples until somebody takes them.
+        """Declare a subscriber that keeps the newest samples until a thread receives them.
 
-        This is the fastest way to a thread of one's own: what arrives does not wait for Python.
+        This is the fastest kind of subscriber: no other thread of Python is involved.
 
         Args:
-            key: Key expression.
-            depth: Samples kept; a newer one pushes the oldest out.
-            history: Samples per publisher to ask the caches of transient-local publishers for.
+            key: The key expression to subscribe to.
+            depth: The number of samples to keep; a new one replaces the oldest.
+            history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
 
         Raises:
@@ -251,12 +266,13 @@ class Session:
     def queryable(
         self, key: str, callback: Callable[[Query], None], *, complete: bool = False
     ) -> Closable:
-        """Declare that questions on a key are answered here.
+        """Declare a queryable that calls back.
 
         Args:
-            key: Key expression.
-            callback: Gets every query, on a thread of its own, and must see to its closing.
-            complete: Whether the answers here are all there are; ROS 2 clients ask only such.
+            key: The key expression whose queries get replies here.
+            callback: Function called with each query on the queryable's thread; it has to close the
+                query.
+            complete: Whether the replies are all there are; ROS 2 clients query only such.
 
         Raises:
             ClosedError: The session is closed.
@@ -267,13 +283,13 @@ class Session:
         return CallbackThread(f"queryable '{key}'", entity, lambda raw: callback(Query(raw)))
 
     def pull_queryable(self, key: str, *, complete: bool = False) -> Queryable:
-        """Declare that questions on a key are answered here, by threads that take them.
+        """Declare a queryable that keeps its queries until a thread receives them.
 
-        The fastest way to threads of one's own: what arrives does not wait for Python.
+        This is the fastest kind of queryable: no other thread of Python is involved.
 
         Args:
-            key: Key expression.
-            complete: Whether the answers here are all there are; ROS 2 clients ask only such.
+            key: The key expression whose queries get replies here.
+            complete: Whether the replies are all there are; ROS 2 clients query only such.
 
         Raises:
             ClosedError: The session is closed.
@@ -285,7 +301,7 @@ class Session:
             )
 
     def token(self, key: str) -> Closable:
-        """Declare a liveliness token: it is seen by others until closed or the link dies.
+        """Declare a liveliness token, which others see until it is closed or the link ends.
 
         Raises:
             ClosedError: The session is closed.
@@ -295,11 +311,12 @@ class Session:
             return Declared(f"token '{key}'", self._raw.liveliness().declare_token(key))
 
     def watch_tokens(self, key: str, callback: Callable[[str, bool], None]) -> Closable:
-        """Watch liveliness tokens, those that exist already first.
+        """Watch liveliness tokens, beginning with those that exist already.
 
         Args:
-            key: Key expression that the tokens match.
-            callback: Gets a token's key and whether it is alive, on a thread of the watch.
+            key: The key expression that the tokens match.
+            callback: Function called on the watch's thread with the key of a token, and with
+                whether it appeared (true) or disappeared (false).
 
         Raises:
             ClosedError: The session is closed.
@@ -325,23 +342,23 @@ class Session:
         any_key: bool = False,
         cancel: Cancellation | None = None,
     ) -> Replies:
-        """Ask, and have the answers to iterate over; one that is not ``ok`` is an error.
+        """Send a query, and return the replies as they come; one that is not ``ok`` is an error.
 
         Args:
-            key: Key expression to ask for.
-            timeout: Seconds after which whoever has not answered is given up; an answer that is not
-                ``ok`` with payload ``Timeout`` stands for them.
-            payload: Sent along with the question.
-            attachment: Sent beside the payload.
-            parameters: What follows the ``?`` of the selector.
-            target: Who is asked.
-            any_key: Whether answers may be for keys outside the one asked for.
-            cancel: What may end it early.
+            key: The key expression to query.
+            timeout: Time limit in seconds. When it is reached, one reply that is not ``ok``, with
+                the payload ``Timeout``, stands for all who have not replied.
+            payload: The payload of the query.
+            attachment: The bytes to send beside the payload.
+            parameters: The part of the selector after the ``?``.
+            target: Who gets the query.
+            any_key: Whether replies may be for keys that ``key`` does not match.
+            cancel: The cancellation that can end the query early.
 
         Raises:
-            ClosedError: The session is closed, or it is cancelled already.
+            ClosedError: The session is closed, or ``cancel`` was cancelled.
             TransportError: The key is malformed.
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
         with translate_errors(f"query '{key}'"):
             handler = self._raw.get(
@@ -358,7 +375,7 @@ class Session:
         return Replies(handler)
 
     def querier(self, key: str, *, timeout: float, target: Target = "all") -> Querier:
-        """Declare a question that is asked often; the arguments are those of `query`.
+        """Declare a query that is made often; the arguments are those of `query`.
 
         Raises:
             ClosedError: The session is closed.
@@ -374,7 +391,7 @@ class Session:
         return Querier(key, entity, timeout)
 
     def get(self, key: str, *, timeout: float, **options: Unpack[QueryOptions]) -> list[Reply]:
-        """Ask, and wait for all answers; the arguments are those of `query`.
+        """Send a query, and wait for all replies; the arguments are those of `query`.
 
         Raises:
             ClosedError: The session is closed.
@@ -391,31 +408,30 @@ class Session:
         timeout: float,
         **options: Unpack[QueryOptions],
     ) -> None:
-        """Ask, and have the answers delivered on another thread.
+        """Send a query, and call back for each reply on another thread.
 
         Args:
-            key: Key expression to ask for.
-            on_reply: Gets each answer.
-            on_done: Called after the last answer, or when the time is over.
-            timeout: As for `query`.
-            options: As for `query`.
+            key: The key expression to query.
+            on_reply: Function called with each reply.
+            on_done: Function called after the last reply, or when the time limit is reached.
+            timeout: Time limit in seconds, as for `query`.
+            options: The options of `query`.
 
         Raises:
             ClosedError: The session is closed.
             TransportError: The key is malformed.
         """
-        answers = self.query(key, timeout=timeout, **options)
+        replies = self.query(key, timeout=timeout, **options)
 
         def deliver() -> None:
             try:
-                for reply in answers:
+                for reply in replies:
                     on_reply(reply)
             finally:
                 on_done()
 
-        if not start_thread(
-            threading.Thread(target=deliver, name=f"rosz answers '{key}'", daemon=True)
-        ):
+        name = f"rosz replies '{key}'"
+        if not start_thread(threading.Thread(target=deliver, name=name, daemon=True)):
             deliver()
 
     def live_tokens(self, key: str, timeout: float) -> list[str]:
@@ -437,54 +453,56 @@ class Session:
         return sorted(str(zid) for zid in (*info.peers_zid(), *info.routers_zid()))
 
     def out_of_reach(self) -> set[str]:
-        """Return the ids of those sessions of this machine that are stopped, and answer nobody."""
-        return {mark.zid for mark in marks(self._rendezvous) if mark.is_stopped}
+        """Return the ids of the sessions of this machine whose processes are stopped."""
+        return {peer.zid for peer in LocalPeers.read(self._rendezvous).stopped}
 
     def why_silent(self, *sessions: str) -> str:
-        """Say which of some sessions' processes are stopped, and what to do; empty if none is."""
-        return why_silent(self._rendezvous, sessions)
+        """Return which of some sessions are stopped, and what to do; empty if none is."""
+        return LocalPeers.read(self._rendezvous).why_silent(sessions)
 
     @property
     def closed(self) -> bool:
         """Whether the session has been closed."""
         return isinstance(self._raw, ClosedSession)
 
-    def disown(self, why: str) -> None:
-        """Refuse everything from now on, leaving Zenoh alone: after a fork, in the child.
-
-        Args:
-            why: What the refusals say.
-        """
-        import ctypes
-
-        # Zenoh's threads are not here to answer: even to free the session would wait for ever.
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._raw))
-        self._closing = threading.Lock()
-        if self._presence is not None:
-            self._presence.close()
-        self._raw = ClosedSession(why)
-        ENDING.set()
-
     def close_links(self) -> AbstractContextManager[None]:
-        """Return within what nothing waits for processes that are stopped: for the end.
+        """Return a context for undeclaring many things before the session closes.
 
-        What is undeclared waits for room in the queue of each link, which one of these has not.
+        To undeclare something, Zenoh waits for room in the queue of each link. In this context,
+        links to stopped processes are closed if they have none.
         """
-        if self.closed:
-            return nullcontext()
-        return parting_from_stopped(self._raw, self._rendezvous)
+        return nullcontext() if self.closed else close_links(self._raw, self._rendezvous)
 
     def close(self) -> None:
-        """Close the session and all that is declared on it; again is no error."""
-        with self._closing:
-            if self.closed:
-                return
-            raw, self._raw = self._raw, ClosedSession("the session is closed")
-            if self._presence is not None:
-                self._presence.close()
-            parting.close(raw, self._rendezvous)
-            del raw
-            sweep()
+        """Close the session and all that is declared on it; a second call has no effect."""
+        self._lifecycle.close(self._disconnect)
+
+    def _disconnect(self) -> None:
+        raw, self._raw = self._raw, ClosedSession("the session is closed")
+        if self._registration is not None:
+            self._registration.close()
+        with close_links(raw, self._rendezvous):
+            try:
+                raw.close()
+            except zenoh.ZError as error:
+                _log.warning(
+                    "a link took no more data when its session closed, and what was still queued"
+                    " for it is lost: %s",
+                    str(error).partition(" at ")[0],
+                )
+        del raw
+        remove_abandoned_segments()
+
+    def _close_in_child(self) -> None:
+        """Refuse everything in a forked child, without touching Zenoh."""
+        import ctypes
+
+        # The threads of Zenoh are not in this process: even freeing the session would never return.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._raw))
+        if self._registration is not None:
+            self._registration.close()
+        self._raw = ClosedSession(self._lifecycle.reason)
+        ENDING.set()
 
     def __enter__(self) -> Self:
         return self
@@ -498,8 +516,8 @@ class Session:
         self.close()
 
 
-def _presence_of(config: SessionConfig) -> Presence | None:
-    """Return the mark of a session that others may want to meet."""
+def _register(config: SessionConfig) -> LocalRegistration | None:
+    """Register a session that others may want to meet."""
     if config.mode == "client" or not config.hold_rendezvous:
         return None
-    return Presence(config.rendezvous, reachable=config.mode == "peer")
+    return LocalRegistration(config.rendezvous, reachable=config.mode == "peer")

@@ -1,4 +1,4 @@
-"""How long a wait may be told to last."""
+"""The longest time that a wait may be given."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from rosz.errors import UsageError
 __all__ = ("LONGEST_WAIT", "clamp_timeout")
 
 LONGEST_WAIT = threading.TIMEOUT_MAX / 2
-"""Seconds, more than a century, that stand for "forever": no wait of the system takes more."""
+"""Seconds that stand for "forever": more than a century, and the longest wait of the system."""
 
 
 def clamp_timeout(timeout: float) -> float:
-    """Return how long to wait, for those who are told: from 0, for less, to `LONGEST_WAIT`.
+    """Return a timeout between 0 and `LONGEST_WAIT`.
 
     Args:
-        timeout: Seconds; may be infinite.
+        timeout: Time limit in seconds; may be infinite.
 
     Raises:
-        UsageError: It is no number, with which no wait would come to its end.
+        UsageError: The timeout is not a number, with which a wait would never end.
     """
     if timeout != timeout:  # noqa: PLR0124  # nan
         raise UsageError(f"timeout is '{timeout}': expected a number of seconds")

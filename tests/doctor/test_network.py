@@ -15,8 +15,7 @@ from rosz.msgs.std_msgs.msg import String
 from rosz.node.control import control_key
 from rosz.params.keys import Keys, Member
 from rosz.params.wire import SyncAnswer, encode
-from rosz.session import Query, Session
-from rosz.session.stopped import is_stopped
+from rosz.session import Query, Session, is_stopped
 from rosz.wire import endpoint_key, pack
 
 from .conftest import Doctor

@@ -15,7 +15,7 @@ from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.sensor_msgs.msg import PointCloud2
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import MessageInfo, Node
-from rosz.session.mesh import place
+from rosz.session.mesh import machine_id
 
 from .plain import Plain, plain_session
 
@@ -215,7 +215,7 @@ def test_control(node: Node, plain: Plain) -> None:
 
 def test_answers_about_links(network: Network, plain: Plain) -> None:
     """Somebody who lies about links delays nobody for ever."""
-    lies = plain.queries(f"@rosz/links/{place()}/liar")
+    lies = plain.queries(f"@rosz/links/{machine_id()}/liar")
 
     def lie() -> None:
         while True:
@@ -223,7 +223,7 @@ def test_answers_about_links(network: Network, plain: Plain) -> None:
             if query is None:
                 return
             with query:
-                query.reply(f"@rosz/links/{place()}/liar", b"\xc1junk")
+                query.reply(f"@rosz/links/{machine_id()}/liar", b"\xc1junk")
 
     network.thread(lie)
     newcomer = network.node("newcomer")

@@ -7,7 +7,7 @@ import signal
 from network import Network, eventually
 
 from rosz.introspect.connect import command_config
-from rosz.session.stopped import is_stopped
+from rosz.session import is_stopped
 
 NODE = """
     import rosz

@@ -67,4 +67,4 @@ def test_waiting_for_neighbours(network: Network) -> None:
     mesh.ready = Interrupted()
     in_time(lambda: mesh.when_ready(lambda: asked.append(3)))
     assert asked == [1]
-    assert len(mesh._waiting) == 2
+    assert len(mesh._callbacks) == 2

@@ -73,7 +73,7 @@ LAPTOP = """
                     node.params.set(rest[0], rest[1])
                     print("set", rest[0], flush=True)
                 elif verb == "names":
-                    tokens = node.context.graph.view().endpoints()
+                    tokens = node.context.graph.view().entities()
                     names = {token.name for token in tokens if token.node_name == "/robot"}
                     print("robot has", *sorted(names), flush=True)
                 elif verb == "get":

@@ -113,7 +113,7 @@ def test_client_waits_for_its_router(place: Network) -> None:
 
 
 def test_client_without_a_router(place: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(config, "_ROUTER_BY", 0.2)
+    monkeypatch.setattr(config, "_ROUTER_TIMEOUT", 0.2)
     with pytest.raises(
         TransportError,
         match=f"^nobody answers at '{place.rendezvous}' within 0.2 s: start 'rosz core', ",

@@ -28,7 +28,7 @@ FORWARD = Twist(Vector3(x=2.0), Vector3())
 def served(scene: Scene) -> set[str]:
     """Return what the simulation offers to the other node, without what every node has."""
     view = scene.user.context.graph.refresh()
-    names = {token.name for token in view.endpoints() if token.node_name == "/turtlesim"}
+    names = {token.name for token in view.entities() if token.node_name == "/turtlesim"}
     return {name for name in names if not name.startswith(("/rosout", "/turtlesim/"))}
 
 

@@ -182,12 +182,12 @@ class Master:
         space = f"{subgraph.rstrip('/')}/"
         if not space.startswith("/"):
             space = f"/{space}"
-        published = live.survey().view.endpoints(Kind.PUBLISHER)
+        published = live.survey().view.entities(Kind.PUBLISHER)
         return [pair for pair in _types(published) if pair[0].startswith(space)]
 
     def getTopicTypes(self) -> Pairs:  # noqa: N802  # ROS 1's
         """Return the topics that somebody publishes or subscribes to, with their types."""
-        return _types(live.survey().view.endpoints(Kind.PUBLISHER, Kind.SUBSCRIPTION))
+        return _types(live.survey().view.entities(Kind.PUBLISHER, Kind.SUBSCRIPTION))
 
     def getSystemState(self) -> list[Ends]:  # noqa: N802  # ROS 1's
         """Return publishers, subscribers and services: names, each with the names of its nodes."""
@@ -196,7 +196,7 @@ class Master:
         except RoszError as error:
             raise MasterFailure(str(error)) from error
         kinds = Kind.PUBLISHER, Kind.SUBSCRIPTION, Kind.SERVICE
-        return [_ends(view.endpoints(kind)) for kind in kinds]
+        return [_ends(view.entities(kind)) for kind in kinds]
 
 
 def _types(tokens: Iterable[Token]) -> Pairs:

@@ -45,5 +45,5 @@ def is_publisher(topic: str, publisher_id: str) -> bool:
 
 def _has(kind: Kind, topic: str, node: str) -> bool:
     name, who = script_resolve_name(_TOOL, topic), script_resolve_name(_TOOL, node)
-    found = live.survey().view.endpoints(kind, name=name)
+    found = live.survey().view.entities(kind, name=name)
     return any(token.node_name == who for token in found)

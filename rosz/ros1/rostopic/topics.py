@@ -139,7 +139,7 @@ def get_topic_list(master: Master | None = None) -> tuple[list[Any], list[Any]]:
 
 def _ends(found: Survey, kind: Kind) -> list[Any]:
     topics: dict[str, tuple[str, dict[str, None]]] = {}
-    for token in found.view.endpoints(kind):
+    for token in found.view.entities(kind):
         _, nodes = topics.setdefault(token.name, (short_type(token.type_name), {}))
         nodes[token.node_name] = None
     return [[name, type_name, list(nodes)] for name, (type_name, nodes) in topics.items()]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from network import eventually
 
-from rosz.session import Session, SessionConfig
+from rosz.session import LocalPeers, Session, SessionConfig
 from rosz.session.opening import open_raw
 
 
@@ -68,7 +68,7 @@ def test_no_file_stays_open(port: int) -> None:
 
 
 def test_a_link_lingers_by_itself(port: int) -> None:
-    """Or there would be nothing to do."""
+    """Otherwise the workaround is not needed any more."""
     hub, leaf = settings(port, "127.0.0.1")
-    with open_raw(hub), Session.open(leaf):
+    with open_raw(hub, LocalPeers.read(hub.rendezvous)), Session.open(leaf):
         assert (port, True) in lingering()

@@ -1,4 +1,4 @@
-"""Shared memory that killed processes left behind goes; what is in use stays."""
+"""Shared memory that killed processes left behind is removed; what is in use stays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from network import Network, eventually
 
-from rosz.session.segments import SEGMENTS, sweep
+from rosz.session.zenoh_workarounds import SEGMENTS, remove_abandoned_segments
 
 TALKER = """
     import rosz
@@ -33,7 +33,7 @@ LISTENER = """
 
 def test_what_nobody_uses_goes(tmp_path: Path) -> None:
     (tmp_path / "1.zenoh").touch()
-    assert sweep(tmp_path, born=-1) == ["1.zenoh"]
+    assert remove_abandoned_segments(tmp_path, min_age=-1) == ["1.zenoh"]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -41,22 +41,22 @@ def test_what_somebody_uses_stays(tmp_path: Path) -> None:
     path = tmp_path / "1.zenoh"
     with path.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_SH)
-        assert sweep(tmp_path, born=-1) == []
-    assert sweep(tmp_path, born=-1) == ["1.zenoh"]
+        assert remove_abandoned_segments(tmp_path, min_age=-1) == []
+    assert remove_abandoned_segments(tmp_path, min_age=-1) == ["1.zenoh"]
 
 
 def test_what_is_just_being_made_stays(tmp_path: Path) -> None:
     (tmp_path / "1.zenoh").touch()
-    assert sweep(tmp_path, born=60) == []
+    assert remove_abandoned_segments(tmp_path, min_age=60) == []
 
 
 def test_other_files_stay(tmp_path: Path) -> None:
     (tmp_path / "sem.other").touch()
-    assert sweep(tmp_path, born=-1) == []
+    assert remove_abandoned_segments(tmp_path, min_age=-1) == []
 
 
 def test_where_there_is_no_shared_memory_nothing_happens(tmp_path: Path) -> None:
-    assert sweep(tmp_path / "none") == []
+    assert remove_abandoned_segments(tmp_path / "none") == []
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /dev/shm and /proc")
@@ -68,13 +68,13 @@ def test_killed_nodes_leave_nothing(network: Network) -> None:
     for program in (talker, listener):
         program.kill()
     left = [SEGMENTS / name for name in names]
-    assert any(map(os.path.exists, left)), "killed processes leave nothing: no need to sweep"
-    sweep(born=-1)
+    assert any(map(os.path.exists, left)), "killed processes leave nothing: nothing to remove"
+    remove_abandoned_segments(min_age=-1)
     assert not any(map(os.path.exists, left))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /dev/shm and /proc")
-def test_the_next_session_sweeps(network: Network) -> None:
+def test_the_next_session_removes_them(network: Network) -> None:
     stale = SEGMENTS / f"{os.getpid()}0.zenoh"
     stale.touch()
 

@@ -1,0 +1,227 @@
+"""The other sessions of this machine, known before there is a link to any of them.
+
+A process that finds nobody at the rendezvous may be the first one. But the process that held the
+rendezvous may also have just died, before its peers could find the newcomer, or it may be stopped,
+so that it introduces nobody to anybody. So each session registers itself with a socket in Linux's
+abstract namespace, which disappears with the process. Nothing is ever sent to it. Its name contains
+the process id and the loopback port where the session can be reached directly.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import sys
+from collections.abc import Container, Iterator
+from functools import cached_property
+from pathlib import Path
+from zlib import crc32
+
+import msgspec
+
+from rosz.errors import TransportError
+from rosz.session.probe import is_listening
+from rosz.session.processes import (
+    describe_process,
+    how_to_resume,
+    is_stopped,
+    pid_namespace,
+    which_listens,
+)
+from rosz.wire import Endpoint
+
+__all__ = ("LocalPeer", "LocalPeers", "LocalRegistration")
+
+_SOCKETS = Path("/proc/net/unix")
+_LOOPBACK = "127.0.0.1"
+_FIELDS = 4
+
+
+class LocalPeer(msgspec.Struct, frozen=True):
+    """A session of this machine, as it is registered.
+
+    Attributes:
+        namespace: The namespace of its process id.
+        pid: The id of its process.
+        port: The loopback port that it listens at; 0 for none.
+        zid: The id of the session; empty while it is being opened.
+    """
+
+    namespace: str
+    pid: int
+    port: int
+    zid: str = ""
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether its process is stopped; false if that is unknown."""
+        return self.namespace == pid_namespace() and is_stopped(self.pid)
+
+    @property
+    def endpoint(self) -> str:
+        """The endpoint where it can be reached directly; empty if there is none."""
+        return str(Endpoint.of("tcp", _LOOPBACK, self.port)) if self.port else ""
+
+
+class LocalPeers:
+    """The sessions of this machine that meet at one endpoint, as they were at one moment.
+
+    Args:
+        rendezvous: The endpoint where they meet.
+        peers: The sessions.
+    """
+
+    def __init__(self, rendezvous: str, peers: tuple[LocalPeer, ...]) -> None:
+        self.rendezvous = rendezvous
+        self._peers = peers
+
+    @classmethod
+    def read(cls, rendezvous: str) -> LocalPeers:
+        """Return the sessions that are registered now."""
+        prefix = f"@{_prefix(rendezvous)}"
+        try:
+            lines = _SOCKETS.read_text(errors="replace").splitlines()
+        except OSError:  # not Linux
+            lines = []
+        found: dict[tuple[str, int, int], LocalPeer] = {}
+        for line in lines:
+            _, is_ours, rest = line.partition(prefix)
+            parts = rest.split("/")
+            if is_ours and len(parts) == _FIELDS and parts[1].isdecimal() and parts[2].isdecimal():
+                peer = LocalPeer(parts[0], int(parts[1]), int(parts[2]), parts[3])
+                key = (peer.namespace, peer.pid, peer.port)
+                if key not in found or peer.zid:
+                    found[key] = peer
+        return cls(rendezvous, tuple(found.values()))
+
+    def __iter__(self) -> Iterator[LocalPeer]:
+        """Iterate over the sessions."""
+        return iter(self._peers)
+
+    @cached_property
+    def stopped(self) -> tuple[LocalPeer, ...]:
+        """The sessions whose processes are stopped."""
+        return tuple(peer for peer in self._peers if peer.is_stopped)
+
+    @cached_property
+    def is_any_running(self) -> bool:
+        """Whether there is a session whose process is not stopped."""
+        return any(not peer.is_stopped for peer in self._peers)
+
+    @property
+    def is_anybody_there(self) -> bool:
+        """Whether there is anybody to meet, with a session of rosz or not, who is not stopped."""
+        if self.is_any_running:
+            return True
+        return is_listening(self.rendezvous) and self.stopped_holder is None
+
+    @cached_property
+    def stopped_holder(self) -> int | None:
+        """The id of the stopped process that listens at the rendezvous, if there is one."""
+        return self._holder(self.stopped)
+
+    @property
+    def is_router_stopped(self) -> bool:
+        """Whether a router listens at the rendezvous and is stopped.
+
+        Peers ask their router about sessions beyond themselves, so a client of such a peer would
+        wait for both.
+        """
+        return self._holder(tuple(peer for peer in self.stopped if not peer.port)) is not None
+
+    @property
+    def why_unanswered(self) -> str:
+        """The reason why nobody answers at the rendezvous, and what to do, if it is stopped."""
+        pid = self.stopped_holder
+        if pid is None:
+            return ""
+        who = f"{describe_process(pid)} holds the meeting point {self.rendezvous}"
+        return f"{who} and is stopped: {how_to_resume(pid)}"
+
+    def why_silent(self, sessions: Container[str]) -> str:
+        """Return which of some sessions are stopped, and what to do; empty if none is.
+
+        Args:
+            sessions: The ids of the sessions.
+        """
+        stopped = {peer.pid for peer in self.stopped if peer.zid in sessions}
+        return "; ".join(
+            f"{describe_process(pid)} is stopped: {how_to_resume(pid)}" for pid in sorted(stopped)
+        )
+
+    def _holder(self, peers: tuple[LocalPeer, ...]) -> int | None:
+        if not peers:
+            return None
+        return which_listens(Endpoint(self.rendezvous), [peer.pid for peer in peers])
+
+
+class LocalRegistration:
+    """The registration of a session of this process, until closed.
+
+    It is made before the session opens, so that of two that open at the same time one sees the
+    other.
+
+    Args:
+        rendezvous: The endpoint where the session meets others.
+        reachable: Whether to reserve a port that the session will listen at.
+
+    Attributes:
+        peer: What others see.
+
+    Raises:
+        TransportError: This process has registered another session that is not reachable: a router.
+    """
+
+    def __init__(self, rendezvous: str, *, reachable: bool = True) -> None:
+        self.peer = LocalPeer(pid_namespace(), os.getpid(), 0)
+        self._rendezvous = rendezvous
+        self._sockets: list[socket.socket] = []
+        self._reserved: socket.socket | None = None
+        if sys.platform != "linux":
+            return
+        if reachable:
+            self._reserved = socket.socket()
+            # Two sockets with this option may have one port, as long as only one of them listens.
+            self._reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._reserved.bind((_LOOPBACK, 0))
+            port = self._reserved.getsockname()[1]
+            self.peer = msgspec.structs.replace(self.peer, port=port)
+        self._bind()
+
+    def opened(self, zid: str) -> None:
+        """Add the id of the session, which is open now."""
+        self.peer = msgspec.structs.replace(self.peer, zid=zid)
+        if self._sockets:
+            self._bind()
+        self._release_port()
+
+    def close(self) -> None:
+        """Remove the registration; a second call has no effect."""
+        self._release_port()
+        for one in self._sockets:
+            one.close()
+
+    def _release_port(self) -> None:
+        if self._reserved is not None:
+            self._reserved.close()
+
+    def _bind(self) -> None:
+        made = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        peer = self.peer
+        parts = (peer.namespace, peer.pid, peer.port, peer.zid)
+        try:
+            made.bind(f"\0{_prefix(self._rendezvous)}{'/'.join(map(str, parts))}")
+        except OSError as error:
+            made.close()
+            if error.errno != errno.EADDRINUSE:
+                raise
+            raise TransportError(
+                f"this process has a router at {self._rendezvous} already, and there is one for"
+                " each meeting point: close that one first"
+            ) from error
+        self._sockets.append(made)
+
+
+def _prefix(rendezvous: str) -> str:
+    return f"rosz/{crc32(rendezvous.encode()):08x}/"
