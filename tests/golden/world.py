@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Self
 
@@ -106,10 +107,13 @@ class GoldenWorld(Rosz):
     def __enter__(self) -> Self:
         if not self._nodes:
             return self
-        super().__enter__()
-        robot = self.start(sys.executable, str(_ROBOT))
-        assert robot.stdout is not None
-        assert robot.stdout.readline() == "ready\n"
+        with ExitStack() as stack:
+            stack.push(self)
+            super().__enter__()
+            robot = self.start(sys.executable, str(_ROBOT))
+            assert robot.stdout is not None
+            assert robot.stdout.readline() == "ready\n"
+            stack.pop_all()
         return self
 
     def answer(self, line: str) -> str:
