@@ -1,9 +1,8 @@
 """Types by name: the shipped classes, and those of any package on the package path.
 
-A package that rosz does not ship is compiled when the first of its types is asked for, whole, into
-a module like the shipped ones. The generated source is kept in a cache folder under a name made of
-what it was generated from, so that other processes need not generate it again; tracebacks show its
-lines. Where the folder cannot be written, the source lives in memory only.
+A package that rosz does not ship is compiled whole, into a module like the shipped ones, when the
+first of its types is requested. The generated source is cached for other processes. A type that is
+on no package path is compiled from the text of its definition.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import hashlib
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -22,8 +21,18 @@ from typing import Any, Literal, TypeAlias
 import rosz.idl
 import rosz.message
 import rosz.msgs
-from rosz.errors import PackageNotFound, TypeNotFound, near_miss
-from rosz.idl import Catalog, Definition, Folders
+from rosz.errors import DefinitionError, PackageNotFound, TypeNotFound, near_miss
+from rosz.idl import (
+    Catalog,
+    Definition,
+    Folders,
+    full_name,
+    message_hash,
+    message_md5,
+    service_hash,
+    service_md5,
+    split_definitions,
+)
 from rosz.idl.cache import SourceCache
 from rosz.idl.generate import (
     MARKER,
@@ -39,25 +48,29 @@ __all__ = ("Kind", "TypeStore", "is_generated", "shipped_packages", "shipped_typ
 
 Kind: TypeAlias = Literal["msg", "srv"]
 
+_BUILT_IN = frozenset(
+    {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration", "std_msgs/msg/Header"}
+)
+"""Types that ROS 1 writes in another way; their classes are always the shipped ones."""
 _NAME = re.compile(r"([A-Za-z]\w*)/(?:(msg|srv)/)?([A-Za-z]\w*)", re.ASCII)
 
 
 class _StaleError(Exception):
-    """A cached module was generated against another definition of a type in it."""
+    """A cached module was generated with another definition of a type in it."""
 
 
 class TypeStore:
-    """Finds message and service classes by name.
+    """Message and service classes by name.
 
     Args:
-        packages: Where packages that rosz does not ship are; none when not given. What rosz ships
-            comes first, so that it stays what ROS 2 understands.
-        cache: Folder for generated sources; none are kept when not given.
+        packages: Index of packages besides those that rosz ships, which come first so that their
+            types stay those of ROS 2.
+        cache: Folder for generated sources; None to keep them in memory only.
     """
 
     def __init__(self, packages: PackageIndex | None = None, cache: Path | None = None) -> None:
         self._packages = packages
-        self._cache = SourceCache(cache)
+        self._compiler = _Compiler(cache)
         self._modules: dict[tuple[str, Kind], ModuleType] = {}
         self._folders = Folders(self._folder)
         self._catalog = Catalog(self.definition)
@@ -70,7 +83,7 @@ class TypeStore:
 
         Raises:
             TypeNotFound: There is no such type.
-            DefinitionError: Its package has a definition that is not well-formed.
+            DefinitionError: A definition in its package is not well-formed.
         """
         cls: type[Message] = self._class(name, "msg")
         return cls
@@ -83,17 +96,54 @@ class TypeStore:
 
         Raises:
             TypeNotFound: There is no such type.
-            DefinitionError: Its package has a definition that is not well-formed.
+            DefinitionError: A definition in its package is not well-formed.
         """
         cls: type[Service] = self._class(name, "srv")
         return cls
+
+    def message_from_text(
+        self, name: str, text: str, others: Mapping[str, str] | None = None
+    ) -> type[Message]:
+        """Return a message class by the text of its definition.
+
+        It is the class that this store has by that name if the definitions are equal. Types in the
+        definition are those of the texts, or else those of this store.
+
+        Args:
+            name: ``std_msgs/String`` or ``std_msgs/msg/String``.
+            text: Text of the definition. Texts of the types in it may follow, each behind a line of
+                ``=`` and a line ``MSG: package/Name``, as in ROS 1's full texts and in bags.
+            others: Texts of types in the definition by name, as ROS 2's get_type_description
+                returns them.
+
+        Raises:
+            TypeNotFound: The name is not that of a message type.
+            DefinitionError: A definition is not well-formed, or a type in it does not exist.
+        """
+        return self._text_types(self._check_name(name, "msg"), text, others).message(name)
+
+    def service_from_text(
+        self, name: str, text: str, others: Mapping[str, str] | None = None
+    ) -> type[Service]:
+        """Return a service class by the text of its definition; see `message_from_text`.
+
+        Args:
+            name: ``std_srvs/SetBool`` or ``std_srvs/srv/SetBool``.
+            text: Text of the definition, which those of types in it may follow.
+            others: Texts of types in the definition by name.
+
+        Raises:
+            TypeNotFound: The name is not that of a service type.
+            DefinitionError: A definition is not well-formed, or a type in it does not exist.
+        """
+        return self._text_types(self._check_name(name, "srv"), text, others).service(name)
 
     def names(self, kind: Kind, package: str | None = None) -> list[str]:
         """Return the names of all types of a kind, as ``std_msgs/String``, sorted.
 
         Args:
-            kind: Messages or services.
-            package: Only those of this package.
+            kind: ``msg`` or ``srv``.
+            package: Package that the types belong to; any when not given.
 
         Raises:
             PackageNotFound: There is no such package.
@@ -113,11 +163,11 @@ class TypeStore:
         return sorted(p for p in known if any(self._bases(p, each) for each in kinds))
 
     def has(self, package: str, kind: Kind) -> bool:
-        """Tell whether a package has types of a kind."""
+        """Return whether a package has types of a kind."""
         return bool(shipped_types(package, kind) or self._folders.names(package, kind))
 
     def definition(self, name: str) -> Definition:
-        """Return the text of a type and where it is.
+        """Return the definition of a type.
 
         Args:
             name: Full name, ``std_msgs/msg/String`` or ``std_srvs/srv/SetBool``.
@@ -138,8 +188,8 @@ class TypeStore:
         """Return the module with all types of one kind that a package has.
 
         Raises:
-            TypeNotFound: It has none.
-            DefinitionError: One of its definitions is not well-formed.
+            TypeNotFound: The package has none.
+            DefinitionError: A definition in it is not well-formed.
         """
         key = package, kind
         if key not in self._modules:
@@ -147,21 +197,21 @@ class TypeStore:
         return self._modules[key]
 
     def sources(self, packages: Sequence[str]) -> dict[str, dict[str, str]]:
-        """Generate importable modules of packages, and of those that they depend on.
+        """Return sources of importable modules for packages, and for those that they depend on.
 
-        What rosz ships is imported from there and not generated again.
+        Types that rosz ships are imported from there.
 
         Args:
             packages: Names of packages on the package path.
 
         Returns:
-            Sources by package and file name; the folders of the packages belong side by side into a
-            folder on Python's path.
+            Sources by package and file name; the packages' folders belong side by side in a folder
+            on Python's path.
 
         Raises:
             PackageNotFound: There is no such package.
             TypeNotFound: A package has no types of its own.
-            DefinitionError: A definition is not well-formed, or refers to what is not there.
+            DefinitionError: A definition is not well-formed, or a type in it does not exist.
         """
         done: dict[str, dict[str, str]] = {}
         rest = list(packages)
@@ -189,19 +239,23 @@ class TypeStore:
         return shipped_module(name) if _is_shipped(name) else f"{package}.{kind}"
 
     def _own_names(self, package: str, kind: str) -> list[str]:
-        """List the full names of a package's types that rosz does not ship."""
+        """Return the full names of a package's types that rosz does not ship."""
         return [name for name in self._folders.names(package, kind) if not _is_shipped(name)]
 
     def _class(self, name: str, kind: Kind) -> Any:
-        match = _NAME.fullmatch(name)
-        if match is None or match[2] not in (None, kind):
-            raise TypeNotFound(name, f"expected a name such as 'package/Type' of a {kind}")
-        package, base = match[1], match[3]
+        package, _, base = self._check_name(name, kind).split("/")
         if base in shipped_types(package, kind):
             return getattr(import_module(shipped_module(f"{package}/{kind}/{base}")), base)
         if base not in self._bases(package, kind):
             raise TypeNotFound(name, self._why_not(package, kind, base))
         return getattr(self.module(package, kind), base)
+
+    def _check_name(self, name: str, kind: Kind) -> str:
+        """Return the full name of a type of a kind."""
+        match = _NAME.fullmatch(name)
+        if match is None or match[2] not in (None, kind):
+            raise TypeNotFound(name, f"expected a name such as 'package/Type' of a {kind}")
+        return f"{match[1]}/{kind}/{match[3]}"
 
     def _why_not(self, package: str, kind: Kind, base: str) -> str:
         bases = self._bases(package, kind)
@@ -228,7 +282,7 @@ class TypeStore:
             return None
 
     def _bases(self, package: str, kind: Kind) -> list[str]:
-        """List the types of a package without the package's name, sorted."""
+        """Return the types of a package without the package's name, sorted."""
         ours = set(shipped_types(package, kind))
         return sorted(ours | {n.rpartition("/")[2] for n in self._folders.names(package, kind)})
 
@@ -249,46 +303,81 @@ class TypeStore:
             compiled.__all__ = tuple(sorted({*ours.__all__, *compiled.__all__}))  # type: ignore[attr-defined]
         return compiled
 
+    def _text_types(self, name: str, text: str, others: Mapping[str, str] | None) -> _TextTypes:
+        texts = {full_name(other, "msg"): one for other, one in (others or {}).items()}
+        return _TextTypes(self, self._compiler, texts | split_definitions(name, text))
+
     def _compile(self, package: str, kind: Kind, names: list[str]) -> ModuleType:
-        digest = hashlib.sha256(self._generation)
-        for name in names:
-            definition = self.definition(name)
-            digest.update(f"\n{name} {len(definition.text)}\n{definition.text}".encode())
-        stem = f"{package}_{kind}_{digest.hexdigest()[:32]}"
-        module_name = f"rosz.msgs.{package}.{kind}" + (
-            "_more" if shipped_types(package, kind) else ""
+        definitions = [(name, self.definition(name).text) for name in names]
+        stem = f"{package}_{kind}_{self._compiler.digest(definitions)}"
+        more = "_more" if shipped_types(package, kind) else ""
+        return self._compiler.load(
+            f"rosz.msgs.{package}.{kind}{more}",
+            stem,
+            [name.rpartition("/")[2] for name in names],
+            self.message,
+            lambda: _source(names, self._catalog),
         )
+
+
+class _Compiler:
+    """Generates modules of message and service classes, and runs them.
+
+    Args:
+        cache: Folder for generated sources; None to keep them in memory only.
+    """
+
+    def __init__(self, cache: Path | None) -> None:
+        self._cache = SourceCache(cache)
+
+    def digest(self, definitions: Iterable[tuple[str, str]]) -> str:
+        """Return a name for the source that is generated from definitions (name, text)."""
+        digest = hashlib.sha256(self._generation)
+        for name, text in definitions:
+            digest.update(f"\n{name} {len(text)}\n{text}".encode())
+        return digest.hexdigest()[:32]
+
+    def load(
+        self,
+        module_name: str,
+        stem: str,
+        members: list[str],
+        message: Callable[[str], type[Message]],
+        write: Callable[[], str],
+    ) -> ModuleType:
+        """Return a generated module: a loaded or a cached one, or a new one.
+
+        Args:
+            module_name: Name of the module, where pickle looks for the classes.
+            stem: Name of the source in the cache.
+            members: Names that the module must have.
+            message: Function that returns the class of a message type in the definitions.
+            write: Function that generates the source.
+        """
         known = sys.modules.get(module_name)
-        if known is not None and self._fits(known, stem):
+        stem_known, needs_known = getattr(known, "_made_of", ("", {}))
+        same = stem_known == stem and all(message(n) is cls for n, cls in needs_known.items())
+        if known is not None and same:
             return known
         needs: dict[str, type[Message]] = {}
 
         def type_of(name: str, type_hash: str, md5: str) -> type[Message]:
-            """Give the module a class that it builds on, if it is still the same."""
-            cls = needs[name] = self.message(name)
+            """Return a class that the module builds on, if it is still the same."""
+            cls = needs[name] = message(name)
             if (cls._type_hash, cls._md5sum) != (type_hash, md5):
                 raise _StaleError(name)
             return cls
 
         namespace = {"_type_of": type_of, "_made_of": (stem, needs)}
-        bases = [name.rpartition("/")[2] for name in names]
-        module = self._cache.load(module_name, stem, namespace, bases)
+        module = self._cache.load(module_name, stem, namespace, members)
         if module is None:
-            source = self._source(package, kind, names)
-            module = self._cache.add(module_name, stem, namespace, source)
-        sys.modules.setdefault(module_name, module)  # where pickle looks for the classes
+            module = self._cache.add(module_name, stem, namespace, write())
+        sys.modules.setdefault(module_name, module)
         return module
-
-    def _fits(self, module: ModuleType, stem: str) -> bool:
-        """Tell whether a module that another store compiled is what this one would compile."""
-        made = getattr(module, "_made_of", None)
-        if made is None or made[0] != stem:
-            return False
-        return all(self.message(name) is cls for name, cls in made[1].items())
 
     @cached_property
     def _generation(self) -> bytes:
-        """Identify the generator and what its code calls."""
+        """A hash of the generator and of what generated code calls."""
         digest = hashlib.sha256()
         for package in (rosz.idl, rosz.message):
             for folder in package.__path__:
@@ -296,16 +385,83 @@ class TypeStore:
                     digest.update(file.read_bytes())
         return digest.digest()
 
-    def _source(self, package: str, kind: Kind, names: list[str]) -> str:
-        if kind == "msg":
-            messages = [self._catalog.message(name) for name in names]
-            return message_module(messages, self._catalog, _injected, package)
-        services = [self._catalog.service(name) for name in names]
-        return service_module(services, self._catalog, _injected, package)
+
+class _TextTypes:
+    """Types whose definitions are given as texts.
+
+    Each is compiled into a module of its own, since types of one name may come with several
+    definitions.
+    """
+
+    def __init__(self, store: TypeStore, compiler: _Compiler, texts: dict[str, str]) -> None:
+        self._store = store
+        self._compiler = compiler
+        self._texts = texts
+        self._catalog = Catalog(self._find)
+
+    def _find(self, name: str) -> Definition:
+        if name in self._texts and name not in _BUILT_IN:
+            return Definition(self._texts[name], f"<{name}>")
+        return self._store.definition(name)
+
+    def message(self, name: str) -> type[Message]:
+        """Return a message class."""
+        name = full_name(name, "msg")
+        spec = self._catalog.message(name)
+        identity = message_hash(spec, self._catalog), message_md5(spec, self._catalog)
+        known: type[Message] | None = self._known(self._store.message, name, identity)
+        if known is not None:
+            return known
+        texts = {spec.name: spec.text}
+        texts |= {one.name: one.text for one in self._catalog.below(spec).values()}
+        cls: type[Message] = self._compile(name, texts)
+        return cls
+
+    def service(self, name: str) -> type[Service]:
+        """Return a service class."""
+        name = full_name(name, "srv")
+        spec = self._catalog.service(name)
+        identity = service_hash(spec, self._catalog), service_md5(spec, self._catalog)
+        known: type[Service] | None = self._known(self._store.service, name, identity)
+        if known is not None:
+            return known
+        texts = {spec.name: spec.text}
+        for half in (spec.request, spec.response):
+            texts |= {one.name: one.text for one in self._catalog.below(half).values()}
+        cls: type[Service] = self._compile(name, texts)
+        return cls
+
+    def _known(self, find: Callable[[str], Any], name: str, identity: tuple[str, str]) -> Any:
+        """Return the store's own class if its definition is the same."""
+        try:
+            cls = find(name)
+        except (TypeNotFound, DefinitionError):
+            return None
+        return cls if (cls._type_hash, cls._md5sum) == identity else None
+
+    def _compile(self, name: str, texts: dict[str, str]) -> Any:
+        package, kind, base = name.split("/")
+        stem = f"{package}_{kind}_{base}_{self._compiler.digest(sorted(texts.items()))}"
+        module = self._compiler.load(
+            f"rosz.msgs.{package}.{kind}.{stem}",
+            stem,
+            [base],
+            self.message,
+            lambda: _source([name], self._catalog),
+        )
+        return getattr(module, base)
+
+
+def _source(names: Sequence[str], catalog: Catalog) -> str:
+    """Return the source of a module of types of one package and kind."""
+    package, kind, _ = names[0].split("/")
+    if kind == "msg":
+        return message_module([catalog.message(one) for one in names], catalog, _injected, package)
+    return service_module([catalog.service(one) for one in names], catalog, _injected, package)
 
 
 def is_generated(file: str) -> bool:
-    """Tell whether a file is a module that rosz generated."""
+    """Return whether a file is a module that rosz generated."""
     try:
         with Path(file).open("rb") as opened:
             return opened.read(len(MARKER)) == MARKER.encode()
@@ -314,7 +470,7 @@ def is_generated(file: str) -> bool:
 
 
 def _injected(_name: str) -> None:
-    """Tell the generator that the module gets its classes from ``_type_of``."""
+    """Return None: the module gets its classes from ``_type_of``."""
 
 
 def shipped_types(package: str, kind: str) -> tuple[str, ...]:

@@ -186,7 +186,7 @@ def test_another_generator_generates_anew(workspace: Path, tmp_path: Path) -> No
     cache = tmp_path / "cache"
     store(workspace, cache).message("shared_msgs/Part")
     newer = store(workspace, cache)
-    newer.__dict__["_generation"] = b"of tomorrow"
+    newer._compiler.__dict__["_generation"] = b"of tomorrow"
     newer.message("shared_msgs/Part")
     assert len(list(cache.glob("*.py"))) == 2
 
@@ -276,3 +276,92 @@ def test_definitions() -> None:
     assert types.definition("std_srvs/srv/SetBool").path == "<std_srvs/srv/SetBool>"
     with pytest.raises(TypeNotFound, match="there is no package 'nowhere'"):
         types.definition("nowhere/msg/X")
+
+
+SCAN = """\
+uint8 FAST=2
+Header header
+Beam[] beams
+other_msgs/Beam last
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+
+================================================================================
+MSG: scan_msgs/Beam
+float32 range
+geometry_msgs/Point end
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: other_msgs/Beam
+duration age
+"""
+
+
+def test_a_message_from_a_full_text() -> None:
+    types = TypeStore()
+    scan = types.message_from_text("scan_msgs/Scan", SCAN)
+    assert (scan._type, scan._type_name) == ("scan_msgs/Scan", "scan_msgs/msg/Scan")
+    beam, other = scan._schema[1][1], scan._schema[2][1]
+    assert isinstance(beam, type)
+    assert isinstance(other, type)
+    assert (beam._type, other._type) == ("scan_msgs/Beam", "other_msgs/Beam")
+    assert scan._schema[0][1] is Header
+    assert beam._schema[1][1] is Point
+    made = scan(Header(frame_id="map"), [beam(1.5, Point(1.0, 2.0, 3.0))])
+    assert scan.from_cdr(made.to_cdr()) == made == pickle.loads(pickle.dumps(made))
+    assert "MSG: other_msgs/Beam" in scan._full_text
+
+
+def test_a_class_from_a_text_is_made_once(tmp_path: Path) -> None:
+    forget()
+    scan = TypeStore(cache=tmp_path).message_from_text("scan_msgs/Scan", SCAN)
+    assert TypeStore(cache=tmp_path).message_from_text("scan_msgs/msg/Scan", SCAN) is scan
+    changed = SCAN.replace("float32 range", "float64 range")
+    assert TypeStore().message_from_text("scan_msgs/Scan", changed) is not scan
+    assert list(tmp_path.glob("scan_msgs_msg_Scan_*.py"))
+
+
+def test_a_text_of_a_known_type_gives_the_known_class() -> None:
+    types = TypeStore()
+    assert types.message_from_text("std_msgs/String", String._full_text) is String
+    assert types.service_from_text("std_srvs/SetBool", SetBool._text) is SetBool
+    longer = types.message_from_text("std_msgs/String", "string data\nint8 more\n")
+    assert longer is not String
+    assert longer._type == String._type
+
+
+def test_a_service_from_texts_by_name() -> None:
+    others = {"arm_msgs/msg/Pose": "Joint[] joints\n", "arm_msgs/msg/Joint": "float64 angle\n"}
+    move = TypeStore().service_from_text("arm_msgs/srv/Move", "Pose to\n---\nbool done\n", others)
+    pose = move.Request._schema[0][1]
+    assert isinstance(pose, type)
+    assert pose._type_name == "arm_msgs/msg/Pose"
+    assert move.Response(done=True).to_cdr() == bytes([0, 1, 0, 0, 1])
+
+
+def test_types_of_a_text_come_from_the_store_too(workspace: Path) -> None:
+    types = store(workspace)
+    made = types.message_from_text("box_msgs/Box", "shared_msgs/Part[] parts\n")
+    assert made._schema[0][1] is types.message("shared_msgs/Part")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "reason"),
+    [
+        ("Scan", "int8 x", "expected a name such as 'package/Type' of a msg"),
+        ("scan_msgs/srv/Scan", "int8 x", "expected a name such as 'package/Type' of a msg"),
+        ("scan_msgs/Scan", "int8", "<scan_msgs/msg/Scan>:1:5: expected a name after type 'int8'"),
+        ("scan_msgs/Scan", "Beam beam", "type 'Beam' of field 'beam'"),
+    ],
+)
+def test_a_text_that_is_refused(name: str, text: str, reason: str) -> None:
+    with pytest.raises((TypeNotFound, DefinitionError)) as caught:
+        TypeStore().message_from_text(name, text)
+    assert reason in str(caught.value)

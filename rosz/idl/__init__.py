@@ -8,7 +8,14 @@ sources, are public as well. Pure; may import floor 0.
 
 from __future__ import annotations
 
-from rosz.idl.catalog import Catalog, Definition, Folders, read_definition
+from rosz.idl.catalog import (
+    Catalog,
+    Definition,
+    Folders,
+    full_name,
+    read_definition,
+    split_definitions,
+)
 from rosz.idl.grammar import parse_action, parse_message, parse_service
 from rosz.idl.hashes import (
     describe,
@@ -31,6 +38,7 @@ __all__ = (
     "MessageSpec",
     "ServiceSpec",
     "describe",
+    "full_name",
     "message_hash",
     "message_md5",
     "parse_action",
@@ -40,4 +48,5 @@ __all__ = (
     "service_hash",
     "service_md5",
     "service_parts",
+    "split_definitions",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,9 +17,12 @@ __all__ = (
     "Definition",
     "Folders",
     "action_messages",
+    "full_name",
     "read_definition",
+    "split_definitions",
 )
 
+_NEXT_DEFINITION = re.compile(r"^=+[ \t]*\r?\nMSG:[ \t]*(\S+)[ \t]*\r?\n", re.MULTILINE)
 _PARTS = ("Goal", "Result", "Feedback")
 _ENVELOPES = {
     "ActionGoal": "Header header\nactionlib_msgs/GoalID goal_id\n{name}Goal goal\n",
@@ -155,6 +159,25 @@ class Catalog:
                 field.line,
                 field.column,
             ) from error
+
+
+def split_definitions(name: str, text: str) -> dict[str, str]:
+    """Return the texts of a type and of the types behind it, by full name.
+
+    Args:
+        name: Full name of the type.
+        text: Text of its definition. Texts of the types in it may follow, each behind a line of
+            ``=`` and a line ``MSG: package/Name``, as in ROS 1's full texts and in bags.
+    """
+    own, *others = _NEXT_DEFINITION.split(text)
+    names = [full_name(other, "msg") for other in others[::2]]
+    return {**dict(zip(names, others[1::2], strict=True)), name: own}
+
+
+def full_name(name: str, kind: str) -> str:
+    """Return a type name with its middle part: ``std_msgs/String`` is ``std_msgs/msg/String``."""
+    package, slash, base = name.partition("/")
+    return name if "/" in base or not slash else f"{package}/{kind}/{base}"
 
 
 def read_definition(file: Path) -> Definition:
