@@ -179,7 +179,7 @@ topic echo -1 --nostr --noarr /robot/joints
 topic echo -1 -p -w 8 /robot/pose/pose
 topic echo -1 --filter "m.data=='hello'" /chatter
 topic echo -1 --filter 'm.data>>' /chatter
-topic echo -1 --filter m.nothing==1 /chatter | head -1
+topic echo -1 --filter m.nothing==1 /chatter
 topic echo -1 /robot/pose/nothing | head -1
 topic echo -1 /robot/joints/position[7] | head -1
 topic echo -1 /chater | head -1
