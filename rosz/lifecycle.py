@@ -15,11 +15,12 @@ signal handler may come in between anywhere.
 
 Threads and Zenoh's links do not survive a fork. In a forked child this module closes every
 lifecycle of the parent, without running hooks and without closing parts, and then calls ``on_fork``
-of each. That is the only place where rosz deals with forks.
+of each, newest first. That is the only place where rosz deals with forks.
 """
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 import threading
@@ -78,7 +79,7 @@ class Lifecycle:
     Reading an attribute is all that a hot path needs: ``if lifecycle.closing: ...``.
 
     Args:
-        what: The owner in error texts, such as ``the publisher``.
+        what: The owner in error texts, such as ``the publisher of '/chatter'``.
         log: Logger for hooks and parts that fail.
         on_fork: Method of the owner that a forked child calls: to replace locks, and to keep alive
             what must not be freed. It must touch neither threads nor links. Only a weak reference
@@ -110,22 +111,21 @@ class Lifecycle:
         self._closer: dict[str, tuple[int]] = {}
         self._closing_flag = _Flag()
         self._closed_flag = _Flag()
+        self._number = next(_numbers)
         _lifecycles.add(self)
 
     def check_open(self, doing: str) -> None:
         """Refuse an operation on a closed owner.
 
         Args:
-            doing: The operation, such as ``publish on '/chatter'``.
+            doing: The operation, such as ``publish``.
 
         Raises:
             ClosedError: Closing has begun.
         """
         if self.closing:
-            why = f"{self._what} is closed"
-            if self.reason:
-                why = self.reason if self.forked else f"{why}: {self.reason}"
-            raise ClosedError(f"cannot {doing}: {why}")
+            why = f": {self.reason}" if self.reason else ""
+            raise ClosedError(f"cannot {doing}: {self._what} is closed{why}")
 
     def keep(self, part: P) -> P:
         """Close a part together with the owner, before the parts that came earlier.
@@ -140,7 +140,7 @@ class Lifecycle:
         if self.closing:
             self.forget(part)
             part.close()
-            self.check_open("add a part")
+            self.check_open("declare anything more")
         return part
 
     def forget(self, part: Closable) -> None:
@@ -246,6 +246,8 @@ class Lifecycle:
         self.reason = FORKED
         self.forked = self.closing = self.closed = True
         self._closer = {"": (threading.get_ident(),)}
+
+    def _run_fork_hook(self) -> None:
         on_fork = None if self._on_fork is None else self._on_fork()
         if on_fork is not None:
             on_fork()
@@ -282,12 +284,16 @@ def _remove(items: list[T], item: T) -> bool:
     return True
 
 
+_numbers = itertools.count()
 _lifecycles: weakref.WeakSet[Lifecycle] = weakref.WeakSet()
 
 
 def _close_all_in_child() -> None:
-    for lifecycle in list(_lifecycles):
-        lifecycle._close_in_child()  # noqa: SLF001  # this module's own
+    inherited = sorted(_lifecycles, key=lambda lifecycle: -lifecycle._number)  # noqa: SLF001
+    for lifecycle in inherited:
+        lifecycle._close_in_child()  # noqa: SLF001
+    for lifecycle in inherited:
+        lifecycle._run_fork_hook()  # noqa: SLF001
 
 
 os.register_at_fork(after_in_child=_close_all_in_child)

@@ -63,13 +63,13 @@ def test_early_reason() -> None:
 
 
 def test_check_open() -> None:
-    life = Lifecycle("the publisher")
-    life.check_open("publish on '/chatter'")
+    life = Lifecycle("the publisher of '/chatter'")
+    life.check_open("publish")
     life.close()
     with pytest.raises(
-        ClosedError, match=r"^cannot publish on '/chatter': the publisher is closed"
+        ClosedError, match=r"^cannot publish: the publisher of '/chatter' is closed$"
     ):
-        life.check_open("publish on '/chatter'")
+        life.check_open("publish")
 
 
 def test_forgotten() -> None:
@@ -277,5 +277,5 @@ def test_forked_child() -> None:
     assert result.returncode == 0, result.stderr
     told, refused, *parent = result.stdout.splitlines()
     assert told == "forked"
-    assert refused == f"cannot publish: {lifecycle.FORKED}"
+    assert refused == f"cannot publish: the owner is closed: {lifecycle.FORKED}"
     assert parent == ["hook", "part"]

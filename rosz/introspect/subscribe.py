@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rosz import names
 from rosz.errors import DefinitionError, InvalidName, NotFoundError
 from rosz.introspect.fields import Target, find_target
-from rosz.node.endpoint import Endpoint
+from rosz.node.entity import Entity
 from rosz.qos import DEFAULT
 from rosz.wire import NO_HASH, Kind, Token, endpoint_key
 
@@ -115,7 +115,7 @@ def find_class(context: Context, token: Token) -> type[Message]:
 
 def subscribe_samples(
     node: Node, topic: str, type_name: str, type_hash: str, callback: Callable[[Sample], None]
-) -> Endpoint:
+) -> Entity:
     """Subscribe to the encoded samples of a topic, of all its types, without a queue.
 
     To other nodes it is a subscription like any other.
@@ -130,9 +130,9 @@ def subscribe_samples(
     Raises:
         ClosedError: The node is closed.
     """
-    entity = Endpoint(node, Kind.SUBSCRIPTION, topic, type_name, type_hash, DEFAULT)
+    entity = Entity(node, Kind.SUBSCRIPTION, topic, type_name, type_hash, DEFAULT)
     context = node.context
     every_type = endpoint_key(context.domain, topic, "*", "*")
-    entity.also_close(context.session.subscriber(every_type, callback))
+    entity.keep(context.session.subscriber(every_type, callback))
     entity.announce(watch=False)
     return node.keep(entity)

@@ -1,15 +1,19 @@
-"""Nodes and all that they declare: publishers, subscriptions, services, clients, timers, a log."""
+"""Nodes and their parts: publishers, subscriptions, services, clients, timers, a log.
 
-from rosz.node.channel import MessageInfo
+Other packages of rosz may also import these modules directly: `clock`, `control`, `entity`, `log`,
+`log_handlers`, `logger`, `service`, `signals` and `standard`. They serve the ROS 1 and ROS 2 names,
+and commands that would otherwise load more than they need.
+"""
+
 from rosz.node.client import Client
 from rosz.node.context import Context
 from rosz.node.control import NodeInfo
-from rosz.node.generic import GenericSubscription
+from rosz.node.decoder import MessageInfo
 from rosz.node.node import Node
 from rosz.node.publisher import Publisher, SubscriberLink
 from rosz.node.rate import Rate
 from rosz.node.service import Service
-from rosz.node.subscription import Subscription
+from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Timer, TimerEvent
 
 __all__ = (

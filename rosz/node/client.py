@@ -15,8 +15,9 @@ from rosz.errors import (
     WaitTimeout,
     near_miss,
 )
-from rosz.node.endpoint import Endpoint
-from rosz.node.mismatch import mismatch
+from rosz.node.core import NodeCore
+from rosz.node.entity import Entity
+from rosz.node.incompatible import explain_incompatible
 from rosz.qos import QoS
 from rosz.session import Cancellation, clamp_timeout
 from rosz.wire import Kind, pack
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from rosz.graph import View
     from rosz.message import Message
     from rosz.message import Service as ServiceType
-    from rosz.node.node import Node
     from rosz.session import Reply
 
 __all__ = ("Client",)
@@ -33,20 +33,20 @@ __all__ = ("Client",)
 _ATTEMPTS = 10
 _PAUSE = 0.02
 _AT_ONCE = 0.01
-"""Seconds within which a question that reaches nobody comes back."""
+"""Seconds within which a query that reaches nobody ends."""
 
 _SAME = 0.001
-"""Seconds by which a timeout may differ from the one that is declared."""
+"""Seconds by which a timeout may differ from that of the declared querier."""
 
 _GRACE = 1.0
-"""Seconds given to a server that is there, but was not heard of yet."""
+"""Seconds to wait for a server that the graph does not show yet."""
 
 
-class Client(Endpoint):
-    """A caller of a service; see `rosz.Node.client`. Any number of threads may call at once."""
+class Client(Entity):
+    """Call a service; see `rosz.Node.client`. Any number of threads may call at once."""
 
     def __init__(
-        self, node: Node, name: str, service_type: type[ServiceType], qos: QoS, timeout: float
+        self, node: NodeCore, name: str, service_type: type[ServiceType], qos: QoS, timeout: float
     ) -> None:
         super().__init__(
             node, Kind.CLIENT, name, service_type._type_name, service_type._type_hash, qos
@@ -56,10 +56,9 @@ class Client(Endpoint):
         self._numbers = itertools.count(1)
         self._cancel = Cancellation()
         self._known: tuple[View | None, bool] = None, False
-        self._querier = node.context.session.querier(
-            self.key, timeout=self.timeout, target="all_complete"
+        self._querier = self.keep(
+            node.context.session.querier(self.key, timeout=self.timeout, target="all_complete")
         )
-        self._declared.append(self._querier)
         self.announce()
 
     def __call__(self, *args: Any, timeout: float | None = None, **fields: Any) -> Any:
@@ -77,20 +76,20 @@ class Client(Endpoint):
         """Send a request and wait for the response.
 
         Args:
-            request: Of the service's request type.
-            timeout: Seconds; the client's own when not given.
+            request: An instance of the service's request type.
+            timeout: Time limit in seconds; the client's own when not given.
 
         Returns:
             The response, an instance of the service's response type.
 
         Raises:
             EncodeError: A field of the request has a value that does not fit.
-            ServiceNotFound: Nobody serves it.
-            ServiceError: The server answered with an error, or ended before it answered. Of several
-                servers, all of which are asked, the first answer counts.
-            WaitTimeout: There was no answer in time.
+            ServiceNotFound: No node serves the service.
+            ServiceError: The server responded with an error, or ended before it responded. All
+                servers get the request, and the first response counts.
+            WaitTimeout: No response came in time.
             ClosedError: The client or its context was closed meanwhile.
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
         limit = self.timeout if timeout is None else clamp_timeout(timeout)
         deadline = time.monotonic() + limit
@@ -102,19 +101,20 @@ class Client(Endpoint):
             reply = self._attempt(payload, deadline, limit)
             if reply is not None:
                 return self._response(reply, limit)
-            # Nobody was asked: the way to a server may be a moment behind its token. But who was
-            # asked, and ended without an answer, may have done the work: it is not asked again.
+            # The query reached nobody: the route to a server may come a moment after its token.
+            # A server that got the request and then ended may have done the work: it does not get
+            # the request again.
             if time.monotonic() - began > _AT_ONCE or not self._is_served():
                 break
             time.sleep(_PAUSE)
         raise ServiceError(f"service [{self.name}]: the server ended before it answered")
 
     def _attempt(self, payload: bytes, deadline: float, limit: float) -> Reply | None:
-        """Ask once; ``None`` when the question ended without an answer."""
+        """Send the request once; ``None`` if the query ended without a reply."""
         left = deadline - time.monotonic()
         if left <= 0:
             raise self._late(limit)
-        self.ensure_open("call")
+        self.check_open("call")
         attachment = pack(next(self._numbers), time.time_ns(), self.gid)
         if abs(self._querier.timeout - left) < _SAME:
             replies = self._querier.query(payload, attachment, self._cancel)
@@ -154,7 +154,7 @@ class Client(Endpoint):
         )
 
     def _is_served(self) -> bool:
-        """Tell whether anybody serves this name with this type, looking once at each view."""
+        """Return whether the service is served with this type, looking once at each view."""
         view = self.node.context.graph.view()
         seen, served = self._known
         if seen is not view:
@@ -163,8 +163,8 @@ class Client(Endpoint):
         return served
 
     def _find_server(self, limit: float) -> None:
-        """Make sure that somebody serves the name, waiting while the process is still joining."""
-        self.ensure_open("call")
+        """Make sure that the service is served, waiting while the process is still joining."""
+        self.check_open("call")
         context = self.node.context
         context.settled.wait(min(limit, _GRACE))
         if self._is_served():
@@ -174,9 +174,8 @@ class Client(Endpoint):
         if any(map(self.matches, others)):
             return
         if others:
-            raise ServiceNotFound(
-                f"service [{self.name}] is not available: {mismatch(self.token, others[0])}"
-            )
+            why = explain_incompatible(self.token, others[0])
+            raise ServiceNotFound(f"service [{self.name}] is not available: {why}")
         known = view.services()
         raise ServiceNotFound(
             f"service [{self.name}] is not available"
@@ -184,17 +183,17 @@ class Client(Endpoint):
         )
 
     def wait_for_service(self, timeout: float = 10.0) -> None:
-        """Wait until somebody serves this name with this type.
+        """Wait until a node serves the service with this type.
 
         Args:
-            timeout: Seconds.
+            timeout: Time limit in seconds.
 
         Raises:
-            WaitTimeout: Nobody did in time.
+            WaitTimeout: No node did in time.
             ClosedError: The client is closed, or the context was shut down meanwhile.
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
-        self.ensure_open("wait for")
+        self.check_open("wait")
         graph = self.node.context.graph
         what = f"service '{self.name}' of type '{self.token.type_name}'"
         try:
@@ -205,7 +204,7 @@ class Client(Endpoint):
             view = graph.view()
             others = view.servers(self.name)
             hint = (
-                mismatch(self.token, others[0])
+                explain_incompatible(self.token, others[0])
                 if others
                 else near_miss(self.name, view.services()).removeprefix("; ")
             )

@@ -1,13 +1,13 @@
 """Wall and ROS time, and sleeping in it.
 
-One time source is shared by a clock and all its branches: the context's clock, those of its nodes,
-those of their timers. Each of them can be closed by itself, which ends the sleeps on it and on its
+A clock and all its branches share one source of time: the clock of the context, those of its nodes,
+and those of their timers. Each can be closed by itself, which ends the sleeps on it and on its
 branches at once.
 
-A sleeper enters itself in a set, looks at time and closing once more, and only then waits, on a
-lock of its own that whoever wakes it releases. So no wake-up is lost, nobody polls, a tick of
-``/clock`` wakes only those whose time has come, and, because nothing is held meanwhile, closing is
-safe from a signal handler too.
+A sleep adds itself to a set, looks at the time and the state of the clock once more, and only then
+waits, on a lock of its own that is released to wake it. So no wake-up is lost, nothing polls, and a
+tick of ``/clock`` wakes only the sleeps whose time has come. No lock is held meanwhile, so a signal
+handler may close a clock.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ def nanoseconds(seconds: float, what: str) -> int:
     """Return seconds as nanoseconds.
 
     Args:
-        seconds: Of any sign.
-        what: What lasts so long, for the error.
+        seconds: Seconds, of any sign.
+        what: Name of the duration, for the error.
 
     Raises:
-        UsageError: It is no number, or infinite.
+        UsageError: `seconds` is not a finite number.
     """
     if not math.isfinite(seconds):
         raise UsageError(f"{what} is '{seconds}' s: expected a finite number")
@@ -41,11 +41,11 @@ def nanoseconds(seconds: float, what: str) -> int:
 
 
 class TimeJump(msgspec.Struct, frozen=True):
-    """A leap of ROS time.
+    """A jump of ROS time.
 
     Attributes:
-        before: ROS time before it, in nanoseconds.
-        after: ROS time after it, in nanoseconds.
+        before: ROS time before the jump, in nanoseconds.
+        after: ROS time after the jump, in nanoseconds.
     """
 
     before: int
@@ -53,7 +53,7 @@ class TimeJump(msgspec.Struct, frozen=True):
 
     @property
     def delta(self) -> int:
-        """How far time moved, in nanoseconds; negative when it moved back."""
+        """Size of the jump in nanoseconds; negative if time moved back."""
         return self.after - self.before
 
 
@@ -71,14 +71,14 @@ class _Sleeper:
         self.lock.acquire()
 
     def is_due(self, now: int) -> bool:
-        """Tell whether a ROS time ends the sleep; nothing but closing ends a sleep in wall time."""
+        """Return whether a ROS time ends the sleep; only closing ends a sleep in wall time."""
         return self.target is not None and (now >= self.target or now < self.start)
 
 
 class _Source:
     """The time that a clock and its branches share."""
 
-    __slots__ = ("advancing", "heard", "now", "observers", "simulated", "sleepers")
+    __slots__ = ("advancing", "last", "now", "observers", "simulated", "sleepers")
 
     def __init__(self) -> None:
         self.now = 0
@@ -86,10 +86,10 @@ class _Source:
         self.sleepers: set[_Sleeper] = set()
         self.observers: list[tuple[Callable[[TimeJump], None], int | None]] = []
         self.advancing = threading.Lock()
-        self.heard: tuple[bytes, int] = b"", 0
+        self.last: tuple[bytes, int] = b"", 0
 
     def wake(self, sleeper: _Sleeper, now: int) -> None:
-        """End a sleep, unless somebody else just did."""
+        """End a sleep, unless another thread just did."""
         try:
             self.sleepers.remove(sleeper)
         except KeyError:
@@ -119,7 +119,7 @@ class Clock:
     def now(self) -> int:
         """Return the time in nanoseconds since the Unix epoch.
 
-        Simulated, it is the newest time of ``/clock``, and 0 before the first.
+        Simulated time is the newest time of ``/clock``, and 0 before the first.
         """
         source = self._source
         return source.now if source.simulated else time.time_ns()
@@ -127,7 +127,7 @@ class Clock:
     def steady(self) -> int:
         """Return nanoseconds to measure intervals with.
 
-        In wall time they come from the monotonic clock, which nobody sets; simulated, they are
+        In wall time they come from the monotonic clock, which is never set; in simulation they are
         ROS time.
         """
         source = self._source
@@ -140,27 +140,27 @@ class Clock:
 
     @property
     def closed(self) -> bool:
-        """Whether this clock, or one that it branched off, is closed."""
+        """Whether this clock, or one that it is a branch of, is closed."""
         return self._closed or (self._parent is not None and self._parent.closed)
 
     def enable_simulation(self) -> None:
-        """Take time from `advance` from now on; it is 0 until the first.
+        """Take the time from `advance` from now on; it is 0 until the first call.
 
-        Sleeps under way end by the wall time they began in.
+        Sleeps that have begun end by wall time.
         """
         self._source.simulated = True
 
-    def advance(self, time_ns: int, *, teller: bytes = b"", number: int = 0) -> None:
-        """Set ROS time, and wake who waited for it.
+    def advance(self, time_ns: int, *, publisher: bytes = b"", number: int = 0) -> None:
+        """Set ROS time, and wake the sleeps whose time has come.
 
-        Each node of a context hears ``/clock`` on a thread of its own, and one that lags behind the
-        others must not set time back. So who tells the time numbers what it says, from 1, and what
-        the same one said before the last thing heard of it is left out.
+        Each node of a context receives ``/clock`` on a thread of its own, and one that lags behind
+        the others must not set time back. So publishers number their messages, from 1, and a
+        message older than the last one of the same publisher is ignored.
 
         Args:
-            time_ns: Nanoseconds; may be earlier than before, as when a simulation starts over.
-            teller: Who tells it.
-            number: Of what it says; 0 where it does not count.
+            time_ns: Time in nanoseconds; may be earlier than before, as when a simulation restarts.
+            publisher: Gid of the publisher of the time.
+            number: Number of its message; 0 if it does not count.
 
         Raises:
             UsageError: Time is not simulated, or `time_ns` is negative.
@@ -172,46 +172,46 @@ class Clock:
         if time_ns < 0:
             raise UsageError(f"ROS time cannot be '{time_ns}' ns: expected 0 or more")
         with source.advancing:
-            last_teller, last = source.heard
-            if teller == last_teller and 0 < number <= last:
+            last_publisher, last = source.last
+            if publisher == last_publisher and 0 < number <= last:
                 return
-            source.heard = teller, number
+            source.last = publisher, number
             before, source.now = source.now, time_ns
             for sleeper in list(source.sleepers):
                 if sleeper.is_due(time_ns):
                     source.wake(sleeper, time_ns)
         if before:
-            self._tell(TimeJump(before, time_ns))
+            self._report(TimeJump(before, time_ns))
 
     def on_jump(
         self, observer: Callable[[TimeJump], None], *, forward_ns: int | None = None
     ) -> Callable[[], None]:
-        """Have a function called when ROS time moves back, or forward by a leap.
+        """Call a function when ROS time jumps back, or far enough forward.
 
-        It runs on the thread that advances the clock, after the time is set.
+        It is called on the thread that advances the clock, after the time is set.
 
         Args:
-            observer: What to call.
-            forward_ns: The least step forward that counts as a leap; none does when not given.
+            observer: Function that gets the jump.
+            forward_ns: Smallest step forward that counts as a jump; none does when not given.
 
         Returns:
-            A function that ends the observation.
+            A function that removes the observer.
         """
         entry = (observer, forward_ns)
         observers = self._source.observers
         observers.append(entry)
 
-        def withdraw() -> None:
+        def remove() -> None:
             if entry in observers:
                 observers.remove(entry)
 
-        return withdraw
+        return remove
 
     def wait_started(self) -> bool:
         """Wait until there is a time: in simulation, for the first ``/clock`` above 0.
 
         Returns:
-            Whether there is; False, at once, if the clock is closed.
+            Whether there is a time; False, at once, if the clock is closed.
         """
         if self._source.simulated:
             self._await_start()
@@ -221,7 +221,7 @@ class Clock:
         """Sleep for a time; simulated, from the first ``/clock`` on.
 
         Args:
-            duration_ns: Nanoseconds; nothing to sleep for if not above 0.
+            duration_ns: Duration in nanoseconds; no sleep if it is not above 0.
 
         Returns:
             Whether the time is over; False, at once, if the clock is closed.
@@ -237,11 +237,11 @@ class Clock:
     def sleep_until(self, time_ns: int) -> bool:
         """Sleep until a time comes.
 
-        In wall time the length of the sleep is settled when it begins: setting the machine's clock
+        In wall time the duration of the sleep is fixed when it begins: setting the machine's clock
         meanwhile changes nothing.
 
         Args:
-            time_ns: Nanoseconds since the Unix epoch, or of ROS time.
+            time_ns: Time in nanoseconds since the Unix epoch, or of ROS time.
 
         Returns:
             Whether that time has come; False, at once, if the clock is closed.
@@ -255,7 +255,7 @@ class Clock:
         return start is not None and self._await(start, time_ns) is not None
 
     def close(self) -> None:
-        """End all sleeps on this clock and its branches, those to come too; again is no error."""
+        """End all sleeps on this clock and its branches, later ones too; again has no effect."""
         self._closed = True
         source = self._source
         for sleeper in list(source.sleepers):
@@ -301,7 +301,7 @@ class Clock:
             raise TimeMovedBackwards(start, now)
         return now
 
-    def _tell(self, jump: TimeJump) -> None:
+    def _report(self, jump: TimeJump) -> None:
         errors: list[Exception] = []
         for observer, forward_ns in list(self._source.observers):
             if jump.delta < 0 or (forward_ns is not None and jump.delta >= forward_ns):

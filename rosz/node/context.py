@@ -5,10 +5,8 @@ from __future__ import annotations
 import atexit
 import itertools
 import logging
-import os
 import socket
 import threading
-import weakref
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Self
 
@@ -16,10 +14,10 @@ from rosz import remap
 from rosz.environment import Environment, package_index
 from rosz.errors import ClosedError
 from rosz.graph import Graph
-from rosz.node import signals
+from rosz.lifecycle import Lifecycle
 from rosz.node.clock import Clock
-from rosz.node.inbox import Inbox
-from rosz.node.mismatch import MismatchWatch
+from rosz.node.direct_delivery import DirectDelivery
+from rosz.node.incompatible import IncompatibleEntities
 from rosz.session import (
     LocalPeers,
     MeshReadiness,
@@ -32,7 +30,6 @@ from rosz.session import (
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from rosz.node.endpoint import Endpoint
     from rosz.params.replica import Replica
     from rosz.security import Leave
     from rosz.typestore import TypeStore
@@ -40,42 +37,35 @@ if TYPE_CHECKING:
 __all__ = ("Context",)
 
 _log = logging.getLogger("rosz.context")
-_FORKED = (
-    "this process was forked from one that uses rosz, and threads and links do not outlive a fork:"
-    " start the child first, or use the 'spawn' method of multiprocessing"
-)
-_CLOSED_BY = 10.0
-"""Seconds that whoever shuts down a second time waits for the first, and its hooks, to be done."""
 
 
 class Context:
-    """Owner of everything that lives as long as the program's part in the network.
+    """Owner of everything that lives as long as the program takes part in the network.
 
     Args:
         environment: Settings; those of the process when not given.
-        argv: Command-line arguments without the program name; ROS ones are taken out.
-        config: How to open the session; by the environment when not given.
+        argv: Command-line arguments without the program name; ROS arguments are taken out.
+        config: How to open the session; as the environment says when not given.
 
     Attributes:
-        session: The network.
-        graph: Who is alive.
+        session: The session.
+        graph: The graph of the domain.
         clock: ROS time.
-        settled: Set when the process is linked to all its neighbours.
-        when_settled: Has a function called when it is, or at once if it is already.
-        inbox: What comes for single subscriptions of this process.
-        reason: Why it is shut down, or about to be.
-        passing: Whether this is a command rather than a part of the system: it holds no parameters.
-        leave: What rules let this machine do elsewhere, where it knows of any.
-        cooperative: Whether the program has shown that it asks for the end by itself.
-        forked: Whether this is the copy in a forked child, which can do nothing.
+        settled: Event, set when the process is linked to all its neighbours.
+        when_settled: Function that calls another one when that is so, or at once if it is already.
+        direct_delivery: Samples for single subscriptions of this process.
+        incompatible: Warnings about entities that cannot reach each other.
+        passing: Whether this is a command, which holds no parameters, rather than a node.
+        leave: What the rules let this machine do elsewhere, if it has any.
+        cooperative: Whether the program has shown that it asks whether it is to end.
 
     Raises:
         TransportError: The session cannot be opened.
-        UsageError: The environment has a value that means nothing.
+        UsageError: A variable of the environment has an invalid value.
     """
 
     SETTLED_BY = 2.0
-    """Seconds after which a young session counts as linked to all its neighbours, come what may."""
+    """Seconds after which a new session counts as linked to all its neighbours in any case."""
 
     def __init__(
         self,
@@ -95,32 +85,24 @@ class Context:
         )
         self.clock = Clock()
         self._ids = itertools.count()
-        self._hooks: list[Callable[[str], None]] = []
-        self._lock = threading.RLock()
         self._making = threading.RLock()
         self._params: Replica | None = None
         self._types: TypeStore | None = None
-        self._stopping = threading.Event()
         self._flushed = threading.Event()
-        self._stopped = threading.Event()
-        self._closer: threading.Thread | None = None
-        self.reason = ""
+        self._lifecycle = Lifecycle("the context", log=_log, on_fork=self._forked)
         self.cooperative = False
-        self.forked = False
-        self._endpoints: weakref.WeakSet[Endpoint] = weakref.WeakSet()
         self.session = Session.open(config, peers)
         try:
-            self._look_around(config, alone=alone)
+            self._join_network(config, alone=alone)
         except BaseException:  # Ctrl-C comes anywhere
             self.session.close()
             raise
         atexit.register(self.close)
-        _contexts.add(self)
 
-    def _look_around(self, config: SessionConfig, *, alone: bool) -> None:
+    def _join_network(self, config: SessionConfig, *, alone: bool) -> None:
         self.graph = Graph(self.session, self.domain)
-        self._mismatches = MismatchWatch(self.graph, self.session.zid)
-        self.inbox = Inbox(self.session, self.domain)
+        self.incompatible = IncompatibleEntities(self.graph, self.session.zid)
+        self.direct_delivery = DirectDelivery(self.session, self.domain)
         mesh = MeshReadiness(
             self.session,
             0 if alone or self.passing else self.SETTLED_BY,
@@ -134,7 +116,7 @@ class Context:
             self._links = serve_links(self.session)
 
     def next_id(self) -> int:
-        """Return a number for a node or endpoint, unique within the session.
+        """Return a number for a node or entity, unique within the session.
 
         Raises:
             ClosedError: The context is shut down, or this is a forked child of its process.
@@ -143,39 +125,18 @@ class Context:
         return next(self._ids)
 
     def check_open(self) -> None:
-        """Refuse to begin something new at the end.
+        """Refuse to declare anything more on a closed context.
 
         Raises:
             ClosedError: The context is shut down, or this is a forked child of its process.
         """
-        if self._stopping.is_set():
-            raise ClosedError(
-                f"the context is shut down{': ' + self.reason if self.reason else ''}"
-            )
-
-    def add_endpoint(self, endpoint: Endpoint, *, watch: bool = True) -> None:
-        """Take note of an endpoint of this process.
-
-        Args:
-            endpoint: It.
-            watch: Whether to tell of endpoints of the same name that it does not reach.
-        """
-        with self._lock:
-            self._endpoints.add(endpoint)
-            if watch:
-                self._mismatches.add(endpoint)
-
-    def remove_endpoint(self, endpoint: Endpoint) -> None:
-        """Forget an endpoint."""
-        with self._lock:
-            self._endpoints.discard(endpoint)
-            self._mismatches.remove(endpoint)
+        self._lifecycle.check_open("declare anything more")
 
     @property
     def params(self) -> Replica:
         """This process's replica of the parameter store, joined on first use.
 
-        It is there until all shutdown hooks have run.
+        It stays open until all shutdown hooks have run.
 
         Raises:
             ClosedError: The context is shut down, and has no replica.
@@ -192,12 +153,10 @@ class Context:
         from rosz.params.replica import Replica
 
         self.check_open()
-        replica = Replica(self.session, self.domain, settled=self.settled)
-        with self._lock:
-            if not self._stopping.is_set():
-                self._params = replica
-                return
-        replica.close()
+        self._params = replica = Replica(self.session, self.domain, settled=self.settled)
+        if self._lifecycle.closing:  # perhaps too late for the thread that closes the context
+            self._params = None
+            replica.close()
 
     @property
     def types(self) -> TypeStore:
@@ -215,66 +174,52 @@ class Context:
     @property
     def is_shutdown(self) -> bool:
         """Whether the end has begun."""
-        return self._stopping.is_set()
+        return self._lifecycle.closing
 
     @property
     def closed(self) -> bool:
-        """Whether the end has come: hooks have run, and the session is closed."""
-        return self._stopped.is_set()
+        """Whether the end is complete: hooks have run, and the session is closed."""
+        return self._lifecycle.closed
 
-    def on_shutdown(self, hook: Callable[[str], None]) -> Callable[[], None]:
-        """Have a function called with the reason when the context shuts down.
+    @property
+    def forked(self) -> bool:
+        """Whether this is the copy in a forked child, which can do nothing."""
+        return self._lifecycle.forked
 
-        Hooks run in the reverse order of registration, before the session closes.
+    @property
+    def reason(self) -> str:
+        """Why the context is shut down, or about to be."""
+        return self._lifecycle.reason
+
+    @reason.setter
+    def reason(self, reason: str) -> None:
+        self._lifecycle.reason = reason
+
+    def on_shutdown(self, hook: Callable[[str], object]) -> Callable[[], None]:
+        """Call a function with the reason when the context shuts down.
+
+        Hooks are called in the reverse order of registration, before the session closes.
 
         Returns:
-            A function that takes the hook back.
+            A function that removes the hook.
 
         Raises:
             ClosedError: The end has begun already.
         """
-        with self._lock:
-            if self._stopping.is_set():
-                raise ClosedError("the context is shut down: no hook will run")
-            self._hooks.append(hook)
-
-        def withdraw() -> None:
-            with self._lock:
-                if hook in self._hooks:
-                    self._hooks.remove(hook)
-
-        return withdraw
+        return self._lifecycle.on_close(hook)
 
     def shutdown(self, reason: str = "") -> None:
-        """End everything: hooks, then the session. Again, or from any callback, is no error."""
-        with self._lock:
-            begun = self._stopping.is_set()
-            if not begun:
-                self.reason = reason = reason or self.reason
-                self._closer = threading.current_thread()
-                self._stopping.set()
-        if begun:
-            # Whoever comes second, often the main thread on its way out, must not outrun the first.
-            if threading.current_thread() is not self._closer and not self._stopped.wait(
-                _CLOSED_BY
-            ):
-                _log.warning("shutting down takes more than %g s: a hook blocks it", _CLOSED_BY)
-            return
-        with self._lock:
-            hooks = self._hooks[::-1]
-            self._hooks.clear()
-        self.clock.close()
-        try:
-            for hook in hooks:
-                try:
-                    hook(reason)
-                except (Exception, SystemExit):  # noqa: BLE001  # the callback boundary
-                    _log.exception("a shutdown hook failed")
-        finally:  # also where Ctrl-C interrupts a hook
-            self._flushed.set()
-            self._disconnect()
+        """End everything: call the hooks, then close the session.
+
+        It may be called from any callback, and a second call has no effect.
+
+        Args:
+            reason: Why, for the hooks and for errors.
+        """
+        self._lifecycle.close(self._disconnect, first=self.clock.close, reason=reason)
 
     def _disconnect(self) -> None:
+        self._flushed.set()
         try:
             with self.session.close_links():
                 if self._params is not None:
@@ -283,38 +228,27 @@ class Context:
             self.session.close()
         finally:
             atexit.unregister(self.close)
-            self._stopped.set()
 
-    def disown(self) -> None:
-        """Refuse everything from now on, touching neither threads nor links: after a fork."""
+    def _forked(self) -> None:
         atexit.unregister(self.close)
-        self.forked = True
-        self.reason = _FORKED
-        self._lock = threading.RLock()
         self._making = threading.RLock()
-        self._stopping = self._flushed = self._stopped = threading.Event()
-        self._stopping.set()
-        self._closer = threading.current_thread()
-        self._hooks = []
         if self._params is not None:
             self._params.disown()
-        for endpoint in self._endpoints:
-            endpoint.disown(_FORKED)
 
     def wait_for_shutdown(self, timeout: float | None = None) -> bool:
-        """Wait until the end has begun; any thread, any number of them.
+        """Wait until the end has begun; any number of threads may.
 
         Args:
-            timeout: Seconds; forever when not given.
+            timeout: Time limit in seconds; none when not given.
 
         Returns:
-            Whether it has.
+            Whether it has begun.
 
         Raises:
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
         self.cooperative = self.cooperative or threading.current_thread() is threading.main_thread()
-        return self._stopping.wait(None if timeout is None else clamp_timeout(timeout))
+        return self._lifecycle.wait_closing(None if timeout is None else clamp_timeout(timeout))
 
     def close(self) -> None:
         """Shut down; the same as `shutdown` without a reason."""
@@ -333,23 +267,9 @@ class Context:
 
 
 def _leave(config: SessionConfig) -> Leave | None:
-    """Return what rules say of this machine, if what it declares is for others as well."""
+    """Return what the rules say of this machine, if others receive what it declares."""
     if config.keys is None or not (config.reaches_beyond or config.must_connect):
         return None
     from rosz.security import Leave
 
     return Leave.find(config.keys, socket.gethostname())
-
-
-_contexts: weakref.WeakSet[Context] = weakref.WeakSet()
-"""Those of this process. What is registered for a fork stays so, and would add up for each."""
-
-
-def _disown_all() -> None:
-    """Take a forked child's hands off what belongs to its parent."""
-    for context in list(_contexts):
-        signals.release()
-        context.disown()
-
-
-os.register_at_fork(after_in_child=_disown_all)

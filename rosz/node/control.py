@@ -1,4 +1,8 @@
-"""What a node answers about itself, and how the older of two nodes of one name gives way."""
+"""What a node responds about itself, and how a newer node of the same name takes over.
+
+Names of nodes are unique in a domain. When a second node of a name appears, the older one shuts
+down, as in ROS 1.
+"""
 
 from __future__ import annotations
 
@@ -11,22 +15,22 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.errors import RoszError
-from rosz.node.endpoint import Withdrawal
-from rosz.node.pool import Jobs, Pool
-from rosz.session.starting import start
+from rosz.lifecycle import Registration
+from rosz.node.core import NodeCore
 from rosz.wire import ProcessToken, own_key
+from rosz.worker import Worker, start_thread
 
 if TYPE_CHECKING:
-    from rosz.node.node import Node
     from rosz.session import Query
 
-__all__ = ("NodeInfo", "attach", "control_key")
+__all__ = ("NodeInfo", "Request", "control_key", "serve_control")
 
 _log = logging.getLogger("rosz.control")
 
 _REPLACED = "new node registered with same name"
-_ANSWER_BY = 1.0
+_REPLY_TIMEOUT = 1.0
 _TOGETHER = 0.2
+"""Seconds; of two nodes that start within this time, their own clocks tell which one is newer."""
 _THREADS = 4
 
 
@@ -38,10 +42,10 @@ class NodeInfo(msgspec.Struct, frozen=True):
         pid: Process id.
         host: Host name.
         argv: Command line.
-        started: Nanoseconds since the Unix epoch.
-        age: Seconds since then, by no clock that anybody sets.
-        now: What its system clock says at this moment, in nanoseconds since the Unix epoch.
-        sees: The sessions of which it knows nodes, its own among them.
+        started: Time of its start by its own clock, in nanoseconds since the Unix epoch.
+        age: Seconds since its start, by the monotonic clock.
+        now: Time of its system clock, in nanoseconds since the Unix epoch.
+        sees: Ids of the sessions whose nodes it knows, its own among them.
     """
 
     name: str
@@ -55,13 +59,13 @@ class NodeInfo(msgspec.Struct, frozen=True):
 
 
 class Request(msgspec.Struct, frozen=True):
-    """What is asked of a node.
+    """A request to a node.
 
     Attributes:
         action: ``info``, ``shutdown``, ``levels`` or ``set_level``.
-        reason: For ``shutdown``.
-        logger: For ``set_level``.
-        level: For ``set_level``.
+        reason: Reason of a ``shutdown``.
+        logger: Name of the logger for ``set_level``.
+        level: Name of the level for ``set_level``.
     """
 
     action: str
@@ -71,44 +75,44 @@ class Request(msgspec.Struct, frozen=True):
 
 
 def control_key(domain: int, zid: str, node_id: int | str) -> str:
-    """Return the key on which a node is asked about itself."""
+    """Return the key on which a node receives requests about itself."""
     return own_key(domain, "control", zid, str(node_id))
 
 
-def attach(node: Node) -> None:
-    """Have a node answer for itself, and give way to a newer one of its name."""
+def serve_control(node: NodeCore) -> None:
+    """Make a node respond to requests about itself, and give way to a newer one of its name."""
     context = node.context
     key = control_key(context.domain, context.session.zid, node.node_id)
     began = time.monotonic()
     ending = threading.Lock()
-    rivals: Jobs[ProcessToken] = Jobs()
-    contests: list[Pool[ProcessToken]] = []
 
     def serve(query: Query) -> None:
         reason = _serve(node, key, query, began)
         if reason and ending.acquire(blocking=False):
-            # Hooks of the program may take their time, and more may be asked meanwhile.
+            # Hooks of the program may take their time, and more requests may come meanwhile.
             name = f"rosz-shutdown{node.name}"
-            start(threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True))
+            start_thread(
+                threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True)
+            )
 
-    def contend(other: ProcessToken) -> None:
-        _contend(node, other, began)
+    duplicates = Worker[ProcessToken](
+        f"rosz-takeover{node.name}",
+        lambda other: _give_way(node, other, began),
+        threads=_THREADS,
+    )
 
     def appeared(other: ProcessToken, alive: bool) -> None:
         if alive and other.node == node.name and other != node.process:
-            rivals.put(other)
-            if not contests:
-                contests.append(Pool(_THREADS, f"rosz-rivals{node.name}", rivals.take, contend))
+            duplicates.submit(other)
 
-    questions = context.session.pull_queryable(key)
-    node.keep(questions)
-    Pool(_THREADS, f"rosz-control{node.name}", questions.receive, serve)
-    node.keep(rivals)
-    node.keep(Withdrawal(context.graph.listen_to_processes(appeared)))
+    queryable = node.keep(context.session.pull_queryable(key))
+    Worker(f"rosz-control{node.name}", serve, receive=queryable.receive, threads=_THREADS)
+    node.keep(Registration(lambda: duplicates.close(0)))
+    node.keep(Registration(context.graph.listen_to_processes(appeared)))
 
 
-def _contend(node: Node, other: ProcessToken, began: float) -> None:
-    """End a node if another one of its name is newer."""
+def _give_way(node: NodeCore, other: ProcessToken, began: float) -> None:
+    """Shut a node down if another one of its name is newer."""
     if not node.is_shutdown and _is_newer(node, other, began):
         node.log.warning(
             "shutdown request: %s (process %d on %s)", _REPLACED, other.pid, other.host
@@ -116,13 +120,13 @@ def _contend(node: Node, other: ProcessToken, began: float) -> None:
         node.shutdown(_REPLACED)
 
 
-def _is_newer(node: Node, other: ProcessToken, began: float) -> bool:
-    """Tell whether another node came later, whatever the clocks of the two machines say."""
+def _is_newer(node: NodeCore, other: ProcessToken, began: float) -> bool:
+    """Return whether another node is newer, whatever the clocks of the two machines show."""
     key = control_key(other.domain, other.zid, other.node_id)
-    ask = msgspec.msgpack.encode(Request("info"))
+    request = msgspec.msgpack.encode(Request("info"))
     asked = time.monotonic()
     try:
-        replies = node.context.session.get(key, payload=ask, timeout=_ANSWER_BY)
+        replies = node.context.session.get(key, payload=request, timeout=_REPLY_TIMEOUT)
         infos = [msgspec.msgpack.decode(r.payload, type=NodeInfo) for r in replies if r.ok]
     except (RoszError, msgspec.DecodeError):
         infos = []
@@ -131,48 +135,29 @@ def _is_newer(node: Node, other: ProcessToken, began: float) -> bool:
         lead = asked + journey / 2 - began - infos[0].age
         if abs(lead) > max(_TOGETHER, journey):
             return lead > 0
-    # Two that start together, or one that does not answer, go by the times they gave themselves.
+    # Two that start together, or one that does not respond: the times they gave themselves decide.
     return other.newer_than(node.process)
 
 
-def _serve(node: Node, key: str, query: Query, began: float) -> str:
-    """Answer a question; return the reason of the shutdown that is to follow, if one is."""
+def _serve(node: NodeCore, key: str, query: Query, began: float) -> str:
+    """Respond to a request; return the reason of the shutdown that is to follow, if any."""
     with query:
         try:
             try:
                 request = msgspec.msgpack.decode(query.payload or b"\x80", type=Request)
-                answer, shut_down = _answer(node, request, time.monotonic() - began)
+                response, shut_down = _respond(node, request, time.monotonic() - began)
             except (msgspec.MsgspecError, RoszError, ValueError) as error:
                 query.reply_error(str(error))
                 return ""
-            query.reply(key, msgspec.msgpack.encode(answer))
+            query.reply(key, msgspec.msgpack.encode(response))
         except RoszError as error:
-            _log.debug("who asks %s cannot be answered: %s", node.name, error)
+            _log.debug("cannot respond to a request to %s: %s", node.name, error)
             return ""
     return shut_down
 
 
-def _info(node: Node, age: float) -> NodeInfo:
-    process = node.process
-    return NodeInfo(
-        node.name,
-        process.pid,
-        process.host,
-        [_sound(word) for word in (sys.executable, *sys.argv)],
-        process.started,
-        age,
-        time.time_ns(),
-        sorted({token.zid for token in node.context.graph.view().tokens}),
-    )
-
-
-def _sound(word: str) -> str:
-    """Return a word of a command line, which may be no UTF-8, as a text that can be sent."""
-    return word.encode(errors="surrogateescape").decode(errors="replace")
-
-
-def _answer(node: Node, request: Request, age: float) -> tuple[Any, str]:
-    """Return what to answer, and the reason of a shutdown to carry out after that."""
+def _respond(node: NodeCore, request: Request, age: float) -> tuple[Any, str]:
+    """Return the response, and the reason of a shutdown to carry out after it."""
     match request.action:
         case "info":
             return _info(node, age), ""
@@ -184,4 +169,23 @@ def _answer(node: Node, request: Request, age: float) -> tuple[Any, str]:
             node.log.set_level(request.logger, request.level)
             return True, ""
         case other:
-            raise ValueError(f"'{other}' is nothing that a node can be asked")
+            raise ValueError(f"a node has no action '{other}'")
+
+
+def _info(node: NodeCore, age: float) -> NodeInfo:
+    process = node.process
+    return NodeInfo(
+        node.name,
+        process.pid,
+        process.host,
+        [_utf8(word) for word in (sys.executable, *sys.argv)],
+        process.started,
+        age,
+        time.time_ns(),
+        sorted({token.zid for token in node.context.graph.view().tokens}),
+    )
+
+
+def _utf8(word: str) -> str:
+    """Return a word of a command line, which may not be UTF-8, as text that can be sent."""
+    return word.encode(errors="surrogateescape").decode(errors="replace")

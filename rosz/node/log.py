@@ -1,9 +1,9 @@
 """A node's log: to the console, a file and ``/rosout``, in a tree of loggers of its own.
 
-The tree is not the process-wide one. So nothing here touches the root logger, or the level,
-handlers or flags of any logger of the program; and ``logging.disable`` or a ``dictConfig`` of the
-program, which by default disables all loggers that it does not name, leaves nodes their log. Two
-nodes of one name, in two domains, do not share one either.
+The tree is not the process-wide one, so nothing here touches the root logger, or the level,
+handlers or flags of any logger of the program. ``logging.disable`` and a ``dictConfig`` of the
+program, which by default disables all loggers that it does not name, do not change the log of a
+node. Two nodes of one name, in two domains, have a log each.
 """
 
 from __future__ import annotations
@@ -13,13 +13,19 @@ from pathlib import Path
 
 from rosz.errors import NotFoundError, near_miss
 from rosz.node.clock import Clock
-from rosz.node.console import DEFAULT_FORMAT, ConsoleSink
-from rosz.node.logfile import BACKUPS, MAX_BYTES, FileSink, log_file_name
-from rosz.node.logger import LoggerTree, NodeLogger
-from rosz.node.rosout import PublishLine, RosoutSink
-from rosz.node.severity import parse_severity, severity_name
+from rosz.node.log_handlers import (
+    BACKUPS,
+    DEFAULT_FORMAT,
+    MAX_BYTES,
+    ConsoleHandler,
+    FileHandler,
+    PublishLine,
+    RosoutHandler,
+    log_file_name,
+)
+from rosz.node.logger import LoggerTree, NodeLogger, parse_severity, severity_name
 
-__all__ = ("NodeLog",)
+__all__ = ("DEFAULT_FORMAT", "NodeLog")
 
 _BASE = "rosout"
 
@@ -31,16 +37,16 @@ class NodeLog(NodeLogger):
 
     Args:
         node: Full name of the node.
-        clock: Its clock.
+        clock: Clock of the node.
         log_dir: Folder for the log file; no file when not given.
         file_name: Log file to use instead of one named after the node in `log_dir`.
         console: Whether to write to the console.
-        console_format: What a line looks like: see `rosz.node.console.compile_format`.
-        color: Whether terminals get colours.
+        console_format: Format of a line, as in ``ROSCONSOLE_FORMAT``.
+        color: Whether to use colours on terminals.
         rosout: Whether to keep lines for ``/rosout``.
-        level: Least level that is logged.
-        max_bytes: Most bytes in a log file.
-        backups: How many full log files to keep.
+        level: Lowest level that is logged.
+        max_bytes: Largest size of a log file in bytes.
+        backups: Number of full log files to keep.
     """
 
     def __init__(
@@ -62,38 +68,38 @@ class NodeLog(NodeLogger):
         self.manager = LoggerTree(self, clock)
         self.node = node
         self._ros_name = node.strip("/").replace("/", ".")
-        self._file: FileSink | None = None
-        self._rosout: RosoutSink | None = None
+        self._file: FileHandler | None = None
+        self._rosout: RosoutHandler | None = None
         self.addHandler(logging.NullHandler())
-        trouble = self.manager.troubles.append
+        report = self.manager.problems.append
         if console:
             self.addHandler(
-                ConsoleSink(node, clock, trouble, text_format=console_format, color=color)
+                ConsoleHandler(node, clock, report, text_format=console_format, color=color)
             )
         path = Path(file_name).absolute() if file_name else None
         if path is None and log_dir is not None:
             path = log_dir / log_file_name(node)
         if path is not None:
-            self._file = FileSink(path, trouble, max_bytes=max_bytes, backups=backups)
+            self._file = FileHandler(path, report, max_bytes=max_bytes, backups=backups)
             self.addHandler(self._file)
         if rosout:
-            self._rosout = RosoutSink(
+            self._rosout = RosoutHandler(
                 self._ros_name, _BASE, clock, lambda text: self.warning("%s", text)
             )
             self.addHandler(self._rosout)
 
     @property
     def file(self) -> Path | None:
-        """The log file, which is made with the first message; None if there is none."""
+        """The log file, which is made with the first message; None without one."""
         return None if self._file is None else self._file.path
 
     def publish_to(self, publish: PublishLine) -> None:
         """Begin to publish on ``/rosout``, with what was logged so far; once only.
 
         Args:
-            publish: Called on a thread of the log, one line at a time, with severity
-                (rcl_interfaces/Log's number), name of the logger as in ROS 2, message, file,
-                function, line, and ROS time in nanoseconds. It may take its time, and log.
+            publish: Function called on a thread of the log, one line at a time, with severity
+                (the number in rcl_interfaces/Log), name of the logger as in ROS 2, message, file,
+                function, line, and ROS time in nanoseconds. It may block, and log.
         """
         if self._rosout is not None:
             self._rosout.publish_to(publish)
@@ -111,7 +117,7 @@ class NodeLog(NodeLogger):
         }
 
     def set_level(self, name: str, level: str) -> None:
-        """Set the level of a logger of the node, and of those below it without one of their own.
+        """Set the level of a logger of the node, and of its children that have none of their own.
 
         Args:
             name: ``rosout``, as in ROS 1, an empty text, or the node's name with dots, as in ROS 2,
@@ -134,7 +140,7 @@ class NodeLog(NodeLogger):
         logger.setLevel(parse_severity(level))
 
     def close(self) -> None:
-        """Publish what is left, for a second at most, and close the file; the console goes on."""
+        """Publish the rest, for a second at most, and close the file; the console stays open."""
         if self._rosout is not None:
             self.removeHandler(self._rosout)
             self._rosout.stop()

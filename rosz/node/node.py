@@ -2,54 +2,41 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import sys
-import time
+import threading
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
-from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from rosz import names
 from rosz.node import control, signals, standard
 from rosz.node.client import Client
 from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
-from rosz.node.ending import Ending, Hook
-from rosz.node.endpoint import Withdrawal
-from rosz.node.generic import GenericSubscription
+from rosz.node.core import NodeCore
 from rosz.node.publisher import Publisher
 from rosz.node.rate import Rate
-from rosz.node.ros2_services import Lookout
+from rosz.node.ros2_detector import Ros2PeerDetector
 from rosz.node.service import Service
-from rosz.node.subscription import Subscription
+from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Timer, TimerEvent
 from rosz.qos import SERVICES, QoS, for_queue
-from rosz.wire import Token
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
-    from rosz.lifecycle import Closable
     from rosz.message import Message
     from rosz.message import Service as ServiceType
-    from rosz.params.api import Params
 
 __all__ = ("Node",)
 
 M = TypeVar("M", bound="Message")
-P = TypeVar("P", bound="Closable")
 
 
-class Node:
+class Node(NodeCore):
     """A named part of the system: publishers, subscriptions, services, timers, parameters, a log.
 
     Args:
         name: Base name; ``__name:=`` on the command line overrides it.
         namespace: Namespace; ``ROS_NAMESPACE`` when not given, and ``__ns:=`` overrides both.
         anonymous: Whether to make the name unique to this process and moment.
-        context: What it shares with other nodes of the process; one of its own when not given,
-            which is then shut down with the node.
+        context: The context, shared with other nodes of the process; when not given, the node opens
+            one and shuts it down at its end.
         argv: Command line without the program name; that of the process when not given. Ignored
             with a ``context``, which has read one already.
         handle_signals: Whether Ctrl-C and SIGTERM shut the node down; by default when it has its
@@ -58,7 +45,7 @@ class Node:
     Raises:
         InvalidName: The name or namespace is not legal.
         TransportError: The session cannot be opened.
-        UsageError: The environment has a value that means nothing.
+        UsageError: A variable of the environment has an invalid value.
     """
 
     def __init__(
@@ -71,69 +58,25 @@ class Node:
         argv: Sequence[str] | None = None,
         handle_signals: bool | None = None,
     ) -> None:
-        self._owns_context = context is None
-        if anonymous:
-            # ROS 1 counts milliseconds, but has one node in a process.
-            name = names.anonymous(name, socket.gethostname(), os.getpid(), time.time_ns())
-        names.check_base(name)
-        self.context = context or Context(argv=sys.argv[1:] if argv is None else argv)
-        self._params: Params | None = None
+        super().__init__(name, namespace=namespace, anonymous=anonymous, context=context, argv=argv)
         try:
-            self._begin(name, namespace)
+            self._begin()
         except BaseException:
-            if self._owns_context:
-                self.context.close()
+            self.close()
             raise
         if self._owns_context if handle_signals is None else handle_signals:
             signals.install(self.context)
 
-    def _begin(self, name: str, namespace: str | None) -> None:
-        context = self.context
-        arguments = context.arguments
-        default = context.environment.namespace if namespace is None else namespace
-        self.name = arguments.node_name(name, default)
-        self.namespace = names.namespace(self.name).rstrip("/") or "/"
-        self.base_name = names.basename(self.name)
-        self.remaps = arguments.resolved_remaps(self.name)
-        self.node_id = context.next_id()
-        self.clock = context.clock.branch()
-        self.log = standard.log_of(self)
-        self._ending = Ending(self.name, self.log)
-        self._withdraw = context.on_shutdown(self._end)
-        try:
-            standard.set_initial_params(self)
-            self.process = standard.process_of(self)
-            control.attach(self)
-            standard.announce(self)
-            if not context.passing:
-                standard.follow_clock(self)
-                self.keep(Lookout(self))
-        except BaseException:
-            self._end("")
-            raise
+    def _begin(self) -> None:
+        standard.set_initial_params(self)
+        control.serve_control(self)
+        self._announce()
+        if not self.context.passing:
+            standard.follow_clock(self)
+            self.keep(Ros2PeerDetector(self))
         standard.open_rosout(self)
 
-    @property
-    def params(self) -> Params:
-        """The parameter store as this node sees it; the process becomes a replica on first use.
-
-        Raises:
-            ClosedError: The context is shut down, and has no replica.
-        """
-        if self._params is None:
-            from rosz.params.api import Params
-
-            self._params = Params(self.context.params, self.name, self.remaps)
-        return self._params
-
-    def resolve(self, name: str) -> str:
-        """Return the global name that a name means here, remappings applied.
-
-        Raises:
-            InvalidName: It is not legal.
-        """
-        return names.resolve(name, self.name, self.remaps)
-
+    @overload
     def publisher(
         self,
         topic: str,
@@ -142,25 +85,47 @@ class Node:
         queue_size: int = 10,
         latch: bool = False,
         qos: QoS | None = None,
-    ) -> Publisher[M]:
-        """Declare that this node publishes on a topic.
+    ) -> Publisher[M]: ...
+    @overload
+    def publisher(
+        self,
+        topic: str,
+        message_type: str,
+        *,
+        queue_size: int = 10,
+        latch: bool = False,
+        qos: QoS | None = None,
+    ) -> Publisher[Any]: ...
+    def publisher(
+        self,
+        topic: str,
+        message_type: type[M] | str,
+        *,
+        queue_size: int = 10,
+        latch: bool = False,
+        qos: QoS | None = None,
+    ) -> Publisher[M] | Publisher[Any]:
+        """Make a publisher of a topic.
 
         Args:
-            topic: Name; resolved and remapped.
-            message_type: What is published.
-            queue_size: Depth of the queue that others are told of; with ``latch`` one sample is
-                kept whatever it is.
-            latch: Whether late joiners get the last message.
-            qos: Instead of both, when given.
+            topic: Name of the topic; resolved and remapped.
+            message_type: Class of the messages, or its name, such as ``std_msgs/String``; the class
+                is compiled from the definition if need be.
+            queue_size: Depth of the queue that others see; with ``latch`` it is 1.
+            latch: Whether late subscriptions get the last message.
+            qos: Quality of service instead of both.
 
         Raises:
             InvalidName: The name is not legal.
-            UsageError: The size of the queue means nothing.
+            UsageError: The size of the queue is not valid.
+            TypeNotFound: There is no type of that name.
+            DefinitionError: A definition in the package of the type is not well-formed.
             ClosedError: The node is closed.
         """
         if qos is None:
             qos = QoS(depth=1, durability="transient_local") if latch else for_queue(queue_size)
-        return self.keep(Publisher(self, self.resolve(topic), message_type, qos))
+        name = self.resolve(topic)
+        return self.keep(Publisher(self, name, self._message_class(message_type), qos))
 
     @overload
     def subscription(
@@ -178,6 +143,18 @@ class Node:
     def subscription(
         self,
         topic: str,
+        message_type: str,
+        callback: Callable[..., Any] | None = None,
+        *,
+        queue_size: int = 10,
+        qos: QoS | None = None,
+        raw: bool = False,
+        with_info: bool = False,
+    ) -> Subscription[Any]: ...
+    @overload
+    def subscription(
+        self,
+        topic: str,
         message_type: None = None,
         callback: Callable[..., Any] | None = None,
         *,
@@ -189,30 +166,32 @@ class Node:
     def subscription(
         self,
         topic: str,
-        message_type: type[M] | None = None,
+        message_type: type[M] | str | None = None,
         callback: Callable[..., Any] | None = None,
         *,
         queue_size: int = 10,
         qos: QoS | None = None,
         raw: bool = False,
         with_info: bool = False,
-    ) -> Subscription[M] | GenericSubscription:
-        """Declare that this node listens to a topic.
+    ) -> Subscription[M] | Subscription[Any] | GenericSubscription:
+        """Make a subscription of a topic.
 
         Args:
-            topic: Name; resolved and remapped.
-            message_type: What is expected; when not given, whatever comes, by the definition that
-                is known here under the name of its type.
-            callback: Gets each message, on a thread of the subscription, one at a time. Without
-                one, iterate over the subscription or call its ``get``.
-            queue_size: The newest so many samples wait for their turn; older ones are dropped.
-            qos: Instead of ``queue_size``, when given.
-            raw: Whether to pass the encoded bytes on.
+            topic: Name of the topic; resolved and remapped.
+            message_type: Class of the messages, or its name, such as ``std_msgs/String``; when not
+                given, every type is received, and decoded by the definition known here.
+            callback: Function that gets each message, on a thread of the subscription, one at a
+                time. Without one, iterate over the subscription or call its ``get``.
+            queue_size: Number of newest samples that wait for their turn; older ones are dropped.
+            qos: Quality of service instead of ``queue_size``.
+            raw: Whether to pass on the encoded bytes.
             with_info: Whether the callback also gets a `MessageInfo`.
 
         Raises:
             InvalidName: The name is not legal.
-            UsageError: The size of the queue means nothing.
+            UsageError: The size of the queue is not valid.
+            TypeNotFound: There is no type of that name.
+            DefinitionError: A definition in the package of the type is not well-formed.
             ClosedError: The node is closed.
         """
         name, qos = self.resolve(topic), qos or for_queue(queue_size)
@@ -220,8 +199,9 @@ class Node:
             return self.keep(
                 GenericSubscription(self, name, callback, qos, raw=raw, with_info=with_info)
             )
+        kind = self._message_class(message_type)
         return self.keep(
-            Subscription(self, name, message_type, callback, qos, raw=raw, with_info=with_info)
+            Subscription(self, name, kind, callback, qos, raw=raw, with_info=with_info)
         )
 
     def service(
@@ -236,17 +216,17 @@ class Node:
         """Serve a service.
 
         Args:
-            name: Name; resolved and remapped.
-            service_type: Its type.
-            handler: Gets a request, on a thread of a pool, and returns the response: an instance,
-                a list or dictionary of its fields, or its only value. What it raises is logged,
-                and told to the caller.
-            qos: What others are told.
-            threads: Most calls handled at one time.
+            name: Name of the service; resolved and remapped.
+            service_type: Class of the service.
+            handler: Function that gets a request, on a thread of the service, and returns the
+                response: an instance, a list or dictionary of its fields, or its only value. What
+                it raises is logged, and sent to the caller.
+            qos: Quality of service that others see.
+            threads: Largest number of calls handled at one time.
 
         Raises:
             InvalidName: The name is not legal.
-            UsageError: There are to be no threads.
+            UsageError: The number of threads is below 1.
             ClosedError: The node is closed.
         """
         return self.keep(Service(self, self.resolve(name), service_type, handler, qos, threads))
@@ -259,17 +239,17 @@ class Node:
         timeout: float = 60.0,
         qos: QoS = SERVICES,
     ) -> Client:
-        """Make a caller of a service.
+        """Make a client of a service.
 
         Args:
-            name: Name; resolved and remapped.
-            service_type: Its type.
-            timeout: Seconds that a call waits at most, unless it says otherwise.
-            qos: What others are told.
+            name: Name of the service; resolved and remapped.
+            service_type: Class of the service.
+            timeout: Time limit of a call in seconds, unless the call has its own.
+            qos: Quality of service that others see.
 
         Raises:
             InvalidName: The name is not legal.
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
             ClosedError: The node is closed.
         """
         return self.keep(Client(self, self.resolve(name), service_type, qos, timeout))
@@ -277,17 +257,25 @@ class Node:
     def timer(
         self, period: float, callback: Callable[[TimerEvent], Any], *, oneshot: bool = False
     ) -> Timer:
-        """Have a function called every so often.
+        """Call a function at each period.
 
         Args:
-            period: Seconds, in ROS time.
-            callback: Gets a `TimerEvent`, on a thread of the timer; what it raises is logged.
+            period: Period in seconds of ROS time.
+            callback: Function that gets a `TimerEvent`, on a thread of the timer; what it raises is
+                logged.
             oneshot: Whether to call it only once.
 
         Raises:
-            UsageError: The period is no number above 0.
+            UsageError: The period is not a number above 0.
+            ClosedError: The node is closed.
         """
-        with self._ending.lock:  # so that one which ends at once is not forgotten before it is kept
+        kept = threading.RLock()
+
+        def forget(timer: Timer) -> None:
+            with kept:  # a timer that ends at once must not be forgotten before it is kept
+                self.forget(timer)
+
+        with kept:
             return self.keep(
                 Timer(
                     nanoseconds(period, "timer period"),
@@ -295,106 +283,42 @@ class Node:
                     self.clock,
                     oneshot=oneshot,
                     on_error=self.log.report,
-                    on_end=self.forget,
+                    on_end=forget,
                 )
             )
 
     def rate(self, hz: float) -> Rate:
-        """Return a pace-maker: iterate over it, or call its ``sleep``.
+        """Return a rate: iterate over it, or call its ``sleep``.
 
         Args:
-            hz: Times per second, in ROS time.
+            hz: Turns per second of ROS time.
 
         Raises:
-            UsageError: `hz` is not above 0, or beyond nanoseconds.
+            UsageError: `hz` is not above 0, or a period is less than a nanosecond.
         """
         self.context.cooperative = True
         return Rate(hz, self.clock)
 
     def now(self) -> int:
-        """Return the time in nanoseconds: simulated where ``use_sim_time`` is set, else wall."""
+        """Return the time in nanoseconds: simulated if ``use_sim_time`` is set, else wall time."""
         return self.clock.now()
 
     def sleep(self, seconds: float) -> bool:
-        """Sleep, in ROS time.
+        """Sleep in ROS time.
+
+        Args:
+            seconds: Duration in seconds.
 
         Returns:
-            Whether the time was slept through; false when the node was shut down meanwhile.
+            Whether the time is over; false if the node was shut down meanwhile.
 
         Raises:
-            UsageError: It is no number, or infinite.
+            UsageError: The duration is not a finite number.
         """
         self.context.cooperative = True
         return self.clock.sleep(nanoseconds(seconds, "a sleep"))
 
-    def spin(self) -> None:
-        """Wait until the node is shut down; callbacks run on threads of their own meanwhile."""
-        self.context.cooperative = True
-        self._ending.begun.wait()
-
-    @property
-    def is_shutdown(self) -> bool:
-        """Whether the node has been closed or its context shut down."""
-        self.context.cooperative = True
-        return self._ending.begun.is_set() or self.context.is_shutdown
-
-    def on_shutdown(self, hook: Hook) -> None:
-        """Have a function called with the reason when the node ends, before its parts close.
-
-        Where the end has begun already it is called at once, as in rospy.
-        """
-        self._ending.add_hook(hook)
-
-    def listen(self, listener: Callable[[Token, bool], None]) -> Closable:
-        """Follow the graph; see `rosz.graph.Graph.listen`."""
-        return Withdrawal(self.context.graph.listen(listener))
-
-    def keep(self, part: P) -> P:
-        """Have something closed when the node ends, before what was declared earlier.
-
-        Raises:
-            ClosedError: The node is closed; the part is, too, now.
-        """
-        return self._ending.keep(part)
-
-    def forget(self, part: Closable) -> None:
-        """Take note that a part has been closed by itself."""
-        self._ending.forget(part)
-
-    def shutdown(self, reason: str = "") -> None:
-        """End the node, and its context where it owns that; again is no error."""
-        try:
-            self._end(reason)
-        finally:  # also where Ctrl-C interrupts a hook
-            if self._owns_context:
-                self.context.shutdown(reason)
-
-    def close(self) -> None:
-        """End the node; the same as `shutdown` without a reason."""
-        self.shutdown()
-
-    def _end(self, reason: str) -> None:
-        context = self.context
-        if context.forked:
-            return
-        leaving = self._owns_context or context.is_shutdown
-        with context.session.close_links() if leaving else nullcontext():
-            self._ending.come(reason or context.reason, self._stop)
-
-    def _stop(self) -> None:
-        self._withdraw()
-        self.clock.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def __repr__(self) -> str:
-        return f"<Node {self.name}{' closed' if self._ending.begun.is_set() else ''}>"
+    def _message_class(self, message_type: type[M] | str) -> type[M | Any]:
+        if isinstance(message_type, str):
+            return self.context.types.message(message_type)
+        return message_type

@@ -1,4 +1,4 @@
-"""Publishers."""
+"""Publishers: messages to all subscriptions of a topic, or to one of them."""
 
 from __future__ import annotations
 
@@ -8,34 +8,33 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosz.errors import ClosedError, EncodeError
-from rosz.node.endpoint import Endpoint, Withdrawal
-from rosz.node.inbox import address
-from rosz.node.pool import Jobs, Pool
+from rosz.lifecycle import Registration
+from rosz.node.core import NodeCore
+from rosz.node.direct_delivery import direct_key
+from rosz.node.entity import Entity
 from rosz.qos import QoS
 from rosz.wire import Kind, Token, pack
+from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
-    from rosz.node.node import Node
 
 __all__ = ("Publisher", "SubscriberLink")
 
 M = TypeVar("M", bound="Message")
 _HELD_SAMPLES = 1000
 _HEADER = 4
-"""Bytes of the header of CDR; who gets fewer may abort."""
+"""Bytes of the header of CDR; a receiver of fewer may abort."""
 
 _UNNUMBERED = 0
-"""Sequence number of what goes to one subscription alone, and leaves no gap for the others."""
+"""Sequence number of a message to one subscription alone, so that the others see no gap."""
 
 
 class SubscriberLink(Generic[M]):
-    """One subscription, as the publisher sees it.
+    """One subscription, as a publisher sees it.
 
     Attributes:
         node: Full name of its node.
-        publish: Sends one message to it alone. A subscription that is not of rosz has no address
-            of its own, and the message goes to all.
     """
 
     def __init__(self, publisher: Publisher[M], token: Token) -> None:
@@ -44,7 +43,9 @@ class SubscriberLink(Generic[M]):
         self.node = token.node_name
 
     def publish(self, message: M) -> None:
-        """Send one message to this subscription.
+        """Send one message to this subscription alone.
+
+        A subscription outside rosz cannot be reached alone: the message then goes to all.
 
         Raises:
             EncodeError: A field has a value that does not fit.
@@ -53,14 +54,14 @@ class SubscriberLink(Generic[M]):
         self._publisher.publish_to(self._token, message)
 
 
-class Publisher(Endpoint, Generic[M]):
-    """A source of messages on a topic; see `rosz.Node.publisher`.
+class Publisher(Entity, Generic[M]):
+    """Publish messages on a topic; see `rosz.Node.publisher`.
 
-    What is published before the process is linked to all its neighbours is held, at most 1000
-    samples for at most two seconds, and sent when it is.
+    Samples published before the process is linked to all its neighbours are held, at most 1000 of
+    them for at most two seconds, and sent then.
     """
 
-    def __init__(self, node: Node, topic: str, message_type: type[M], qos: QoS) -> None:
+    def __init__(self, node: NodeCore, topic: str, message_type: type[M], qos: QoS) -> None:
         super().__init__(
             node, Kind.PUBLISHER, topic, message_type._type_name, message_type._type_hash, qos
         )
@@ -97,19 +98,19 @@ class Publisher(Endpoint, Generic[M]):
         self._send(self._encode(message))
 
     def publish_raw(self, payload: bytes | bytearray | memoryview) -> None:
-        """Send a message that is encoded already.
+        """Send an encoded message.
 
         Args:
-            payload: CDR with its header of four bytes; whether it fits the type is not looked at.
+            payload: CDR with its header of four bytes; it is not checked against the type.
 
         Raises:
-            EncodeError: It is no bytes, or fewer than the header has.
+            EncodeError: The payload is not bytes, or shorter than the header.
             ClosedError: The publisher is closed.
         """
         if not isinstance(payload, bytes | bytearray | memoryview):
             given = type(payload).__name__
             raise EncodeError(self.message_type._type, "", f"expected bytes, got {given}")
-        # A copy, where others could change it while it waits; and what ROS 2 would choke on.
+        # A copy, because the caller could change a mutable buffer while it waits.
         data = bytes(payload)
         if len(data) < _HEADER:
             raise EncodeError(
@@ -124,27 +125,25 @@ class Publisher(Endpoint, Generic[M]):
             if self._held is None:
                 self._put(payload, attachment)
                 return
-            self.ensure_open("publish on")
+            self.check_open("publish")
             self._held.append((payload, attachment))
             del self._held[:-_HELD_SAMPLES]
 
     def publish_to(self, subscription: Token, message: M) -> None:
-        """Send a message to one subscription, where that has an address of its own.
+        """Send a message to one subscription alone; see `SubscriberLink.publish`.
 
         Raises:
             EncodeError: A field has a value that does not fit.
             ClosedError: The publisher is closed.
         """
-        self.ensure_open("publish on")
+        self.check_open("publish")
         context = self.node.context
-        to_it_alone = address(subscription, context.graph.view())
-        if to_it_alone is None:
+        key = direct_key(subscription, context.graph.view())
+        if key is None:
             self.publish(message)
             return
         attachment = pack(_UNNUMBERED, time.time_ns(), self.gid)
-        context.session.put(
-            to_it_alone, self._encode(message), attachment=attachment, block=self._blocks
-        )
+        context.session.put(key, self._encode(message), attachment=attachment, block=self._blocks)
 
     def _build(self, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
         if len(args) == 1 and getattr(args[0], "_type_hash", "") == self.message_type._type_hash:
@@ -160,7 +159,7 @@ class Publisher(Endpoint, Generic[M]):
             ) from error
 
     def _release(self) -> None:
-        """Send what was held, in order, and hold no more."""
+        """Send the held samples, in order, and hold no more."""
         with self._ordered:
             held, self._held = self._held, None
             for payload, attachment in held or ():
@@ -182,16 +181,16 @@ class Publisher(Endpoint, Generic[M]):
         return [token for token in view.subscriptions(self.name) if self.matches(token)]
 
     def wait_for_subscribers(self, count: int = 1, timeout: float = 10.0) -> None:
-        """Wait until at least so many subscriptions are reached.
+        """Wait until this publisher reaches a number of subscriptions.
 
         Args:
-            count: How many.
-            timeout: Seconds.
+            count: Number of subscriptions.
+            timeout: Time limit in seconds.
 
         Raises:
-            WaitTimeout: There were fewer when the time was over.
+            WaitTimeout: There were fewer at the end of the time.
             ClosedError: The context was shut down meanwhile.
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
         self.node.context.graph.wait_for(
             lambda view: sum(map(self.matches, view.subscriptions(self.name))) >= count,
@@ -204,20 +203,20 @@ class Publisher(Endpoint, Generic[M]):
         connected: Callable[[SubscriberLink[M]], object] | None = None,
         disconnected: Callable[[str], object] | None = None,
     ) -> None:
-        """Have subscriptions told as they come and go, those that exist already first.
+        """Call functions as subscriptions come and go, beginning with those that exist.
 
-        Both run on a thread of their own, one at a time; what they raise is logged.
+        They run on a thread of their own, one at a time; what they raise is logged.
 
         Args:
-            connected: Gets the link, whose ``publish`` reaches that subscription alone.
-            disconnected: Gets the full name of the node.
+            connected: Function that gets a link to each new subscription.
+            disconnected: Function that gets the full name of the node of each that has gone.
 
         Raises:
             ClosedError: The publisher is closed.
         """
-        self.ensure_open("follow the links of")
+        self.check_open("follow its subscriptions")
 
-        def tell(change: tuple[Token, bool]) -> None:
+        def report(change: tuple[Token, bool]) -> None:
             token, alive = change
             if self.closed:
                 return
@@ -230,18 +229,15 @@ class Publisher(Endpoint, Generic[M]):
                 if not (self.closed and isinstance(error, ClosedError)):
                     self.node.log.report(f"connection callback of '{self.name}' failed", error)
 
-        changes: Jobs[tuple[Token, bool]] = Jobs()
-        Pool(1, f"rosz-links{self.name}", changes.take, tell)
+        changes = Worker(f"rosz-links{self.name}", report)
 
         def changed(token: Token, alive: bool) -> None:
             if self.matches(token):
-                changes.put((token, alive))
+                changes.submit((token, alive))
 
-        self.also_close(Withdrawal(changes.close))
-        self.also_close(self.node.listen(changed))
+        self.keep(Registration(lambda: changes.close(0)))
+        self.keep(self.node.listen(changed))
 
-    def disown(self, reason: str) -> None:
-        """Refuse everything from now on, touching neither threads nor links: after a fork."""
-        super().disown(reason)
+    def _forked(self) -> None:
         self._ordered = threading.RLock()
-        self._held = []
+        self._held = []  # so that publish looks whether it is open

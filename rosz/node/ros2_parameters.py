@@ -1,32 +1,51 @@
-"""A node's private parameters as ROS 2 sees them: dotted names, and values of ten types.
+"""The services that every node of ROS 2 has: its parameters, and how its types are defined.
 
-``/talker/gains/p`` of the store is the parameter ``gains.p`` of the node ``/talker``. What the
-store may hold beyond ROS 2's types, such as lists of different things, is shown as YAML text and
-cannot be set from there.
+A private parameter has a dotted name there: ``/talker/gains/p`` of the store is the parameter
+``gains.p`` of the node ``/talker``. ROS 2 has values of ten types. Other values of the store, such
+as lists of mixed items, appear as YAML text, and cannot be set from there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from rosz.errors import ParamError
+from rosz.errors import ClosedError, ParamError
+from rosz.lifecycle import Lifecycle
 from rosz.msgs.rcl_interfaces.msg import (
     ListParametersResult,
     Parameter,
     ParameterDescriptor,
     ParameterType,
     ParameterValue,
+    SetParametersResult,
 )
+from rosz.msgs.rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rosz.node.core import NodeCore
+from rosz.node.service import Service
 from rosz.params.merge import Change, condense
 from rosz.params.paths import Path, joined, split
 from rosz.params.values import Value, normalise, type_name
 from rosz.params.writes import DELETED, Deleted
+from rosz.qos import PARAMETERS, SERVICES
+from rosz.session import Query
+from rosz.worker import Worker
 
 if TYPE_CHECKING:
-    from rosz.node.node import Node
+    from rosz.message import Service as ServiceType
 
-__all__ = ("Ros2Parameters", "from_ros2", "to_ros2")
+__all__ = ("Ros2ParameterServices", "Ros2Parameters", "from_ros2", "to_ros2")
+
+_THREADS = 4
+_OF_PACKAGE = "{domain}{node}/*/{package}::srv::dds_::$*/*"
+_Handler = Callable[[Any], Any]
 
 _DOT = "."
 _SIM_TIME = "use_sim_time"
@@ -59,14 +78,14 @@ _ARRAYS: Mapping[frozenset[type], int] = {
 
 
 def _type_of(value: Value) -> int:
-    """Return the number of a value's type; ``PARAMETER_NOT_SET`` where ROS 2 has none for it."""
+    """Return the number of a value's type; ``PARAMETER_NOT_SET`` if ROS 2 has none for it."""
     if type(value) is list:
         return _ARRAYS.get(frozenset(map(type, value)), ParameterType.PARAMETER_NOT_SET)
     return _TYPES.get(type(value), ParameterType.PARAMETER_NOT_SET)
 
 
 def to_ros2(value: Value) -> ParameterValue:
-    """Return a value as ROS 2 sends it; as YAML text if it has no type for it."""
+    """Return a value as ROS 2 sends it: as YAML text if ROS 2 has no type for it."""
     number = _type_of(value)
     if number == ParameterType.PARAMETER_NOT_SET:
         from rosz.params.yaml import inline
@@ -78,43 +97,43 @@ def to_ros2(value: Value) -> ParameterValue:
 
 
 def from_ros2(value: ParameterValue) -> Value | Deleted:
-    """Return what a value of ROS 2 means; one that is not set deletes.
+    """Return what a value of ROS 2 means; "not set" means to delete the parameter.
 
     Raises:
-        ParamError: It is of no type that there is.
+        ParamError: The type of the value does not exist.
     """
     if value.type == ParameterType.PARAMETER_NOT_SET:
         return DELETED
     field = _FIELDS.get(value.type)
     if field is None:
-        raise ParamError(f"'{value.type}' is no type of parameter; expected 0 to {len(_FIELDS)}")
+        raise ParamError(f"'{value.type}' is not a type of parameter; expected 0 to {len(_FIELDS)}")
     return normalise(getattr(value, field))
 
 
 class Ros2Parameters:
-    """The parameters of one node.
+    """The private parameters of a node as ROS 2 sees them.
 
     Args:
-        node: It.
+        node: The node.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: NodeCore) -> None:
         self._node = node
         self._base = split(node.name)
 
     def values(self) -> dict[str, tuple[Path, Value]]:
-        """Return all parameters by their names, with their places in the store."""
+        """Return the paths in the store and the values of all parameters, by name."""
         top = self._node.params.get(self._node.name, None)
         leaves = _leaves(self._base, top) if type(top) is dict else ()
         return {_DOT.join(path[len(self._base) :]): (path, value) for path, value in leaves}
 
     def get(self, names: Iterable[str]) -> list[ParameterValue]:
-        """Return the values of some parameters; "not set" for those that are not there."""
+        """Return the values of some parameters; "not set" for those that do not exist."""
         known = self._all()
         return [to_ros2(known[name]) if name in known else ParameterValue() for name in names]
 
     def describe(self, names: Iterable[str]) -> list[ParameterDescriptor]:
-        """Return what there is to say about some parameters: anybody may set them to anything."""
+        """Return descriptions of some parameters, which may be set to values of any type."""
         known = self._all()
         return [
             _described(name, known[name]) if name in known else ParameterDescriptor(name)
@@ -122,11 +141,11 @@ class Ros2Parameters:
         ]
 
     def names(self, prefixes: Iterable[str], depth: int) -> ListParametersResult:
-        """Return the names of parameters, and all that stands before a last dot in them.
+        """Return the names of parameters, and their prefixes (what precedes the last dot).
 
         Args:
-            prefixes: Only these, and what lies below them; all when there are none.
-            depth: Only so many levels below; 0 for all.
+            prefixes: Prefixes of the names to return; all names if there are none.
+            depth: Largest number of levels below a prefix; 0 for all.
         """
         wanted = [prefix.split(_DOT) for prefix in prefixes] or [[]]
         names = [
@@ -141,7 +160,7 @@ class Ros2Parameters:
         """Set or delete parameters as one change.
 
         Raises:
-            ParamError: One of them cannot be set to that; nothing has changed then.
+            ParamError: One of them cannot be set to its value; none is changed then.
             ClosedError: The node is shut down.
         """
         known = self.values()
@@ -150,7 +169,7 @@ class Ros2Parameters:
         replica.write(condense(changes), origin=f"{self._node.name} for ROS 2 ({replica.label})")
 
     def _all(self) -> dict[str, Value]:
-        """Return the values by name, with the one that every node of ROS 2 has."""
+        """Return the values by name, with ``use_sim_time``, which every node of ROS 2 has."""
         found = {name: value for name, (_, value) in self.values().items()}
         return {_SIM_TIME: self._node.clock.simulated, **found}
 
@@ -171,11 +190,11 @@ class Ros2Parameters:
             )
         path = split(joined((*self._base, *name.split(_DOT))))
         if path == self._base:
-            raise ParamError(f"'{name}' is no name of a parameter")
+            raise ParamError(f"'{name}' is not the name of a parameter")
         if value is DELETED:
             raise ParamError(f"'{name}' is not set")
         if any(other.startswith(f"{name}{_DOT}") for other in known):
-            raise ParamError(f"'{name}' is no parameter: there are parameters below it")
+            raise ParamError(f"'{name}' is not a parameter: there are parameters below it")
         return path, value
 
 
@@ -203,3 +222,107 @@ def _described(name: str, value: Any) -> ParameterDescriptor:
             read_only=True,
         )
     return ParameterDescriptor(name, number, read_only=name == _SIM_TIME, dynamic_typing=True)
+
+
+class Ros2ParameterServices:
+    """The services of one node; those of one package share a queryable and its threads.
+
+    Args:
+        node: The node.
+
+    Attributes:
+        services: The services by their keys.
+
+    Raises:
+        ClosedError: The node is closed.
+    """
+
+    def __init__(self, node: NodeCore) -> None:
+        self.node = node
+        self.services: dict[str, _SharedService] = {}
+        self._parameters = Ros2Parameters(node)
+        self._lifecycle = Lifecycle("the parameter services", log=node.log)
+        try:
+            self._declare()
+        except ClosedError:
+            self.close()
+            raise
+
+    def _declare(self) -> None:
+        node, keep = self.node, self._lifecycle.keep
+        session, domain = node.context.session, node.context.domain
+        kinds = self._kinds()
+        for package in sorted({kind._type_name.partition("/")[0] for kind, _ in kinds.values()}):
+            key = _OF_PACKAGE.format(domain=domain, node=node.name, package=package)
+            queryable = keep(session.pull_queryable(key, complete=True))
+            name = f"rosz-ros2{node.name}"
+            Worker(name, self._serve, receive=queryable.receive, threads=_THREADS)
+        for name, (kind, handler) in kinds.items():
+            keep(_SharedService(self, f"{node.name}/{name}", kind, handler))
+
+    def _kinds(self) -> dict[str, tuple[type[ServiceType], _Handler]]:
+        """Return the types and handlers of the services by their names."""
+        own = self._parameters
+        found: dict[str, tuple[type[ServiceType], _Handler]] = {
+            "describe_parameters": (DescribeParameters, lambda ask: [own.describe(ask.names)]),
+            "get_parameters": (GetParameters, lambda ask: [own.get(ask.names)]),
+            "get_parameter_types": (
+                GetParameterTypes,
+                lambda ask: [bytes(value.type for value in own.get(ask.names))],
+            ),
+            "list_parameters": (ListParameters, lambda ask: [own.names(ask.prefixes, ask.depth)]),
+            "set_parameters": (
+                SetParameters,
+                lambda ask: [[self._set([parameter]) for parameter in ask.parameters]],
+            ),
+            "set_parameters_atomically": (
+                SetParametersAtomically,
+                lambda ask: [self._set(ask.parameters)],
+            ),
+        }
+        if self.node.context.environment.distro != "humble":
+            from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
+            from rosz.node.type_description import describe_type
+
+            types = self.node.context.types
+            found["get_type_description"] = (
+                GetTypeDescription,
+                lambda ask: describe_type(types, ask),
+            )
+        return found
+
+    def _set(self, parameters: Iterable[Parameter]) -> SetParametersResult:
+        try:
+            self._parameters.write(parameters)
+        except (ParamError, ClosedError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _serve(self, query: Query) -> None:
+        service = self.services.get(query.key)
+        if service is None:
+            query.close()
+        else:
+            service.serve(query)
+
+    def close(self) -> None:
+        """Undeclare the services; a second call has no effect."""
+        self._lifecycle.close()
+
+
+class _SharedService(Service):
+    """A service whose requests arrive at the queryable of its package."""
+
+    def __init__(
+        self,
+        owner: Ros2ParameterServices,
+        name: str,
+        kind: type[ServiceType],
+        handler: _Handler,
+    ) -> None:
+        self._owner = owner
+        qos = PARAMETERS if kind._type_name.startswith("rcl_interfaces/") else SERVICES
+        super().__init__(owner.node, name, kind, handler, qos, 0)
+
+    def _open(self, _threads: int) -> None:
+        self._owner.services[self.key] = self

@@ -14,16 +14,16 @@ from rosz.errors import (
     TransportError,
     UsageError,
 )
-from rosz.node.endpoint import Endpoint
-from rosz.node.pool import Pool
+from rosz.node.core import NodeCore
+from rosz.node.entity import Entity
 from rosz.qos import QoS
 from rosz.session import Query
 from rosz.wire import Kind, pack, read
+from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.message import Service as ServiceType
-    from rosz.node.node import Node
 
 __all__ = ("Refusal", "Service", "to_response")
 
@@ -31,20 +31,20 @@ _NO_GID = bytes(16)
 
 
 class Refusal(ServiceError):
-    """What a handler raises to answer with an error that it has told the log about itself."""
+    """Raised by a handler to respond with an error that it has logged itself."""
 
 
-class Service(Endpoint):
-    """A server of a service; see `rosz.Node.service`.
+class Service(Entity):
+    """Serve a service; see `rosz.Node.service`.
 
-    Every call gets a thread of a bounded pool. What the handler raises is logged here and arrives
-    at the caller as `ServiceError`; a handler that raises `ServiceError` itself refuses a request
-    on purpose, and nothing is logged.
+    Each call is handled on one of a bounded number of threads. What the handler raises is logged
+    here and arrives at the caller as `ServiceError`; a handler that raises `ServiceError` itself
+    refuses a request on purpose, and nothing is logged.
     """
 
     def __init__(
         self,
-        node: Node,
+        node: NodeCore,
         name: str,
         service_type: type[ServiceType],
         handler: Callable[[Any], Any],
@@ -60,19 +60,18 @@ class Service(Endpoint):
         self.announce()
 
     def _open(self, threads: int) -> None:
-        """Take questions in from now on.
+        """Receive requests from now on.
 
         Raises:
-            UsageError: That many threads would answer nobody.
+            UsageError: The number of threads is below 1.
         """
         if not isinstance(threads, int) or threads < 1:
             raise UsageError(f"threads is {threads!r}: expected 1 or more")
-        questions = self.node.context.session.pull_queryable(self.key, complete=True)
-        self._declared.append(questions)
-        Pool(threads, f"rosz-srv{self.name}", questions.receive, self.serve)
+        queryable = self.keep(self.node.context.session.pull_queryable(self.key, complete=True))
+        Worker(f"rosz-srv{self.name}", self.serve, receive=queryable.receive, threads=threads)
 
     def serve(self, query: Query) -> None:
-        """Answer a question, and close it."""
+        """Respond to a request, and close its query."""
         try:
             if self.closed:
                 return
@@ -80,7 +79,7 @@ class Service(Endpoint):
             sequence, gid = 0, _NO_GID
             if attachment is not None:
                 sequence, _, gid = read(attachment)
-            payload = self._answer(query.payload or b"", gid)
+            payload = self._respond(query.payload or b"", gid)
             query.reply(self.key, payload, attachment=pack(sequence, time.time_ns(), gid))
         except TransportError as error:
             self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
@@ -90,22 +89,22 @@ class Service(Endpoint):
             query.close()
 
     def handle(self, request: Any, caller: bytes) -> Any:
-        """Have the handler answer a request.
+        """Return the handler's result for a request.
 
         Args:
             request: The request.
-            caller: The gid of the client that sent it; zeros where it does not say.
+            caller: Gid of the client that sent it; zeros if the client does not tell.
         """
         del caller
         return self._handler(request)
 
-    def _answer(self, request: bytes, caller: bytes) -> bytes:
+    def _respond(self, request: bytes, caller: bytes) -> bytes:
         """Return the encoded response.
 
         Raises:
             DecodeError: The request is damaged.
             Refusal: The handler raised it.
-            ServiceError: The handler raised something else, or returned what is no response.
+            ServiceError: The handler raised something else, or did not return a response.
         """
         types = self.service_type
         message = types.Request._decode(request)
@@ -113,9 +112,9 @@ class Service(Endpoint):
             result = self.handle(message, caller)
         except Refusal:
             raise
-        except ServiceError as error:  # a refusal, which is no fault of the handler
+        except ServiceError as error:  # a refusal on purpose
             raise ServiceError(f"service cannot process request: {error}") from error
-        except BaseException as error:  # what it raises must not end a thread of the pool
+        except BaseException as error:  # it must not end the thread
             self.node.log.exception("handler of service '%s' failed", self.name)
             raise ServiceError(f"error processing request: {error}") from error
         try:
@@ -132,7 +131,7 @@ class Service(Endpoint):
 
 
 def to_response(response: type[Message], result: Any) -> Message:
-    """Turn what a handler returned into a response, as rospy does.
+    """Return the response that the result of a handler means, as rospy does.
 
     Args:
         response: Class of the response.
@@ -140,7 +139,7 @@ def to_response(response: type[Message], result: Any) -> Message:
             a response without fields, or the value of a single field.
 
     Raises:
-        EncodeError: It is none of these.
+        EncodeError: The result is none of these.
     """
     if isinstance(result, response):
         return result

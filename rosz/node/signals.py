@@ -20,12 +20,12 @@ import threading
 import time
 from collections.abc import Callable
 from types import FrameType
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from rosz.node.context import Context
+from rosz.lifecycle import Lifecycle
+from rosz.node.context import Context
+from rosz.worker import start_thread
 
-__all__ = ("install", "of_program", "release")
+__all__ = ("install", "of_program")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_FD = -1
@@ -67,14 +67,6 @@ def of_program(number: signal.Signals) -> Callable[[int, FrameType | None], obje
     return None if present is signal.default_int_handler else present
 
 
-def release() -> None:
-    """Give the signals back: in a forked child, whose pipe is still that of its parent."""
-    for number in _SIGNALS:
-        handler = signal.getsignal(number)
-        if isinstance(handler, _Handler):
-            handler.let_go(number)
-
-
 class _Handler:
     """Who is told of the signals of a process."""
 
@@ -85,6 +77,7 @@ class _Handler:
         self._asked_at = 0.0
         self._ran = threading.Event()
         self._echoes = 0
+        self._lifecycle = Lifecycle("the signal handler", on_fork=self._forked)
         self._reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)
         previous = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
@@ -121,6 +114,12 @@ class _Handler:
             signal.set_wakeup_fd(_NO_FD)
         default = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
         signal.signal(number, default)
+
+    def _forked(self) -> None:
+        """Give the signals back in a forked child, whose pipe is still that of its parent."""
+        for number in self._numbers:
+            if self._hears(number):
+                self.let_go(number)
 
     def _is_watching(self) -> bool:
         own = self._writer.fileno()
@@ -166,6 +165,7 @@ class _Handler:
         reason = signal.Signals(number).name
         for context in live:
             # On another thread: this one may hold a lock that is needed, or has to hear of more.
-            threading.Thread(
-                target=context.shutdown, args=(reason,), name="rosz-signal", daemon=True
-            ).start()
+            name = "rosz-signal"
+            start_thread(
+                threading.Thread(target=context.shutdown, args=(reason,), name=name, daemon=True)
+            )

@@ -1,81 +1,34 @@
-"""What every node has without being asked: a log, tokens, first parameters, /rosout, /clock."""
+"""The standard parts of a node: initial parameters, ``/clock``, ``/rosout``, logger services."""
 
 from __future__ import annotations
 
-import os
-import socket
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rosz.errors import ClosedError, UsageError, YamlError
-from rosz.node.console import DEFAULT_FORMAT
-from rosz.node.log import NodeLog
-from rosz.qos import CLOCK, ROSOUT
-from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
+from rosz.errors import ClosedError, NotFoundError, UsageError, YamlError
+from rosz.node.core import NodeCore
+from rosz.node.publisher import Publisher
+from rosz.node.service import Service
+from rosz.node.subscription import Subscription
+from rosz.qos import CLOCK, ROSOUT, SERVICES
+from rosz.worker import start_thread
 
 if TYPE_CHECKING:
-    from rosz.node.channel import MessageInfo
-    from rosz.node.node import Node
+    from rosz.node.decoder import MessageInfo
 
-__all__ = (
-    "announce",
-    "follow_clock",
-    "log_of",
-    "open_rosout",
-    "process_of",
-    "set_initial_params",
-    "simulate",
-)
+__all__ = ("follow_clock", "open_rosout", "serve_loggers", "set_initial_params", "simulate")
 
 _SECOND = 1_000_000_000
+_THREADS = 16
 
 
-def process_of(node: Node) -> ProcessToken:
-    """Return what a node is as a process, as of now."""
-    context = node.context
-    return ProcessToken(
-        context.domain,
-        context.session.zid,
-        node.node_id,
-        context.session.stamp().time,
-        os.getpid(),
-        socket.gethostname(),
-        node.name,
-    )
-
-
-def log_of(node: Node) -> NodeLog:
-    """Return a node's log, by the environment and the command line."""
-    environment = node.context.environment
-    return NodeLog(
-        node.name,
-        clock=node.clock,
-        log_dir=environment.log_dir,
-        file_name=node.context.arguments.special.get("__log", ""),
-        console_format=environment.console_format or DEFAULT_FORMAT,
-        color=environment.color,
-    )
-
-
-def announce(node: Node) -> None:
-    """Make a node known, to ROS 2 by its token and to rosz by that of its process."""
-    session = node.context.session
-    number, namespace = node.node_id, node.namespace
-    token = Token(
-        node.context.domain, session.zid, number, number, Kind.NODE, namespace, node.base_name
-    )
-    # Last to go what tells that it is of rosz: one that is not is offered ROS 2's services.
-    for key in (format_process(node.process), format_token(token)):
-        node.keep(session.token(key))
-
-
-def set_initial_params(node: Node) -> None:
+def set_initial_params(node: NodeCore) -> None:
     """Set the private parameters that the command line gives (``_name:=value``).
 
-    One without a value (``_name:=``) is not set, as in rospy.
+    An argument without a value (``_name:=``) sets nothing, as in rospy.
 
     Raises:
-        UsageError: A value is no YAML.
+        UsageError: A value is not YAML.
     """
     if not node.context.arguments.params:
         return
@@ -86,23 +39,23 @@ def set_initial_params(node: Node) -> None:
             value = next(read_plain(text, "<value>"), None)
         except YamlError as error:
             raise UsageError(
-                f"argument '_{name}:={text}' is no YAML value: {error.reason}"
+                f"argument '_{name}:={text}' is not a YAML value: {error.reason}"
             ) from error
         if value is not None:
             node.params[f"~{name}"] = value
 
 
-def follow_clock(node: Node) -> None:
-    """Live in simulated time where the parameter /use_sim_time says so (ROS wiki, Clock).
+def follow_clock(node: NodeCore) -> None:
+    """Simulate time if the parameter ``/use_sim_time`` says so (ROS wiki, Clock).
 
-    Reading it makes the process a replica of the parameters, as every node is.
+    Reading the parameter makes the process a replica of the store, as every node is.
     """
     if node.params.get("/use_sim_time", False) is True:
         simulate(node)
 
 
-def simulate(node: Node) -> None:
-    """Live in simulated time from now on, and take it from ``/clock``."""
+def simulate(node: NodeCore) -> None:
+    """Take the time of a node's context from ``/clock`` from now on."""
     from rosz.msgs.rosgraph_msgs.msg import Clock
 
     clock = node.context.clock
@@ -110,36 +63,70 @@ def simulate(node: Node) -> None:
 
     def tick(message: Clock, info: MessageInfo) -> None:
         now = message.clock.sec * _SECOND + message.clock.nanosec
-        clock.advance(now, teller=info.gid, number=info.sequence)
+        clock.advance(now, publisher=info.gid, number=info.sequence)
 
-    node.subscription("/clock", Clock, tick, qos=CLOCK, with_info=True)
-
-
-def open_rosout(node: Node) -> None:
-    """Publish a node's log, from a thread: nobody waits for the message type to load."""
-    threading.Thread(
-        target=_open_rosout, args=(node,), name="rosz-rosout-open", daemon=True
-    ).start()
+    topic = node.resolve("/clock")
+    node.keep(Subscription(node, topic, Clock, tick, CLOCK, with_info=True))
 
 
-def _sent(text: str) -> str:
-    """Return a text with what no message can hold, such as bytes of a file's name, written out."""
-    return text.encode(errors="backslashreplace").decode().replace("\0", "\\x00")
+def open_rosout(node: NodeCore) -> None:
+    """Publish a node's log, from a thread: nothing waits for the message type to load."""
+    _start("rosz-rosout-open", _open_rosout, node)
 
 
-def _open_rosout(node: Node) -> None:
+def serve_loggers(node: NodeCore) -> None:
+    """Serve ``~get_loggers`` and ``~set_logger_level``, by which ROS 1 tools set levels."""
+    _start("rosz-loggers", _serve_loggers, node)
+
+
+def _start(name: str, target: Any, node: NodeCore) -> None:
+    def run() -> None:
+        try:
+            target(node)
+        except ClosedError:
+            return  # a program that ends within its first moments
+
+    start_thread(threading.Thread(target=run, name=name, daemon=True))
+
+
+def _open_rosout(node: NodeCore) -> None:
     from rosz.msgs.builtin_interfaces.msg import Time
     from rosz.msgs.rcl_interfaces.msg import Log
 
-    try:
-        rosout = node.publisher("/rosout", Log, qos=ROSOUT)
-    except ClosedError:
-        return  # a program that ends within its first moments
+    rosout = node.keep(Publisher(node, node.resolve("/rosout"), Log, ROSOUT))
 
-    def publish(  # noqa: PLR0917  # the signature of RosoutSink
+    def publish(  # noqa: PLR0917  # the signature of RosoutHandler
         level: int, name: str, message: str, file: str, function: str, line: int, stamp: int
     ) -> None:
         time = Time(*divmod(stamp, _SECOND))
-        rosout.publish(Log(time, level, name, _sent(message), _sent(file), function, line))
+        rosout.publish(Log(time, level, name, _valid(message), _valid(file), function, line))
 
     node.log.publish_to(publish)
+
+
+def _valid(text: str) -> str:
+    """Return a text with escapes for what no message can hold, such as bytes of a file's name."""
+    return text.encode(errors="backslashreplace").decode().replace("\0", "\\x00")
+
+
+def _serve_loggers(node: NodeCore) -> None:
+    from rosz.msgs.roscpp.msg import Logger
+    from rosz.msgs.roscpp.srv import GetLoggers, SetLoggerLevel
+
+    def get_loggers(_request: Any) -> Any:
+        levels = node.log.get_levels()
+        return GetLoggers.Response([Logger(name, level) for name, level in levels.items()])
+
+    def set_level(request: Any) -> Any:
+        try:
+            node.log.set_level(request.logger, request.level)
+        except (NotFoundError, UsageError) as error:
+            # As in rospy, the caller gets no error.
+            node.log.warning("cannot set the level of a logger: %s", error)
+        return SetLoggerLevel.Response()
+
+    for name, kind, handler in (
+        ("~get_loggers", GetLoggers, get_loggers),
+        ("~set_logger_level", SetLoggerLevel, set_level),
+    ):
+        node.keep(Service(node, node.resolve(name), kind, handler, SERVICES, _THREADS))

@@ -1,86 +1,463 @@
-"""Subscriptions of a known type."""
+"""Subscriptions: from Zenoh's samples to a callback, an iterator or `Subscription.get`.
+
+There is one way in, `Subscription._receive`, which puts a sample into the queue of the
+subscription; it is decoded when its turn comes, so a sample that newer ones push out costs nothing.
+
+With a callback, live samples skip that queue: Zenoh's own ring holds them, and a thread takes them
+from there. Python then has no part before a sample's turn comes, which halves the time from arrival
+to callback. Only replays of latching publishers and directly delivered samples come by the queue,
+and have a second thread, started with the first of them; callbacks run one at a time.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from rosz.node.channel import Channel
-from rosz.node.endpoint import Endpoint, Withdrawal
-from rosz.node.history import ask_for_history
-from rosz.node.reader import Reader
+from rosz.errors import ClosedError, DecodeError, RoszError, WaitTimeout
+from rosz.node.core import NodeCore
+from rosz.node.decoder import Decoder, Received
+from rosz.node.entity import ANY, Entity
 from rosz.qos import QoS
-from rosz.wire import Kind, Token, format_token, gid
+from rosz.session import LONGEST_WAIT, clamp_timeout
+from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid, ros_type
+from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
-    from rosz.node.node import Node
+    from rosz.session import PullSubscriber, Reply, Sample
 
-__all__ = ("Subscription",)
+__all__ = ("GenericSubscription", "Subscription")
 
 M = TypeVar("M")
 
+_ALL = 1 << 17
+"""Samples to keep when all are to be kept: a callback that hangs must not eat the memory."""
 
-class Subscription(Reader[M], Endpoint):
-    """A sink of messages of a topic; see `rosz.Node.subscription`.
+_MOST = 1 << 20
+"""Largest queue: Zenoh allocates 256 bytes for each sample at once, and aborts if it cannot."""
+
+_HISTORY_TIMEOUT = 10.0
+
+_Item = tuple["Sample | Reply", Decoder | None]
+"""A sample, with its decoder if its key does not tell its type."""
+
+
+class Subscription(Entity, Generic[M]):
+    """Receive the messages of a topic; see `rosz.Node.subscription`.
+
+    Without a message type it receives all types from the start, so that nothing is missed. When the
+    graph shows a publisher, a subscription of that publisher's type is announced, so that others
+    see who listens.
+
+    Args:
+        node: The node that the subscription belongs to.
+        topic: Resolved name of the topic.
+        message_type: Class of the messages; any type when not given.
+        callback: Function that gets each message, and its info if ``with_info``.
+        qos: The depth of the queue, and what is asked of publishers.
+        raw: Whether to pass on the encoded bytes instead of messages.
+        with_info: Whether the callback also gets a `MessageInfo`.
 
     Attributes:
-        message_type: What is expected.
+        message_type: As given.
     """
 
     def __init__(
         self,
-        node: Node,
+        node: NodeCore,
         topic: str,
-        message_type: type[Message],
+        message_type: type[Message] | None,
         callback: Callable[..., Any] | None,
         qos: QoS,
         *,
         raw: bool = False,
         with_info: bool = False,
     ) -> None:
-        type_name = message_type._type_name
-        Endpoint.__init__(
-            self, node, Kind.SUBSCRIPTION, topic, type_name, message_type._type_hash, qos
-        )
+        name, type_hash = ANY, ANY
+        if message_type is not None:
+            name, type_hash = message_type._type_name, message_type._type_hash
+        super().__init__(node, Kind.SUBSCRIPTION, topic, name, type_hash, qos)
         qos = self.qos
-        Reader.__init__(self, node, topic, callback, qos, with_info=with_info)
         self.message_type = message_type
-        self._channel = Channel(
-            topic, type_name, None if raw else message_type, node.log, with_info=with_info
-        )
-        context = node.context
-        self._declared.append(
-            self._subscribe(
-                self.key,
-                self._channel.take,
-                history=qos.depth if qos.latched else 0,
-                recover=qos.latched and qos.reliable,
-            )
-        )
-        self._deliver = partial(self._put, self._channel.take)
-        self._declared.append(Withdrawal(context.inbox.open(self.token.entity_id, self._deliver)))
-        self.announce()
-        if not qos.latched:
-            self._declared.append(node.listen(self._follow))
+        self._callback = callback
+        self._raw = raw
+        self._with_info = with_info
+        self._depth = _ALL if qos.history == "keep_all" else min(qos.depth, _MOST)
+        self._queue = _Queue(self._depth)
+        self._queue_worker: Worker[_Item] | None = None
+        self._turn = threading.RLock()
+        self._learning = threading.RLock()  # a signal handler may come in between
+        self._decoder = None
+        self._decoders: dict[tuple[str, str], Decoder | None] = {}
+        self._announced: set[tuple[str, str]] = set()
+        if message_type is not None:
+            self._decoder = self._make_decoder(name, type_hash, None if raw else message_type)
+        self._open()
 
-    def _follow(self, publisher: Token, alive: bool) -> None:
-        """Ask a latching publisher for what it sent before it knew of this subscription."""
-        latched = publisher.qos is not None and publisher.qos.latched
-        if alive and latched and self.matches(publisher):
-            self._channel.expect_replay(gid(format_token(publisher)))
-            ask_for_history(self.node, publisher, self._deliver, self._depth)
+    def _open(self) -> None:
+        """Begin to receive, and announce the subscription if its type is known."""
+        typed, latched = self._decoder is not None, self.qos.latched
+        self._subscribe(
+            history=self.qos.depth if typed and latched else 0,
+            recover=typed and latched and self.qos.reliable,
+        )
+        if typed:
+            direct = self.node.context.direct_delivery
+            self.keep(direct.register(self.token.entity_id, self._receive))
+            self.announce()
+        if not (typed and latched):
+            self.keep(self.node.listen(self._follow))
+
+    def _subscribe(self, *, history: int, recover: bool) -> None:
+        session = self.node.context.session
+        if self._callback is None:
+            self.keep(session.subscriber(self.key, self._receive, history=history, recover=recover))
+            return
+        ring = session.pull_subscriber(self.key, self._depth, history=history, recover=recover)
+        self.keep(ring)
+        Worker(f"rosz-sub{self.name}", self._dispatch, receive=partial(_next_sample, ring))
+
+    @property
+    def types(self) -> list[str]:
+        """The types received or seen so far, as ``pkg/msg/Name``, in the order of appearance."""
+        if self.message_type is not None:
+            return [self.token.type_name]
+        return list(dict.fromkeys(name for name, _ in list(self._decoders)))
+
+    def matches(self, token: Token) -> bool:
+        """Return whether this subscription receives what a publisher sends."""
+        if self.message_type is not None:
+            return super().matches(token)
+        return token.kind is Kind.PUBLISHER and token.name == self.name
 
     def publishers(self) -> list[Token]:
-        """Return the publishers that this subscription hears: same topic, type and hash."""
+        """Return the publishers that this subscription receives from."""
         view = self.node.context.graph.view()
         return [token for token in view.publishers(self.name) if self.matches(token)]
 
-    def disown(self, reason: str) -> None:
-        """Refuse everything from now on, touching neither threads nor links: after a fork."""
-        super().disown(reason)
-        self._feed.closed = True
+    # Receiving.
+
+    def _receive(self, sample: Sample | Reply, decoder: Decoder | None = None) -> None:
+        """Put a sample into the queue; called on threads of the session.
+
+        Args:
+            sample: The sample.
+            decoder: Its decoder, if its key does not tell its type.
+        """
+        self._queue.put((sample, decoder))
+        if self._callback is not None and self._queue_worker is None:
+            with self._learning:
+                if self._queue_worker is None:
+                    self._queue_worker = Worker(
+                        f"rosz-sub{self.name}",
+                        lambda item: self._dispatch(*item),
+                        receive=self._queue.receive,
+                    )
+
+    def _decode(self, sample: Sample | Reply, decoder: Decoder | None) -> Received | None:
+        decoder = decoder or self._decoder or self._decoder_of(sample)
+        return None if decoder is None else decoder.decode(sample)
+
+    def _dispatch(self, sample: Sample | Reply, decoder: Decoder | None = None) -> None:
+        """Call the callback with a sample whose turn it is."""
+        callback = self._callback
+        if callback is None or self._queue.closed:
+            return
+        try:
+            with self._turn:
+                received = self._decode(sample, decoder)
+                if received is None:
+                    return
+                if self._with_info:
+                    callback(*received)
+                else:
+                    callback(received[0])
+        except BaseException as error:  # noqa: BLE001  # the thread outlives what a callback raises
+            ending = self._queue.closed or self.node.context.is_shutdown
+            # What a callback tries while its node is being shut down is not its fault.
+            if not (ending and isinstance(error, ClosedError)):
+                self.node.log.report(f"callback of '{self.name}' failed", error)
+
+    def get(self, timeout: float = 10.0) -> M:
+        """Return the oldest message of the queue, waiting for one.
+
+        Args:
+            timeout: Time limit in seconds.
+
+        Raises:
+            WaitTimeout: No message came in time.
+            ClosedError: The subscription was closed meanwhile.
+            UsageError: The timeout is not a number.
+        """
+        queue = self._queue
+        deadline = time.monotonic() + clamp_timeout(timeout)
+        while True:
+            while queue.items and not queue.closed:
+                received = self._next()
+                if received is not None:
+                    if queue.items:
+                        queue.wake()  # another thread may wait for the rest
+                    message: M = received[0]
+                    return message
+            if queue.closed:
+                queue.wake()
+                self.check_open("get a message")
+            left = deadline - time.monotonic()
+            if left <= 0:
+                raise WaitTimeout(f"message on '{self.name}'", timeout)
+            queue.wait(left)
+
+    def _next(self) -> Received | None:
+        """Decode the oldest sample, if there is one."""
+        with self._turn:  # decoding counts samples, so they must be decoded in their order
+            item = self._queue.pop()
+            return None if item is None else self._decode(*item)
+
+    def __iter__(self) -> Iterator[M]:
+        """Yield messages until the subscription or its context is closed."""
+        self.node.context.cooperative = True
+        return self._messages()
+
+    def _messages(self) -> Iterator[M]:
+        while True:
+            try:
+                message = self.get(LONGEST_WAIT)
+            except ClosedError:
+                return
+            yield message
+
+    def __aiter__(self) -> AsyncIterator[M]:
+        """Yield messages in an asyncio program until the subscription or its context is closed."""
+        self.node.context.cooperative = True
+        return self._async_messages()
+
+    async def _async_messages(self) -> AsyncIterator[M]:
+        import asyncio  # a third of what a node would load, for the few that use it
+
+        queue, loop = self._queue, asyncio.get_running_loop()
+        arrived = asyncio.Event()
+
+        def wake() -> None:
+            try:
+                loop.call_soon_threadsafe(arrived.set)
+            except RuntimeError:  # the loop has ended
+                queue.remove_waker(wake)
+
+        queue.add_waker(wake)
+        try:
+            while not queue.closed:
+                arrived.clear()
+                while queue.items and not queue.closed:
+                    received = self._next()
+                    if received is not None:
+                        yield received[0]
+                if not queue.closed:
+                    await arrived.wait()
+        finally:
+            queue.remove_waker(wake)
+
+    # Types and latching publishers.
+
+    def _follow(self, publisher: Token, alive: bool) -> None:
+        """Announce the publisher's type, and ask a latching one for what it sent before."""
+        if not alive or publisher.qos is None or not self.matches(publisher):
+            return
+        kind = publisher.type_name, publisher.type_hash
+        decoder = self._decoder or self._decoder_for(*kind)
+        if decoder is None:
+            return
+        receive = partial(self._receive, decoder=decoder)
+        if self.message_type is None:
+            self._announce(kind, receive)
+        if publisher.qos.latched:
+            decoder.expect_replay(gid(format_token(publisher)))
+            self._request_history(publisher, publisher.qos.depth, receive)
+
+    def _announce(self, kind: tuple[str, str], receive: Callable[[Sample], None]) -> None:
+        """Announce a subscription of one type, with a key for direct delivery."""
+        if kind in self._announced:
+            return
+        self._announced.add(kind)
+        with suppress(ClosedError):  # the subscription or its context ends
+            entity = self.keep(Entity(self.node, Kind.SUBSCRIPTION, self.name, *kind, self.qos))
+            direct = self.node.context.direct_delivery
+            entity.keep(direct.register(entity.token.entity_id, receive))
+            entity.announce(watch=False)
+
+    def _request_history(
+        self, publisher: Token, depth: int, receive: Callable[[Reply], None]
+    ) -> None:
+        """Request the newest samples in a latching publisher's cache."""
+        key = endpoint_key(
+            publisher.domain, publisher.name, publisher.type_name, publisher.type_hash
+        )
+        context = self.node.context
+        try:
+            context.session.get_async(
+                f"{key}/@adv/pub/{publisher.zid}/**",
+                lambda reply: receive(reply) if reply.ok else None,
+                lambda: None,
+                timeout=_HISTORY_TIMEOUT,
+                parameters=f"_max={min(depth, self._depth)};_anyke",
+                any_key=True,
+            )
+        except RoszError as error:
+            if not context.is_shutdown:
+                self.node.log.warning(
+                    "no history of '%s' from node '%s': %s", self.name, publisher.node_name, error
+                )
+
+    def _decoder_of(self, sample: Sample | Reply) -> Decoder | None:
+        """Return the decoder for a sample whose key tells its type."""
+        *_, dds_name, type_hash = sample.key.split("/")
+        try:
+            return self._decoder_for(ros_type(dds_name), type_hash)
+        except DecodeError:
+            return None  # something else of Zenoh's below the name of the topic
+
+    def _decoder_for(self, type_name: str, type_hash: str) -> Decoder | None:
+        """Return the decoder for a type; ``None``, after one warning, if it cannot be decoded."""
+        kind = (type_name, type_hash)
+        with self._learning:
+            if kind not in self._decoders:
+                self._decoders[kind] = self._learn(*kind)
+            return self._decoders[kind]
+
+    def _learn(self, type_name: str, type_hash: str) -> Decoder | None:
+        log = self.node.log
+        if self._raw:
+            return self._make_decoder(type_name, type_hash, None)
+        try:
+            message_type: type[Message] = self.node.context.types.message(type_name)
+        except RoszError as error:
+            log.warning("cannot decode what comes on '%s': %s", self.name, error)
+            return None
+        if type_hash not in {message_type._type_hash, NO_HASH}:
+            log.warning(
+                "cannot decode what comes on '%s': its definition of '%s' (%.15s…) is not the one"
+                " known here (%.15s…); put the sender's package on ROSZ_PACKAGE_PATH",
+                self.name,
+                type_name,
+                type_hash,
+                message_type._type_hash,
+            )
+            return None
+        return self._make_decoder(type_name, type_hash, message_type)
+
+    def _make_decoder(
+        self, type_name: str, type_hash: str, message_type: type[Message] | None
+    ) -> Decoder:
+        log, with_info = self.node.log, self._with_info
+        return Decoder(self.name, type_name, type_hash, message_type, log, with_info=with_info)
+
+    # The end.
 
     def _finish(self) -> None:
-        self._feed.close()
+        self._queue.close()
+
+    def _forked(self) -> None:
+        self._queue.closed = True
+
+    def __repr__(self) -> str:
+        types = ", ".join(self.types) or "any type"
+        return f"<{type(self).__name__} {self.name} [{types}]{' closed' if self.closed else ''}>"
+
+
+class GenericSubscription(Subscription[Any]):
+    """A `Subscription` without a message type."""
+
+    def __init__(
+        self,
+        node: NodeCore,
+        topic: str,
+        callback: Callable[..., Any] | None,
+        qos: QoS,
+        *,
+        raw: bool = False,
+        with_info: bool = False,
+    ) -> None:
+        super().__init__(node, topic, None, callback, qos, raw=raw, with_info=with_info)
+
+
+class _Queue:
+    """The newest samples, and those who wait for them.
+
+    A lock serves as the bell: it is locked while nothing new has come, and releasing it wakes one
+    waiter. That takes a fraction of the time of a condition, on a path that every sample goes.
+    Whoever leaves items for others, or finds the queue closed, wakes the next one.
+
+    Args:
+        depth: Number of newest samples to keep.
+
+    Attributes:
+        items: The samples, oldest first.
+        closed: Whether the queue is closed.
+    """
+
+    def __init__(self, depth: int) -> None:
+        self.items: deque[_Item] = deque(maxlen=depth)
+        self.closed = False
+        self._bell = threading.Lock()
+        self._bell.acquire()
+        self._wakers: tuple[Callable[[], None], ...] = ()
+
+    def put(self, item: _Item) -> None:
+        """Add an item; neither blocks nor raises."""
+        self.items.append(item)
+        self.wake()
+
+    def wake(self) -> None:
+        """Wake one waiter, and all event loops."""
+        if self._bell.locked():
+            # Another thread may wake the waiter between the look and the release.
+            with suppress(RuntimeError):
+                self._bell.release()
+        for waker in self._wakers:
+            waker()
+
+    def wait(self, timeout: float = -1) -> None:
+        """Wait until an item was added or the queue was closed since the last wait."""
+        self._bell.acquire(timeout=timeout)
+
+    def pop(self) -> _Item | None:
+        """Remove and return the oldest item; ``None`` if there is none."""
+        try:
+            return self.items.popleft()
+        except IndexError:
+            return None
+
+    def receive(self) -> _Item | None:
+        """Wait for an item and return it; ``None`` when the queue is closed."""
+        while not self.closed:
+            item = self.pop()
+            if item is not None:
+                return item
+            self.wait()
+        self.wake()
+        return None
+
+    def add_waker(self, waker: Callable[[], None]) -> None:
+        """Call a function with each item, and at the end."""
+        self._wakers = (*self._wakers, waker)
+
+    def remove_waker(self, waker: Callable[[], None]) -> None:
+        """Stop calling a function."""
+        self._wakers = tuple(other for other in self._wakers if other is not waker)
+
+    def close(self) -> None:
+        """End all waits; a second call has no effect."""
+        self.closed = True
+        self.wake()
+
+
+def _next_sample(ring: PullSubscriber) -> Sample | None:
+    try:
+        return ring.receive()
+    except ClosedError:
+        return None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node
-from rosz.node.loggers import serve_loggers
+from rosz.node.standard import serve_loggers
 
 __all__ = ("main",)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rosz.node import Node
-from rosz.node.loggers import serve_loggers
+from rosz.node.standard import serve_loggers
 from rosz.turtlesim.simulator import Simulator
 from rosz.turtlesim.window import Window, WindowError
 

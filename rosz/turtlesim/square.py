@@ -12,7 +12,7 @@ from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node, TimerEvent
-from rosz.node.loggers import serve_loggers
+from rosz.node.standard import serve_loggers
 
 __all__ = ("Move", "Square", "main")
 

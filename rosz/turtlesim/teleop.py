@@ -11,7 +11,7 @@ import sys
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node
-from rosz.node.loggers import serve_loggers
+from rosz.node.standard import serve_loggers
 from rosz.turtlesim.keyboard import Keyboard
 
 __all__ = ("Teleop", "main")

@@ -105,12 +105,12 @@ def test_levels(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "text"),
     [
-        (["level", "/ns/busy", "rosout", "loud"], 2, "'loud' is no level"),
+        (["level", "/ns/busy", "rosout", "loud"], 2, "'loud' is not a level"),
         (["level", "/ns/busy", "leg", "INFO"], 1, "has no logger 'leg'"),
         (["level", "/ns/bus", "rosout", "INFO"], 1, "did you mean '/ns/busy'?"),
         (["level", "/ns/busy"], 2, "rosz log level NODE LOGGER LEVEL"),
         (["levels"], 2, "rosz log levels NODE"),
-        (["--level", "loud"], 2, "'loud' is no level"),
+        (["--level", "loud"], 2, "'loud' is not a level"),
         (["-n", "0"], 2, "-n is 0; expected 1 or more lines"),
         (["--grep", "("], 2, "'(' is no regular expression"),
     ],

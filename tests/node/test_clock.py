@@ -339,12 +339,12 @@ def test_what_one_said_before_is_no_jump_back() -> None:
     clock = SimulatedClock(0)
     jumps: list[TimeJump] = []
     clock.on_jump(jumps.append)
-    clock.advance(START, teller=b"gazebo", number=1)
-    clock.advance(START + 2, teller=b"gazebo", number=3)
-    clock.advance(START + 1, teller=b"gazebo", number=2)
+    clock.advance(START, publisher=b"gazebo", number=1)
+    clock.advance(START + 2, publisher=b"gazebo", number=3)
+    clock.advance(START + 1, publisher=b"gazebo", number=2)
     assert (clock.now(), jumps) == (START + 2, [])
-    clock.advance(START, teller=b"gazebo", number=4)
-    clock.advance(START - 1, teller=b"another", number=1)
+    clock.advance(START, publisher=b"gazebo", number=4)
+    clock.advance(START - 1, publisher=b"another", number=1)
     assert jumps == [TimeJump(START + 2, START), TimeJump(START, START - 1)]
 
 

@@ -85,7 +85,7 @@ def test_what_means_nothing_is_refused_and_the_next_is_answered(network: Network
     for _ in range(2 * control._THREADS):
         (refused,) = ask("dance")
         assert not refused.ok
-        assert b"'dance' is nothing that a node can be asked" in refused.payload
+        assert b"a node has no action 'dance'" in refused.payload
     assert ask("info")[0].ok
 
 
@@ -111,7 +111,7 @@ def test_many_rivals_take_few_threads(network: Network, monkeypatch: pytest.Monk
     network.node("last")
     king.context.graph.wait_for_node("/last", PATIENCE)
     assert threading.active_count() - before < len(rivals)
-    assert len(threads("rosz-rivals/king")) == control._THREADS
+    assert len(threads("rosz-takeover/king")) == control._THREADS
     go_on.set()
     seen += [asked.get(timeout=PATIENCE) for _ in range(len(rivals) - len(seen))]
     assert sorted(seen) == list(range(len(rivals)))

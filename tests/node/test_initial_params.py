@@ -25,5 +25,5 @@ def test_values_are_yaml(network: Network) -> None:
     ids=["date", "deep"],
 )
 def test_what_is_no_value(network: Network, value: str, reason: str) -> None:
-    with pytest.raises(UsageError, match=f"is no YAML value: .*{reason}"):
+    with pytest.raises(UsageError, match=f"is not a YAML value: .*{reason}"):
         network.node(argv=[f"_a:={value}"])

@@ -22,19 +22,19 @@ def in_time(call: Any) -> None:
 
 def test_subscribing(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     context = network.context()
-    inbox, session = context.inbox, context.session
+    direct, session = context.direct_delivery, context.session
     subscriber = session.subscriber
     opened: list[int] = []
 
     def interrupted(*args: Any) -> Any:
         if not opened:
             opened.append(1)
-            inbox.open(1, lambda _: None)
+            direct.register(1, lambda _: None)
         return subscriber(*args)
 
     monkeypatch.setattr(session, "subscriber", interrupted)
-    in_time(lambda: inbox.open(2, lambda _: None))
-    assert set(inbox._owners) == {"1", "2"}
+    in_time(lambda: direct.register(2, lambda _: None))
+    assert set(direct._receivers) == {"1", "2"}
 
 
 def test_learning_a_type(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,11 +45,11 @@ def test_learning_a_type(network: Network, monkeypatch: pytest.MonkeyPatch) -> N
     def interrupted(type_name: str, type_hash: str) -> Any:
         learned.append(type_name)
         if len(learned) == 1:
-            subscription._channel(String._type, String._type_hash)
+            subscription._decoder_for(String._type, String._type_hash)
         return learn(type_name, type_hash)
 
     monkeypatch.setattr(subscription, "_learn", interrupted)
-    in_time(lambda: subscription._channel(String._type_name, String._type_hash))
+    in_time(lambda: subscription._decoder_for(String._type_name, String._type_hash))
     assert len(learned) == 2
 
 

@@ -14,8 +14,7 @@ from simulation import SECOND, START, SimulatedClock
 from rosz.errors import NotFoundError, UsageError
 from rosz.node.clock import Clock
 from rosz.node.log import NodeLog
-from rosz.node.logger import NodeLogger
-from rosz.node.severity import parse_severity, severity_name
+from rosz.node.logger import NodeLogger, parse_severity, severity_name
 
 
 class Collect(logging.Handler):
@@ -283,7 +282,7 @@ def test_unknown_logger_and_level() -> None:
         NotFoundError, match=r"no logger 'leg': expected one of rosout, rosout\.arm"
     ):
         log.set_level("leg", "DEBUG")
-    with pytest.raises(UsageError, match=r"'debgu' is no level: .* FATAL; did you mean 'DEBUG'"):
+    with pytest.raises(UsageError, match=r"'debgu' is not a level: .* FATAL; did you mean 'DEBUG'"):
         log.set_level("rosout", "debgu")
 
 

@@ -15,10 +15,10 @@ from typing import Any
 
 import pytest
 
-from rosz.node import logfile
+from rosz.node import log_handlers
 from rosz.node.clock import Clock
 from rosz.node.log import NodeLog
-from rosz.node.logfile import FileSink, log_file_name
+from rosz.node.log_handlers import FileHandler, log_file_name
 
 
 class Bench:
@@ -27,7 +27,7 @@ class Bench:
     def __init__(self, path: Path, max_bytes: int = 1000, backups: int = 2) -> None:
         self.path = path
         self.troubles: list[str] = []
-        self.sink = FileSink(path, self.troubles.append, max_bytes=max_bytes, backups=backups)
+        self.sink = FileHandler(path, self.troubles.append, max_bytes=max_bytes, backups=backups)
         self.sink.setFormatter(logging.Formatter("%(message)s"))
 
     def write(self, text: str) -> None:
@@ -173,7 +173,7 @@ def test_full_disk(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
 
     bench.write("before")
     with monkeypatch.context() as patch:
-        patch.setattr(logfile, "FileIO", FullDisk)
+        patch.setattr(log_handlers, "FileIO", FullDisk)
         bench.sink.close()
         bench.write("during")
         bench.write("during")

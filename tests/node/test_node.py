@@ -11,11 +11,11 @@ import pytest
 from network import PATIENCE, Network, eventually
 
 from rosz.errors import UsageError
+from rosz.lifecycle import Registration
 from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Node
 from rosz.node.control import NodeInfo, control_key
-from rosz.node.endpoint import Withdrawal
 from rosz.params.replica import Replica
 from rosz.qos import ROSOUT
 from rosz.session import Session
@@ -172,7 +172,7 @@ def test_a_part_that_cannot_be_closed_keeps_no_other_open(
         raise ValueError("stuck")
 
     subscription = node.subscription("chatter", String)
-    node.keep(Withdrawal(fail))
+    node.keep(Registration(fail))
     node.close()
     assert subscription.closed
     assert "ValueError: stuck" in capfd.readouterr().err
@@ -213,10 +213,10 @@ def test_any_text_comes_to_rosout(network: Network, node: Node) -> None:
 
 def test_timers_that_ended_are_not_kept(node: Node) -> None:
     called: SimpleQueue[object] = SimpleQueue()
-    before = len(node._ending.parts)
+    before = len(node._lifecycle._parts)
     for _ in range(50):
         node.timer(0.001, called.put, oneshot=True)
     for _ in range(50):
         called.get(timeout=PATIENCE)
     # What else comes is the publisher of /rosout, which a thread opens.
-    eventually(lambda: len(node._ending.parts) <= before + 1, "only what still runs is kept")
+    eventually(lambda: len(node._lifecycle._parts) <= before + 1, "only what still runs is kept")

@@ -10,11 +10,11 @@ import pytest
 from network import PATIENCE, Network, eventually
 
 from rosz.errors import ClosedError, EncodeError, InvalidName, UsageError, WaitTimeout
+from rosz.lifecycle import Registration
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.std_msgs.msg import Int32, String, UInt8MultiArray
 from rosz.msgs.std_srvs.srv import Empty, Trigger
 from rosz.node import Node, SubscriberLink
-from rosz.node.endpoint import Withdrawal
 from rosz.qos import QoS
 
 
@@ -121,7 +121,7 @@ def test_closed(talker: Node) -> None:
     publisher = talker.publisher("chatter", String)
     publisher.close()
     publisher.close()
-    with pytest.raises(ClosedError, match="the publisher is closed"):
+    with pytest.raises(ClosedError, match="the publisher of '/chatter' is closed"):
         publisher.publish("hello")
     assert repr(publisher) == "<Publisher /chatter [std_msgs/msg/String] closed>"
 
@@ -130,7 +130,7 @@ def test_closed_follows_nobody(talker: Node) -> None:
     publisher = talker.publisher("chatter", String)
     publisher.close()
     threads = threading.active_count()
-    with pytest.raises(ClosedError, match="cannot follow the links of '/chatter'"):
+    with pytest.raises(ClosedError, match="cannot follow its subscriptions"):
         publisher.on_connection(print)
     assert threading.active_count() <= threads
 
@@ -153,8 +153,8 @@ def test_what_comes_to_a_closed_one_is_closed(talker: Node) -> None:
     publisher = talker.publisher("chatter", String)
     publisher.close()
     withdrawn: list[bool] = []
-    with pytest.raises(ClosedError, match="cannot declare more on '/chatter'"):
-        publisher.also_close(Withdrawal(lambda: withdrawn.append(True)))
+    with pytest.raises(ClosedError, match="cannot declare anything more"):
+        publisher.keep(Registration(lambda: withdrawn.append(True)))
     assert withdrawn == [True]
 
 

@@ -24,8 +24,8 @@ from rosz.msgs.rcl_interfaces.srv import (
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
 from rosz.node import Client, Node
+from rosz.node.ros2_detector import Ros2PeerDetector
 from rosz.node.ros2_parameters import from_ros2, to_ros2
-from rosz.node.ros2_services import Lookout
 from rosz.wire import Kind, Token, format_token
 
 STORED = {
@@ -102,7 +102,7 @@ def test_values_that_only_the_store_has(
 
 
 def test_value_of_no_type() -> None:
-    with pytest.raises(ParamError, match="'10' is no type of parameter; expected 0 to 9"):
+    with pytest.raises(ParamError, match="'10' is not a type of parameter; expected 0 to 9"):
         from_ros2(ParameterValue(10))
 
 
@@ -174,13 +174,13 @@ def test_set(asker: Node, talker: Node) -> None:
         False,
     ]
     assert [result.reason for result in results if not result.successful] == [
-        "'gains' is no parameter: there are parameters below it",
+        "'gains' is not a parameter: there are parameters below it",
         "'odd' is a list that ROS 2 has no type for: set '/robot/talker/odd' with 'rosz param set'",
         "'use_sim_time' is the same for all nodes: set '/use_sim_time' with 'rosz param set' before"
         " they start",
-        "'' is no name of a parameter",
+        "'' is not the name of a parameter",
         "'none' is not set",
-        "'77' is no type of parameter; expected 0 to 9",
+        "'77' is not a type of parameter; expected 0 to 9",
     ]
     assert talker.params["~rate"] == 5
     assert talker.params["~new/x"] == 1
@@ -295,16 +295,16 @@ def test_wanted_while_it_has_a_look(
     """That there is nobody foreign does not make it forget that somebody asked for them."""
     looking, go_on = threading.Event(), threading.Event()
 
-    def look_long(lookout: Lookout, _suspects: set[str]) -> bool:
+    def look_long(lookout: Ros2PeerDetector, _suspects: set[str]) -> bool:
         if lookout._node is not talker:
             return False
         looking.set()
         return not go_on.wait(PATIENCE)
 
-    monkeypatch.setattr(Lookout, "_is_foreign", look_long)
+    monkeypatch.setattr(Ros2PeerDetector, "_is_foreign", look_long)
     asker = network.node("asker")
     assert looking.wait(PATIENCE)
-    monkeypatch.setattr(Lookout, "_declare", lambda _: None)
+    monkeypatch.setattr(Ros2PeerDetector, "_declare", lambda _: None)
     lists = asker.client("/robot/talker/list_parameters", ListParameters)
     graph = talker.context.graph
     graph.wait_for(lambda view: bool(view.clients(lists.name)), PATIENCE, "a client")
@@ -314,7 +314,7 @@ def test_wanted_while_it_has_a_look(
 
 
 def test_who_came_and_went_is_forgotten(network: Network, talker: Node) -> None:
-    lookout = Lookout(talker)
+    lookout = Ros2PeerDetector(talker)
     graph = talker.context.graph
     for _ in range(3):
         guest = network.node("guest")

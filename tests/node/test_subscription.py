@@ -93,9 +93,9 @@ def test_newest_samples_are_kept(talker: Node, listener: Node, with_callback: bo
     if with_callback:
         assert [got.get(timeout=PATIENCE) for _ in range(3)] == [17, 18, 19]
     else:
-        waiting = subscription._feed._ring  # each subscription has a thread that fills its own
+        waiting = subscription._queue.items  # each subscription has a thread that fills its own
         eventually(
-            lambda: waiting and Int32._decode(waiting[-1][1].payload).data == 19, "the last one"
+            lambda: waiting and Int32._decode(waiting[-1][0].payload).data == 19, "the last one"
         )
         assert [subscription.get().data for _ in range(3)] == [17, 18, 19]
 
@@ -221,7 +221,10 @@ def test_closing_ends_a_wait(network: Network, listener: Node) -> None:
 
     network.thread(take)
     listener.close()
-    assert ends.get(timeout=PATIENCE) == "the subscription of '/chatter' is closed"
+    assert (
+        ends.get(timeout=PATIENCE)
+        == "cannot get a message: the subscription of '/chatter' is closed"
+    )
 
 
 def test_async_iteration(talker: Node, listener: Node) -> None:

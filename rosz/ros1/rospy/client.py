@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from rosz import names
 from rosz.node import Node
-from rosz.node.loggers import serve_loggers
-from rosz.node.rosout import RosoutSink
+from rosz.node.log_handlers import RosoutHandler
+from rosz.node.standard import serve_loggers
 from rosz.ros1.rospy.absent import attribute
 from rosz.ros1.rospy.core import signal_shutdown, wait_for_shutdown
 from rosz.ros1.rospy.exceptions import ROSException, ROSInitException
@@ -120,7 +120,7 @@ def init_node(  # noqa: PLR0917  # rospy's signature
         chain()
     if disable_rosout:
         for sink in node.log.handlers[:]:
-            if isinstance(sink, RosoutSink):
+            if isinstance(sink, RosoutHandler):
                 node.log.removeHandler(sink)
 
 

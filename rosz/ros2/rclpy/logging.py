@@ -11,11 +11,9 @@ from enum import IntEnum
 from typing import Any
 
 from rosz.errors import UsageError
-from rosz.node.console import ConsoleSink
 from rosz.node.log import NodeLog
-from rosz.node.logger import NodeLogger
-from rosz.node.severity import severity, severity_name
-from rosz.node.sink import Sink
+from rosz.node.log_handlers import ConsoleHandler, LogHandler
+from rosz.node.logger import NodeLogger, severity, severity_name
 
 __all__ = ("LoggingSeverity", "RcutilsLogger", "get_logger", "write_as_rclpy")
 
@@ -137,17 +135,17 @@ class RcutilsLogger:
         return len(self._seen) > count
 
 
-class _Console(Sink):
+class _Console(LogHandler):
     """Writes lines as rclpy does: all to stderr, in the format of the environment.
 
     Args:
         name: Name of the node's logger.
-        on_trouble: See `Sink`.
+        on_problem: See `LogHandler`.
         text_format: What a line looks like (``RCUTILS_CONSOLE_OUTPUT_FORMAT``).
     """
 
-    def __init__(self, name: str, on_trouble: Callable[[str], object], text_format: str) -> None:
-        super().__init__(on_trouble)
+    def __init__(self, name: str, on_problem: Callable[[str], object], text_format: str) -> None:
+        super().__init__(on_problem)
         self._name = name
         self._format = text_format
         wish = os.environ.get("RCUTILS_COLORIZED_OUTPUT", "")
@@ -174,7 +172,7 @@ class _Console(Sink):
             stream.write(f"{color}{text}\033[0m\n" if color else f"{text}\n")
             stream.flush()
         except (OSError, ValueError) as error:
-            self._on_trouble(f"cannot log to the console: {error}")
+            self._on_problem(f"cannot log to the console: {error}")
 
 
 def write_as_rclpy(log: NodeLog, name: str) -> None:
@@ -185,10 +183,10 @@ def write_as_rclpy(log: NodeLog, name: str) -> None:
         name: Name of its logger.
     """
     for handler in list(log.handlers):
-        if isinstance(handler, ConsoleSink):
+        if isinstance(handler, ConsoleHandler):
             log.removeHandler(handler)
     text_format = os.environ.get("RCUTILS_CONSOLE_OUTPUT_FORMAT") or _DEFAULT_FORMAT
-    log.addHandler(_Console(name, log.manager.troubles.append, text_format))
+    log.addHandler(_Console(name, log.manager.problems.append, text_format))
 
 
 def get_logger(name: str) -> RcutilsLogger:

@@ -9,7 +9,7 @@ from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import Node
-from rosz.node.mismatch import mismatch
+from rosz.node.incompatible import explain_incompatible
 from rosz.wire import NO_HASH, Kind, Token
 
 
@@ -143,7 +143,7 @@ def token(kind: Kind, type_name: str = "a/msg/A", type_hash: str = "RIHS01_1") -
     ],
 )
 def test_sentences(own: Token, other: Token, part: str) -> None:
-    text = mismatch(own, other)
+    text = explain_incompatible(own, other)
     assert part in text
     assert bool(text) == bool(part)
 
@@ -151,7 +151,7 @@ def test_sentences(own: Token, other: Token, part: str) -> None:
 def test_what_was_told_of_an_endpoint_ends_with_it(network: Network) -> None:
     talker, listener = network.node("talker"), network.node("listener")
     publisher = talker.publisher("chatter", String)
-    told = talker.context._mismatches._told
+    told = talker.context.incompatible._warned
     with listener.subscription("chatter", Int32):
         eventually(lambda: bool(told), "it is told")
         publisher.close()
