@@ -121,7 +121,7 @@ def test_closed(talker: Node) -> None:
     publisher = talker.publisher("chatter", String)
     publisher.close()
     publisher.close()
-    with pytest.raises(ClosedError, match="the publisher of '/chatter' is closed"):
+    with pytest.raises(ClosedError, match="the publisher is closed"):
         publisher.publish("hello")
     assert repr(publisher) == "<Publisher /chatter [std_msgs/msg/String] closed>"
 
