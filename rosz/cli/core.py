@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import uuid
-from contextlib import nullcontext
+from contextlib import ExitStack, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +13,8 @@ from rosz.cli.group import print_lines, until_stopped
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
-    from rosz.introspect.core import Core
+    from rosz.params.replica import Replica
+    from rosz.params.store import Store
 
 __all__ = ("app",)
 
@@ -52,34 +53,41 @@ def core_command(
 
     from rosz.cli.zenohlog import zenoh_log_bounded
     from rosz.environment import Environment
-    from rosz.introspect.core import Core
+    from rosz.params.replica import Replica
+    from rosz.session.router import Router
 
     environment = Environment.read()
     if keys:
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     file = Path(store).absolute() if store else None
     bounded = nullcontext() if environment.keys is None else zenoh_log_bounded()
-    with (
-        bounded,
-        until_stopped() as ready,
-        Core(environment, listen or (), connect or (), file) as core,
-    ):
-        _introduce(core)
-        lines = [f"listening on {endpoint}" for endpoint in core.endpoints]
-        lines += [f"connecting to {endpoint}" for endpoint in core.connect]
-        kept = f"kept in {core.store}" if core.store else "kept in memory"
-        lines.append(f"parameters of domain {core.domain} are {kept}")
+    with bounded, until_stopped() as ready, ExitStack() as stack:
+        keep = None if file is None else _open_store(file, stack)
+        router = stack.enter_context(Router(environment, listen or (), connect or ()))
+        domain = environment.domain
+        replica = stack.enter_context(closing(Replica(router.session, domain, keep=keep)))
+        _set_core_params(replica)
+        lines = [f"listening on {endpoint}" for endpoint in router.endpoints]
+        lines += [f"connecting to {endpoint}" for endpoint in router.connect]
+        kept = f"kept in {file}" if file else "kept in memory"
+        lines.append(f"parameters of domain {domain} are {kept}")
         ready()
         print_lines([*lines, "started core; press Ctrl-C to end it"])
         threading.Event().wait()
 
 
-def _introduce(core: Core) -> None:
-    """Set the parameters that a ROS 1 core sets, where nobody has set them before."""
+def _open_store(file: Path, stack: ExitStack) -> Store:
+    from rosz.params.store import Store
+
+    return stack.enter_context(closing(Store(file)))
+
+
+def _set_core_params(replica: Replica) -> None:
+    """Set the parameters that a ROS 1 core sets, unless somebody has set them before."""
     from rosz.launch.run.network import ReplicaStore
     from rosz.launch.run.parameters import core_params
 
-    store = ReplicaStore(core.params)
+    store = ReplicaStore(replica)
     known = core_params(str(uuid.uuid1()))
     missing = {name: value for name, value in known.items() if not store.has(name)}
     if missing:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from rosz.params.replica import Replica
-    from rosz.security import Leave
+    from rosz.security import LocalPermissions
     from rosz.typestore import TypeStore
 
 __all__ = ("Context",)
@@ -266,10 +266,10 @@ class Context:
         self.close()
 
 
-def _leave(config: SessionConfig) -> Leave | None:
+def _leave(config: SessionConfig) -> LocalPermissions | None:
     """Return what the rules say of this machine, if others receive what it declares."""
     if config.keys is None or not (config.reaches_beyond or config.must_connect):
         return None
-    from rosz.security import Leave
+    from rosz.security import LocalPermissions
 
-    return Leave.find(config.keys, socket.gethostname())
+    return LocalPermissions.find(config.keys, socket.gethostname())

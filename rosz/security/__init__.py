@@ -1,12 +1,15 @@
-"""Keys and rules: who may be linked to this machine, and what each may do.
+"""Keys and rules: which links this machine accepts, and what each holder of a key may do.
 
-A folder of keys makes every link beyond the machine mutual TLS; rules beside the keys say which
+A folder of keys makes every link beyond the machine mutual TLS. Rules beside the keys say which
 names each holder of a key may publish, subscribe to, call, serve and set.
+
+Public modules beside the names exported here, because few programs need them:
+`rosz.security.authority` and `rosz.security.review`, which need the cryptography package, and
+`rosz.security.handshake`, which needs ssl.
 """
 
 from rosz.security.access import access_control
-from rosz.security.folder import KeyFolder
-from rosz.security.leave import Leave
+from rosz.security.folder import KeyFolder, LocalPermissions
 from rosz.security.rules import Permit, Rules, read_rules
 
-__all__ = ("KeyFolder", "Leave", "Permit", "Rules", "access_control", "read_rules")
+__all__ = ("KeyFolder", "LocalPermissions", "Permit", "Rules", "access_control", "read_rules")

@@ -1,8 +1,8 @@
-"""Rules as Zenoh's access control checks them, message by message, on each link.
+"""The access control of Zenoh, made from rules: it checks each message of each link.
 
-``ingress`` is what the other end of a link sends here, ``egress`` what is sent to it. Links within
-the machine are free; a link from beyond needs a certificate, and what its holder may do is spelt
-out for every kind of message that belongs to it (https://zenoh.io/docs/manual/access-control).
+``ingress`` is what the other end of a link sends, ``egress`` what is sent to it. Links within the
+machine are unrestricted. A link from another machine needs a certificate, and what its holder may
+do is listed for every kind of message involved (https://zenoh.io/docs/manual/access-control).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ("access_control",)
 
 Flow = Literal["ingress", "egress"]
 _Grant = tuple[Flow, tuple[str, ...], list[str]]
-"""Which way, which kinds of messages, and on which keys."""
+"""The direction, the kinds of messages, and the key expressions."""
 
 _DATA: Final = ("put", "delete")
 _LISTEN: Final = ("declare_subscriber",)
@@ -30,15 +30,15 @@ _MESSAGES: Final = (*_DATA, *_LISTEN, *_ASK, *_ANSWER, *_TOKEN, *_LOOK)
 
 _OWN: Final = f"{OWN_SPACE}/*"
 _ANY_KEY: Final = ["**", "**/@adv/**", f"{SPACE}/**", f"{OWN_SPACE}/**"]
-"""All that goes over a link; wildcards leave out chunks that begin with ``@``."""
+"""All keys; wildcards do not match chunks that begin with ``@``."""
 
 
 def access_control(rules: Rules | None, loopback: Sequence[str]) -> dict[str, Any]:
     """Return the ``access_control`` part of a Zenoh configuration.
 
     Args:
-        rules: Who may do what; whoever has a key may do everything when not given.
-        loopback: Network interfaces of links within the machine.
+        rules: What each holder of a key may do; everything when not given.
+        loopback: The network interfaces of links within the machine.
     """
     everything = [_rule("all", flow, _MESSAGES, _ANY_KEY) for flow in ("ingress", "egress")]
     table = list(everything)
@@ -91,7 +91,7 @@ def _rule(name: str, flow: Flow, messages: Sequence[str], keys: Sequence[str]) -
 
 
 def _grants(permit: Permit) -> Iterator[_Grant]:
-    """Yield all that belongs to what somebody may do; the default being that it may not."""
+    """Yield the messages that a permit allows; all others are refused."""
     yield from _presence()
     yield from _topics(permit.publish, "ingress", "egress")
     yield from _topics(permit.subscribe, "egress", "ingress")
@@ -101,7 +101,7 @@ def _grants(permit: Permit) -> Iterator[_Grant]:
         yield from _reading()
     yield from _setting(permit.set)
     if permit.control:
-        # A newer process of a node's name ends the older one.
+        # A newer process with the name of a node ends the older one.
         yield "ingress", _TOKEN, [f"{_OWN}/node/**"]
         yield "ingress", _ASK, [f"{_OWN}/control/**", f"{_OWN}/launch/**"]
         yield "egress", _ANSWER, [f"{_OWN}/control/**", f"{_OWN}/launch/**"]
@@ -111,9 +111,9 @@ def _grants(permit: Permit) -> Iterator[_Grant]:
 
 
 def _presence() -> Iterator[_Grant]:
-    """Yield what everybody needs: to look around, to be there as a node, to find its peers.
+    """Yield what everybody needs: to watch tokens, to be present as a node, and to find peers.
 
-    Looking is free, for what there is to see is given out token by token.
+    Watching is unrestricted, because each token that could be seen is restricted itself.
     """
     yield "egress", _TOKEN, [f"{_OWN}/node/**"]
     for flow in _both():
@@ -123,18 +123,18 @@ def _presence() -> Iterator[_Grant]:
 
 
 def _topics(names: Sequence[str], out: Flow, back: Flow) -> Iterator[_Grant]:
-    """Yield what belongs to topics whose samples go one way.
+    """Yield the messages of topics whose samples go in one direction.
 
     Args:
-        names: Patterns of the topics.
-        out: The way of the samples.
-        back: The other way.
+        names: The patterns of the topics.
+        out: The direction of the samples.
+        back: The opposite direction.
     """
     samples = _data(names)
     kept = [f"{key}/@adv/**" for key in samples]
     yield out, _DATA, samples
     yield back, _LISTEN, samples
-    # What a transient-local publisher keeps is asked for, and answered, beside the samples.
+    # The samples that a transient-local publisher keeps are queried with keys of their own.
     yield back, _ASK, kept
     yield out, _ANSWER, kept + samples
     yield out, _TOKEN, kept + _tokens(Kind.PUBLISHER, names)
@@ -142,7 +142,7 @@ def _topics(names: Sequence[str], out: Flow, back: Flow) -> Iterator[_Grant]:
 
 
 def _services(names: Sequence[str], asked: Flow, answered: Flow) -> Iterator[_Grant]:
-    """Yield what belongs to services whose calls go one way."""
+    """Yield the messages of services whose calls go in one direction."""
     calls = _data(names)
     yield asked, _ASK, calls
     yield answered, _ANSWER, calls
@@ -151,12 +151,12 @@ def _services(names: Sequence[str], asked: Flow, answered: Flow) -> Iterator[_Gr
 
 
 def _reading() -> Iterator[_Grant]:
-    """Yield what a replica needs that only takes in, and one who asks a replica."""
+    """Yield the messages of a replica that only receives, and of a client of a replica."""
     for flow in _both():
         yield flow, _TOKEN, [f"{_OWN}/replica/**"]
         yield flow, _DATA, [f"{_OWN}/ack/*"]
         yield flow, _LISTEN, [f"{_OWN}/ack/*", f"{_OWN}/change/**"]
-        # A write that seems to have got lost is told again; what matters is whose key it is for.
+        # A write that seems lost is queried again; its key says which parameter it is for.
         yield flow, _ANSWER, [f"{_OWN}/store/*/write/**"]
     yield "egress", _DATA, [f"{_OWN}/change/**", f"{_OWN}/param/**"]
     yield "ingress", _LISTEN, [f"{_OWN}/param/**"]
@@ -166,7 +166,7 @@ def _reading() -> Iterator[_Grant]:
 
 
 def _setting(names: Sequence[str]) -> Iterator[_Grant]:
-    """Yield what belongs to setting parameters; each write says in its key how far it reaches."""
+    """Yield the messages that set parameters; the key of a write says which ones it sets."""
     places = [_chunks(name) for name in names]
     yield "ingress", _DATA, [key for at in places for key in _below(f"{_OWN}/change", at)]
     writes = [key for at in places for key in _below(f"{_OWN}/store/*/write", at)]
@@ -174,7 +174,7 @@ def _setting(names: Sequence[str]) -> Iterator[_Grant]:
     tells = [key for at in places for key in _below(f"{_OWN}/store/*/tell", at)]
     yield "ingress", _ASK, writes + sets + tells
     if EVERYTHING in names:
-        # Only whom all is believed may be asked what others have missed.
+        # Only a holder that may set everything is queried for writes that others have missed.
         yield "ingress", _ANSWER, [f"{_OWN}/store/*/{verb}" for verb in ("sync", "tell/**")]
         yield "egress", _ASK, [f"{_OWN}/store/*/{verb}" for verb in ("sync", "tell/**")]
         yield "ingress", _ANSWER, [f"{_OWN}/param/**"]
@@ -186,13 +186,13 @@ def _data(names: Sequence[str]) -> list[str]:
 
 
 def _tokens(kind: Kind, names: Sequence[str]) -> list[str]:
-    """Return the tokens of endpoints, where a whole name is one chunk with ``%`` for ``/``."""
+    """Return the keys of tokens, in which a whole name is one chunk with ``%`` for ``/``."""
     head = f"{SPACE}/*/*/*/*/{kind.value}/*/*/*"
     return [f"{head}/{chunk}/**" for name in names for chunk in _mangled(name)]
 
 
 def _mangled(name: str) -> set[str]:
-    """Return what the chunk of a name looks like; a wildcard there does not stop at a ``%``."""
+    """Return the chunks for a pattern of names; a wildcard in them also matches ``%``."""
     chunk = name.replace("/", "%").replace("**", "*").replace("*", "$*")
     return {"*" if one == "%$*" else one for one in (chunk, chunk.removesuffix("%$*")) if one}
 
@@ -204,12 +204,12 @@ def _chunks(name: str) -> str:
 
 
 def _below(head: str, chunks: str) -> list[str]:
-    """Return the keys of a place and of all below it."""
+    """Return the keys of a name and of all names below it."""
     return [f"{head}/{chunks}"] if chunks.endswith("**") else [f"{head}/{chunks}/**"]
 
 
 def _canonical(key: str) -> str:
-    """Return a key expression in the one form that Zenoh takes: ``**`` comes after each ``*``."""
+    """Return a key expression in canonical form, as Zenoh requires: ``**`` comes after ``*``."""
     chunks: list[str] = []
     for chunk in key.split("/"):
         if chunks[-1:] != ["**"] or chunk not in {"*", "**"}:

@@ -1,7 +1,7 @@
 """A small certificate authority: one key that signs those of machines and people.
 
-Certificates are X.509 version 3 (RFC 5280) on the curve P-256. A holder's certificate serves both
-ends of a link, and bears the holder's name and, for machines, the addresses it is reached at.
+Certificates are X.509 version 3 (RFC 5280) on the curve P-256. A certificate serves either end of
+a link. It contains the name of its holder and, for machines, the addresses that reach it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ("Authority", "read_certificate")
 _HOME = "authority"
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?")
 _LONGEST_NAME = 64
-"""Characters of a common name in a certificate (RFC 5280, appendix A.1)."""
+"""The longest common name of a certificate, in characters (RFC 5280, appendix A.1)."""
 _AUTHORITY_DAYS = 3650
 _CLOCKS_DIFFER = dt.timedelta(hours=1)
 
@@ -35,7 +35,11 @@ class Authority:
     """The authority of a folder of keys.
 
     Args:
-        folder: What `create` made.
+        folder: The folder that `create` made.
+
+    Attributes:
+        folder: The folder.
+        certificate: The certificate of the authority.
 
     Raises:
         UsageError: There is no authority, or others may read its key.
@@ -52,15 +56,15 @@ class Authority:
 
     @classmethod
     def create(cls, folder: Path, name: str = "rosz", days: float = _AUTHORITY_DAYS) -> Authority:
-        """Make a new authority.
+        """Create a new authority.
 
         Args:
-            folder: Where; is made if need be.
-            name: What its certificate calls it.
-            days: How long it is good for.
+            folder: The folder, which is created if necessary.
+            name: The name of the authority in its certificate.
+            days: The lifetime of the certificate in days.
 
         Raises:
-            UsageError: There is one already, which is not touched.
+            UsageError: There is an authority already, which is left as it is.
         """
         home = folder / _HOME
         if (home / KEY).exists():
@@ -75,18 +79,18 @@ class Authority:
         return cls(folder)
 
     def add(self, name: str, addresses: Sequence[str] = (), days: float = 825) -> Path:
-        """Make keys for a machine or a person.
+        """Create keys for a machine or a person.
 
         Args:
-            name: What others call it: host name, or user name. Rules are by this name.
-            addresses: IP addresses and further host names that others reach the machine at.
-            days: How long they are good for.
+            name: The host name or user name of the holder, which rules refer to.
+            addresses: IP addresses and further host names of the machine.
+            days: The lifetime of the certificate in days.
 
         Returns:
-            The folder to bring to the machine.
+            The folder to copy to the machine.
 
         Raises:
-            UsageError: The name is none, or has keys already, which are not touched.
+            UsageError: The name is not valid, or has keys already, which are left as they are.
         """
         if not _NAME.fullmatch(name) or name == _HOME or len(name) > _LONGEST_NAME:
             raise UsageError(
@@ -106,13 +110,13 @@ class Authority:
         return folder
 
     def holders(self) -> list[Path]:
-        """Return the folders of all for whom there are keys, sorted."""
+        """Return the folders of all holders of keys, sorted."""
         found = (file.parent for file in self.folder.glob(f"*/{CERTIFICATE}"))
         return sorted(folder for folder in found if folder.name != _HOME)
 
 
 class _Draft:
-    """A certificate that nobody has signed yet."""
+    """A certificate that is not signed yet."""
 
     def __init__(self, subject: Name, public: Any, days: float, places: Sequence[str] = ()) -> None:
         self._subject = subject
@@ -163,7 +167,7 @@ def read_certificate(file: Path) -> Certificate:
     """Read a certificate.
 
     Raises:
-        UsageError: It is none.
+        UsageError: The file does not contain a certificate.
     """
     x509 = _cryptography().x509
     try:
@@ -229,7 +233,7 @@ def _write(folder: Path, key: EllipticCurvePrivateKey, certificate: Certificate)
 
 
 def _create(file: Path, data: bytes) -> None:
-    """Write a file that nobody else may read at any moment, and overwrite none."""
+    """Create a file that nobody else can read at any moment."""
     handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(handle, "wb") as opened:
         opened.write(data)

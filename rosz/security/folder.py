@@ -2,13 +2,13 @@
 
 ::
 
-    authority.pem      whom it believes
-    certificate.pem    who it is
-    key.pem            what proves it; nobody else may read this one
-    rules.yaml         what others may do; everything where there is none
+    authority.pem      the certificate of the authority that it trusts
+    certificate.pem    its own certificate
+    key.pem            its private key; nobody else may read this one
+    rules.yaml         what others may do; everything if there is no such file
 
-``rosz keys`` makes such a folder for each machine, below one that also holds the authority's own
-key. Given that one, a machine takes the folder of its host name.
+``rosz keys`` makes such a folder for each machine, inside one that also holds the key of the
+authority. Given the outer folder, a machine uses the folder that has its host name.
 """
 
 from __future__ import annotations
@@ -16,18 +16,33 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import Final
 
 import msgspec
 
 from rosz.errors import UsageError
-from rosz.security.rules import Rules, read_rules
+from rosz.security.rules import Permit, Rules, read_rules
+from rosz.wire import Kind
 
-__all__ = ("AUTHORITY", "CERTIFICATE", "KEY", "RULES", "KeyFolder")
+__all__ = ("AUTHORITY", "CERTIFICATE", "KEY", "RULES", "KeyFolder", "LocalPermissions")
 
 AUTHORITY = "authority.pem"
 CERTIFICATE = "certificate.pem"
 KEY = "key.pem"
 RULES = "rules.yaml"
+
+_VERBS: Final = {
+    Kind.PUBLISHER: "publish",
+    Kind.SUBSCRIPTION: "subscribe",
+    Kind.CLIENT: "call",
+    Kind.SERVICE: "serve",
+}
+_STANDARD: Final = {
+    (Kind.PUBLISHER, "/rosout"),
+    (Kind.PUBLISHER, "/parameter_events"),
+    (Kind.SUBSCRIPTION, "/clock"),
+}
+"""The entities that every node has."""
 
 
 class KeyFolder(msgspec.Struct, frozen=True):
@@ -36,7 +51,7 @@ class KeyFolder(msgspec.Struct, frozen=True):
     Attributes:
         path: The folder.
         rules: What others may do; everything when ``None``.
-        rules_file: Where that stands.
+        rules_file: The file of the rules.
     """
 
     path: Path
@@ -48,12 +63,13 @@ class KeyFolder(msgspec.Struct, frozen=True):
         """Find and check the keys of this machine.
 
         Args:
-            folder: Its own folder, or the one with a folder for each machine.
-            host: Name of this machine.
+            folder: The folder of this machine, or the one with a folder for each machine.
+            host: The name of this machine.
 
         Raises:
-            UsageError: There are none, others may read the key, or write what is believed.
-            YamlError: The rules are no rules.
+            UsageError: There are no keys, others may read the private key, or others may write what
+                this machine trusts.
+            YamlError: The rules cannot be read.
         """
         own = next((one for one in (folder, folder / host) if (one / KEY).is_file()), None)
         if own is None:
@@ -71,27 +87,79 @@ class KeyFolder(msgspec.Struct, frozen=True):
 
     @property
     def authority(self) -> Path:
-        """Certificate of the authority."""
+        """The certificate of the authority."""
         return self.path / AUTHORITY
 
     @property
     def certificate(self) -> Path:
-        """Certificate of this machine."""
+        """The certificate of this machine."""
         return self.path / CERTIFICATE
 
     @property
     def key(self) -> Path:
-        """Private key of this machine."""
+        """The private key of this machine."""
         return self.path / KEY
 
 
+class LocalPermissions:
+    """What rules permit the machine that has them.
+
+    Other machines refuse what their rules do not permit, and say nothing. If all machines have the
+    same rules, and these name this machine, it can be warned at once.
+
+    Args:
+        holder: The name of the machine in the rules.
+        permit: What the machine may do.
+        file: The file of the rules.
+    """
+
+    def __init__(self, holder: str, permit: Permit, file: Path) -> None:
+        self._holder = holder
+        self._permit = permit
+        self._file = file
+        self._seen = set(_STANDARD)
+
+    @classmethod
+    def find(cls, keys: KeyFolder | None, host: str) -> LocalPermissions | None:
+        """Return the permissions of this machine, if rules name it.
+
+        Args:
+            keys: The keys of the machine.
+            host: The name of the machine. If the rules do not know it, the name of the folder of
+                keys is used instead.
+        """
+        if keys is None or keys.rules is None or keys.rules_file is None:
+            return None
+        for holder in (host, keys.path.name):
+            permit = keys.rules.permit_of(holder)
+            if permit is not None:
+                return cls(holder, permit, keys.rules_file)
+        return None
+
+    def objection(self, kind: Kind, name: str) -> str:
+        """Return why an entity has no effect beyond the machine; empty if it has, or the next time.
+
+        Args:
+            kind: The kind of the entity.
+            name: The global name of its topic or service.
+        """
+        verb = _VERBS[kind]
+        if (kind, name) in self._seen or self._permit.allows(verb, name):
+            return ""
+        self._seen.add((kind, name))
+        return (
+            f"the {kind.name.lower()} of '{name}' reaches no other machine: '{self._file}' does not"
+            f" allow '{self._holder}' to {verb} it"
+        )
+
+
 def check_private(key: Path) -> None:
-    """Refuse a key that others could have read.
+    """Check that only its owner can read a private key.
 
     Raises:
-        UsageError: They can.
+        UsageError: Others can read it.
     """
-    mode = stat.S_IMODE(os.stat(key).st_mode)  # noqa: PTH116  # of the file that a link leads to
+    mode = stat.S_IMODE(os.stat(key).st_mode)  # noqa: PTH116  # follows links
     if mode & 0o077:
         raise UsageError(
             f"others may read '{key}' (mode {mode:04o}, expected 0600): if nobody did,"
@@ -100,12 +168,12 @@ def check_private(key: Path) -> None:
 
 
 def check_trusted(file: Path) -> None:
-    """Refuse a file by which others could say who is let in, and what each may do.
+    """Check that nobody else can write a file that decides who is trusted.
 
     Raises:
-        UsageError: They can write it.
+        UsageError: Anybody can write it.
     """
-    mode = stat.S_IMODE(os.stat(file).st_mode)  # noqa: PTH116  # of the file that a link leads to
+    mode = stat.S_IMODE(os.stat(file).st_mode)  # noqa: PTH116  # follows links
     if mode & 0o002:
         raise UsageError(
             f"anybody may write '{file}' (mode {mode:04o}): see that it says what it should, then"
@@ -117,12 +185,12 @@ def load_rules(file: Path) -> Rules:
     """Read a file of rules.
 
     Raises:
-        UsageError: It cannot be read, or anybody may write it.
-        YamlError: It holds no rules.
+        UsageError: The file cannot be read, or anybody may write it.
+        YamlError: The file does not contain rules.
     """
     try:
         check_trusted(file)
-        if not file.is_file():  # a pipe would be waited for
+        if not file.is_file():  # opening a pipe would block
             raise UsageError(f"'{file}' is no regular file")
         return read_rules(file.read_text(encoding="utf-8"), str(file))
     except (OSError, UnicodeDecodeError) as error:

@@ -1,6 +1,6 @@
-"""Asking the other end of a link why it refuses, or is to be refused.
+"""Finding out why a link with keys is refused, by this machine or by the other end.
 
-Zenoh keeps trying and says little; one handshake with the same keys says what is wrong.
+Zenoh keeps trying and says little. One TLS handshake with the same keys says what is wrong.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from rosz.wire import Endpoint
 __all__ = ("refusal", "wants_keys")
 
 _OTHER_NAME = {62, 64}
-"""What OpenSSL says of a certificate that is for another host name, or address."""
+"""The codes of OpenSSL for a certificate of another host name or address."""
 _ALERT_BY = 0.5
-"""Seconds within which the other end of a finished handshake says that it is not content."""
+"""Seconds within which the other end refuses a finished handshake."""
 
 
 def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
-    """Return why no link to an endpoint comes about; empty when one does.
+    """Return why a link to an endpoint is refused; empty if it is not.
 
     Args:
         endpoint: The endpoint to connect to, such as ``tls/robot1:7447``.
@@ -29,7 +29,7 @@ def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
     """
     context = ssl.create_default_context(cafile=keys.authority)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
-    # Zenoh does not mind what this forbids, such as a certificate that names no key of its issuer.
+    # Zenoh accepts what this flag forbids, such as a certificate without the key id of its issuer.
     context.verify_flags &= ~ssl.VERIFY_X509_STRICT
     try:
         host, port = endpoint.host, endpoint.port
@@ -38,7 +38,7 @@ def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
             socket.create_connection((host, port), timeout) as plain,
             context.wrap_socket(plain, server_hostname=host) as link,
         ):
-            # By TLS 1.3 the other end judges this one's certificate after the handshake.
+            # In TLS 1.3, the other end checks the certificate of this one after the handshake.
             link.settimeout(_ALERT_BY)
             link.recv(1)
     except TimeoutError as error:
@@ -59,7 +59,7 @@ def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
 
 
 def wants_keys(endpoint: Endpoint, timeout: float = 1.0) -> bool:
-    """Tell whether what answers at an endpoint is TLS, to which a link needs keys.
+    """Tell whether an endpoint speaks TLS, so that a link to it needs keys.
 
     Args:
         endpoint: The endpoint to connect to, such as ``tcp/robot1:7447``.

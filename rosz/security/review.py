@@ -1,4 +1,4 @@
-"""Looking through a folder of keys: who has any, until when, and what is wrong."""
+"""The review of a folder of keys: who has keys, until when, and what is wrong with them."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ _HOME = "authority"
 
 
 class Holder(msgspec.Struct, frozen=True):
-    """Somebody who has keys.
+    """A holder of keys.
 
     Attributes:
-        name: As in the certificate, and in rules.
-        places: Host names and addresses that it may be reached at, beside its name.
-        until: When the certificate ends.
-        folder: Where.
+        name: The name in the certificate, which rules refer to.
+        places: Further host names and addresses in the certificate.
+        until: The end of the certificate.
+        folder: The folder of the keys.
     """
 
     name: str
@@ -48,11 +48,11 @@ class Holder(msgspec.Struct, frozen=True):
 
 
 class RuleFile(msgspec.Struct, frozen=True):
-    """Rules, in words.
+    """A file of rules, in words.
 
     Attributes:
-        file: Where they stand.
-        allowed: A line for each thing that somebody may do.
+        file: The file.
+        allowed: What each holder may do, one line for each kind of permission.
     """
 
     file: str
@@ -60,12 +60,12 @@ class RuleFile(msgspec.Struct, frozen=True):
 
 
 class Review(msgspec.Struct):
-    """What a folder of keys holds.
+    """The contents of a folder of keys.
 
     Attributes:
-        holders: Who has keys.
-        rules: All rules that are in force somewhere.
-        wrong: A line for each thing that does not work, or will not for long.
+        holders: The holders of keys.
+        rules: All rules that some machine uses.
+        wrong: One line for each mistake, and for each certificate that ends soon.
     """
 
     holders: list[Holder] = []
@@ -74,14 +74,14 @@ class Review(msgspec.Struct):
 
 
 def review(folder: Path, now: dt.datetime | None = None) -> Review:
-    """Look through a folder: all keys with their authority, or those of one machine.
+    """Review a folder: all keys with their authority, or those of one machine.
 
     Args:
-        folder: It.
-        now: What to compare dates with.
+        folder: The folder.
+        now: The current time; by the system's clock when not given.
 
     Raises:
-        UsageError: There are no keys.
+        UsageError: There are no keys in the folder.
     """
     now = now or dt.datetime.now(dt.UTC)
     found = Review()
@@ -91,16 +91,16 @@ def review(folder: Path, now: dt.datetime | None = None) -> Review:
         raise UsageError(f"no keys in '{folder}': 'rosz keys init {folder}' makes an authority")
     for home in homes:
         try:
-            _look(home, now, found)
+            _review_keys(home, now, found)
         except RoszError as error:
             found.wrong.append(str(error))
     for file in [folder / RULES, *(home / RULES for home in homes if home != folder)]:
         if os.path.lexists(file):
-            _look_at_rules(file, found, complete=not one)
+            _review_rules(file, found, complete=not one)
     return found
 
 
-def _look(home: Path, now: dt.datetime, found: Review) -> None:
+def _review_keys(home: Path, now: dt.datetime, found: Review) -> None:
     certificate = read_certificate(home / CERTIFICATE)
     if (home / KEY).is_file():
         check_private(home / KEY)
@@ -130,7 +130,7 @@ def _check_signature(home: Path, certificate: Certificate) -> None:
         raise UsageError(f"'{home}' has no '{AUTHORITY}'") from error
 
 
-def _look_at_rules(file: Path, found: Review, *, complete: bool) -> None:
+def _review_rules(file: Path, found: Review, *, complete: bool) -> None:
     try:
         rules = load_rules(file)
     except RoszError as error:

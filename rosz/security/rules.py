@@ -1,4 +1,4 @@
-"""Access rules as people write them: for each holder of a key, the names it may use.
+"""Access rules as users write them: for each holder of a key, the names that it may use.
 
 ::
 
@@ -40,14 +40,14 @@ class Permit(msgspec.Struct, frozen=True, kw_only=True):
     """What one holder of a key may do.
 
     Attributes:
-        publish: Topics it may publish, as patterns of global names.
-        subscribe: Topics it may subscribe to.
-        call: Services it may call.
-        serve: Services it may serve.
-        set: Parameters it may set and delete.
-        get: Whether it may read parameters, which are one store: all of them or none.
-        control: Whether it may ping and end nodes, also by newer ones of their names, set log
-            levels, and ask about launches.
+        publish: The topics it may publish, as patterns of global names.
+        subscribe: The topics it may subscribe to.
+        call: The services it may call.
+        serve: The services it may serve.
+        set: The parameters it may set and delete.
+        get: Whether it may read parameters. They are one store, so that is all of them or none.
+        control: Whether it may ping and end nodes, also by starting newer ones of their names, set
+            log levels, and query launches.
     """
 
     publish: tuple[str, ...] = ()
@@ -60,17 +60,17 @@ class Permit(msgspec.Struct, frozen=True, kw_only=True):
 
     @classmethod
     def all(cls) -> Permit:
-        """Return leave to do everything."""
+        """Return the permission to do everything."""
         names = dict.fromkeys(NAME_VERBS, (EVERYTHING,))
         return cls(**names, get=True, control=True)
 
     def allows(self, verb: str, name: str) -> bool:
-        """Tell whether a verb with names covers a global name."""
+        """Tell whether the patterns of a verb match a global name."""
         return any(_matches(pattern, name) for pattern in getattr(self, verb))
 
     @property
     def is_all(self) -> bool:
-        """Whether it is leave to do everything."""
+        """Whether it permits everything."""
         return self == Permit.all()
 
 
@@ -78,13 +78,14 @@ class Rules(msgspec.Struct, frozen=True):
     """Who may do what.
 
     Attributes:
-        permits: By the name in a key's certificate; under `ANYBODY`, what all may do.
+        permits: What each holder may do, by the name in its certificate; what all may do is under
+            `ANYBODY`.
     """
 
     permits: dict[str, Permit]
 
-    def told_of(self, name: str) -> Permit | None:
-        """Return all that a holder may do, if the rules name it; else they may not be meant."""
+    def permit_of(self, name: str) -> Permit | None:
+        """Return all that a holder may do; ``None`` if the rules do not name the holder."""
         own = self.permits.get(name)
         if own is None:
             return None
@@ -95,14 +96,14 @@ class Rules(msgspec.Struct, frozen=True):
 
 
 def read_rules(text: str, file: str) -> Rules:
-    """Read the rules of a file.
+    """Parse the rules of a file.
 
     Args:
-        text: What the file holds.
-        file: What errors call it.
+        text: The text of the file.
+        file: The name of the file, for errors.
 
     Raises:
-        YamlError: It is no YAML, or says something that means nothing.
+        YamlError: The text is not YAML, or does not consist of rules.
     """
     try:
         top = yaml.compose(text, Loader=yaml.SafeLoader)
@@ -130,7 +131,7 @@ def _matches(pattern: str, name: str) -> bool:
 
 
 class _Reader:
-    """Reads nodes of a document, and says of what is wrong where it stands."""
+    """Converts the nodes of a YAML document; its errors say where the mistake is."""
 
     def __init__(self, file: str) -> None:
         self._file = file

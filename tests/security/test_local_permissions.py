@@ -1,4 +1,4 @@
-"""What a machine is told of rules that forbid what it declares."""
+"""Warnings about rules that forbid what a machine declares."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import pytest
 from hosts.host import Host
 from hosts.world import World
 
+from rosz.security import LocalPermissions
 from rosz.security.authority import Authority
 from rosz.security.folder import KeyFolder
-from rosz.security.leave import Leave
 from rosz.security.rules import read_rules
 from rosz.wire import Kind
 
@@ -40,10 +40,10 @@ DECLARER = """
 """
 
 
-def leave(rules: str, host: str = "laptop", folder: str = "keys") -> Leave | None:
+def permissions(rules: str, host: str = "laptop", folder: str = "keys") -> LocalPermissions | None:
     file = Path("/etc/rules.yaml")
     keys = KeyFolder(Path("/home") / folder, read_rules(rules, str(file)), file)
-    return Leave.find(keys, host)
+    return LocalPermissions.find(keys, host)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def leave(rules: str, host: str = "laptop", folder: str = "keys") -> Leave | Non
     ],
 )
 def test_what_is_allowed(kind: Kind, name: str, allowed: bool) -> None:
-    found = leave(RULES)
+    found = permissions(RULES)
     assert found is not None
     text = found.objection(kind, name)
     assert (text == "") == allowed
@@ -77,12 +77,14 @@ def test_what_is_allowed(kind: Kind, name: str, allowed: bool) -> None:
 
 
 def test_whose_rules_they_are() -> None:
-    assert leave(RULES, "robot") is None  # what others may do here says nothing of this machine
-    assert leave(RULES, "desk", "laptop") is not None  # keys of a person, on some host
-    assert leave("{}") is None
-    assert Leave.find(None, "laptop") is None
-    assert Leave.find(KeyFolder(Path("/home/keys"), None), "laptop") is None
-    everything = leave("laptop: all\n")
+    assert (
+        permissions(RULES, "robot") is None
+    )  # rules for others
+    assert permissions(RULES, "desk", "laptop") is not None  # keys of a person, on some host
+    assert permissions("{}") is None
+    assert LocalPermissions.find(None, "laptop") is None
+    assert LocalPermissions.find(KeyFolder(Path("/home/keys"), None), "laptop") is None
+    everything = permissions("laptop: all\n")
     assert everything is not None
     assert everything.objection(Kind.SERVICE, "/a/b") == ""
 

@@ -1,0 +1,179 @@
+"""A Zenoh router at the rendezvous: the session of ``rosz core``.
+
+Nothing needs it, because nodes find each other by themselves. It gives what only a process that
+stays can give: a rendezvous that does not move, and links to other machines.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import socket
+import threading
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, Self
+
+import msgspec
+
+from rosz.environment import Environment
+from rosz.errors import RoszError, TransportError
+from rosz.lifecycle import Lifecycle
+from rosz.session.config import SessionConfig, keys_of
+from rosz.session.opening import places_of
+from rosz.session.session import Session
+from rosz.wire import Endpoint
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+__all__ = ("Router",)
+
+_OCCUPIED: Final = re.compile(
+    r"bound to (\S+?): \[.*address already in use|listener on (\S+) - unable to acquire lock",
+    re.IGNORECASE,
+)
+"""What Zenoh says about a TCP endpoint, and about a unix socket, that another process holds."""
+_POLL_SECONDS: Final = 2.0
+_ON_INTERFACE: Final = "#iface="
+_log = logging.getLogger("rosz.core")
+
+
+class Router:
+    """A router, until closed.
+
+    Args:
+        environment: The settings of the process.
+        listen: Further endpoints to listen at.
+        connect: Further endpoints to connect to.
+
+    Attributes:
+        endpoints: The endpoints that it listens at.
+        connect: The endpoints that it connects to.
+        session: Its session.
+
+    Raises:
+        TransportError: An endpoint is occupied or malformed.
+    """
+
+    def __init__(
+        self, environment: Environment, listen: Sequence[str] = (), connect: Sequence[str] = ()
+    ) -> None:
+        listen = (*environment.listen, *listen)
+        if environment.multicast and all(Endpoint(text).is_local for text in listen):
+            listen += _reachable_endpoints(environment.rendezvous)
+        config = SessionConfig(
+            mode="router",
+            rendezvous=environment.rendezvous,
+            listen=listen,
+            connect=(*environment.connect, *connect),
+            multicast=environment.multicast,
+            keys=keys_of(environment),
+            config_file=environment.zenoh_config,
+            override=environment.zenoh_override,
+        )
+        self.endpoints, self.connect = places_of(config)
+        self._lifecycle = Lifecycle("the router", log=_log)
+        try:
+            self.session = self._lifecycle.keep(Session.open(config))
+        except TransportError as error:
+            raise _explain(error, self.endpoints) from error
+        self._lifecycle.keep(_NewInterfaces(config))
+
+    def close(self) -> None:
+        """Close the router; a second call has no effect."""
+        self._lifecycle.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class _NewInterfaces:
+    """Listens on network interfaces that appear while a router runs, such as that of a VPN.
+
+    With keys, each interface has a listener of its own. Zenoh cannot add listeners to an open
+    session, so a further router, linked to the first one within the machine, listens on new
+    interfaces.
+
+    Args:
+        config: The session of the router, which listens on the interfaces that exist.
+    """
+
+    def __init__(self, config: SessionConfig) -> None:
+        self._config = config
+        self._known = set(socket.if_nameindex())
+        self._sessions: dict[tuple[int, str], Session] = {}
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        if any(_ON_INTERFACE in place for place in places_of(config)[0]):
+            self._thread = threading.Thread(target=self._watch, name="rosz-interfaces", daemon=True)
+            self._thread.start()
+
+    def _watch(self) -> None:
+        while not self._closing.wait(_POLL_SECONDS):
+            # An interface that disappeared and came back has another number.
+            found = set(socket.if_nameindex())
+            for interface in self._known - found:
+                if interface in self._sessions:
+                    self._sessions.pop(interface).close()
+            for interface in sorted(found - self._known):
+                self._listen(interface)
+            self._known = found
+
+    def _listen(self, interface: tuple[int, str]) -> None:
+        name = interface[1]
+        listen, _ = places_of(self._config)
+        places = [place for place in listen if place.rpartition(_ON_INTERFACE)[2] == name]
+        if not places:
+            return
+        further = msgspec.structs.replace(
+            self._config,
+            rendezvous=places[0],
+            hold_rendezvous=False,
+            listen=tuple(places[1:]),
+            connect=(self._config.rendezvous,),
+            multicast=False,
+        )
+        try:
+            self._sessions[interface] = Session.open(further)
+        except RoszError as error:
+            _log.warning("cannot listen on '%s', which has come up: %s", name, error)
+            return
+        for place in places:
+            _log.warning("listening on %s, which has come up", place)
+
+    def close(self) -> None:
+        """Stop listening there; a second call has no effect."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+        while self._sessions:
+            self._sessions.popitem()[1].close()
+
+
+def _reachable_endpoints(rendezvous: str) -> tuple[str, ...]:
+    """Return where sessions that find this router by multicast can connect to it."""
+    endpoint = Endpoint(rendezvous)
+    if endpoint.protocol != "tcp" or endpoint.port is None:
+        return ()
+    return (str(Endpoint.of("tcp", "0.0.0.0", endpoint.port)),)  # noqa: S104  # as multicast needs
+
+
+def _explain(error: TransportError, endpoints: Sequence[str]) -> TransportError:
+    """Return a clearer error if an endpoint is occupied."""
+    match = _OCCUPIED.search(str(error))
+    if match is None:
+        return error
+    place = match[1] or match[2]
+    endpoint = next((one for one in endpoints if one.endswith(place)), place)
+    return TransportError(
+        f"'{endpoint}' is occupied: another core, or a node that the others meet at, holds it; all"
+        " goes on as it is, or end that one and start the core then"
+    )
