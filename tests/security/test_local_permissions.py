@@ -77,9 +77,7 @@ def test_what_is_allowed(kind: Kind, name: str, allowed: bool) -> None:
 
 
 def test_whose_rules_they_are() -> None:
-    assert (
-        permissions(RULES, "robot") is None
-    )  # rules for others
+    assert permissions(RULES, "robot") is None  # rules for others
     assert permissions(RULES, "desk", "laptop") is not None  # keys of a person, on some host
     assert permissions("{}") is None
     assert LocalPermissions.find(None, "laptop") is None
