@@ -1,17 +1,16 @@
-"""Makes ROS 1's names importable: message packages, and the Python modules that rosz has for them.
+"""Makes ROS 1's Python modules and message packages importable.
 
-Two finders on ``sys.meta_path``. The first one stands in front and knows a name at a glance: what
-rosz ships (``std_msgs``, ``rospy``, …), and ``<package>.msg``, ``<package>.srv`` and
-``<package>.cfg`` of any package on the package path. The second one stands at the end, for packages
-that nothing else provides; only it searches the package path for a plain name.
+It adds two finders to ``sys.meta_path``. The first one stands in front and finds what rosz ships
+(``std_msgs``, ``rospy``, …), and ``<package>.msg``, ``<package>.srv`` and ``<package>.cfg`` of any
+package on the package path. The second one stands at the end and finds packages that nothing else
+provides; only it searches the package path for a plain name.
 
-A name imported this way is the very module that rosz has, under one more name: ``std_msgs.msg`` is
-``rosz.msgs.std_msgs.msg``.
+Such a module is the same object as rosz's own: ``std_msgs.msg`` is ``rosz.msgs.std_msgs.msg``.
 """
 
 from __future__ import annotations
 
-import copy  # noqa: F401  # looks for Jython's "org" as it loads: no package to search for
+import copy  # noqa: F401  # tries to import Jython's "org", which must not be searched for
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -26,47 +25,28 @@ from types import ModuleType
 from rosz.environment import Environment, package_index
 from rosz.errors import PackageError, RoszError
 from rosz.packages import PackageIndex
+from rosz.ros1.modules import (
+    ELSEWHERE,
+    MODULES,
+    SUBMODULES,
+    add_submodules,
+    explain_missing,
+    submodule,
+)
 from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
 
-__all__ = ("MODULES", "install", "package_path", "type_store", "uninstall")
-
-MODULES = (
-    "actionlib",
-    "dynamic_reconfigure",
-    "genmsg",
-    "genpy",
-    "message_filters",
-    "rosgraph",
-    "roslib",
-    "rosmsg",
-    "rosnode",
-    "rosparam",
-    "rospkg",
-    "rospy",
-    "rosservice",
-    "rostest",
-    "rostopic",
-    "rosunit",
-    "tf",
-    "tf2_geometry_msgs",
-    "tf2_ros",
-    "tf_conversions",
-)
-"""ROS 1's Python modules, which lie beside this one."""
-
-_ELSEWHERE = {"rclpy": "ros2.rclpy", "tf_transformations": "ros1.tf.transformations"}
-"""ROS 2's names, and where below ``rosz`` their modules lie."""
+__all__ = ("install", "package_path", "type_store", "uninstall")
 
 _KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
 _CFG = "cfg"
 
 
 def install(store: TypeStore | None = None, packages: PackageIndex | None = None) -> None:
-    """Make the names importable in this process; once is enough.
+    """Make ROS 1's names importable in this process; again does nothing.
 
     Args:
-        store: Where classes come from; by the process's environment when not given.
-        packages: Where packages are; by the process's environment when not given.
+        store: Store of message classes; by the environment of the process when not given.
+        packages: Packages to search; by the environment of the process when not given.
     """
     if any(isinstance(finder, _First) for finder in sys.meta_path):
         return
@@ -76,24 +56,24 @@ def install(store: TypeStore | None = None, packages: PackageIndex | None = None
 
 
 def uninstall() -> None:
-    """Take the names back; modules that are imported stay."""
+    """Remove the finders; modules that are imported stay."""
     sys.meta_path[:] = [one for one in sys.meta_path if not isinstance(one, _First | _Last)]
 
 
 def type_store() -> TypeStore:
-    """Return the store that imports take their classes from."""
+    """Return the store of the message classes that imports return."""
     install()
     return next(one.types.store for one in sys.meta_path if isinstance(one, _First))
 
 
 def package_path() -> PackageIndex:
-    """Return the packages that imports look in."""
+    """Return the packages that imports search."""
     install()
     return next(one.types.packages for one in sys.meta_path if isinstance(one, _First))
 
 
 class _Types:
-    """Packages and their types, looked at when they are needed."""
+    """Packages and their types, read when they are needed."""
 
     def __init__(self, store: TypeStore | None, packages: PackageIndex | None) -> None:
         if store is not None:
@@ -117,7 +97,7 @@ class _Types:
         return self.store.has(package, kind)
 
     def shipped(self, package: str, kind: Kind) -> ModuleType:
-        """Return a shipped module; what it lacks, a package of the same name may have."""
+        """Return a shipped module; types that it lacks come from a package of the same name."""
         if not shipped_types(package, kind):
             return self.store.module(package, kind)
         module = import_module(f"rosz.msgs.{package}.{kind}")
@@ -125,7 +105,7 @@ class _Types:
         def more(name: str) -> object:
             whole = module
             if not name.startswith("_"):
-                with suppress(PackageError):  # of a package that has nothing to do with this one
+                with suppress(PackageError):  # of an unrelated package
                     whole = self.store.module(package, kind)
             if name not in whole.__dict__:
                 raise AttributeError(f"module '{package}.{kind}' has no attribute '{name}'")
@@ -135,51 +115,53 @@ class _Types:
         return module
 
     def cfg_files(self, package: str) -> list[Path]:
-        """Return the files of a package that describe parameters of dynamic_reconfigure."""
+        """Return the dynamic_reconfigure files of a package."""
         from rosz.ros1.dynamic_reconfigure.files import find_files
 
         try:
             return find_files(self.packages.find(package).path)
-        except RoszError:  # as below
+        except RoszError:  # a broken package must not break other imports
             return []
 
     def folder(self, package: str) -> Path | None:
-        """Return the folder of a package that has types, or descriptions of parameters."""
+        """Return the folder of a package that has types or dynamic_reconfigure files."""
         try:
             if self.has(package, "msg") or self.has(package, "srv") or self.cfg_files(package):
                 return self.packages.find(package).path
-        except RoszError:  # an import of something else must not fail over a broken package
+        except RoszError:  # a broken package must not break other imports
             return None
         return None
 
 
-class _Same(Loader):
-    """Gives a module that exists under another name."""
+class _AliasLoader(Loader):
+    """Loads a module that exists under another name."""
 
     def __init__(self, load: Callable[[], ModuleType]) -> None:
         self._load = load
+        self._name = ""
         self._spec: ModuleSpec | None = None
 
-    def create_module(self, spec: ModuleSpec) -> ModuleType:  # noqa: ARG002
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
         """Return the module."""
         module = self._load()
-        self._spec = module.__spec__
+        self._name, self._spec = spec.name, module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Leave the module as it is; it has run."""
-        module.__spec__ = self._spec
+        """Add submodules; the module has been executed under its own name."""
+        module.__spec__ = self._spec or module.__spec__
+        add_submodules(self._name)
 
 
-def _same(name: str, load: Callable[[], ModuleType]) -> ModuleSpec:
-    return ModuleSpec(name, _Same(load), is_package=True)
+def _alias(name: str, load: Callable[[], ModuleType]) -> ModuleSpec:
+    return ModuleSpec(name, _AliasLoader(load), is_package=True)
 
 
 class _First(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self.types = types
         self._shipped = shipped_packages()
-        self._modules = frozenset((*MODULES, *_ELSEWHERE))
+        self._modules = frozenset((*MODULES, *ELSEWHERE))
 
     def find_spec(
         self,
@@ -187,32 +169,37 @@ class _First(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> ModuleSpec | None:
-        """Find what rosz has under a name."""
+        """Find a module that rosz ships or compiles."""
         root, _, rest = fullname.partition(".")
         if root == "rosz":
-            return self._ours(fullname)
+            return self._compiled(fullname)
         first, _, inner = rest.partition(".")
         if first in _KINDS:
             return self._of_package(fullname, root, _KINDS[first], inner, path)
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
         if root in self._modules:
-            ours = _ELSEWHERE.get(root, f"ros1.{root}") + fullname[len(root) :]
-            return self._known(fullname, f"rosz.{ours}")
+            return self._of_rosz(fullname, root)
         if root in self._shipped and not rest:
-            return _same(fullname, lambda: import_module(f"rosz.msgs.{root}"))
+            return _alias(fullname, lambda: import_module(f"rosz.msgs.{root}"))
         return None
 
-    def _known(self, name: str, ours: str) -> ModuleSpec | None:
-        try:
-            module = import_module(ours)
-        except ModuleNotFoundError as error:
-            if error.name != ours:
-                raise
-            return None
-        return _same(name, lambda: module)
+    def _of_rosz(self, name: str, root: str) -> ModuleSpec | None:
+        """Find ``rospy`` or one of its submodules."""
+        if name in SUBMODULES:
+            module = submodule(name)
+        else:
+            own = f"rosz.{ELSEWHERE.get(root, f'ros1.{root}')}{name[len(root) :]}"
+            try:
+                module = import_module(own)
+            except ModuleNotFoundError as error:
+                if error.name != own:
+                    raise
+                return None
+        explain_missing(name, module)
+        return _alias(name, lambda: module)
 
-    def _ours(self, name: str) -> ModuleSpec | None:
+    def _compiled(self, name: str) -> ModuleSpec | None:
         """Find ``rosz.msgs.<package>`` of a package that is compiled, for pickle."""
         parts = name.split(".")
         if parts[:2] != ["rosz", "msgs"] or len(parts) == 2 or parts[2] in self._shipped:  # noqa: PLR2004
@@ -223,7 +210,7 @@ class _First(MetaPathFinder):
         kind = _KINDS.get(parts[3]) if len(parts) == 4 else None  # noqa: PLR2004
         if kind is None or not self.types.has(package, kind):
             return None
-        return _same(name, lambda: self.types.store.module(package, kind))
+        return _alias(name, lambda: self.types.store.module(package, kind))
 
     def _of_package(
         self, name: str, package: str, kind: Kind, inner: str, path: Sequence[str] | None
@@ -233,15 +220,15 @@ class _First(MetaPathFinder):
             return None
         if not inner:
             if package in self._shipped:
-                return _same(name, lambda: self.types.shipped(package, kind))
+                return _alias(name, lambda: self.types.shipped(package, kind))
             generated = PathFinder.find_spec(name, path)
             if generated is not None and generated.origin and is_generated(generated.origin):
                 return generated
-            return _same(name, lambda: self.types.store.module(package, kind))
+            return _alias(name, lambda: self.types.store.module(package, kind))
         module = import_module(f"{package}.{kind}")
         if not inner.startswith("_") or not hasattr(module, inner[1:]):
             return None
-        return _same(name, lambda: _single(name, module, inner[1:]))
+        return _alias(name, lambda: _single(name, module, inner[1:]))
 
     def _of_cfg(
         self, name: str, package: str, inner: str, path: Sequence[str] | None
@@ -251,7 +238,7 @@ class _First(MetaPathFinder):
         if not files:
             return None
         if inner:
-            return _same(name, lambda: _config(name, files)) if inner.endswith("Config") else None
+            return _alias(name, lambda: _config(name, files)) if inner.endswith("Config") else None
         generated = PathFinder.find_spec(name, path)
         spec = ModuleSpec(name, None, is_package=True)
         spec.submodule_search_locations = [
@@ -270,13 +257,13 @@ class _Last(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> ModuleSpec | None:
-        """Find a package of the package path that nothing else provides."""
+        """Find a package on the package path."""
         if path is not None or "." in fullname:
             return None
         folder = self._types.folder(fullname)
         if folder is None:
             return None
-        # Where catkin looks for the Python modules of a package (catkin_python_setup).
+        # The folder of catkin_python_setup.
         code = folder / "src" / fullname
         if (code / "__init__.py").is_file():
             return spec_from_file_location(
@@ -294,7 +281,7 @@ def _config(name: str, files: Sequence[Path]) -> ModuleType:
 
 
 def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:
-    """Return a module with one type in it, and with the messages of a service."""
+    """Return a module with one type, and with the messages of a service."""
     single = ModuleType(name)
     for each in (type_name, f"{type_name}Request", f"{type_name}Response"):
         if hasattr(module, each):

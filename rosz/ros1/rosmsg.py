@@ -1,4 +1,4 @@
-"""rosmsg as a module: definitions of messages and services (ROS wiki, rosmsg)."""
+"""rosmsg: definitions of messages and services (ROS wiki, rosmsg)."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ MODE_SRV = ".srv"
 
 
 class ROSMsgException(Exception):
-    """A definition that is not there, or cannot be read."""
+    """A definition is not found, or is invalid."""
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: RosPack | None = None) -> str:  # noqa: ARG001
     """Return the definition of a message.
 
     Args:
-        type_: ``std_msgs/String``.
-        raw: Whether to return it as it is written; otherwise without comments and with the fields
-            of the messages in it.
-        rospack: Not used: all that can be imported is found.
+        type_: Type name, such as ``std_msgs/String``.
+        raw: Whether to return the text of the file; otherwise comments are removed, and the fields
+            of nested messages are added.
+        rospack: Ignored; all types that can be imported are found.
 
     Raises:
-        ROSMsgException: There is none, or it is not well-formed.
+        ROSMsgException: There is no such type, or its definition is invalid.
     """
     return _text(type_, MODE_MSG, raw=raw)
 
@@ -69,10 +69,10 @@ def _text(name: str, mode: str, *, raw: bool) -> str:
 
 
 def rosmsg_md5(mode: str, type_: str) -> str:
-    """Return the hash that ROS 1 identifies a definition by.
+    """Return the MD5 hash of a definition.
 
     Raises:
-        ROSMsgException: There is none of that name, or it is not well-formed.
+        ROSMsgException: There is no such type, or its definition is invalid.
     """
     definitions = _definitions(mode)
     try:
@@ -92,11 +92,11 @@ def list_srvs(package: str, rospack: RosPack | None = None) -> list[str]:
 
 
 def list_types(package: str, mode: str = MODE_MSG, rospack: RosPack | None = None) -> list[str]:
-    """Return the names of the types of a kind that a package has.
+    """Return the names of the messages or services of a package.
 
     Raises:
         ResourceNotFound: There is no such package.
-        ValueError: There is no such kind.
+        ValueError: The mode is neither `MODE_MSG` nor `MODE_SRV`.
     """
     kind: Any = "msg" if mode == MODE_MSG else "srv"
     _definitions(mode)
@@ -108,10 +108,10 @@ def list_types(package: str, mode: str = MODE_MSG, rospack: RosPack | None = Non
 
 
 def iterate_packages(rospack: RosPack, mode: str) -> Iterator[tuple[str, str]]:
-    """Yield the packages that have types of a kind, with the folders that hold them.
+    """Yield the packages with messages or services, and the folders of the definitions.
 
     Raises:
-        ValueError: There is no such kind.
+        ValueError: The mode is neither `MODE_MSG` nor `MODE_SRV`.
     """
     _definitions(mode)
     for name in rospack.list():
@@ -121,12 +121,12 @@ def iterate_packages(rospack: RosPack, mode: str) -> Iterator[tuple[str, str]]:
 
 
 def rosmsg_search(rospack: RosPack, mode: str, base_type: str) -> Iterator[str]:
-    """Yield the types of a base name, of whatever package.
+    """Yield the types of a base name in all packages.
 
     Args:
-        rospack: Where packages are.
+        rospack: Packages to search.
         mode: `MODE_MSG` or `MODE_SRV`.
-        base_type: ``String``.
+        base_type: Name without package, such as ``String``.
     """
     for name, _ in iterate_packages(rospack, mode):
         try:

@@ -1,4 +1,4 @@
-"""rosnode as a module: nodes, their state and their end (ROS wiki, rosnode)."""
+"""rosnode: lists, describes, pings and ends nodes (ROS wiki, rosnode)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from rosz.errors import NotFoundError, RoszError
 from rosz.introspect import nodes
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import in_namespace
-from rosz.ros1.rosgraph import Master, MasterException, live
+from rosz.ros1.rosgraph.masterapi import Master, MasterException, uri
 from rosz.ros1.rosgraph.names import script_resolve_name
+from rosz.ros1.state import ready_context, survey
 from rosz.wire import Token
 
 __all__ = (
@@ -39,7 +40,7 @@ _KILLED = "rosnode kill"
 
 
 class ROSNodeException(Exception):
-    """Something wrong with a node."""
+    """A node does not exist."""
 
 
 class ROSNodeIOException(ROSNodeException):
@@ -50,19 +51,19 @@ def get_node_names(namespace: str | None = None) -> list[str]:
     """Return the full names of nodes, sorted.
 
     Args:
-        namespace: Only those in it.
+        namespace: Namespace of the nodes to list.
     """
-    found = dict.fromkeys(live.survey().view.nodes())
+    found = dict.fromkeys(survey().view.nodes())
     return [name for name in found if in_namespace(name, namespace or "/")]
 
 
 def get_api_uri(master: Master, caller_id: str, skip_cache: bool = False) -> str | None:  # noqa: ARG001
-    """Return the address of a node; None if there is no such node.
+    """Return the URI of a node, or None if there is no such node.
 
     Args:
-        master: What to ask.
+        master: The master.
         caller_id: Full name of the node.
-        skip_cache: Not used: nothing is remembered.
+        skip_cache: Ignored; there is no cache.
     """
     try:
         return master.lookupNode(caller_id)
@@ -71,34 +72,34 @@ def get_api_uri(master: Master, caller_id: str, skip_cache: bool = False) -> str
 
 
 def get_machines_by_nodes() -> list[str]:
-    """Return the hosts that nodes run on."""
-    return nodes.machines(nodes.list_nodes(live.survey()))
+    """Return the machines on which nodes run."""
+    return nodes.machines(nodes.list_nodes(survey()))
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
     """Return the names of the nodes on a machine, sorted.
 
     Raises:
-        ROSNodeException: None runs there.
+        ROSNodeException: No node runs there.
     """
     try:
-        return nodes.on_machine(nodes.list_nodes(live.survey()), machine)
+        return nodes.on_machine(nodes.list_nodes(survey()), machine)
     except NotFoundError as error:
         raise ROSNodeException(str(error)) from error
 
 
 def kill_nodes(node_names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Have nodes shut down, and wait until they are gone.
+    """Shut nodes down, and wait until they are gone.
 
     Args:
-        node_names: Full names.
+        node_names: Full names of the nodes.
 
     Returns:
-        The names of those that are gone, and of those that are not.
+        The names of the nodes that are gone, and of those that are not.
     """
-    found = live.survey()
+    found = survey()
     known = [name for name in node_names if found.members(name)]
-    stayed = {name for name, _ in nodes.kill_nodes(live.context().session, found, known, _KILLED)}
+    stayed = {name for name, _ in nodes.kill_nodes(ready_context().session, found, known, _KILLED)}
     gone = [name for name in known if name not in stayed]
     return gone, [name for name in node_names if name not in gone]
 
@@ -114,19 +115,16 @@ def rosnode_ping(
     verbose: bool = False,
     skip_cache: bool = False,  # noqa: ARG001  # ROS 1's
 ) -> bool:
-    """Ask a node whether it is there, once a second.
+    """Ping a node once per second.
 
     Args:
-        node_name: Its name.
-        max_count: How often; for ever when not given.
-        verbose: Whether to write what comes back to stdout.
-        skip_cache: Not used: nothing is remembered.
+        node_name: Name of the node.
+        max_count: Number of pings; no limit when not given.
+        verbose: Whether to write the results to stdout.
+        skip_cache: Ignored; there is no cache.
 
     Returns:
-        Whether it answered each time.
-
-    Raises:
-        ROSNodeException: There is no such node.
+        Whether the node replied to every ping.
     """
     name = script_resolve_name(NAME, node_name)
     pause = threading.Event()
@@ -134,21 +132,21 @@ def rosnode_ping(
     while max_count is None or sent < max_count:
         if sent:
             pause.wait(1.0)
-        found = live.survey()
+        found = survey()
         member = _member(found, name)
         if member is None:
             if verbose:
                 sys.stderr.write(f"cannot ping [{name}]: unknown node\n")
             return False
         try:
-            passed = nodes.ping(live.context().session, member) * 1e3
+            passed = nodes.ping(ready_context().session, member) * 1e3
         except RoszError as error:
             if verbose:
                 sys.stderr.write(f"connection to [{name}] failed: {error}\n")
             return False
         sent += 1
         if verbose:
-            address = live.address(found, member)
+            address = uri(found, member)
             sys.stdout.write(f"reply from {address}\ttime={passed:f}ms\n")
     return True
 
@@ -157,24 +155,24 @@ def rosnode_ping_all(
     verbose: bool = False,
     skip_cache: bool = False,  # noqa: ARG001  # ROS 1's
 ) -> tuple[list[str], list[str]]:
-    """Ask all nodes whether they are there, once.
+    """Ping all nodes once.
 
     Args:
-        verbose: Whether to write what comes back to stdout.
-        skip_cache: Not used: nothing is remembered.
+        verbose: Whether to write the results to stdout.
+        skip_cache: Ignored; there is no cache.
 
     Returns:
-        The names of those that answered, and of those that did not.
+        The names of the nodes that replied, and of those that did not.
     """
-    answered: list[str] = []
+    replied: list[str] = []
     silent: list[str] = []
     for name in get_node_names():
-        (answered if rosnode_ping(name, 1, verbose) else silent).append(name)
-    return answered, silent
+        (replied if rosnode_ping(name, 1, verbose) else silent).append(name)
+    return replied, silent
 
 
 def rosnode_cleanup() -> None:
-    """Do nothing: a node that is dead is gone from all lists at once."""
+    """Do nothing: dead nodes are never listed."""
 
 
 def rosnode_listnodes(
@@ -183,9 +181,9 @@ def rosnode_listnodes(
     """Write the names of nodes to stdout.
 
     Args:
-        namespace: Only those in it.
-        list_uri: Write their addresses instead.
-        list_all: Write both.
+        namespace: Namespace of the nodes to list.
+        list_uri: Whether to write the URIs instead.
+        list_all: Whether to write both.
     """
     master = Master(ID)
     for name in get_node_names(namespace):
@@ -195,8 +193,8 @@ def rosnode_listnodes(
 
 
 def get_node_info_description(node_name: str) -> str:
-    """Return what ``rosnode info`` says about a node without asking it."""
-    found = live.survey()
+    """Return the text of ``rosnode info`` without the connections of the node."""
+    found = survey()
     member = _member(found, node_name)
     if member is None:
         return f"Node [{node_name}]\nPublications: None\n\nSubscriptions: None\n\nServices: None\n"
@@ -204,18 +202,18 @@ def get_node_info_description(node_name: str) -> str:
 
 
 def get_node_connection_info_description(node_api: str, master: Master) -> str:  # noqa: ARG001
-    """Return whom a node exchanges messages with.
+    """Return the process id of a node and its connections to other nodes.
 
     Args:
-        node_api: Its address, as `get_api_uri` returns it.
-        master: Not used.
+        node_api: URI of the node, from `get_api_uri`.
+        master: Ignored.
 
     Raises:
-        ROSNodeIOException: No node has that address.
+        ROSNodeIOException: No node has that URI.
     """
-    found = live.survey()
+    found = survey()
     for token in found.view.tokens:
-        if live.address(found, token) == node_api:
+        if uri(found, token) == node_api:
             process = found.process(token)
             pid = f"Pid: {process.pid}\n" if process is not None else ""
             return pid + nodes.connections(found, token)
@@ -223,11 +221,11 @@ def get_node_connection_info_description(node_api: str, master: Master) -> str: 
 
 
 def rosnode_info(node_name: str, quiet: bool = False) -> None:
-    """Write what there is to say about a node to stdout.
+    """Write the text of ``rosnode info`` to stdout.
 
     Args:
-        node_name: Its name.
-        quiet: Whether to leave out whom it is connected with.
+        node_name: Name of the node.
+        quiet: Whether to omit the connections.
     """
     name = script_resolve_name(NAME, node_name)
     sys.stdout.write(f"{'-' * 80}\n{get_node_info_description(name)}\n")

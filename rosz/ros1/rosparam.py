@@ -1,4 +1,4 @@
-"""rosparam as a module: the parameters, YAML in and out (ROS wiki, rosparam)."""
+"""rosparam: reads, sets, loads and dumps parameters as YAML (ROS wiki, rosparam)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import yaml
 
 from rosz.errors import ParamError, YamlError
 from rosz.params.yaml import dump, load, load_documents
-from rosz.ros1.rosgraph import Master, live
+from rosz.ros1.rosgraph.masterapi import Master
 from rosz.ros1.rosgraph.names import GLOBALNS, get_ros_namespace, make_global_ns
+from rosz.ros1.state import params_of
 
 __all__ = (
     "GLOBALNS",
@@ -37,37 +38,37 @@ NS = "_ns"
 
 
 class RosParamException(Exception):
-    """Something wrong with parameters or with a file of them."""
+    """A parameter or a parameter file is wrong."""
 
 
 class RosParamIOException(RosParamException):
-    """A file that cannot be read or written."""
+    """A file cannot be read or written."""
 
 
 def get_param_server() -> Master:
-    """Return what answers for the parameters: ``getParam``, ``setParam`` and so on."""
+    """Return the object with ``getParam``, ``setParam`` and the like."""
     return Master(NAME)
 
 
 def get_param(param: str) -> Any:
-    """Return a parameter, or all below a namespace.
+    """Return a parameter, or all parameters in a namespace.
 
     Raises:
-        MasterError: It is not set.
+        MasterError: The parameter is not set.
     """
     return get_param_server().getParam(param)
 
 
 def set_param(param: str, value: str, verbose: bool = False) -> None:
-    """Set a parameter to what a YAML text says; a dict leaf by leaf.
+    """Set a parameter from a YAML text; a dict is merged.
 
     Args:
-        param: Its name.
-        value: The text.
-        verbose: Whether to tell what is set.
+        param: Name of the parameter.
+        value: YAML text.
+        verbose: Whether to write what is set to stdout.
 
     Raises:
-        RosParamException: The text is no YAML, or says what no parameter can be.
+        RosParamException: The text is not YAML, or a parameter cannot have this value.
     """
     try:
         found = load(value)
@@ -77,15 +78,15 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 
 
 def set_param_raw(param: str, value: Any, verbose: bool = False) -> None:
-    """Set a parameter to a value; a dict leaf by leaf, as one change.
+    """Set a parameter to a value; a dict is merged, as one change.
 
     Args:
-        param: Its name.
+        param: Name of the parameter.
         value: The value.
-        verbose: Whether to tell what is set.
+        verbose: Whether to write what is set to stdout.
 
     Raises:
-        RosParamException: It is none that a parameter may have.
+        RosParamException: A parameter cannot have this value.
     """
     _upload(param, value)
     if verbose:
@@ -94,15 +95,15 @@ def set_param_raw(param: str, value: Any, verbose: bool = False) -> None:
 
 
 def upload_params(ns: str, values: Any, verbose: bool = False) -> None:
-    """Set all that a dict says below a namespace, and leave the rest.
+    """Merge a dict into a namespace.
 
     Args:
         ns: The namespace.
-        values: A dict; below the root nothing else will do.
-        verbose: Whether to tell what is set.
+        values: A dict; for other namespaces than the root also a single value.
+        verbose: Whether to write what is set to stdout.
 
     Raises:
-        RosParamException: A value is none that a parameter may have.
+        RosParamException: A parameter cannot have such a value.
     """
     if ns == GLOBALNS and not isinstance(values, dict):
         raise RosParamException("global / can only be set to a dictionary")
@@ -113,13 +114,13 @@ def upload_params(ns: str, values: Any, verbose: bool = False) -> None:
 
 def _upload(name: str, value: Any) -> None:
     try:
-        live.params(get_param_server().caller_id).update(dict(_leaves(name, value)))
+        params_of(get_param_server().caller_id).update(dict(_leaves(name, value)))
     except ParamError as error:
         raise RosParamException(str(error)) from error
 
 
 def print_params(params: Any, ns: str) -> None:
-    """Write names and values to stdout, a line each."""
+    """Write names and values to stdout, one per line."""
     for name, value in _leaves(ns, params):
         sys.stdout.write(f"{name}={value}\n")
 
@@ -138,14 +139,14 @@ def _leaves(name: str, value: Any) -> list[tuple[str, Any]]:
 
 
 def delete_param(param: str, verbose: bool = False) -> None:
-    """Delete a parameter and all below it; of the root, all.
+    """Delete a parameter or namespace; the root deletes all parameters.
 
     Args:
-        param: Its name.
-        verbose: Whether to tell that it is done.
+        param: Name of the parameter.
+        verbose: Whether to write what is deleted to stdout.
 
     Raises:
-        MasterError: It is not set.
+        MasterError: The parameter is not set.
     """
     if param == GLOBALNS:
         get_param_server().setParam(GLOBALNS, {})
@@ -168,22 +169,22 @@ def load_str(
     default_namespace: str | None = None,
     verbose: bool = False,
 ) -> list[tuple[Any, str]]:
-    """Return the documents of a YAML text, each with the namespace it belongs to.
+    """Return the documents of a YAML text, each with its namespace.
 
     Args:
-        str: The text; angles such as ``deg(90)`` are read, too.
-        filename: Where it is from, for errors.
-        default_namespace: For documents that do not name one with ``_ns``.
-        verbose: Whether to tell namespaces that documents name.
+        str: The text; angles such as ``deg(90)`` are converted.
+        filename: File name in errors.
+        default_namespace: Namespace of documents without the key ``_ns``.
+        verbose: Whether to write the namespaces of documents with the key to stdout.
 
     Raises:
-        YAMLError: It is no YAML.
+        YAMLError: The text is not YAML.
     """
     space = default_namespace or get_ros_namespace()
     try:
         found = load_documents(str, space, filename)
     except YamlError as error:
-        # What rosparam's own callers catch.
+        # Callers of rosparam catch this error.
         raise yaml.YAMLError(f"{error}") from error
     for name, _ in found if verbose else ():
         if name != space:
@@ -197,13 +198,13 @@ def load_file(
     """Return the documents of a YAML file; see `load_str`.
 
     Args:
-        filename: The file; ``-`` is standard input.
-        default_namespace: For documents that do not name one.
-        verbose: Whether to tell what is done.
+        filename: Path of the file; ``-`` is standard input.
+        default_namespace: Namespace of documents without the key ``_ns``.
+        verbose: Whether to write the progress to stdout.
 
     Raises:
         RosParamException: There is no such file.
-        YAMLError: It is no YAML.
+        YAMLError: The text is not YAML.
     """
     if filename == "-":
         return load_str(sys.stdin.read(), filename, default_namespace, verbose)
@@ -216,12 +217,12 @@ def load_file(
 
 
 def dump_params(filename: str | None, param: str, verbose: bool = False) -> None:
-    """Write a parameter, or all below a namespace, to a file as YAML.
+    """Write a parameter or namespace to a file as YAML.
 
     Args:
-        filename: The file; standard output when None, empty or ``-``.
-        param: The name.
-        verbose: Whether to tell what is written.
+        filename: Path of the file; None, an empty text and ``-`` are standard output.
+        param: Name of the parameter or namespace.
+        verbose: Whether to write the parameters to stdout.
 
     Raises:
         RosParamIOException: The file cannot be written.

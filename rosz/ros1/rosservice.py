@@ -1,4 +1,4 @@
-"""rosservice as a module: who serves what, and calling it (ROS wiki, rosservice)."""
+"""rosservice: services, their nodes and types, and calls (ROS wiki, rosservice)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Any
 from rosz.errors import EncodeError, NotFoundError, RoszError
 from rosz.introspect.services import call, find, server, uri
 from rosz.names import short_type
-from rosz.ros1.genpy.message import get_printable_message_args, get_service_class
-from rosz.ros1.rosgraph import Master, live
+from rosz.ros1.genpy import get_printable_message_args, get_service_class
+from rosz.ros1.rosgraph.masterapi import Master
 from rosz.ros1.rosgraph.names import make_global_ns, script_resolve_name
+from rosz.ros1.state import survey, unnamed_node
 
 __all__ = (
     "NAME",
@@ -31,7 +32,7 @@ NAME = "rosservice"
 
 
 class ROSServiceException(Exception):
-    """Something wrong with a service or a call of it."""
+    """A service, its type or a call is wrong."""
 
 
 class ROSServiceIOException(ROSServiceException):
@@ -44,9 +45,9 @@ def get_service_list(
     """Return the names of services.
 
     Args:
-        node: Only those that this node serves.
-        namespace: Only those in it.
-        include_nodes: Whether to return pairs of a name and the names of the nodes that serve it.
+        node: Full name of a node, to list only its services.
+        namespace: Namespace of the services to list.
+        include_nodes: Whether to return pairs of a name and a list of nodes.
     """
     found = Master(NAME).getSystemState()[2]
     if namespace:
@@ -58,41 +59,41 @@ def get_service_list(
 
 
 def _server(service_name: str) -> Any:
-    """Return who serves a service; None if nobody does."""
+    """Return the server of a service, or None if there is none."""
     try:
-        return server(live.survey().view, service_name)
+        return server(survey().view, service_name)
     except NotFoundError:
         return None
 
 
 def get_service_type(service_name: str) -> str | None:
-    """Return the type of a service; None if nobody serves it."""
+    """Return the type of a service, or None if no node serves it."""
     token = _server(service_name)
     return None if token is None else short_type(token.type_name)
 
 
 def get_service_node(service_name: str) -> str | None:
-    """Return the name of the node that serves a service; None if none does."""
+    """Return the name of the node that serves a service, or None if none does."""
     token = _server(service_name)
     return None if token is None else str(token.node_name)
 
 
 def get_service_uri(service_name: str) -> str | None:
-    """Return where a service is called, its key expression on Zenoh; None if nobody serves it."""
+    """Return the key expression of a service on Zenoh, or None if no node serves it."""
     token = _server(service_name)
     return None if token is None else uri(token)
 
 
 def rosservice_find(service_type: str) -> list[str]:
     """Return the names of the services of a type."""
-    return find(live.survey().view, service_type)
+    return find(survey().view, service_type)
 
 
 def get_service_class_by_name(service_name: str) -> type[Any]:
     """Return the class of a service.
 
     Raises:
-        ROSServiceException: Nobody serves it, or its type is not known here.
+        ROSServiceException: No node serves it, or the definition of its type is not found.
     """
     type_name = get_service_type(service_name)
     if type_name is None:
@@ -106,24 +107,24 @@ def get_service_class_by_name(service_name: str) -> type[Any]:
 
 
 def get_service_args(service_name: str) -> str:
-    """Return the names of the values that a call of a service takes, separated by spaces.
+    """Return the names of the values in a request of a service, separated by spaces.
 
     Raises:
-        ROSServiceException: Nobody serves it, or its type is not known here.
+        ROSServiceException: No node serves it, or the definition of its type is not found.
     """
     found = get_service_class_by_name(script_resolve_name(NAME, service_name))
     return get_printable_message_args(found.Request())
 
 
 def has_service_args(service_name: str, service_class: type[Any] | None = None) -> bool:
-    """Tell whether a call of a service takes values.
+    """Return whether the request of a service has fields.
 
     Args:
         service_name: Name of the service.
-        service_class: Its class, where it is known.
+        service_class: Class of the service; found by name when not given.
 
     Raises:
-        ROSServiceException: Nobody serves it, or its type is not known here.
+        ROSServiceException: No node serves it, or the definition of its type is not found.
     """
     name = script_resolve_name(NAME, service_name)
     found = service_class or get_service_class_by_name(name)
@@ -136,29 +137,29 @@ def call_service(
     """Call a service.
 
     Args:
-        service_name: Its name.
-        service_args: A dict of fields in a list, or a value for each field.
-        service_class: Its class, where it is known.
+        service_name: Name of the service.
+        service_args: List of one dict of fields, or of a value for each field.
+        service_class: Class of the service; found by name when not given.
 
     Returns:
         Request and response.
 
     Raises:
-        ROSServiceException: Nobody serves it, the values do not fit, or it failed.
+        ROSServiceException: No node serves it, the values do not fit, or the call failed.
     """
     name = script_resolve_name(NAME, service_name)
     found = service_class or get_service_class_by_name(name)
-    with live.nameless_node(NAME) as node:
-        client = node.client(name, found)
-        try:
-            return call(client, list(service_args), node.now())
-        except EncodeError as error:
-            given = "\n".join(f" * {one} (type {type(one).__name__})" for one in service_args)
-            raise ROSServiceException(
-                f"Incompatible arguments to call service:\n{error}\nProvided arguments are:\n"
-                f"{given}\n\nService arguments are: [{get_printable_message_args(found.Request())}]"
-            ) from error
-        except RoszError as error:
-            raise ROSServiceException(str(error)) from error
-        finally:
-            client.close()
+    node = unnamed_node()
+    client = node.client(name, found)
+    try:
+        return call(client, list(service_args), node.now())
+    except EncodeError as error:
+        given = "\n".join(f" * {one} (type {type(one).__name__})" for one in service_args)
+        raise ROSServiceException(
+            f"Incompatible arguments to call service:\n{error}\nProvided arguments are:\n{given}"
+            f"\n\nService arguments are: [{get_printable_message_args(found.Request())}]"
+        ) from error
+    except RoszError as error:
+        raise ROSServiceException(str(error)) from error
+    finally:
+        client.close()

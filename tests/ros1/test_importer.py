@@ -101,10 +101,16 @@ def test_shipped_packages(tmp_path: Path) -> None:
 def test_modules_by_all_their_names(tmp_path: Path) -> None:
     code = """
         from importlib import import_module
-        from rosz.ros1.importer import MODULES, install
+        from rosz.ros1.importer import install
+        from rosz.ros1.modules import MODULES, SUBMODULES
         install()
         for name in MODULES:
             assert import_module(name) is import_module(f"rosz.ros1.{name}"), name
+        for name in SUBMODULES:
+            assert import_module(name).__name__ == name
+        import roslib, rospkg.common
+        assert roslib.message.Message is import_module("rosz.ros1.genpy").Message
+        assert rospkg.rospack.RosPack is roslib.rospack.RosPack is rospkg.RosPack
         import tf.transformations, tf_transformations
         from tf_transformations import quaternion_from_euler
         assert tf_transformations is tf.transformations

@@ -13,8 +13,8 @@ from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
+from rosz.ros1 import state
 from rosz.ros1.actionlib.types import TERMINAL, ActionTypes, seconds_of
-from rosz.ros1.rospy import state
 
 __all__ = ("SimpleActionClient", "SimpleGoalState")
 

@@ -11,8 +11,8 @@ from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
 from rosz.qos import QoS
+from rosz.ros1 import state
 from rosz.ros1.actionlib.types import TERMINAL, ActionTypes
-from rosz.ros1.rospy import state
 
 __all__ = ("SimpleActionServer",)
 

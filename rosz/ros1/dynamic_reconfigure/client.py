@@ -11,6 +11,7 @@ from rosz.errors import ClosedError, ParamError, ServiceError, WaitTimeout
 from rosz.reconfigure import Description
 from rosz.reconfigure.messages import pack_description
 from rosz.reconfigure.servers import SET
+from rosz.ros1 import state
 from rosz.ros1.dynamic_reconfigure.encoding import (
     Config,
     decode_description,
@@ -21,9 +22,8 @@ from rosz.ros1.dynamic_reconfigure.exceptions import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
 )
-from rosz.ros1.rospy import state
-from rosz.ros1.rospy.exceptions import ROSException, ROSInterruptException
-from rosz.ros1.rospy.proxy import wait_for_service
+from rosz.ros1.exceptions import ROSException, ROSInterruptException
+from rosz.ros1.rospy.service import wait_for_service
 
 __all__ = ("Client",)
 

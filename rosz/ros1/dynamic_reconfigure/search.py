@@ -10,7 +10,7 @@ __all__ = ("find_reconfigure_services", "get_parameter_names")
 def find_reconfigure_services() -> list[str]:
     """Return the names of all servers there are, sorted; before ``init_node`` as well."""
     from rosz.reconfigure import find_servers
-    from rosz.ros1.rospy import state
+    from rosz.ros1 import state
 
     return find_servers(state.context().graph.refresh())
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from rosz import reconfigure
 from rosz.errors import ParamError
+from rosz.ros1 import state
 from rosz.ros1.dynamic_reconfigure.cfgfile import describe
 from rosz.ros1.dynamic_reconfigure.encoding import Config, encode_description
 from rosz.ros1.dynamic_reconfigure.exceptions import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
 )
-from rosz.ros1.rospy import state
 
 __all__ = ("Server",)
 

@@ -1,11 +1,10 @@
-"""rosgraph: names, addresses, and the graph as the Master API has it (ROS wiki, rosgraph).
+"""rosgraph: names, addresses, and the Master API (ROS wiki, rosgraph).
 
-There is no master. `Master` answers from the live graph and the parameter store; what would
-register something by hand is not there, and says so.
+There is no master. `Master` returns what the live graph and the parameter store have; it lacks
+the calls that register something, since nodes declare themselves.
 """
 
 from rosz.ros1.rosgraph import masterapi, names, network, rosenv
-from rosz.ros1.rosgraph.arguments import myargv
 from rosz.ros1.rosgraph.masterapi import (
     Master,
     MasterError,
@@ -13,6 +12,7 @@ from rosz.ros1.rosgraph.masterapi import (
     MasterFailure,
     is_online,
 )
+from rosz.ros1.rosgraph.names import myargv
 from rosz.ros1.rosgraph.rosenv import (
     ROS_HOSTNAME,
     ROS_IP,

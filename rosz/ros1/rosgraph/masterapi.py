@@ -1,7 +1,7 @@
-"""rosgraph.masterapi: ROS 1's Master and Parameter Server APIs as far as programs read them.
+"""rosgraph.masterapi: the reading part of ROS 1's Master API, and its Parameter Server API.
 
-Answers have ROS 1's forms (ROS wiki, Master API); they come from liveliness tokens and from this
-process's own copy of the parameters, so that nothing has to be registered anywhere.
+The values have the forms of ROS 1 (ROS wiki, Master API). They come from the liveliness tokens of
+the network and from this process's replica of the parameters, so nothing has to be registered.
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ from collections.abc import Iterable
 from typing import Any, NoReturn
 
 from rosz.errors import ParamError, ParamNotFound, RoszError, TransportError
+from rosz.introspect.survey import Survey
 from rosz.names import short_type
-from rosz.ros1.rosgraph import live
+from rosz.params.api import Params
 from rosz.ros1.rosgraph.names import make_caller_id
 from rosz.ros1.rosgraph.rosenv import get_master_uri
+from rosz.ros1.state import node_uri, params_of, ready_context, survey
 from rosz.wire import Kind, Token
 
 __all__ = (
@@ -29,22 +31,22 @@ __all__ = (
 )
 
 Pairs = list[list[str]]
-"""Names, each with its type."""
+"""Names with their types."""
 
-Ends = list[list[Any]]
-"""Names, each with the list of its nodes."""
+NamesWithNodes = list[list[Any]]
+"""Names with the lists of their nodes."""
 
 
 class MasterException(Exception):
-    """Root of the errors of the Master API."""
+    """Base class of the errors of the Master API."""
 
 
 class MasterFailure(MasterException):
-    """A question could not be answered."""
+    """A call could not be made."""
 
 
 class MasterError(MasterException):
-    """A question that has no answer: nothing of that name is there."""
+    """A call failed, since there is nothing of that name."""
 
 
 ROSMasterException = MasterException
@@ -53,20 +55,20 @@ Error = MasterError
 
 
 def is_online(master_uri: str | None = None) -> bool:  # noqa: ARG001  # ROS 1's
-    """Tell whether the graph can be reached; there is no master that could be missing."""
+    """Return whether the network can be reached; there is no master."""
     try:
-        live.context()
+        ready_context()
     except TransportError:
         return False
     return True
 
 
 class Master:
-    """The graph and the parameters, as a program sees them.
+    """The Master API, from the graph and the parameters.
 
     Args:
-        caller_id: Name of the program, for names that are not global.
-        master_uri: Only shown by `getUri`.
+        caller_id: Name of the program, which relative names are resolved by.
+        master_uri: URI that `getUri` returns.
     """
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
@@ -80,8 +82,12 @@ class Master:
         )
 
     def is_online(self) -> bool:
-        """Tell whether the graph can be reached."""
+        """Return whether the network can be reached."""
         return is_online()
+
+    @property
+    def _params(self) -> Params:
+        return params_of(self.caller_id)
 
     # Parameters.
 
@@ -89,114 +95,122 @@ class Master:
         """Delete a parameter.
 
         Raises:
-            MasterError: It is not set.
+            MasterError: The parameter is not set, or is the root.
         """
         try:
-            live.params(self.caller_id).delete(key)
+            self._params.delete(key)
         except ParamNotFound as error:
             raise MasterError(f"parameter [{error.name}] is not set") from error
+        except ParamError as error:
+            raise MasterError(str(error)) from error
         return 0
 
     def setParam(self, key: str, value: Any) -> int:  # noqa: N802  # ROS 1's
-        """Set a parameter; a dict replaces all that was below it.
+        """Set a parameter; a dict replaces everything below the name.
 
         Raises:
-            MasterError: The value is none that a parameter may have.
+            MasterError: A parameter cannot have this value.
         """
         try:
-            live.params(self.caller_id).set(key, value)
+            self._params.set(key, value)
         except ParamError as error:
             raise MasterError(str(error)) from error
         return 0
 
     def getParam(self, key: str) -> Any:  # noqa: N802  # ROS 1's
-        """Return a parameter, or all below a namespace.
+        """Return a parameter, or all parameters in a namespace.
 
         Raises:
-            MasterError: It is not set.
+            MasterError: The parameter is not set.
         """
         try:
-            return live.params(self.caller_id).get(key)
+            return self._params.get(key)
         except ParamNotFound as error:
             raise MasterError(f"Parameter [{error.name}] is not set") from error
 
     def searchParam(self, key: str) -> str:  # noqa: N802  # ROS 1's
-        """Return the global name of the nearest parameter of a name, upwards from the caller.
+        """Search a parameter in the namespace of the caller and those above; return its full name.
 
         Raises:
-            MasterError: There is none.
+            MasterError: The parameter is not set in any of them.
         """
-        found = live.params(self.caller_id).search(key)
+        found = self._params.search(key)
         if found is None:
             raise MasterError(f"Cannot find parameter [{key}] in an upwards search")
         return found
 
     def hasParam(self, key: str) -> bool:  # noqa: N802  # ROS 1's
-        """Tell whether a parameter is set."""
-        return live.params(self.caller_id).has(key)
+        """Return whether a parameter is set."""
+        return self._params.has(key)
 
     def getParamNames(self) -> list[str]:  # noqa: N802  # ROS 1's
         """Return the global names of all parameters."""
-        return live.params(self.caller_id).names()
+        return self._params.names()
 
     # The graph.
 
     def getPid(self) -> int:  # noqa: N802  # ROS 1's
-        """Return the process id of who answers: this process."""
+        """Return the id of this process, which answers all calls."""
         return os.getpid()
 
     def getUri(self) -> str:  # noqa: N802  # ROS 1's
-        """Return where a master would be."""
+        """Return the URI of the master, at which nothing listens."""
         return self.master_uri or ""
 
     def lookupNode(self, node_name: str) -> str:  # noqa: N802  # ROS 1's
-        """Return the address of a node; see `live.address`.
+        """Return the URI of a node.
 
         Raises:
             MasterError: There is no such node.
         """
-        found = live.survey()
+        found = survey()
         members = found.members(node_name)
         if not members:
             raise MasterError(f"unknown node [{node_name}]")
-        return live.address(found, members[-1])
+        return uri(found, members[-1])
 
     def lookupService(self, service: str) -> str:  # noqa: N802  # ROS 1's
-        """Return the address of the node that serves a service.
+        """Return the URI of the node that serves a service.
 
         Raises:
-            MasterError: Nobody does.
+            MasterError: No node serves it.
         """
-        found = live.survey()
+        found = survey()
         servers = found.view.servers(service)
         if not servers:
             raise MasterError("no provider")
-        return live.address(found, servers[0])
+        return uri(found, servers[0])
 
     def getPublishedTopics(self, subgraph: str) -> Pairs:  # noqa: N802  # ROS 1's
-        """Return the topics that somebody publishes, with their types.
+        """Return the topics that have publishers, with their types.
 
         Args:
-            subgraph: Only those in this namespace; all when empty.
+            subgraph: Namespace of the topics; empty for all.
         """
         space = f"{subgraph.rstrip('/')}/"
         if not space.startswith("/"):
             space = f"/{space}"
-        published = live.survey().view.entities(Kind.PUBLISHER)
+        published = survey().view.entities(Kind.PUBLISHER)
         return [pair for pair in _types(published) if pair[0].startswith(space)]
 
     def getTopicTypes(self) -> Pairs:  # noqa: N802  # ROS 1's
-        """Return the topics that somebody publishes or subscribes to, with their types."""
-        return _types(live.survey().view.entities(Kind.PUBLISHER, Kind.SUBSCRIPTION))
+        """Return all topics with their types."""
+        return _types(survey().view.entities(Kind.PUBLISHER, Kind.SUBSCRIPTION))
 
-    def getSystemState(self) -> list[Ends]:  # noqa: N802  # ROS 1's
-        """Return publishers, subscribers and services: names, each with the names of its nodes."""
+    def getSystemState(self) -> list[NamesWithNodes]:  # noqa: N802  # ROS 1's
+        """Return the publishers, subscribers and services: names with the names of their nodes."""
         try:
-            view = live.survey().view
+            view = survey().view
         except RoszError as error:
             raise MasterFailure(str(error)) from error
         kinds = Kind.PUBLISHER, Kind.SUBSCRIPTION, Kind.SERVICE
-        return [_ends(view.entities(kind)) for kind in kinds]
+        return [_with_nodes(view.entities(kind)) for kind in kinds]
+
+
+def uri(found: Survey, token: Token) -> str:
+    """Return the URI of the node of a token; the host of a ROS 2 node is ``unknown``."""
+    process = found.process(token)
+    return node_uri(token.zid, token.node_id, process.host if process else "unknown")
 
 
 def _types(tokens: Iterable[Token]) -> Pairs:
@@ -204,7 +218,7 @@ def _types(tokens: Iterable[Token]) -> Pairs:
     return [[name, type_name] for name, type_name in sorted(found.items())]
 
 
-def _ends(tokens: Iterable[Token]) -> Ends:
+def _with_nodes(tokens: Iterable[Token]) -> NamesWithNodes:
     found: dict[str, dict[str, None]] = {}
     for token in tokens:
         found.setdefault(token.name, {})[token.node_name] = None

@@ -32,6 +32,7 @@ __all__ = (
     "load_mappings",
     "make_caller_id",
     "make_global_ns",
+    "myargv",
     "namespace",
     "ns_join",
     "resolve_name",
@@ -54,10 +55,10 @@ _NAME = re.compile(r"[~/A-Za-z][\w/]*")
 def get_ros_namespace(
     env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
 ) -> str:
-    """Return the namespace that ``__ns:=`` or ``ROS_NAMESPACE`` gives, with slashes at both ends.
+    """Return the namespace of ``__ns:=`` or ``ROS_NAMESPACE``, with slashes at both ends.
 
     Args:
-        env: Variables; those of the process when not given.
+        env: Environment variables; those of the process when not given.
         argv: Command line; that of the process when not given.
     """
     for word in sys.argv if argv is None else argv:
@@ -68,7 +69,7 @@ def get_ros_namespace(
 
 
 def make_caller_id(name: str) -> str:
-    """Return a name in the process's namespace, with slashes at both ends."""
+    """Return a name in the namespace of the process, with slashes at both ends."""
     return make_global_ns(ns_join(get_ros_namespace(), name))
 
 
@@ -76,7 +77,7 @@ def make_global_ns(name: str) -> str:
     """Return a name with slashes at both ends.
 
     Raises:
-        ValueError: It is private.
+        ValueError: The name is private.
     """
     if is_private(name):
         raise ValueError(f"cannot turn [{name}] into a global name")
@@ -85,21 +86,21 @@ def make_global_ns(name: str) -> str:
 
 
 def is_global(name: str) -> bool:
-    """Tell whether a name starts at the root."""
+    """Return whether a name starts with a slash."""
     return bool(name) and names.is_global(name)
 
 
 def is_private(name: str) -> bool:
-    """Tell whether a name is private to its node."""
+    """Return whether a name starts with a tilde."""
     return bool(name) and names.is_private(name)
 
 
 def namespace(name: str) -> str:
-    """Return the namespace that a name lies in, with its slash at the end.
+    """Return the namespace of a name, with a slash at the end.
 
     Raises:
-        ValueError: It is None.
-        TypeError: It is no text.
+        ValueError: The name is None.
+        TypeError: The name is not a string.
     """
     if name is None:
         raise ValueError("name")
@@ -109,14 +110,23 @@ def namespace(name: str) -> str:
 
 
 def ns_join(ns: str, name: str) -> str:
-    """Put a name into a namespace; a global or private one stays as it is."""
+    """Join a namespace and a name; a global or private name is returned unchanged."""
     if is_private(name) or is_global(name) or not ns:
         return name
     return ns + name if ns == PRIV_NAME or ns.endswith(SEP) else f"{ns}{SEP}{name}"
 
 
+def myargv(argv: Sequence[str] | None = None) -> list[str]:
+    """Return a command line without remappings, for the option parser of the program.
+
+    Args:
+        argv: Command line with the program name; that of the process when not given.
+    """
+    return [word for word in (sys.argv if argv is None else argv) if REMAP not in word]
+
+
 def load_mappings(argv: Sequence[str]) -> dict[str, str]:
-    """Return the remappings of a command line, ``__name`` and its like among them."""
+    """Return the remappings of a command line, including ``__name`` and other special ones."""
     found: dict[str, str] = {}
     for word in filter(is_legal_remap, argv):
         left, _, right = (part.strip() for part in word.partition(REMAP))
@@ -126,34 +136,34 @@ def load_mappings(argv: Sequence[str]) -> dict[str, str]:
 
 
 def is_legal_name(name: str | None) -> bool:
-    """Tell whether a text is a legal name of any sort; the empty one is."""
+    """Return whether a text is a legal name: empty, relative, global or private."""
     if name is None:
         return False
     return not name or (_NAME.fullmatch(name) is not None and "//" not in name)
 
 
 def is_legal_base_name(name: str | None) -> bool:
-    """Tell whether a text is a legal name without a namespace."""
+    """Return whether a text is a legal name without a namespace."""
     return name is not None and _BASE.fullmatch(name) is not None
 
 
 def is_legal_remap(arg: str | None) -> bool:
-    """Tell whether a word of a command line is a remapping or sets a private parameter."""
+    """Return whether an argument is a remapping or sets a private parameter."""
     return arg is not None and _REMAPPING.fullmatch(arg) is not None
 
 
 def canonicalize_name(name: str) -> str:
-    """Take away what slashes there are too many."""
+    """Remove redundant slashes."""
     return names.canonical(name)
 
 
 def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Return the global name that a name means to a node.
+    """Resolve a name of a node.
 
     Args:
-        name: Any name; the empty one means the node's namespace.
+        name: The name; an empty one is resolved to the namespace of the node.
         namespace_: Full name of the node.
-        remappings: Resolved name to resolved name.
+        remappings: Resolved names to resolved names.
     """
     if not name:
         return namespace(namespace_)
@@ -166,11 +176,11 @@ def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | Non
 
 
 def script_resolve_name(script_name: str, name: str) -> str:
-    """Return the global name that a name means to a program that is no node.
+    """Resolve a name of a program that is not a node.
 
     Args:
-        script_name: Name that stands for the program's.
-        name: Any name.
+        script_name: Name of the program, for private names.
+        name: The name.
     """
     if not name:
         return get_ros_namespace()
@@ -182,5 +192,5 @@ def script_resolve_name(script_name: str, name: str) -> str:
 
 
 def anonymous_name(id: str) -> str:  # noqa: A002  # ROS 1's name
-    """Return a name made unique to this machine, process and moment."""
+    """Return a name with the host, process id and time appended."""
     return names.anonymous(id, socket.gethostname(), os.getpid(), time.time_ns() // 1_000_000)

@@ -1,6 +1,6 @@
-"""rosgraph.network: addresses of this machine, which programs show and log.
+"""rosgraph.network: the addresses of this machine.
 
-ROS 1's handshake and XML-RPC functions are not there: nothing here speaks them.
+The handshake and XML-RPC functions of ROS 1 are missing, since rosz does not use these protocols.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ __all__ = (
 )
 
 _NOWHERE = ("10.255.255.255", 1)
-"""No packet goes there: a socket that is only connected tells which address it would use."""
+"""No packet is sent there: connecting a UDP socket only chooses the local address."""
 
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:
-    """Return host and port of an address such as ``http://localhost:11311/``.
+    """Return host and port of a URL such as ``http://localhost:11311/``.
 
     Raises:
-        ValueError: It is no such address.
+        ValueError: The text is not such a URL.
     """
     parts = urlsplit(url)
     if not parts.hostname:
@@ -37,7 +37,7 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 
 
 def get_address_override() -> str | None:
-    """Return what ``__hostname:=``, ``__ip:=``, ``ROS_HOSTNAME`` or ``ROS_IP`` says; else None."""
+    """Return the value of ``__hostname:=``, ``__ip:=``, ``ROS_HOSTNAME`` or ``ROS_IP``, or None."""
     for word in sys.argv:
         if word.startswith(("__hostname:=", "__ip:=")):
             return word.partition(":=")[2]
@@ -45,7 +45,7 @@ def get_address_override() -> str | None:
 
 
 def get_host_name() -> str:
-    """Return what others may call this machine."""
+    """Return the name by which other machines reach this one."""
     override = get_address_override()
     if override:
         return override
@@ -54,7 +54,7 @@ def get_host_name() -> str:
 
 
 def get_local_address() -> str:
-    """Return the address that others most likely reach this machine at."""
+    """Return the address by which other machines most likely reach this one."""
     override = get_address_override()
     if override:
         return override
@@ -63,24 +63,24 @@ def get_local_address() -> str:
 
 
 def get_local_addresses() -> list[str]:
-    """Return the IPv4 addresses of this machine that can be told without further libraries."""
+    """Return the IPv4 addresses of this machine that the standard library can find."""
     found: dict[str, None] = {}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(_NOWHERE)
             found[probe.getsockname()[0]] = None
-        except OSError:  # a machine without a network
+        except OSError:  # no network
             pass
     try:
         known = socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
-    except OSError:  # a name that nobody resolves
+    except OSError:  # the name cannot be resolved
         known = []
     found.update((str(entry[4][0]), None) for entry in known)
     return [*found, *(() if "127.0.0.1" in found else ("127.0.0.1",))]
 
 
 def is_local_address(hostname: str) -> bool:
-    """Tell whether a name or address means this machine."""
+    """Return whether a name or address is that of this machine."""
     try:
         known = {str(entry[4][0]) for entry in socket.getaddrinfo(hostname, None)}
     except OSError:
@@ -91,5 +91,5 @@ def is_local_address(hostname: str) -> bool:
 
 
 def use_ipv6() -> bool:
-    """Tell whether ``ROS_IPV6`` asks for IPv6."""
+    """Return whether ``ROS_IPV6`` is on."""
     return os.environ.get("ROS_IPV6") == "on"

@@ -29,12 +29,12 @@ DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 def get_master_uri(
     env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
 ) -> str | None:
-    """Return where a master would be: ``__master:=``, or the variable, or ROS 1's default.
+    """Return the URI of the master: ``__master:=``, ``ROS_MASTER_URI`` or ROS 1's default.
 
-    Nothing of rosz goes there; programs show it.
+    Programs print it; nothing in rosz uses it.
 
     Args:
-        env: Variables; those of the process when not given.
+        env: Environment variables; those of the process when not given.
         argv: Command line; that of the process when not given.
     """
     for word in sys.argv if argv is None else argv:

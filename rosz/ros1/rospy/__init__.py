@@ -1,11 +1,24 @@
-"""rospy: the names of ROS 1's Python library over `rosz.node` (ROS wiki, rospy).
+"""rospy: ROS 1's Python client library over `rosz.node` (ROS wiki, rospy).
 
-One process is one node here, as in rospy. May import all that is below ``rosz.cli``.
+One process is one node.
 """
 
 from __future__ import annotations
 
-from rosz.ros1.rospy.absent import attribute
+import sys
+
+from rosz.ros1.exceptions import (
+    ROSException,
+    ROSInitException,
+    ROSInternalException,
+    ROSInterruptException,
+    ROSSerializationException,
+    ROSTimeMovedBackwardsException,
+    TransportException,
+    TransportInitError,
+    TransportTerminated,
+)
+from rosz.ros1.modules import attribute
 from rosz.ros1.rospy.client import (
     delete_param,
     get_master,
@@ -19,32 +32,17 @@ from rosz.ros1.rospy.client import (
     search_param,
     set_param,
     spin,
+    wait_for_message,
 )
 from rosz.ros1.rospy.core import (
-    get_node_uri,
-    get_ros_root,
-    is_shutdown,
-    on_shutdown,
-    parse_rosrpc_uri,
-    signal_shutdown,
-)
-from rosz.ros1.rospy.exceptions import (
-    ROSException,
-    ROSInitException,
-    ROSInternalException,
-    ROSInterruptException,
-    ROSSerializationException,
-    ROSTimeMovedBackwardsException,
-    TransportException,
-    TransportInitError,
-    TransportTerminated,
-)
-from rosz.ros1.rospy.logs import (
     DEBUG,
     ERROR,
     FATAL,
     INFO,
     WARN,
+    get_node_uri,
+    get_ros_root,
+    is_shutdown,
     logdebug,
     logdebug_once,
     logdebug_throttle,
@@ -66,6 +64,9 @@ from rosz.ros1.rospy.logs import (
     logwarn_once,
     logwarn_throttle,
     logwarn_throttle_identical,
+    on_shutdown,
+    parse_rosrpc_uri,
+    signal_shutdown,
 )
 from rosz.ros1.rospy.msg import AnyMsg
 from rosz.ros1.rospy.names import (
@@ -75,9 +76,8 @@ from rosz.ros1.rospy.names import (
     remap_name,
     resolve_name,
 )
-from rosz.ros1.rospy.proxy import ServiceProxy, wait_for_message, wait_for_service
 from rosz.ros1.rospy.rostime import Duration, Time, get_rostime, get_time
-from rosz.ros1.rospy.service import Service, ServiceException
+from rosz.ros1.rospy.service import Service, ServiceException, ServiceProxy, wait_for_service
 from rosz.ros1.rospy.timer import Rate, Timer, TimerEvent, sleep
 from rosz.ros1.rospy.topics import Publisher, SubscribeListener, Subscriber
 
@@ -163,12 +163,12 @@ __all__ = (
 )
 
 __getattr__ = attribute(
-    __name__,
+    "rospy",
+    sys.modules[__name__],
     {
         "Header": "rosz.msgs.std_msgs.msg",
         "MasterProxy": "rosz.ros1.rospy.msproxy",
         "Message": "rosz.message",
-        "impl": "rosz.ros1.rospy.impl",
         "msproxy": "rosz.ros1.rospy.msproxy",
         "numpy_msg": "rosz.ros1.rospy.numpy_msg",
     },

@@ -1,4 +1,4 @@
-"""What a rospy program begins with, and asks about itself and others (ROS wiki, rospy/Overview)."""
+"""rospy.client: ``init_node``, ``spin``, parameters and the master (ROS wiki, rospy/Overview)."""
 
 from __future__ import annotations
 
@@ -8,39 +8,47 @@ import threading
 import time
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rosz import names
+from rosz.errors import InvalidName, ParamError, ParamNotFound
 from rosz.node import Node
 from rosz.node.log_handlers import RosoutHandler
 from rosz.node.standard import serve_loggers
-from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.core import signal_shutdown, wait_for_shutdown
-from rosz.ros1.rospy.exceptions import ROSException, ROSInitException
-from rosz.ros1.rospy.logs import (
+from rosz.ros1.exceptions import ROSException, ROSInitException
+from rosz.ros1.rosgraph.names import myargv
+from rosz.ros1.rospy.core import (
     DEBUG,
     ERROR,
     FATAL,
     INFO,
     LEVELS,
+    SLICE,
     WARN,
-    Bridge,
+    PythonLogHandler,
+    chain_signals,
+    check_running,
+    deadline_of,
     logdebug,
     logerr,
     loginfo,
     logwarn,
+    on_shutdown,
+    signal_shutdown,
+    wait_for_shutdown,
 )
-from rosz.ros1.rospy.params import (
-    delete_param,
-    get_param,
-    get_param_cached,
-    get_param_names,
-    has_param,
-    search_param,
-    set_param,
+from rosz.ros1.rospy.names import get_namespace
+from rosz.ros1.rospy.topics import Subscriber
+from rosz.ros1.state import (
+    NO_NODE,
+    arguments,
+    context,
+    params,
+    run_hooks,
+    set_arguments,
+    state,
 )
-from rosz.ros1.rospy.signals import chain
-from rosz.ros1.rospy.state import arguments, context, run_hooks, set_arguments, state
+from rosz.time import DurationValue
 
 if TYPE_CHECKING:
     from rosz.ros1.rospy.msproxy import MasterProxy
@@ -64,10 +72,14 @@ __all__ = (
     "loginfo",
     "logwarn",
     "myargv",
+    "on_shutdown",
     "search_param",
     "set_param",
     "spin",
+    "wait_for_message",
 )
+
+_UNSET: Any = object()
 
 
 def init_node(  # noqa: PLR0917  # rospy's signature
@@ -88,15 +100,15 @@ def init_node(  # noqa: PLR0917  # rospy's signature
         argv: Command line; that of the process when not given.
         anonymous: Whether to make the name unique.
         log_level: Least level that is logged, such as ``rospy.DEBUG``.
-        disable_rostime: Accepted; programs without time to follow do not pay for it here.
-        disable_rosout: Whether to keep the log from ``/rosout``.
-        disable_signals: Whether to leave Ctrl-C and SIGTERM to the program.
-        xmlrpc_port: Accepted; there is no such port.
-        tcpros_port: Accepted; there is no such port.
+        disable_rostime: Ignored; ROS time costs nothing unless it is simulated.
+        disable_rosout: Whether to keep log messages from ``/rosout``.
+        disable_signals: Whether the program handles Ctrl-C and SIGTERM itself.
+        xmlrpc_port: Ignored; there is no such port.
+        tcpros_port: Ignored; there is no such port.
 
     Raises:
-        ValueError: The name is empty, or has a namespace in it.
-        ROSException: There is a node, made with other arguments.
+        ValueError: The name is empty, or has a namespace.
+        ROSException: The process is a node already, with other arguments.
     """
     if not name:
         raise ValueError("name must not be empty")
@@ -114,17 +126,17 @@ def init_node(  # noqa: PLR0917  # rospy's signature
             return
         if argv is not None:
             set_arguments(command)
-        node = _begin(name, anonymous=anonymous, log_level=log_level, signals=not disable_signals)
+        node = _open(name, anonymous=anonymous, log_level=log_level, signals=not disable_signals)
         state.init_call = call
     if not disable_signals:
-        chain()
+        chain_signals()
     if disable_rosout:
         for sink in node.log.handlers[:]:
             if isinstance(sink, RosoutHandler):
                 node.log.removeHandler(sink)
 
 
-def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) -> Node:
+def _open(name: str, *, anonymous: bool, log_level: int | None, signals: bool) -> Node:
     if not names.is_valid(name) or names.is_private(name):
         warnings.warn(
             f"'{name}' is not a legal ROS base name. This may cause problems with other ROS tools.",
@@ -132,13 +144,12 @@ def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) 
         )
     if anonymous and "__name" not in arguments().special:
         name = f"{name}_{os.getpid()}_{time.time_ns() // 1_000_000}"
-    shared = context()
-    node = Node(name, context=shared, handle_signals=signals)
+    node = Node(name, context=context(), handle_signals=signals)
     if log_level is not None:
         node.log.setLevel(LEVELS[log_level])
-    node.on_shutdown(_ended)
+    node.on_shutdown(_shut_down_process)
     state.node = node
-    Bridge.install(node.log.level)
+    PythonLogHandler.install(node.log.level)
     serve_loggers(node)
     waiting, state.waiting = state.waiting, []
     for act in waiting:
@@ -146,58 +157,167 @@ def _begin(name: str, *, anonymous: bool, log_level: int | None, signals: bool) 
     return node
 
 
-def _ended(reason: str) -> None:
-    """End the process's part when its node was told to end, as by a newer one of its name."""
+def _shut_down_process(reason: str) -> None:
+    """Shut down the rest of the process when its node is, as by a new node of the same name."""
     run_hooks(reason)
     if state.context is not None and not state.context.is_shutdown:
-        # Not here: this runs while the node closes, which the context would wait for.
-        end = threading.Thread(
-            target=state.context.shutdown, args=(reason,), name="rosz-rospy-end", daemon=True
+        # On another thread: the context waits for the node, whose shutdown calls this.
+        thread = threading.Thread(
+            target=state.context.shutdown, args=(reason,), name="rosz-rospy-shutdown", daemon=True
         )
-        end.start()
+        thread.start()
 
 
 def spin() -> None:
-    """Wait until the node is shut down; callbacks run on threads of their own meanwhile.
+    """Wait until the node is shut down; callbacks run on their own threads.
 
     Raises:
         ROSInitException: ``init_node`` has not been called.
     """
     if state.node is None:
-        raise ROSInitException("client code must call rospy.init_node() first")
+        raise ROSInitException(NO_NODE)
     try:
         wait_for_shutdown()
-    except KeyboardInterrupt:  # where the program has not left signals to the node
+    except KeyboardInterrupt:  # the program handles signals itself
         signal_shutdown("keyboard interrupt")
 
 
-def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return a command line without what is meant for ROS.
+def wait_for_message(
+    topic: str, topic_type: type[Any], timeout: float | DurationValue | None = None
+) -> Any:
+    """Return the next message of a topic.
 
     Args:
-        argv: The command line; that of the process when not given.
+        topic: Name of the topic.
+        topic_type: Message class.
+        timeout: Time limit in seconds; no limit when not given.
+
+    Raises:
+        ROSException: No message came in time.
+        UsageError: The timeout is not a number.
+        ROSInterruptException: The node was shut down.
     """
-    return [one for one in (sys.argv if argv is None else argv) if ":=" not in one]
+    check_running()
+    context()
+    found: list[Any] = []
+    received = threading.Event()
+
+    def receive(message: Any) -> None:
+        found.append(message)
+        received.set()
+
+    deadline = deadline_of(timeout)
+    subscriber = Subscriber(topic, topic_type, receive)
+    try:
+        while not received.wait(min(max(deadline - time.monotonic(), 0.0), SLICE)):
+            check_running()
+            if time.monotonic() >= deadline:
+                raise ROSException(f"timeout exceeded while waiting for message on topic {topic}")
+    finally:
+        subscriber.unregister()
+    return found[0]
+
+
+# The master.
 
 
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
-    """Return the topics that somebody publishes on, each with its type.
+    """Return the topics that have publishers, with their types.
 
     Args:
-        namespace: Only those in there.
+        namespace: Namespace of the topics.
     """
     topics: list[list[str]] = get_master().getPublishedTopics(namespace)[2]
     return topics
 
 
 def get_master(env: dict[str, str] | None = None) -> MasterProxy:  # noqa: ARG001
-    """Return what answers as a master would."""
+    """Return an object with the methods of ROS 1's Master API."""
     from rosz.ros1.rospy.msproxy import MasterProxy
 
     return MasterProxy()
 
 
-__getattr__ = attribute(
-    __name__,
-    {"wait_for_message": "rosz.ros1.rospy.proxy", "on_shutdown": "rosz.ros1.rospy.core"},
-)
+# Parameters (ROS wiki, rospy/Overview/Parameter Server).
+
+
+def get_param(param_name: str, default: Any = _UNSET) -> Any:
+    """Return a parameter.
+
+    Args:
+        param_name: Name of the parameter; that of a namespace returns a dictionary.
+        default: Value to return if the parameter is not set.
+
+    Raises:
+        KeyError: The parameter is not set, and there is no default.
+    """
+    if not isinstance(param_name, str) and param_name is not None:
+        if default is _UNSET:
+            raise KeyError(param_name)
+        return default
+    try:
+        return params().get(param_name or get_namespace())
+    except (ParamNotFound, InvalidName):
+        if default is not _UNSET:
+            return default
+        raise KeyError(param_name) from None
+
+
+get_param_cached = get_param
+"""Every read is a look-up in the memory of the process."""
+
+
+def set_param(param_name: str, param_value: Any) -> None:
+    """Set a parameter; a dictionary replaces everything below the name.
+
+    Raises:
+        TypeError: A parameter cannot have this value.
+    """
+    if not isinstance(param_name, str):
+        raise TypeError(f"expected a name, got {type(param_name).__name__} {param_name!r}")
+    try:
+        params().set(param_name or get_namespace(), param_value)
+    except ParamError as error:
+        raise TypeError(str(error)) from error
+
+
+def has_param(param_name: str) -> bool:
+    """Return whether a parameter, or any parameter below the name, is set."""
+    return params().has(param_name or get_namespace())
+
+
+def delete_param(param_name: str) -> None:
+    """Delete a parameter and all parameters below it.
+
+    Raises:
+        KeyError: The parameter is not set.
+    """
+    try:
+        params().delete(param_name or get_namespace())
+    except (ParamNotFound, ParamError):
+        raise KeyError(param_name) from None
+
+
+def search_param(param_name: str) -> str | None:
+    """Search a parameter in the node's namespace, then in each namespace above it.
+
+    Args:
+        param_name: Relative name.
+
+    Returns:
+        The full name of the parameter, or None if it is not set.
+
+    Raises:
+        ROSException: The name is private.
+    """
+    if not param_name:
+        return None
+    try:
+        return params().search(param_name)
+    except ParamError as error:
+        raise ROSException(str(error)) from error
+
+
+def get_param_names() -> list[str]:
+    """Return the full names of all parameters."""
+    return params().names()

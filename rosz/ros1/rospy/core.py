@@ -1,17 +1,26 @@
-"""The life of rospy's one node: whether it is there, how it ends, who is told.
+"""rospy.core: the shutdown of the node, and the log functions (ROS wiki, rospy/Overview).
 
-Everything that ``rospy.core`` is imported for in programs lies here or is shown here.
+Before ``init_node`` the log functions write to Python's logger ``rosout``, as in rospy: warnings
+and worse appear on stderr. Afterwards they write to the log of the node, and so does whatever
+the program logs to that logger and its children. The level of that logger is applied too.
 """
 
 from __future__ import annotations
 
 import atexit
+import logging
 import os
+import signal
+import threading
+import time
 from collections.abc import Callable
+from functools import partial
+from types import FrameType
+from typing import Any, Protocol
 from urllib.parse import urlparse
 
-from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.exceptions import (
+from rosz.node.signals import of_program
+from rosz.ros1.exceptions import (
     ROSException,
     ROSInitException,
     ROSInterruptException,
@@ -27,8 +36,10 @@ from rosz.ros1.rospy.names import (
     remap_name,
     resolve_name,
 )
-from rosz.ros1.rospy.state import cooperate, run_hooks, state
-from rosz.ros1.rospy.state import is_shutdown as ended
+from rosz.ros1.state import cooperate, node_uri, run_hooks, state
+from rosz.ros1.state import is_shutdown as node_is_shutdown
+from rosz.session import clamp_timeout
+from rosz.time import DurationValue
 
 __all__ = (
     "ROSException",
@@ -49,6 +60,27 @@ __all__ = (
     "is_initialized",
     "is_shutdown",
     "is_shutdown_requested",
+    "logdebug",
+    "logdebug_once",
+    "logdebug_throttle",
+    "logdebug_throttle_identical",
+    "logerr",
+    "logerr_once",
+    "logerr_throttle",
+    "logerr_throttle_identical",
+    "logfatal",
+    "logfatal_once",
+    "logfatal_throttle",
+    "logfatal_throttle_identical",
+    "loginfo",
+    "loginfo_once",
+    "loginfo_throttle",
+    "loginfo_throttle_identical",
+    "logout",
+    "logwarn",
+    "logwarn_once",
+    "logwarn_throttle",
+    "logwarn_throttle_identical",
     "on_shutdown",
     "parse_rosrpc_uri",
     "remap_name",
@@ -60,37 +92,72 @@ __all__ = (
     "signal_shutdown",
 )
 
+NO_LIMIT = 30 * 86400.0
+"""Seconds that a wait takes without a time limit; a shutdown ends it earlier."""
 
-_SLICE = 0.5
+SLICE = 0.5
+"""Seconds between two looks at the shutdown during a wait."""
+
+SHUT_DOWN = "rospy shutdown"
+"""Text of the error of a wait that a shutdown ends."""
+
+_HOOKS_TAKE = 2.0
+"""Seconds that a signal handler of the program waits for the shutdown."""
 
 atexit.register(run_hooks, "atexit")
 
 
+# The shutdown.
+
+
 def is_initialized() -> bool:
-    """Tell whether ``init_node`` has been called."""
+    """Return whether ``init_node`` has been called."""
     return state.node is not None
 
 
 def is_shutdown() -> bool:
-    """Tell whether the end has begun."""
+    """Return whether the node is shut down."""
     cooperate()
-    return ended()
+    return node_is_shutdown()
 
 
 def is_shutdown_requested() -> bool:
-    """Tell whether the end has begun; the same as `is_shutdown`."""
+    """Return whether the node is shut down; the same as `is_shutdown`."""
     return is_shutdown()
 
 
 def signal_shutdown(reason: object) -> None:
-    """End the node: hooks are called, then all that it declared is closed. Again is no error.
+    """Shut the node down: run the hooks, then close everything. Again is not an error.
 
     Args:
-        reason: Why, for the log.
+        reason: Reason for hooks and log.
     """
     run_hooks(str(reason))
     if state.context is not None:
         state.context.shutdown(str(reason))
+
+
+def chain_signals() -> None:
+    """Shut the node down before the program's own signal handlers run, as in rospy.
+
+    Only the main thread can set signal handlers; on other threads this does nothing.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for number in (signal.SIGINT, signal.SIGTERM):
+        own = of_program(number)
+        if own is not None:
+            signal.signal(number, partial(_shut_down_first, own))
+
+
+def _shut_down_first(
+    own: Callable[[int, FrameType | None], object], number: int, frame: FrameType | None
+) -> None:
+    # On another thread, since this one may hold a lock that the shutdown needs.
+    thread = threading.Thread(target=signal_shutdown, args=(f"signal-{number}",), daemon=True)
+    thread.start()
+    thread.join(_HOOKS_TAKE)
+    own(number, frame)
 
 
 def _add_hook(stage: str, hook: Callable[..., object], *late: str) -> None:
@@ -99,17 +166,17 @@ def _add_hook(stage: str, hook: Callable[..., object], *late: str) -> None:
             f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}"
         )
     with state.lock:
-        if not ended():
+        if not node_is_shutdown():
             state.hooks[stage].append(hook)
             return
     hook(*late)
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
-    """Have a function called when the node ends; now if it already has.
+    """Call a function when the node shuts down; now if it is shut down already.
 
     Raises:
-        TypeError: It cannot be called.
+        TypeError: The argument cannot be called.
     """
     _add_hook("client", h)
 
@@ -118,40 +185,68 @@ on_shutdown = add_client_shutdown_hook
 
 
 def add_preshutdown_hook(h: Callable[[str], object]) -> None:
-    """Have a function called with the reason when the node ends, after the program's own hooks.
+    """Call a function with the reason of the shutdown, after the hooks of the program.
 
     Raises:
-        TypeError: It cannot be called.
+        TypeError: The argument cannot be called.
     """
     _add_hook("preshutdown", h, "")
 
 
 def add_shutdown_hook(h: Callable[[str], object]) -> None:
-    """Have a function called with the reason when the node ends, after all other hooks.
+    """Call a function with the reason of the shutdown, after all other hooks.
 
     Raises:
-        TypeError: It cannot be called.
+        TypeError: The argument cannot be called.
     """
     _add_hook("shutdown", h, "")
 
 
+def check_running() -> None:
+    """Check that the node is not shut down.
+
+    Raises:
+        ROSInterruptException: The node is shut down.
+    """
+    if is_shutdown():
+        raise ROSInterruptException(SHUT_DOWN)
+
+
+def deadline_of(timeout: float | DurationValue | None) -> float:
+    """Return the time of ``time.monotonic()`` at which a wait ends.
+
+    Args:
+        timeout: Time limit in seconds; 30 days when not given.
+
+    Raises:
+        UsageError: The timeout is not a number.
+    """
+    if timeout is None:
+        return time.monotonic() + NO_LIMIT
+    seconds = timeout.to_sec() if isinstance(timeout, DurationValue) else timeout
+    return time.monotonic() + clamp_timeout(seconds)
+
+
 def wait_for_shutdown() -> None:
-    """Wait until the end has begun; any thread, any number of them."""
-    # In slices: a signal that Python sees right before a wait would have to wait, too.
-    while state.context is not None and not state.context.wait_for_shutdown(_SLICE):
+    """Wait until the node is shut down; any number of threads may wait."""
+    # In slices: Python would not notice a signal that comes right before a longer wait.
+    while state.context is not None and not state.context.wait_for_shutdown(SLICE):
         pass
 
 
+# The environment.
+
+
 def get_node_uri() -> str | None:
-    """Return what identifies the node's process; no address that XML-RPC could call."""
+    """Return the URI of the node, or None before ``init_node``; nothing listens there."""
     if state.node is None:
         return None
     process = state.node.process
-    return f"rosz://{process.host}:{process.pid}/"
+    return node_uri(process.zid, process.node_id, process.host)
 
 
 def get_ros_root(required: bool = False, env: dict[str, str] | None = None) -> str | None:
-    """Return ``ROS_ROOT``, which nothing here needs.
+    """Return ``ROS_ROOT``, which rosz does not use.
 
     Raises:
         ROSException: It is required, and not set.
@@ -163,56 +258,151 @@ def get_ros_root(required: bool = False, env: dict[str, str] | None = None) -> s
 
 
 def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
-    """Return host and port of a ``rosrpc://`` address.
+    """Return host and port of a ``rosrpc://`` URI.
 
     Raises:
-        ValueError: It is none.
+        ValueError: The text is not such a URI.
     """
     parts = urlparse(uri if uri.startswith("rosrpc://") else "")
     if not parts.hostname or parts.port is None:
-        raise ValueError(f"expected an address such as rosrpc://host:1234, got '{uri}'")
+        raise ValueError(f"expected a URI such as rosrpc://host:1234, got '{uri}'")
     return parts.hostname, parts.port
 
 
-def rospydebug(msg: object, *args: object) -> None:
-    """Log what only developers of rospy want to know."""
-    if state.node is not None:
-        state.node.log.child("rospy").debug(msg, *args)
-
-
-def rospyinfo(msg: object, *args: object) -> None:
-    """Log what goes as it should."""
-    if state.node is not None:
-        state.node.log.child("rospy").info(msg, *args)
-
-
-def rospywarn(msg: object, *args: object) -> None:
-    """Log what was not expected."""
-    if state.node is not None:
-        state.node.log.child("rospy").warning(msg, *args)
-
-
-def rospyerr(msg: object, *args: object) -> None:
-    """Log what failed."""
-    if state.node is not None:
-        state.node.log.child("rospy").error(msg, *args)
-
-
 def deprecated(function: Callable[..., object]) -> Callable[..., object]:
-    """Return a function as it is."""
+    """Return a function unchanged."""
     return function
 
 
-__getattr__ = attribute(
-    __name__,
-    {
-        name: "rosz.ros1.rospy.logs"
-        for level in ("debug", "info", "warn", "err", "fatal")
-        for name in (
-            f"log{level}",
-            f"log{level}_once",
-            f"log{level}_throttle",
-            f"log{level}_throttle_identical",
-        )
-    },
-)
+# The log.
+
+DEBUG, INFO, WARN, ERROR, FATAL = 1, 2, 4, 8, 16
+"""Levels of rosgraph_msgs/Log."""
+
+LEVELS = {
+    DEBUG: logging.DEBUG,
+    INFO: logging.INFO,
+    WARN: logging.WARNING,
+    ERROR: logging.ERROR,
+    FATAL: logging.CRITICAL,
+}
+"""ROS 1's levels to those of Python."""
+
+_rospy_to_logging_levels = LEVELS
+
+_BASE = "rosout"
+_CALLER = 3
+
+
+class _Log(Protocol):
+    def __call__(self, msg: object, *args: object, **kwargs: Any) -> None:
+        """Log a message."""
+
+
+class _ThrottledLog(Protocol):
+    def __call__(self, period: float, msg: object, *args: object, **kwargs: Any) -> None:
+        """Log a message at most once in a period of seconds."""
+
+
+def _write(level: int, msg: object, args: tuple[object, ...], options: dict[str, Any]) -> None:
+    """Log on behalf of the caller of the calling function."""
+    child = options.pop("logger_name", None)
+    if state.node is None:
+        for needs_node in ("once", "throttle", "throttle_identical"):
+            options.pop(needs_node, None)
+        plain = logging.getLogger(f"{_BASE}.{child}" if child else _BASE)
+        plain.log(level, msg, *args, stacklevel=_CALLER, **options)
+        return
+    _apply_python_level()
+    log = state.node.log.child(child) if child else state.node.log
+    log.log(level, msg, *args, stacklevel=_CALLER, **options)
+
+
+def _apply_python_level() -> None:
+    """Apply the level that the program has set on Python's logger ``rosout``."""
+    level = logging.getLogger(_BASE).level
+    if level != state.python_level and state.node is not None:
+        state.python_level = level
+        state.node.log.setLevel(level)
+
+
+def _log(level: int, **fixed: bool) -> _Log:
+    def log(msg: object, *args: object, **kwargs: Any) -> None:
+        _write(level, msg, args, {**kwargs, **fixed})
+
+    return log
+
+
+def _throttled(level: int, option: str) -> _ThrottledLog:
+    def log(period: float, msg: object, *args: object, **kwargs: Any) -> None:
+        _write(level, msg, args, {**kwargs, option: float(period)})
+
+    return log
+
+
+logdebug = _log(logging.DEBUG)
+loginfo = logout = _log(logging.INFO)
+logwarn = _log(logging.WARNING)
+logerr = _log(logging.ERROR)
+logfatal = _log(logging.CRITICAL)
+
+logdebug_once = _log(logging.DEBUG, once=True)
+loginfo_once = _log(logging.INFO, once=True)
+logwarn_once = _log(logging.WARNING, once=True)
+logerr_once = _log(logging.ERROR, once=True)
+logfatal_once = _log(logging.CRITICAL, once=True)
+
+logdebug_throttle = _throttled(logging.DEBUG, "throttle")
+loginfo_throttle = _throttled(logging.INFO, "throttle")
+logwarn_throttle = _throttled(logging.WARNING, "throttle")
+logerr_throttle = _throttled(logging.ERROR, "throttle")
+logfatal_throttle = _throttled(logging.CRITICAL, "throttle")
+
+logdebug_throttle_identical = _throttled(logging.DEBUG, "throttle_identical")
+loginfo_throttle_identical = _throttled(logging.INFO, "throttle_identical")
+logwarn_throttle_identical = _throttled(logging.WARNING, "throttle_identical")
+logerr_throttle_identical = _throttled(logging.ERROR, "throttle_identical")
+logfatal_throttle_identical = _throttled(logging.CRITICAL, "throttle_identical")
+
+
+def _rospy_log(level: int) -> Callable[..., None]:
+    def log(msg: object, *args: object) -> None:
+        if state.node is not None:
+            state.node.log.child("rospy").log(level, msg, *args, stacklevel=2)
+
+    return log
+
+
+rospydebug = _rospy_log(logging.DEBUG)
+rospyinfo = _rospy_log(logging.INFO)
+rospywarn = _rospy_log(logging.WARNING)
+rospyerr = _rospy_log(logging.ERROR)
+
+
+class PythonLogHandler(logging.Handler):
+    """Passes what the program logs to Python's logger ``rosout`` to the log of the node."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Pass a record on."""
+        node = state.node
+        if node is None:
+            return
+        child = record.name.removeprefix(_BASE).strip(".")
+        log = node.log.child(child) if child else node.log
+        if log.isEnabledFor(record.levelno):
+            log.handle(record)
+
+    @classmethod
+    def install(cls, level: int) -> None:
+        """Add a handler to the logger ``rosout``.
+
+        Args:
+            level: Least level that the node logs.
+        """
+        python = logging.getLogger(_BASE)
+        if not any(isinstance(handler, cls) for handler in python.handlers):
+            python.addHandler(cls())
+            python.propagate = False
+            if python.level == logging.NOTSET:
+                python.setLevel(level)
+        state.python_level = python.level

@@ -1,4 +1,4 @@
-"""Messages as rospy passes them around: of any type, and made of what a caller gave."""
+"""rospy.msg: messages of any type, and messages from the arguments of a call."""
 
 from __future__ import annotations
 
@@ -7,19 +7,18 @@ from typing import Any, ClassVar, Self
 
 from rosz.errors import EncodeError
 from rosz.message import Writable
-from rosz.ros1.rospy.absent import attribute
 from rosz.time import DurationValue, TimeValue
 
-__all__ = ("AnyMsg", "args_kwds_to_message", "encode", "in_words_of_genpy")
+__all__ = ("AnyMsg", "args_kwds_to_message", "encode", "in_words_of_genpy", "to_ros1_log")
 
 _STAMPS = (TimeValue, DurationValue)
 
 
 class AnyMsg:
-    """A message of whatever type a topic has, not decoded.
+    """A message of any type, not decoded.
 
     Attributes:
-        _buff: Its bytes: CDR, with the header of four bytes.
+        _buff: Bytes of the message in CDR, including the header of four bytes.
         _connection_header: ``type``, ``md5sum``, ``message_definition``, ``topic``, ``callerid``.
     """
 
@@ -36,11 +35,11 @@ class AnyMsg:
         self._connection_header: dict[str, str] = {}
 
     def serialize(self, buff: Writable) -> None:
-        """Write the bytes into a file-like object."""
+        """Write the bytes to a file-like object."""
         buff.write(self._buff)
 
     def deserialize(self, data: bytes) -> Self:
-        """Take bytes as they are."""
+        """Set the bytes."""
         self._buff = bytes(data)
         return self
 
@@ -48,16 +47,16 @@ class AnyMsg:
 def args_kwds_to_message(
     data_class: type[Any], args: Sequence[Any], kwds: Mapping[str, Any]
 ) -> Any:
-    """Return the message that the arguments of a ``publish`` mean.
+    """Return the message for the arguments of ``publish`` or a service call.
 
     Args:
-        data_class: Class of the topic's messages.
+        data_class: Message class.
         args: A message, or the values of all its fields.
         kwds: Values of some of its fields by name.
 
     Raises:
-        TypeError: They are neither, or of another type.
-        AttributeError: There is no such field.
+        TypeError: The arguments are neither, or the message has another type.
+        AttributeError: The message does not have such a field.
     """
     if args and kwds:
         raise TypeError("publish() can be called with arguments or keywords, but not both.")
@@ -89,10 +88,10 @@ def _by_name(data_class: type[Any], fields: Mapping[str, Any]) -> Any:
 
 
 def encode(message: Any) -> bytes:
-    """Return a message as bytes.
+    """Return the bytes of a message.
 
     Raises:
-        EncodeError: A field has a value that does not fit, said as genpy says it.
+        EncodeError: A value does not fit its field; the text is that of genpy.
     """
     try:
         payload: bytes = message._encode(message)
@@ -102,17 +101,37 @@ def encode(message: Any) -> bytes:
 
 
 def in_words_of_genpy(message: Any, error: EncodeError) -> EncodeError:
-    """Return what genpy would say of a message that cannot be encoded; the same if it is silent."""
-    from rosz.ros1.genpy.message import check_type
+    """Return the error of genpy for an invalid message; the given one if genpy accepts it."""
+    from rosz.ros1.genpy import check_type
 
     try:
         for name, kind in zip(message.__slots__, message._slot_types, strict=True):
             check_type(name, kind, getattr(message, name))
-    except EncodeError as said:
-        return said
-    except AttributeError:  # a value that is no message at all, which genpy stumbles over
+    except EncodeError as genpy_error:
+        return genpy_error
+    except AttributeError:  # genpy fails for a value that is not a message
         return error
     return error
 
 
-__getattr__ = attribute(__name__)
+def to_ros1_log(message: Any) -> Any:
+    """Convert a ROS 2 log message to ROS 1's; the topics of its node are unknown."""
+    from rosz.msgs.rcl_interfaces.msg import Log as Ros2Log
+    from rosz.msgs.rosgraph_msgs.msg import Log
+    from rosz.msgs.std_msgs.msg import Header
+
+    levels = (
+        (Ros2Log.FATAL, Log.FATAL),
+        (Ros2Log.ERROR, Log.ERROR),
+        (Ros2Log.WARN, Log.WARN),
+        (Ros2Log.INFO, Log.INFO),
+    )
+    return Log(
+        header=Header(stamp=message.stamp),
+        level=next((ours for theirs, ours in levels if message.level >= theirs), Log.DEBUG),
+        name="/" + message.name.lstrip("/").replace(".", "/"),
+        msg=message.msg,
+        file=message.file,
+        function=message.function,
+        line=message.line,
+    )

@@ -1,4 +1,4 @@
-"""Messages whose numeric sequences arrive as numpy arrays (ROS wiki, rospy_tutorials numpy)."""
+"""rospy.numpy_msg: messages with numpy arrays (ROS wiki, rospy_tutorials/Tutorials/numpy)."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ from typing import Any
 
 from rosz.errors import UsageError
 from rosz.message import ARRAY_CODES, Message, slots
-from rosz.ros1.rospy.absent import attribute
 
 __all__ = ("numpy_msg",)
 
 
 @cache
 def numpy_msg(msg_type: type[Any]) -> type[Any]:
-    """Return a class of the same messages, with numpy arrays for sequences of numbers.
+    """Return a subclass of a message class with numpy arrays for sequences of numbers.
 
-    As in rospy, sequences of octets stay ``bytes``. The class serves publishers and
-    subscribers alike; sequences in nested messages are arrays, too.
+    Nested messages have arrays too. As in rospy, sequences of octets stay ``bytes``. The class
+    works for publishers and subscribers.
 
     Args:
-        msg_type: Class of a message.
+        msg_type: Message class.
 
     Raises:
         UsageError: numpy is not installed.
@@ -43,7 +42,7 @@ def numpy_msg(msg_type: type[Any]) -> type[Any]:
 
 
 def _convert(message: Message, np: Any) -> None:
-    """Turn what a message holds of numeric sequences into arrays, in place."""
+    """Convert the numeric sequences of a message to arrays, in place."""
     for slot in slots(type(message)):
         value = getattr(message, slot.name)
         if isinstance(value, Message):
@@ -52,8 +51,5 @@ def _convert(message: Message, np: Any) -> None:
             for each in value:
                 _convert(each, np)
         elif slot.shape != "one" and slot.kind in ARRAY_CODES:
-            # Arrays of Python and numpy share their type codes, and here also the memory.
+            # Python and numpy have the same type codes; the array uses the same memory.
             setattr(message, slot.name, np.frombuffer(value, dtype=ARRAY_CODES[str(slot.kind)]))
-
-
-__getattr__ = attribute(__name__)

@@ -1,4 +1,4 @@
-"""Times, durations and the clock by rospy's names (ROS wiki, rospy/Overview/Time)."""
+"""rospy.rostime: times, durations and the clock (ROS wiki, rospy/Overview/Time)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
-from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.exceptions import ROSInitException
-from rosz.ros1.rospy.state import state
+from rosz.ros1.exceptions import ROSInitException
+from rosz.ros1.state import state
 from rosz.time import ClassicConstructor
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ __all__ = (
 
 
 class Duration(DurationMessage, metaclass=ClassicConstructor):
-    """A span of time: ``Duration(1.5)``, ``Duration(1, 500000000)``."""
+    """A duration: ``Duration(1.5)``, ``Duration(1, 500000000)``."""
 
     def __repr__(self) -> str:
         return f"rospy.Duration[{self.to_nsec()}]"
@@ -52,7 +51,7 @@ class Time(TimeMessage, metaclass=ClassicConstructor):
 
     @classmethod
     def from_seconds(cls, float_secs: float) -> Self:
-        """Return the time of so many seconds since the epoch; the older name of ``from_sec``."""
+        """Return the time of seconds since the epoch; the older name of ``from_sec``."""
         return cls.from_sec(float_secs)
 
 
@@ -68,7 +67,7 @@ def clock() -> Clock:
 
 
 def get_rostime() -> Time:
-    """Return the ROS time: wall time, or that of ``/clock`` in simulation.
+    """Return the ROS time: wall time, or the time of ``/clock`` in simulation.
 
     Raises:
         ROSInitException: ``init_node`` has not been called.
@@ -79,7 +78,7 @@ def get_rostime() -> Time:
 
 
 def get_time() -> float:
-    """Return the ROS time as float seconds.
+    """Return the ROS time in seconds.
 
     Raises:
         ROSInitException: ``init_node`` has not been called.
@@ -88,27 +87,24 @@ def get_time() -> float:
 
 
 def is_rostime_initialized() -> bool:
-    """Tell whether there is a time."""
+    """Return whether ``init_node`` has been called."""
     return state.node is not None
 
 
 def set_rostime_initialized(val: bool) -> None:
-    """Do nothing: there is a time as soon as there is a node."""
+    """Do nothing: ``init_node`` initializes the time."""
 
 
 def is_wallclock() -> bool:
-    """Tell whether time is that of the machine rather than of a simulation."""
+    """Return whether ROS time is wall time, not that of a simulation."""
     return state.node is None or not state.node.clock.simulated
 
 
 def switch_to_wallclock() -> None:
-    """Do nothing: which time a node lives in is settled by /use_sim_time when it starts."""
+    """Do nothing: ``/use_sim_time`` selects the clock when the node starts."""
 
 
 def wallsleep(duration: float) -> None:
-    """Sleep so many seconds of wall time; not at all if that is negative."""
+    """Sleep for seconds of wall time; not at all if the duration is negative."""
     if duration > 0:
         time.sleep(duration)
-
-
-__getattr__ = attribute(__name__)

@@ -1,4 +1,4 @@
-"""Services by rospy's names (ROS wiki, rospy/Overview/Services)."""
+"""rospy.service: services and their callers (ROS wiki, rospy/Overview/Services)."""
 
 from __future__ import annotations
 
@@ -8,48 +8,54 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from rosz.node import Node
+from rosz.errors import ClosedError, EncodeError, ServiceError, ServiceNotFound, WaitTimeout
+from rosz.node import Client, Node
 from rosz.node import Service as NodeService
 from rosz.node.service import Refusal
 from rosz.qos import SERVICES
-from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.msg import args_kwds_to_message, encode
+from rosz.ros1.exceptions import ROSException, ROSInterruptException
+from rosz.ros1.rospy.core import NO_LIMIT, SHUT_DOWN, SLICE, check_running, deadline_of, is_shutdown
+from rosz.ros1.rospy.msg import args_kwds_to_message, encode, in_words_of_genpy
 from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
-from rosz.ros1.rospy.state import has_node, state, when_ready
+from rosz.ros1.state import context, has_node, state, unnamed_node, when_ready
+from rosz.ros1.state import is_shutdown as node_is_shutdown
+from rosz.time import DurationValue
 from rosz.wire import format_token, gid
 
-__all__ = ("Service", "ServiceException")
+__all__ = ("Service", "ServiceException", "ServiceProxy", "wait_for_service")
 
 _THREADS = 1000
 _BUFF_SIZE = 65536
-_CALLER_SHOWS_BY = 1.0
-"""Seconds in which the graph gets to know a client whose first request overtook the news of it."""
+_CALLER_SECONDS = 1.0
+"""Seconds to wait for the token of a client whose first request came before it."""
 _LOOK_AGAIN = 0.01
+_REFUSED = "responded with an error: "
+_MISMATCH = "is not available: "
 
 ErrorHandler = Callable[[BaseException, Any, Any, Any], object]
 
 
 class ServiceException(Exception):
-    """A service call that failed."""
+    """A service call failed."""
 
     __module__ = "rospy.service"
 
 
-class ServiceEnd:
-    """What services and their callers have in common.
+class _ServiceBase:
+    """Base class of services and their callers.
 
     Args:
         name: Name of the service.
-        service_class: Its class.
+        service_class: Class of the service.
 
     Attributes:
-        resolved_name: The global name.
-        request_class: Class of its requests.
-        response_class: Class of its responses.
+        resolved_name: Full name of the service.
+        request_class: Class of the requests.
+        response_class: Class of the responses.
 
     Raises:
-        ValueError: The name is none.
-        AttributeError: The class is none of a service.
+        ValueError: The name is invalid.
+        AttributeError: The class is not that of a service.
     """
 
     def __init__(self, name: str, service_class: type[Any]) -> None:
@@ -68,39 +74,34 @@ class ServiceEnd:
 
 
 class _Server(NodeService):
-    """A server that tells who calls.
+    """A server of the node whose handler also receives the GID of the client."""
 
-    Args:
-        node: Its node.
-        service: Whom it tells.
-    """
-
-    def __init__(self, node: Node, service: Service) -> None:
-        self._service = service
+    def __init__(self, node: Node, service: Service, handler: Callable[[Any, bytes], Any]) -> None:
+        self._handle = handler
         name, kind = service.resolved_name, service.service_class
         super().__init__(node, name, kind, service.handler, SERVICES, _THREADS)
 
     def handle(self, request: Any, caller: bytes) -> Any:
-        """Have a request answered."""
-        return self._service.answer(request, caller)
+        """Return the response to a request."""
+        return self._handle(request, caller)
 
 
-class Service(ServiceEnd):
+class Service(_ServiceBase):
     """A service of this node.
 
     Args:
         name: Name of the service.
-        service_class: Its class.
-        handler: Gets a request, and returns a response, or what makes one: a list, tuple or
-            dictionary of its fields, or the value of its only one.
-        buff_size: Accepted; no buffer has to be large enough for a request here.
-        error_handler: Told instead of the log of what the handler raises: exception, class, value
-            and traceback.
+        service_class: Class of the service.
+        handler: Function of a request that returns a response; or a list, tuple or dictionary of
+            its fields; or the value of its only field.
+        buff_size: Ignored; there is no such buffer.
+        error_handler: Function to call, instead of logging, with an error of the handler: the
+            exception, its class, its value and its traceback.
 
     Raises:
-        ValueError: The name is none.
-        AttributeError: The class is none of a service.
-        ServiceException: This process has a service of that name.
+        ValueError: The name is invalid.
+        AttributeError: The class is not that of a service.
+        ServiceException: This process has a service of this name already.
     """
 
     def __init__(
@@ -115,7 +116,7 @@ class Service(ServiceEnd):
         self.handler = handler
         self.buff_size = buff_size
         self.error_handler = error_handler
-        self._over = threading.Event()
+        self._shut_down = threading.Event()
         self._service: _Server | None = None
         with state.lock:
             if self.resolved_name in state.services:
@@ -124,16 +125,16 @@ class Service(ServiceEnd):
         when_ready(self._open)
 
     def _open(self, node: Node) -> None:
-        if not self._over.is_set():
-            self._service = node.keep(_Server(node, self))
+        if not self._shut_down.is_set():
+            self._service = node.keep(_Server(node, self, self._respond))
 
     def connection_header(self, caller: bytes) -> dict[str, str]:
-        """Return what rospy calls the header of the connection that a request came on.
+        """Return the connection header of a request, in the terms of rospy.
 
         Args:
-            caller: Gid of the client.
+            caller: GID of the client.
         """
-        deadline = time.monotonic() + _CALLER_SHOWS_BY
+        deadline = time.monotonic() + _CALLER_SECONDS
         while not (name := self._name_of(caller)) and time.monotonic() < deadline:
             time.sleep(_LOOK_AGAIN)
         return {
@@ -144,22 +145,22 @@ class Service(ServiceEnd):
         }
 
     def _name_of(self, caller: bytes) -> str:
-        """Return the name of the node that a client belongs to; empty while it is not known."""
+        """Return the name of the node of a client; empty while it is unknown."""
         if self._service is None:
             return ""
         known = self._service.node.context.graph.view().clients(self.resolved_name)
         names = (token.node_name for token in known if gid(format_token(token)) == caller)
         return next(names, "")
 
-    def answer(self, request: Any, caller: bytes) -> Any:
+    def _respond(self, request: Any, caller: bytes) -> Any:
         """Return the response to a request.
 
         Args:
             request: The request.
-            caller: Gid of the client.
+            caller: GID of the client.
 
         Raises:
-            Refusal: There is none; the text is for the caller.
+            Refusal: The handler failed; the text is sent to the caller.
         """
         state.local.delivery = (request, self, caller)
         try:
@@ -168,7 +169,7 @@ class Service(ServiceEnd):
         except ServiceException as error:
             raise Refusal(f"service cannot process request: {error}") from error
         except Exception as error:
-            self._tell(error)
+            self._report(error)
             raise Refusal(f"error processing request: {error}") from error
         return response
 
@@ -189,7 +190,7 @@ class Service(ServiceEnd):
         except (AttributeError, TypeError) as error:
             raise ServiceException(f"handler {fault}: {error}") from error
 
-    def _tell(self, error: Exception) -> None:
+    def _report(self, error: Exception) -> None:
         if self.error_handler is not None:
             self.error_handler(error, type(error), error, error.__traceback__)
         elif state.node is not None:
@@ -197,13 +198,13 @@ class Service(ServiceEnd):
             state.node.log.error("Error processing request: %s\n%s", error, trace)
 
     def shutdown(self, reason: str = "") -> None:
-        """End the service; again is no error.
+        """Shut the service down; again is not an error.
 
         Args:
-            reason: Why, for the log.
+            reason: Ignored.
         """
         del reason
-        self._over.set()
+        self._shut_down.set()
         with state.lock:
             if state.services.get(self.resolved_name) is self:
                 del state.services[self.resolved_name]
@@ -211,11 +212,122 @@ class Service(ServiceEnd):
             self._service.close()
 
     def spin(self) -> None:
-        """Wait until the service or the node ends."""
-        from rosz.ros1.rospy.core import is_shutdown
-
-        while not is_shutdown() and not self._over.wait(0.5):
+        """Wait until the service or the node is shut down."""
+        while not is_shutdown() and not self._shut_down.wait(SLICE):
             pass
 
 
-__getattr__ = attribute(__name__)
+class ServiceProxy(_ServiceBase):
+    """A caller of a service, which is called like a function.
+
+    Args:
+        name: Name of the service.
+        service_class: Class of the service.
+        persistent: Ignored; a call never makes a new connection.
+        headers: Ignored; connections do not have headers of their own.
+
+    Raises:
+        ValueError: The name is invalid.
+        AttributeError: The class is not that of a service.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[Any],
+        persistent: bool = False,
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        super().__init__(name, service_class)
+        self.persistent = persistent
+        self._headers = headers
+        self._lock = threading.Lock()
+        self._client: Client | None = None
+
+    def __call__(self, *args: Any, **kwds: Any) -> Any:
+        """Call the service; see `call`."""
+        return self.call(*args, **kwds)
+
+    def call(self, *args: Any, **kwds: Any) -> Any:
+        """Send a request and wait for the response.
+
+        Args:
+            args: A request, or the values of all its fields.
+            kwds: Values of some of its fields by name.
+
+        Raises:
+            ServiceException: No node serves it, or the server responded with an error.
+            EncodeError: A value does not fit its field in the request.
+            TypeError: The arguments do not make a request.
+        """
+        request = args_kwds_to_message(self.request_class, args, kwds)
+        if node_is_shutdown():
+            raise ServiceException(f"service [{self.resolved_name}] unavailable")
+        name = self.resolved_name
+        try:
+            return self._connected().call(request)
+        except EncodeError as error:
+            raise in_words_of_genpy(request, error) from error
+        except ServiceNotFound as error:
+            _, other, why = str(error).partition(_MISMATCH)
+            text = (
+                f"unable to connect to service: {why}" if other else f"service [{name}] unavailable"
+            )
+            raise ServiceException(text) from error
+        except ServiceError as error:
+            _, refused, text = str(error).partition(_REFUSED)
+            if refused:
+                # As in rospy under Python 3, which shows the bytes; programs compare with it.
+                text = f"service [{name}] {_REFUSED}{text.encode()!r}"
+            raise ServiceException(text or str(error)) from error
+        except ClosedError as error:
+            raise ServiceException(f"service [{name}] returned no response") from error
+
+    def _connected(self) -> Client:
+        with self._lock:
+            client = self._client
+            if client is None or client.closed:
+                node = unnamed_node()
+                client = Client(node, self.resolved_name, self.service_class, SERVICES, NO_LIMIT)
+                self._client = node.keep(client)
+            return client
+
+    def wait_for_service(self, timeout: float | DurationValue | None = None) -> None:
+        """Wait until a node serves it; see `wait_for_service`."""
+        wait_for_service(self.resolved_name, timeout)
+
+    def close(self) -> None:
+        """Close the connection; another call opens a new one."""
+        with self._lock:
+            client, self._client = self._client, None
+        if client is not None:
+            client.close()
+
+
+def wait_for_service(service: str, timeout: float | DurationValue | None = None) -> None:
+    """Wait until a node serves a service.
+
+    Args:
+        service: Name of the service.
+        timeout: Time limit in seconds; no limit when not given.
+
+    Raises:
+        ROSException: No node served it in time.
+        ValueError: The timeout is 0.
+        UsageError: The timeout is not a number.
+        ROSInterruptException: The node was shut down.
+    """
+    if timeout == 0:
+        raise ValueError("timeout must be non-zero")
+    name = resolve_name(service)
+    check_running()
+    deadline = deadline_of(timeout)
+    while (left := deadline - time.monotonic()) > 0:
+        try:
+            context().graph.wait_for_service(name, min(left, SLICE))
+        except WaitTimeout:
+            continue
+        except ClosedError as error:
+            raise ROSInterruptException(SHUT_DOWN) from error
+        return
+    raise ROSException(f"timeout exceeded while waiting for service {name}")

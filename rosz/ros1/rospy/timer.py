@@ -1,66 +1,51 @@
-"""Sleeping, rates and timers in ROS time (ROS wiki, rospy/Overview/Time)."""
+"""rospy.timer: sleeping, rates and timers in ROS time (ROS wiki, rospy/Overview/Time)."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz.errors import TimeMovedBackwards
-from rosz.ros1.rospy.absent import attribute
-from rosz.ros1.rospy.exceptions import (
-    ROSInterruptException,
-    ROSTimeMovedBackwardsException,
-)
-from rosz.ros1.rospy.rostime import (
-    Duration,
-    Time,
-    clock,
-    get_rostime,
-    is_wallclock,
-    wallsleep,
-)
-from rosz.ros1.rospy.state import cooperate, state
-from rosz.ros1.rospy.state import is_shutdown as ended
+from rosz.ros1.exceptions import ROSInterruptException, ROSTimeMovedBackwardsException
+from rosz.ros1.rospy.rostime import Duration, Time, clock, get_rostime, is_wallclock, wallsleep
+from rosz.ros1.state import cooperate, is_shutdown, state
 from rosz.time import DurationValue, TimeValue
-
-if TYPE_CHECKING:
-    from rosz.time import DurationValue as AnyDuration
 
 __all__ = ("Rate", "Timer", "TimerEvent", "sleep")
 
 _SECOND = 1_000_000_000
-_ENDED = "ROS shutdown request"
-_SLEPT_OUT = 2.0
-"""Seconds of a sleep that a shutdown leaves to be slept out.
+_SHUT_DOWN = "ROS shutdown request"
+_FINISHED = 2.0
+"""Longest rest of a sleep, in seconds, that a shutdown does not interrupt.
 
-Under Python 3, rospy sleeps every sleep in wall time to its end, and programs rely on it: what
-follows their loop stops the robot. A longer rest is ended by the exception that rospy documents.
+Under Python 3, rospy finishes every sleep in wall time, and programs rely on it: the code after
+their loop stops the robot. A longer rest ends with the exception that rospy documents.
 """
 
 
-def sleep(duration: float | AnyDuration) -> None:
+def sleep(duration: float | DurationValue) -> None:
     """Sleep in ROS time.
 
     Args:
-        duration: Seconds, or a ``rospy.Duration``; nothing to sleep for if not above 0.
+        duration: Seconds, or a ``rospy.Duration``; a negative one does not sleep.
 
     Raises:
-        ROSInterruptException: The node was shut down meanwhile, and more than two seconds were
-            left to sleep, or time is simulated.
-        ROSTimeMovedBackwardsException: ROS time was set back meanwhile.
+        ROSInterruptException: The node was shut down with more than two seconds left to sleep, or
+            in simulated time.
+        ROSTimeMovedBackwardsException: ROS time was set back.
         ROSInitException: Time is simulated, and ``init_node`` has not been called.
     """
     seconds = duration.to_sec() if isinstance(duration, DurationValue) else duration
     if seconds < 0:
         return
-    in_hook = state.ender is threading.current_thread() and not state.ended.is_set()
+    in_hook = state.hook_thread is threading.current_thread() and not state.lifecycle.closed
     if state.node is None or in_hook:
-        # As in rospy: hooks that stop a robot and wait for it may do so.
+        # As in rospy, a hook may stop a robot and wait for it.
         wallsleep(seconds)
-    elif ended():
-        _sleep_out(seconds)
+    elif is_shutdown():
+        _finish_sleep(seconds)
     else:
         _sleep_ns(round(seconds * _SECOND))
 
@@ -74,26 +59,26 @@ def _sleep_ns(nanoseconds: int) -> None:
         raise ROSTimeMovedBackwardsException((error.after - error.before) / _SECOND) from error
     if slept:
         return
-    _sleep_out((nanoseconds - (time.monotonic_ns() - began)) / _SECOND)
+    _finish_sleep((nanoseconds - (time.monotonic_ns() - began)) / _SECOND)
 
 
-def _sleep_out(seconds: float) -> None:
-    """Sleep what is left of a sleep when the node is shut down."""
-    if not is_wallclock() or seconds > _SLEPT_OUT:
-        raise ROSInterruptException(_ENDED)
+def _finish_sleep(seconds: float) -> None:
+    """Sleep the rest of a sleep that the shutdown interrupts."""
+    if not is_wallclock() or seconds > _FINISHED:
+        raise ROSInterruptException(_SHUT_DOWN)
     wallsleep(seconds)
 
 
 class Rate:
-    """Hold a loop at a rate: call `sleep` at the end of each turn.
+    """Runs a loop at a rate: call `sleep` at the end of each pass.
 
     Args:
-        hz: Turns per second.
-        reset: Whether to go on, with a new period, when ROS time is set back.
+        hz: Passes per second.
+        reset: Whether to start a new period, instead of an error, when ROS time is set back.
 
     Attributes:
-        last_time: Time that the current period is counted from.
-        sleep_dur: The period.
+        last_time: Start of the current period.
+        sleep_dur: Length of the period.
 
     Raises:
         ROSInitException: ``init_node`` has not been called.
@@ -112,15 +97,15 @@ class Rate:
         return self.sleep_dur - (curr_time - self.last_time)
 
     def remaining(self) -> DurationValue:
-        """Return how long the next `sleep` would be; negative if it is late."""
+        """Return the duration of the next `sleep`; negative if it is late."""
         return self._remaining(get_rostime())
 
     def sleep(self) -> None:
-        """Sleep until the next turn is due; not at all if it already is.
+        """Sleep until the end of the period; not at all if it is over.
 
         Raises:
-            ROSInterruptException: The node was shut down meanwhile.
-            ROSTimeMovedBackwardsException: ROS time was set back, and `reset` is off.
+            ROSInterruptException: The node was shut down.
+            ROSTimeMovedBackwardsException: ROS time was set back, and `reset` is false.
         """
         now = get_rostime()
         try:
@@ -136,14 +121,14 @@ class Rate:
 
 
 class TimerEvent:
-    """When a timer was due, and when it came.
+    """The expected and real times of a timer's calls.
 
     Attributes:
-        last_expected: When the previous call was due; None at the first.
-        last_real: When it was made; None at the first.
-        current_expected: When this call was due.
-        current_real: When it was made.
-        last_duration: Seconds that the previous call took, in wall time; None at the first.
+        last_expected: Expected time of the previous call; None for the first call.
+        last_real: Real time of the previous call; None for the first call.
+        current_expected: Expected time of this call.
+        current_real: Real time of this call.
+        last_duration: Wall time of the previous call in seconds; None for the first call.
     """
 
     def __init__(
@@ -162,15 +147,15 @@ class TimerEvent:
 
 
 class Timer(threading.Thread):
-    """Call a function at each period, on this thread, until `shutdown` or the node's end.
+    """A thread that calls a function periodically until `shutdown` or the node's shutdown.
 
-    What the function raises ends the timer, as in rospy, with a traceback.
+    As in rospy, an exception of the function ends the timer with a traceback.
 
     Args:
-        period: A ``rospy.Duration``.
-        callback: Gets a `TimerEvent`.
+        period: Period as a ``rospy.Duration``.
+        callback: Function of a `TimerEvent`.
         oneshot: Whether to call it only once.
-        reset: Whether to go on when ROS time is set back.
+        reset: Whether to continue when ROS time is set back.
     """
 
     def __init__(
@@ -189,24 +174,24 @@ class Timer(threading.Thread):
         self.start()
 
     def shutdown(self) -> None:
-        """Make no more calls; one under way is not waited for."""
+        """Stop the calls; do not wait for a running one."""
         self._shutdown = True
 
     def run(self) -> None:
-        """Do the work of the thread."""
+        """Run the timer; called by the thread."""
         rate = Rate(1.0 / self._period.to_sec(), reset=self._reset)
         expected = rate.last_time + self._period
         last_expected: Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
-        while not (ended() or self._shutdown):
+        while not (is_shutdown() or self._shutdown):
             try:
                 rate.sleep()
             except ROSTimeMovedBackwardsException:
                 raise
             except ROSInterruptException:
                 return
-            if ended() or self._shutdown:
+            if is_shutdown() or self._shutdown:
                 return
             real = get_rostime()
             began = time.monotonic()
@@ -216,6 +201,3 @@ class Timer(threading.Thread):
             last_duration = time.monotonic() - began
             last_expected, last_real = expected, real
             expected += self._period
-
-
-__getattr__ = attribute(__name__)

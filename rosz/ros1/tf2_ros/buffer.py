@@ -15,8 +15,7 @@ from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
-from rosz.ros1 import tf2_geometry_msgs
-from rosz.ros1.rospy import state
+from rosz.ros1 import state, tf2_geometry_msgs
 from rosz.transforms import Buffer as Frames
 from rosz.transforms import Pose
 from rosz.transforms import StaticTransformBroadcaster as _StaticBroadcaster

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from importlib import import_module
 from typing import Any
 
 import pytest
@@ -11,7 +12,10 @@ from ros1_oracle import same
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.sensor_msgs.msg import LaserScan
 from rosz.msgs.std_msgs.msg import Header, String
-from rosz.ros1 import genpy, roslib
+from rosz.ros1 import install
+
+install()
+genpy: Any = import_module("genpy")
 
 VALUES = "[0, 1, -1, 255, 256, 2**31, 2**64, 1.5, True, 'a', b'a', None, [], [1], ['a'], (1, 2)]"
 TYPES = (
@@ -54,8 +58,8 @@ def test_messages_are_checked() -> None:
 
 def test_classes_by_name() -> None:
     assert genpy.message.get_message_class("std_msgs/String") is String
-    assert roslib.message.get_message_class("Header") is Header
-    service = roslib.message.get_service_class("std_srvs/SetBool")
+    assert genpy.message.get_message_class("Header") is Header
+    service = genpy.message.get_service_class("std_srvs/SetBool")
     assert service is not None
     assert service._type == "std_srvs/SetBool"
     assert genpy.message.get_message_class("std_msgs/Nothing") is None

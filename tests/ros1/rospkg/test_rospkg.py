@@ -10,8 +10,6 @@ import pytest
 from ros1_oracle import same
 
 from rosz.ros1 import roslib, rospkg
-from rosz.ros1.roslib import packages
-from rosz.ros1.roslib.launcher import load_manifest
 
 ARM = """<package format="2">
   <name>arm</name>
@@ -119,14 +117,14 @@ def test_package_of_a_file(tmp_path: Path) -> None:
     inside.mkdir()
     assert rospkg.get_package_name(str(inside / "run.py")) == "arm"
     assert rospkg.get_package_name("/") is None
-    assert packages.get_dir_pkg(str(inside)) == (str(tmp_path / "arm"), "arm")
-    assert packages.get_dir_pkg("/") == (None, None)
+    assert roslib.get_dir_pkg(str(inside)) == (str(tmp_path / "arm"), "arm")
+    assert roslib.get_dir_pkg("/") == (None, None)
 
 
 def test_what_rosz_ships_is_found() -> None:
     assert "std_msgs" in rospkg.RosPack().list()
     assert Path(rospkg.RosPack().get_path("std_msgs"), "msg", "String.msg").is_file()
-    assert packages.get_pkg_dir("std_msgs") == rospkg.RosPack().get_path("std_msgs")
+    assert roslib.get_pkg_dir("std_msgs") == rospkg.RosPack().get_path("std_msgs")
 
 
 def test_folders_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,21 +146,21 @@ def test_folders_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_pkg_dir_of_nothing() -> None:
-    assert packages.get_pkg_dir("no_such_thing", required=False) is None
-    with pytest.raises(packages.InvalidROSPkgException, match="'no_such_thing' not found"):
-        packages.get_pkg_dir("no_such_thing")
+    assert roslib.get_pkg_dir("no_such_thing", required=False) is None
+    with pytest.raises(roslib.InvalidROSPkgException, match="'no_such_thing' not found"):
+        roslib.get_pkg_dir("no_such_thing")
 
 
 def test_files_of_a_package(packs: rospkg.RosPack, tmp_path: Path) -> None:
     script = tmp_path / "arm" / "scripts" / "move.py"
     script.parent.mkdir()
     script.write_text("#!/usr/bin/env python\n")
-    assert packages.find_resource("arm", "move.py", rospack=packs) == [str(script)]
-    assert packages.find_node("arm", "move.py", packs) == []
+    assert roslib.find_resource("arm", "move.py", rospack=packs) == [str(script)]
+    assert roslib.find_node("arm", "move.py", packs) == []
     script.chmod(script.stat().st_mode | stat.S_IXUSR)
-    assert packages.find_node("arm", "move.py", packs) == [str(script)]
+    assert roslib.find_node("arm", "move.py", packs) == [str(script)]
     with pytest.raises(rospkg.ResourceNotFound):
-        packages.find_resource("leg", "move.py", rospack=packs)
+        roslib.find_resource("leg", "move.py", rospack=packs)
 
 
 def test_load_manifest_makes_the_code_of_a_package_importable(
@@ -171,16 +169,14 @@ def test_load_manifest_makes_the_code_of_a_package_importable(
     monkeypatch.setattr(sys, "path", list(sys.path))
     before = list(sys.path)
     for name in ("rospy", "roslib", "rosbag"):
-        load_manifest(name)
+        roslib.load_manifest(name)
     assert sys.path == before
     roslib.load_manifest("std_msgs")
     with pytest.raises(rospkg.ResourceNotFound):
         roslib.load_manifest("no_such_thing")
     code = make(tmp_path, "arm", ARM) / "src"
     code.mkdir()
-    monkeypatch.setattr(
-        "rosz.ros1.roslib.launcher.RosPack", lambda: rospkg.RosPack([str(tmp_path)])
-    )
-    load_manifest("arm")
-    load_manifest("arm")
+    monkeypatch.setattr(roslib, "RosPack", lambda: rospkg.RosPack([str(tmp_path)]))
+    roslib.load_manifest("arm")
+    roslib.load_manifest("arm")
     assert sys.path == [str(code), *before]

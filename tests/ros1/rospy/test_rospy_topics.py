@@ -69,8 +69,8 @@ def test_what_publish_takes(network: Network) -> None:
         "empty -> None",
         "not empty -> TypeError | Invalid number of arguments, args should be [] args are(1,)",
     ]
-    # Nobody listens: as in rospy no exception, but a word about it.
-    assert "a message on '/number' cannot be sent" in lines[-2]
+    # Nobody listens: as in rospy no exception, but a warning.
+    assert "a message on '/number' cannot be published" in lines[-2]
     assert lines[-1] == "unheard -> None"
 
 

@@ -1,51 +1,74 @@
-"""roslib.packages: packages and the files in them."""
+"""roslib: packages and the files in them, for programs older than rospkg (ROS wiki, roslib)."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 from rosz.packages import Package
+from rosz.ros1.modules import MODULES
 from rosz.ros1.rospkg import MANIFEST_FILE, PACKAGE_FILE, ResourceNotFound, RosPack
 
-__all__ = (
-    "MANIFEST_FILE",
-    "PACKAGE_FILE",
-    "InvalidROSPkgException",
-    "MultipleNodesException",
-    "ROSPkgException",
-    "find_node",
-    "find_resource",
-    "get_dir_pkg",
-    "get_pkg_dir",
-    "get_pkg_subdir",
-    "list_pkgs",
-    "list_pkgs_by_path",
-    "resource_file",
-)
+__all__ = ("load_manifest", "message", "names", "packages")
+
+message: ModuleType  # built by the importer, as the next two
+names: ModuleType
+packages: ModuleType
+
+TYPE_SEPARATOR = "/"
+
+_PROVIDED = frozenset({*MODULES, "rclpy", "rosbag", "roscpp", "rosconsole", "rosout"})
+"""Packages of ROS itself that are not folders here; their modules need no path."""
 
 
 class ROSPkgException(Exception):
-    """Root of the errors of packages."""
+    """Base class of the errors of packages."""
 
 
 class InvalidROSPkgException(ROSPkgException):
-    """There is no such package."""
+    """A package does not exist."""
 
 
 class MultipleNodesException(ROSPkgException):
     """A package has several executables of one name."""
 
 
+def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:  # noqa: ARG001  # ROS 1's
+    """Add the Python folders of a package and of its dependencies to ``sys.path``.
+
+    Messages do not need this: they can always be imported.
+
+    Args:
+        package_name: Package of the program.
+        bootstrap_version: Ignored.
+
+    Raises:
+        ResourceNotFound: There is no such package.
+    """
+    if package_name in _PROVIDED:
+        return
+    packs = RosPack()
+    packs.get_path(package_name)
+    folders = [
+        str(folder)
+        for name in (package_name, *packs.get_depends(package_name))
+        for folder in (Path(packs.get_path(name), "src"), Path(packs.get_path(name), "lib"))
+        if folder.is_dir()
+    ]
+    sys.path[:0] = [folder for folder in folders if folder not in sys.path]
+
+
 def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
-    """Return the folder of the package that a folder lies in, and that folder's name.
+    """Return the folder of the package that a folder lies in, and the name of that folder.
 
     Args:
         d: The folder.
 
     Returns:
-        Twice None if it lies in none.
+        None and None if it lies in no package.
     """
     here = Path(d).absolute()
     for folder in (here, *here.parents):
@@ -63,13 +86,13 @@ def get_pkg_dir(
     """Return the folder of a package.
 
     Args:
-        package: Its name.
-        required: Whether it is an error if it is not there; otherwise None is returned.
-        ros_root: Not used: there is no such folder any more.
-        ros_package_path: Where to look, instead of where the process does.
+        package: Name of the package.
+        required: Whether to raise an error if there is no such package; otherwise return None.
+        ros_root: Shown in the error.
+        ros_package_path: Folders to search instead of those of the process.
 
     Raises:
-        InvalidROSPkgException: It is not there.
+        InvalidROSPkgException: There is no such package.
     """
     paths = None if ros_package_path is None else ros_package_path.split(os.pathsep)
     try:
@@ -85,15 +108,16 @@ def get_pkg_dir(
 
 
 def get_pkg_subdir(package: str, subdir: str, required: bool = True) -> str | None:
-    """Return a folder of a package, which is made if it is not there.
+    """Return a folder of a package; create it if it does not exist.
 
     Args:
         package: Name of the package.
         subdir: Relative path of the folder.
-        required: Whether to make it, and to fail where that cannot be; otherwise None is returned.
+        required: Whether to create it, and to raise an error if there is no such package;
+            otherwise return None.
 
     Raises:
-        InvalidROSPkgException: There is no such package, or something else has that path.
+        InvalidROSPkgException: There is no such package, or the path is that of a file.
     """
     top = get_pkg_dir(package, required)
     if top is None:
@@ -113,7 +137,7 @@ def get_pkg_subdir(package: str, subdir: str, required: bool = True) -> str | No
 
 
 def resource_file(package: str, subdir: str, resource_name: str) -> str:
-    """Return the path of a file in a folder of a package; it need not be there.
+    """Return the path of a file in a folder of a package; it need not exist.
 
     Raises:
         InvalidROSPkgException: There is no such package.
@@ -143,8 +167,8 @@ def find_resource(
     Args:
         pkg: Name of the package.
         resource_name: Name of the files.
-        filter_fn: Gets a path, and tells whether it is wanted.
-        rospack: Where to look for the package.
+        filter_fn: Function of a path that returns whether to include it.
+        rospack: Packages to search; those of the process when not given.
 
     Raises:
         ResourceNotFound: There is no such package.
@@ -168,7 +192,7 @@ def list_pkgs_by_path(path: str, packages: list[str] | None = None) -> list[str]
 
     Args:
         path: The folder.
-        packages: A list to add to; a new one when not given.
+        packages: List to extend; a new one when not given.
     """
     found = [] if packages is None else packages
     found += RosPack([path]).list()

@@ -1,38 +1,57 @@
-"""genmsg.names: names of resources in packages, ``std_msgs/String``."""
+"""genmsg: names of types, and the errors of definitions, as scripts use them.
+
+The generator API of genmsg (``MsgSpec``, ``MsgContext``, ``load_msg_by_type``, …) is missing;
+``rosz.idl`` reads definitions.
+"""
 
 from __future__ import annotations
 
 import re
+from types import ModuleType
+
+from rosz.errors import DefinitionError as InvalidMsgSpec
+from rosz.errors import TypeNotFound as MsgNotFound
 
 __all__ = (
-    "PRN_SEPARATOR",
+    "EXT_MSG",
+    "EXT_SRV",
+    "HEADER",
+    "SEP",
+    "InvalidMsgSpec",
+    "MsgNotFound",
     "is_legal_resource_base_name",
     "is_legal_resource_name",
-    "normalize_package_context",
+    "names",
     "package_resource_name",
     "resource_name",
     "resource_name_base",
     "resource_name_package",
 )
 
-PRN_SEPARATOR = "/"
+names: ModuleType  # built by the importer
+
+SEP = PRN_SEPARATOR = "/"
+EXT_MSG = ".msg"
+EXT_SRV = ".srv"
+HEADER = "Header"
+
 _PARTS = 2
 _NAME = re.compile(r"[A-Za-z][\w/]*")
 _BASE = re.compile(r"[A-Za-z]\w*")
 
 
 def normalize_package_context(package_context: str) -> str:
-    """Take spaces, and slashes at the end, off the name of a package."""
+    """Strip spaces, and slashes at the end, from a package name."""
     return package_context.strip().rstrip(PRN_SEPARATOR)
 
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
-    """Put a package in front of a name, unless it is the package that asks.
+    """Return a name with its package in front, unless that is the caller's.
 
     Args:
         res_pkg_name: Package of the resource.
-        name: Its name in there.
-        my_pkg: Package that asks.
+        name: Name of the resource in its package.
+        my_pkg: Package of the caller.
     """
     return name if res_pkg_name == my_pkg else f"{res_pkg_name}{PRN_SEPARATOR}{name}"
 
@@ -43,16 +62,16 @@ def resource_name_base(name: str) -> str:
 
 
 def resource_name_package(name: str) -> str | None:
-    """Return the package of a name; None where it has none."""
+    """Return the package of a name, or None if the name has no package."""
     package, separator, _ = name.partition(PRN_SEPARATOR)
     return package if separator else None
 
 
 def package_resource_name(name: str) -> tuple[str, str]:
-    """Part a name into package, which may be empty, and name.
+    """Split a name into its package, which may be empty, and the rest.
 
     Raises:
-        ValueError: It has more than two parts.
+        ValueError: The name has more than two parts.
     """
     parts = name.split(PRN_SEPARATOR)
     if len(parts) > _PARTS:
@@ -61,10 +80,10 @@ def package_resource_name(name: str) -> tuple[str, str]:
 
 
 def is_legal_resource_name(name: str | None) -> bool:
-    """Tell whether it is a letter, followed by letters, digits, ``_`` and single slashes."""
+    """Return whether a name is a letter followed by letters, digits, ``_`` and single slashes."""
     return name is not None and _NAME.fullmatch(name) is not None and "//" not in name
 
 
 def is_legal_resource_base_name(name: str | None) -> bool:
-    """Tell whether it is a letter, followed by letters, digits and ``_``."""
+    """Return whether a name is a letter followed by letters, digits and ``_``."""
     return name is not None and _BASE.fullmatch(name) is not None

@@ -1,8 +1,10 @@
-"""The exceptions of rospy, by its names (ROS wiki, rospy/Overview/Exceptions)."""
+"""The exceptions of rospy; programs import them as ``rospy.exceptions``.
+
+They do not lie in ``rosz.ros1.rospy``, since what rospy is built on raises them too (ROS wiki,
+rospy/Overview/Exceptions).
+"""
 
 from __future__ import annotations
-
-from rosz.ros1.rospy.absent import attribute
 
 __all__ = (
     "ROSException",
@@ -18,7 +20,7 @@ __all__ = (
 
 
 class ROSException(Exception):
-    """Root of what rospy raises for its users to handle."""
+    """Base class of the errors that rospy raises for its users."""
 
 
 class ROSSerializationException(ROSException):
@@ -26,7 +28,7 @@ class ROSSerializationException(ROSException):
 
 
 class ROSInitException(ROSException):
-    """Something needs a node, and there is none."""
+    """An operation needs a node, and ``init_node`` has not been called."""
 
 
 class ROSInterruptException(ROSException, KeyboardInterrupt):
@@ -37,7 +39,7 @@ class ROSTimeMovedBackwardsException(ROSInterruptException):
     """ROS time was set back during a sleep.
 
     Attributes:
-        time: By how many seconds, negative.
+        time: The change of ROS time in seconds; negative.
     """
 
     def __init__(self, time: float) -> None:
@@ -46,23 +48,21 @@ class ROSTimeMovedBackwardsException(ROSInterruptException):
 
 
 class ROSInternalException(Exception):
-    """A fault inside; nothing raises it but code written for rospy."""
+    """An internal error; raised only by code written for rospy."""
 
 
 class TransportException(ROSInternalException):
-    """A fault of a connection; nothing raises it but code written for rospy."""
+    """An error of a connection; raised only by code written for rospy."""
 
 
 class TransportTerminated(TransportException):
-    """The other side closed a connection; nothing raises it but code written for rospy."""
+    """The peer closed a connection; raised only by code written for rospy."""
 
 
 class TransportInitError(TransportException):
-    """A connection could not be made; nothing raises it but code written for rospy."""
+    """A connection could not be made; raised only by code written for rospy."""
 
 
 for _name in __all__:
-    # Tracebacks and reprs show it as programs import it.
+    # Tracebacks and pickles use the name that programs import.
     globals()[_name].__module__ = "rospy.exceptions"
-
-__getattr__ = attribute(__name__)

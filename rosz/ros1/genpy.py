@@ -1,9 +1,15 @@
-"""genpy.message: classes by name, checks of fields, and messages from and to text."""
+"""genpy: messages, times and durations as generated ROS 1 code uses them (ROS wiki, genpy).
+
+``genpy.dynamic`` is missing: rosz compiles definitions with ``rosz.typestore``. The methods
+``serialize`` and ``deserialize`` of a message use CDR, the format of messages on the network, and
+not ROS 1's.
+"""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 from rosz.errors import DecodeError as DeserializationError
@@ -11,10 +17,10 @@ from rosz.errors import DefinitionError, TypeNotFound
 from rosz.errors import EncodeError as SerializationError
 from rosz.errors import MessageError as MessageException
 from rosz.message import Message
-from rosz.message.convert import fill_message_args, strify_message
-from rosz.ros1.genpy.rostime import Duration, Time
+from rosz.msgs.builtin_interfaces.msg import Duration, Time
 from rosz.ros1.importer import type_store
 from rosz.time import DurationValue, StampValue, TimeValue
+from rosz.time import StampValue as TVal
 
 __all__ = (
     "DeserializationError",
@@ -22,15 +28,14 @@ __all__ = (
     "Message",
     "MessageException",
     "SerializationError",
+    "TVal",
     "Time",
-    "check_type",
-    "fill_message_args",
-    "get_message_class",
-    "get_printable_message_args",
-    "get_service_class",
-    "is_simple",
-    "strify_message",
+    "message",
+    "rostime",
 )
+
+message: ModuleType  # built by the importer, as the next one
+rostime: ModuleType
 
 _SIGNED = {"byte": 8, "int8": 8, "int16": 16, "int32": 32, "int64": 64}
 _UNSIGNED = {"char": 8, "uint8": 8, "uint16": 16, "uint32": 32, "uint64": 64}
@@ -39,7 +44,7 @@ _HEADERS = frozenset({"Header", "std_msgs/Header", "roslib/Header"})
 
 
 class _FieldError(SerializationError):
-    """A value that is not of the type of its field, in genpy's words."""
+    """A value does not fit the type of its field; the text is that of genpy."""
 
     def __init__(self, field: str, reason: str) -> None:
         super().__init__("", field, reason)
@@ -49,19 +54,19 @@ class _FieldError(SerializationError):
 
 
 def is_simple(type_: str) -> bool:
-    """Tell whether a type is a number or a bool."""
+    """Return whether a type is a number or a bool."""
     return type_ in _SIGNED or type_ in _UNSIGNED or type_ in _FLOATS or type_ == "bool"
 
 
 def get_message_class(message_type: str, reload_on_error: bool = False) -> type[Any] | None:  # noqa: ARG001  # genpy's
-    """Return a message class by its name.
+    """Return the message class of a name.
 
     Args:
-        message_type: ``std_msgs/String``.
-        reload_on_error: Not needed here: definitions are read when they are asked for.
+        message_type: Type name, such as ``std_msgs/String``.
+        reload_on_error: Ignored; definitions are read when they are needed.
 
     Returns:
-        The class; None if there is none of that name.
+        The class, or None if there is no such type.
 
     Raises:
         ValueError: The name has no package.
@@ -70,7 +75,7 @@ def get_message_class(message_type: str, reload_on_error: bool = False) -> type[
 
 
 def get_service_class(service_type: str, reload_on_error: bool = False) -> type[Any] | None:  # noqa: ARG001  # genpy's
-    """Return a service class by its name; see `get_message_class`."""
+    """Return the service class of a name; see `get_message_class`."""
     return _find(service_type, type_store().service)
 
 
@@ -87,12 +92,12 @@ def _find(name: str, look: Any) -> type[Any] | None:
 
 
 def get_printable_message_args(msg: Any, buff: Any = None, prefix: str = "") -> str:
-    """Return the names of the values that a message is made of, separated by spaces.
+    """Return the names of the values in a message, separated by spaces.
 
     Args:
         msg: The message.
-        buff: A text stream to write them to instead; nothing but its content is returned then.
-        prefix: What each name begins with.
+        buff: A ``StringIO`` to append the names to; its content is returned then.
+        prefix: Prefix of each name.
     """
     text = " ".join(_leaves(msg, prefix))
     if buff is None:
@@ -114,15 +119,15 @@ def _leaves(msg: Any, prefix: str) -> list[str]:
 
 
 def check_type(field_name: str, field_type: str, field_val: Any) -> None:
-    """Check a value against the type of a field, as ROS 1 spells it.
+    """Check a value against the type of a field.
 
     Args:
-        field_name: For the error.
-        field_type: ``uint8``, ``string[]``, ``geometry_msgs/Point``, …
+        field_name: Name of the field in the error.
+        field_type: Type as ROS 1 writes it: ``uint8``, ``string[]``, ``geometry_msgs/Point``, …
         field_val: The value.
 
     Raises:
-        SerializationError: It does not fit.
+        SerializationError: The value does not fit.
     """
     if field_type.endswith("]"):
         _check_array(field_name, field_type.partition("[")[0], field_val)

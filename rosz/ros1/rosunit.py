@@ -1,4 +1,4 @@
-"""Running a test case, and writing what came of it as XML in JUnit's form."""
+"""rosunit: runs a test case and writes its results as JUnit XML (ROS wiki, rosunit)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _OUTPUT = "--gtest_output=xml:"
 
 
 class _Result(unittest.TextTestResult):
-    """Remembers every test with its time and what went wrong."""
+    """A result that records every test with its time and its errors."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -53,20 +53,20 @@ def unitrun(
     sysargs: Sequence[str] | None = None,
     coverage_packages: Sequence[str] | None = None,  # noqa: ARG001  # rosunit's
 ) -> None:
-    """Run a test case, write its results, and end the program if it failed.
+    """Run a test case, write its results, and exit the program if it failed.
 
-    Results go to the file that ``--gtest_output=xml:FILE`` names, or to
+    The results are written to the file of the option ``--gtest_output=xml:FILE``, or to
     ``<test results>/<package>/rosunit-<test_name>.xml``.
 
     Args:
-        package: The package that the test belongs to.
+        package: Package of the test.
         test_name: Name of the test.
-        test: A class of test cases, or the name of a module, class or method.
+        test: A ``TestCase`` class, or the name of a module, class or method.
         sysargs: Command line; that of the process when not given.
-        coverage_packages: Not used.
+        coverage_packages: Ignored.
 
     Raises:
-        SystemExit: With code 1, if a test failed.
+        SystemExit: A test failed; the code is 1.
     """
     words = sys.argv if sysargs is None else sysargs
     load = unittest.defaultTestLoader
@@ -84,13 +84,8 @@ def unitrun(
         sys.exit(1)
 
 
-def rosrun(
-    package: str,
-    test_name: str,
-    test: Any,
-    sysargs: Sequence[str] | None = None,
-) -> None:
-    """Run a test case in a program that is a node; see `unitrun`."""
+def rosrun(package: str, test_name: str, test: Any, sysargs: Sequence[str] | None = None) -> None:
+    """Run a test case of a program that is a node; see `unitrun`."""
     unitrun(package, test_name, test, sysargs)
 
 

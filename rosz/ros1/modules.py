@@ -1,0 +1,203 @@
+"""ROS 1's Python modules: which ones rosz has, and what to use instead of what is missing.
+
+Some submodules of ROS 1 hold names that are defined in another module here. They are not files;
+the importer builds them from `SUBMODULES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from rosz.errors import near_miss
+
+__all__ = (
+    "ELSEWHERE",
+    "MODULES",
+    "SUBMODULES",
+    "add_submodules",
+    "attribute",
+    "explain_missing",
+    "submodule",
+)
+
+MODULES = (
+    "actionlib",
+    "dynamic_reconfigure",
+    "genmsg",
+    "genpy",
+    "message_filters",
+    "rosgraph",
+    "roslib",
+    "rosmsg",
+    "rosnode",
+    "rosparam",
+    "rospkg",
+    "rospy",
+    "rosservice",
+    "rostest",
+    "rostopic",
+    "rosunit",
+    "tf",
+    "tf2_geometry_msgs",
+    "tf2_ros",
+    "tf_conversions",
+)
+"""ROS 1's Python modules, which lie beside this one."""
+
+ELSEWHERE = {"rclpy": "ros2.rclpy", "tf_transformations": "ros1.tf.transformations"}
+"""ROS 2's names, and where below ``rosz`` their modules lie."""
+
+_NAMES = (
+    "is_legal_resource_base_name is_legal_resource_name package_resource_name resource_name"
+    " resource_name_base resource_name_package"
+)
+_MESSAGE = {
+    "errors": "DeserializationError=DecodeError SerializationError=EncodeError",
+    "message": "Message",
+    "message.convert": "fill_message_args strify_message",
+    "msgs.builtin_interfaces.msg": "Duration Time",
+    "ros1.genpy": "check_type get_message_class get_printable_message_args get_service_class",
+}
+
+SUBMODULES: Mapping[str, Mapping[str, str]] = {
+    "genmsg.names": {"ros1.genmsg": f"PRN_SEPARATOR normalize_package_context {_NAMES}"},
+    "genpy.message": {
+        **_MESSAGE,
+        "ros1.genpy": f"MessageException is_simple {_MESSAGE['ros1.genpy']}",
+    },
+    "genpy.rostime": {"ros1.genpy": "Duration TVal Time"},
+    "roslib.launcher": {"ros1.roslib": "load_manifest"},
+    "roslib.message": {**_MESSAGE, "time": "TVal=StampValue"},
+    "roslib.names": {
+        "ros1.genmsg": f"PRN_SEPARATOR {_NAMES}",
+        "ros1.roslib": "TYPE_SEPARATOR",
+        "ros1.rosgraph.names": "ANYTYPE GLOBALNS PRIV_NAME REMAP SEP anonymous_name"
+        " canonicalize_name get_ros_namespace is_global is_legal_base_name is_legal_name is_private"
+        " load_mappings make_caller_id make_global_ns namespace ns_join resolve_name",
+    },
+    "roslib.packages": {
+        "ros1.roslib": "MANIFEST_FILE PACKAGE_FILE InvalidROSPkgException MultipleNodesException"
+        " ROSPkgException find_node find_resource get_dir_pkg get_pkg_dir get_pkg_subdir list_pkgs"
+        " list_pkgs_by_path resource_file"
+    },
+    "roslib.rospack": {"ros1.roslib": "list_pkgs", "ros1.rospkg": "ResourceNotFound RosPack"},
+    "rospkg.common": {"ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE ResourceNotFound"},
+    "rospkg.environment": {
+        "ros1.rospkg": "get_etc_ros_dir get_log_dir get_ros_home get_ros_package_path get_ros_paths"
+        " get_ros_root get_test_results_dir on_ros_path"
+    },
+    "rospkg.manifest": {
+        "ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE Depend Export InvalidManifest Manifest"
+        " ResourceNotFound RosDep read_manifest"
+    },
+    "rospkg.rospack": {"ros1.rospkg": "RosPack RosStack get_package_name"},
+    "rospy.exceptions": {
+        "ros1.exceptions": "ROSException ROSInitException ROSInternalException"
+        " ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException"
+        " TransportException TransportInitError TransportTerminated"
+    },
+    "rospy.impl": {},
+    "rospy.impl.rosout": {"ros1.rospy.core": "_rospy_to_logging_levels"},
+    "rospy.impl.tcpros": {"ros1.rospy.topics": "DEFAULT_BUFF_SIZE"},
+    "rospy.impl.tcpros_base": {"ros1.rospy.topics": "DEFAULT_BUFF_SIZE"},
+    "rospy.impl.tcpros_service": {
+        "ros1.rospy.service": "Service ServiceException ServiceProxy wait_for_service"
+    },
+}
+"""Submodules of ROS 1: the modules below ``rosz`` that define their names, and the names.
+
+``TVal=StampValue`` is the name ``TVal`` for ``StampValue``.
+"""
+
+_NO_MASTER = (
+    "there is no master and no XML-RPC here; rospy.get_master() answers what a master would"
+)
+_NO_TCPROS = "messages travel over Zenoh, not TCPROS; use rospy.Publisher and rospy.Subscriber"
+_REASONS = {
+    "get_registration_listeners": _NO_MASTER,
+    "get_service_manager": _NO_MASTER,
+    "get_tcpros_handler": _NO_TCPROS,
+    "get_tcpros_server_address": _NO_TCPROS,
+    "get_topic_manager": _NO_TCPROS,
+    "init_tcpros": _NO_TCPROS,
+    "QueuedConnection": _NO_TCPROS,
+    "set_node_uri": _NO_MASTER,
+    "set_service_manager": _NO_MASTER,
+    "set_topic_manager": _NO_TCPROS,
+    "start_node": "use rospy.init_node()",
+    "TCPROSHandler": _NO_TCPROS,
+    "TCPROSTransport": _NO_TCPROS,
+    "xmlrpcapi": _NO_MASTER,
+    "xmlrpcclient": _NO_MASTER,
+}
+
+
+def submodule(name: str) -> ModuleType:
+    """Build a module of `SUBMODULES`.
+
+    Args:
+        name: Full name, such as ``rospy.impl.tcpros``.
+    """
+    module = ModuleType(name, f"``{name}``: names that ROS 1's programs import from here.")
+    for home, names in SUBMODULES[name].items():
+        defined = import_module(f"rosz.{home}")
+        for each in names.split():
+            public, _, own = each.partition("=")
+            setattr(module, public, getattr(defined, own or public))
+    vars(module)["__all__"] = tuple(sorted(one for one in vars(module) if not one.startswith("_")))
+    return module
+
+
+def add_submodules(name: str) -> None:
+    """Import the built submodules of a module, as ROS 1's own modules do when they load."""
+    for one in SUBMODULES:
+        if one.rpartition(".")[0] == name:
+            import_module(one)
+
+
+def explain_missing(name: str, module: ModuleType) -> None:
+    """Make a module and its loaded submodules say what to use instead of a missing name.
+
+    Args:
+        name: Name that programs import the module by.
+        module: The module.
+    """
+    vars(module).setdefault("__getattr__", attribute(name, module, {}))
+    own = f"{module.__name__}."
+    for inner in list(vars(module).values()):
+        if isinstance(inner, ModuleType) and inner.__name__.startswith(own):
+            shown = f"{name}.{inner.__name__.removeprefix(own)}"
+            vars(inner).setdefault("__getattr__", attribute(shown, inner, {}))
+
+
+def attribute(name: str, module: ModuleType, homes: Mapping[str, str]) -> Callable[[str], Any]:
+    """Make the ``__getattr__`` of a module.
+
+    Args:
+        name: Name of the module in error texts.
+        module: The module.
+        homes: Further names of the module, and the modules that define them, which are imported
+            when the name is first used.
+
+    Returns:
+        A function that loads such a name, or raises an AttributeError that says what to use
+        instead.
+    """
+
+    def get(wanted: str) -> Any:
+        if wanted in homes:
+            home = import_module(homes[wanted])
+            value = home if home.__name__.endswith(f".{wanted}") else getattr(home, wanted)
+            setattr(module, wanted, value)
+            return value
+        text = f"module '{name}' of rosz has no attribute '{wanted}'"
+        reason = _REASONS.get(wanted)
+        if reason is None and not wanted.startswith("_"):
+            reason = near_miss(wanted, [n for n in vars(module) if not n.startswith("_")])
+            reason = reason.removeprefix("; ")
+        raise AttributeError(f"{text}; {reason}" if reason else text, name=wanted, obj=module)
+
+    return get

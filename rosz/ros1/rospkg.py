@@ -1,0 +1,423 @@
+"""rospkg: packages on the package path (documentation of rospkg), from rosz's package index.
+
+Stacks and rosdep keys are missing, since catkin packages do not have them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Container, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+from xml.etree import ElementTree as ET
+
+from rosz.errors import PackageError, PackageNotFound
+from rosz.packages import PackageIndex
+from rosz.ros1.importer import package_path
+
+__all__ = (
+    "MANIFEST_FILE",
+    "PACKAGE_FILE",
+    "InvalidManifest",
+    "Manifest",
+    "ResourceNotFound",
+    "RosPack",
+    "RosStack",
+    "get_etc_ros_dir",
+    "get_log_dir",
+    "get_package_name",
+    "get_ros_home",
+    "get_ros_package_path",
+    "get_ros_paths",
+    "get_ros_root",
+    "get_test_results_dir",
+    "on_ros_path",
+)
+
+MANIFEST_FILE = "manifest.xml"
+PACKAGE_FILE = "package.xml"
+
+_DEPENDS = (
+    "depend",
+    "buildtool_depend",
+    "build_depend",
+    "build_export_depend",
+    "buildtool_export_depend",
+    "exec_depend",
+    "run_depend",
+    "test_depend",
+)
+
+Variables = Mapping[str, str] | None
+"""Environment variables; None for those of the process."""
+
+
+class ResourceNotFound(Exception):
+    """A package is not on the package path.
+
+    Attributes:
+        ros_paths: Folders that were searched.
+    """
+
+    def __init__(self, msg: str, ros_paths: Sequence[str] | None = None) -> None:
+        super().__init__(msg)
+        self.ros_paths = ros_paths
+
+    def __str__(self) -> str:
+        lines = [str(self.args[0])]
+        lines += [f"ROS path [{i}]={path}" for i, path in enumerate(self.ros_paths or ())]
+        return "\n".join(lines)
+
+
+class InvalidManifest(Exception):
+    """A package.xml cannot be read."""
+
+
+# The environment.
+
+
+def _get(env: Variables, name: str, default: str) -> str:
+    return (os.environ if env is None else env).get(name, default)
+
+
+def get_ros_root(env: Variables = None) -> str | None:
+    """Return ``ROS_ROOT``, or None if it is not set."""
+    return (os.environ if env is None else env).get("ROS_ROOT")
+
+
+def get_ros_package_path(env: Variables = None) -> str:
+    """Return ``ROS_PACKAGE_PATH``; empty if it is not set."""
+    return _get(env, "ROS_PACKAGE_PATH", "")
+
+
+def get_ros_paths(env: Variables = None) -> list[str]:
+    """Return the folders that are searched for packages, in order.
+
+    Args:
+        env: Variables to read ``ROS_PACKAGE_PATH`` from; all folders of rosz when not given.
+    """
+    if env is None:
+        return [str(root) for root in package_path().roots]
+    return [part for part in get_ros_package_path(env).split(os.pathsep) if part]
+
+
+def get_ros_home(env: Variables = None) -> str:
+    """Return ``ROS_HOME`` or ``~/.ros``."""
+    return _get(env, "ROS_HOME", str(Path("~/.ros").expanduser()))
+
+
+def get_log_dir(env: Variables = None) -> str:
+    """Return ``ROS_LOG_DIR`` or ``log`` in ROS's home."""
+    return _get(env, "ROS_LOG_DIR", str(Path(get_ros_home(env), "log")))
+
+
+def get_test_results_dir(env: Variables = None) -> str:
+    """Return ``ROS_TEST_RESULTS_DIR`` or ``test_results`` in ROS's home."""
+    return _get(env, "ROS_TEST_RESULTS_DIR", str(Path(get_ros_home(env), "test_results")))
+
+
+def get_etc_ros_dir(env: Variables = None) -> str:
+    """Return ``ROS_ETC_DIR`` or ``/etc/ros``."""
+    return _get(env, "ROS_ETC_DIR", "/etc/ros")
+
+
+def on_ros_path(p: str, env: Variables = None) -> bool:
+    """Return whether a file or folder lies in a folder that is searched for packages."""
+    here = Path(p).resolve()
+    return any(here.is_relative_to(Path(root).resolve()) for root in get_ros_paths(env))
+
+
+# Manifests (REP 127, REP 140, REP 149).
+
+
+class Depend:
+    """A package that another package depends on."""
+
+    def __init__(self, name: str, type_: str = "package") -> None:
+        self.name = name
+        self.type = type_
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __repr__(self) -> str:
+        return self.name
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Depend) and (self.name, self.type) == (other.name, other.type)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.type))
+
+
+class RosDep:
+    """A dependency of a package that is not on the package path."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __repr__(self) -> str:
+        return self.name
+
+
+class Export:
+    """An element of the ``<export>`` section of a package.xml."""
+
+    def __init__(self, tag: str, attrs: dict[str, str], text: str) -> None:
+        self.tag = tag
+        self.attrs = attrs
+        self.str = text
+
+    def get(self, attr: str) -> str | None:
+        """Return an attribute, or None if the element does not have it."""
+        return self.attrs.get(attr)
+
+
+class Manifest:
+    """The content of a package.xml; texts that it does not give are empty."""
+
+    def __init__(
+        self, type_: str = "package", filename: str | None = None, is_catkin: bool = False
+    ) -> None:
+        self.type = type_
+        self.filename = filename
+        self.is_catkin = is_catkin
+        self.name = self.description = self.brief = self.author = self.version = ""
+        self.license = self.license_url = self.url = self.status = self.notes = ""
+        self.licenses: list[str] = []
+        self.depends: list[Depend] = []
+        self.rosdeps: list[RosDep] = []
+        self.exports: list[Export] = []
+
+    def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
+        """Return an attribute of all exported elements of a name.
+
+        Args:
+            tag: Name of the elements.
+            attr: Name of the attribute.
+            convert: Whether to replace ``${prefix}`` by the folder of the package.
+        """
+        found = [one.attrs[attr] for one in self.exports if one.tag == tag and attr in one.attrs]
+        prefix = str(Path(self.filename or "").parent)
+        return [text.replace("${prefix}", prefix) for text in found] if convert else found
+
+
+def read_manifest(folder: Path, packages: Container[str]) -> Manifest:
+    """Read the package.xml of a folder.
+
+    Args:
+        folder: Folder of the package.
+        packages: Names of the packages on the path; other dependencies become ``rosdeps``.
+
+    Raises:
+        InvalidManifest: The file cannot be read.
+    """
+    top = _parse(folder / PACKAGE_FILE)
+    manifest = Manifest(filename=str(folder / MANIFEST_FILE), is_catkin=True)
+    manifest.name = _text(top, "name")
+    manifest.version = _text(top, "version")
+    manifest.description = _text(top, "description")
+    manifest.licenses = [_content(one) for one in top.findall("license")]
+    manifest.license = ", ".join(manifest.licenses)
+    manifest.url = _text(top, "url")
+    manifest.author = ", ".join(
+        [f"Maintainer: {_person(one)}" for one in top.findall("maintainer")]
+        + [_person(one) for one in top.findall("author")]
+    )
+    names = {_content(one): None for tag in _DEPENDS for one in top.findall(tag)}
+    manifest.depends = [Depend(name) for name in names if name in packages]
+    manifest.rosdeps = [RosDep(name) for name in names if name not in packages]
+    exported = top.find("export")
+    manifest.exports = [
+        Export(one.tag, dict(one.attrib), _content(one))
+        for one in (() if exported is None else exported)
+    ]
+    return manifest
+
+
+def _parse(path: Path) -> ET.Element:
+    try:
+        return ET.parse(path).getroot()  # noqa: S314  # the user's own package
+    except (OSError, ET.ParseError) as error:
+        raise InvalidManifest(f"[{path}] cannot be read: {error}") from error
+
+
+def _content(element: ET.Element) -> str:
+    return "".join(element.itertext()).strip()
+
+
+def _text(top: ET.Element, tag: str) -> str:
+    element = top.find(tag)
+    return "" if element is None else " ".join(_content(element).split())
+
+
+def _person(element: ET.Element) -> str:
+    address = element.get("email")
+    return f"{_content(element)} <{address}>" if address else _content(element)
+
+
+# Packages.
+
+
+class RosPack:
+    """Finds packages and reads their manifests.
+
+    Args:
+        ros_paths: Folders to search; those of the process when not given.
+    """
+
+    def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
+        self._paths = None if ros_paths is None else tuple(map(Path, ros_paths))
+        self._manifests: dict[str, Manifest] = {}
+        self._caches: dict[str, Any] = {}
+
+    @classmethod
+    def get_instance(cls, ros_paths: Sequence[str] | None = None) -> Self:
+        """Return an instance that searches these folders."""
+        return cls(ros_paths)
+
+    @cached_property
+    def _index(self) -> PackageIndex:
+        return package_path() if self._paths is None else PackageIndex(self._paths)
+
+    @property
+    def ros_paths(self) -> list[str]:
+        """The folders that are searched."""
+        return [str(root) for root in self._index.roots]
+
+    def get_ros_paths(self) -> list[str]:
+        """Return the folders that are searched."""
+        return self.ros_paths
+
+    def list(self) -> list[str]:
+        """Return the names of all packages, except those with an unreadable package.xml."""
+        return self._index.names()
+
+    def get_path(self, name: str) -> str:
+        """Return the folder of a package.
+
+        Raises:
+            ResourceNotFound: There is no such package.
+            InvalidManifest: The package.xml in a folder of that name cannot be read.
+        """
+        try:
+            return str(self._index.find(name).path)
+        except PackageNotFound as error:
+            raise ResourceNotFound(name, ros_paths=self.ros_paths) from error
+        except PackageError as error:
+            raise InvalidManifest(str(error)) from error
+
+    def get_manifest(self, name: str) -> Manifest:
+        """Return the manifest of a package.
+
+        Raises:
+            ResourceNotFound: There is no such package.
+            InvalidManifest: Its package.xml cannot be read.
+        """
+        if name not in self._manifests:
+            folder = Path(self.get_path(name))
+            self._manifests[name] = read_manifest(folder, frozenset(self.list()))
+        return self._manifests[name]
+
+    def get_depends(self, name: str, implicit: bool = True) -> Sequence[str]:
+        """Return the packages on the path that a package depends on.
+
+        Args:
+            name: Name of the package.
+            implicit: Whether to include the dependencies of the dependencies.
+
+        Raises:
+            ResourceNotFound: There is no such package.
+        """
+        found = [depend.name for depend in self.get_manifest(name).depends]
+        if not implicit:
+            return found
+        known = {name: None}
+        rest = found
+        while rest:
+            one = rest.pop(0)
+            if one not in known:
+                known[one] = None
+                rest += [depend.name for depend in self.get_manifest(one).depends]
+        del known[name]
+        return list(known)
+
+    def get_depends_on(self, name: str, implicit: bool = True) -> Sequence[str]:
+        """Return the packages on the path that depend on a package; see `get_depends`.
+
+        Raises:
+            ResourceNotFound: There is no such package.
+        """
+        self.get_path(name)
+        return [
+            other
+            for other in self.list()
+            if other != name and name in self.get_depends(other, implicit)
+        ]
+
+    def get_rosdeps(self, package: str, implicit: bool = True) -> Sequence[str]:
+        """Return the dependencies of a package that are not on the path; see `get_depends`."""
+        names = [package, *(self.get_depends(package) if implicit else ())]
+        found = {dep.name: None for one in names for dep in self.get_manifest(one).rosdeps}
+        return list(found)
+
+    def stack_of(self, name: str) -> None:
+        """Return None: catkin packages do not belong to stacks.
+
+        Raises:
+            ResourceNotFound: There is no such package.
+        """
+        self.get_path(name)
+
+    def get_custom_cache(self, key: str, default: Any = None) -> Any:
+        """Return a value that the program stored with `set_custom_cache`."""
+        return self._caches.get(key, default)
+
+    def set_custom_cache(self, key: str, value: Any) -> None:
+        """Store a value for the program."""
+        self._caches[key] = value
+
+
+class RosStack:
+    """The stacks on the package path; there are none.
+
+    Args:
+        ros_paths: Folders that an error names.
+    """
+
+    def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
+        self.ros_paths = list(ros_paths or ())
+
+    @classmethod
+    def get_instance(cls, ros_paths: Sequence[str] | None = None) -> Self:
+        """Return an instance."""
+        return cls(ros_paths)
+
+    def list(self) -> Sequence[str]:
+        """Return an empty list."""
+        return []
+
+    def get_path(self, name: str) -> str:
+        """Raise an error.
+
+        Raises:
+            ResourceNotFound: Always.
+        """
+        raise ResourceNotFound(name, ros_paths=self.ros_paths)
+
+
+def get_package_name(path: str) -> str | None:
+    """Return the name of the package of a file or folder, or None if it lies in no package.
+
+    Raises:
+        InvalidManifest: The package.xml cannot be read.
+    """
+    here = Path(path).resolve()
+    for folder in (here, *here.parents):
+        manifest = folder / PACKAGE_FILE
+        if manifest.is_file():
+            return (_parse(manifest).findtext("name") or "").strip()
+        if (folder / MANIFEST_FILE).is_file():
+            return folder.name
+    return None

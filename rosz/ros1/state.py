@@ -1,0 +1,298 @@
+"""The process-wide state of the ROS 1 modules: in rospy one process is one node.
+
+No other module of rosz has process-wide state. What a program creates before ``init_node`` waits
+here for the node. Modules such as rosnode and rosparam work without a node; they use the context
+here.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rosz import remap
+from rosz.errors import ClosedError
+from rosz.lifecycle import Lifecycle
+from rosz.node import Context, Node
+from rosz.params.api import Params
+from rosz.ros1.exceptions import ROSInitException
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+
+__all__ = (
+    "NO_NODE",
+    "UNNAMED",
+    "State",
+    "arguments",
+    "context",
+    "cooperate",
+    "has_node",
+    "is_shutdown",
+    "node",
+    "node_uri",
+    "params",
+    "params_of",
+    "ready_context",
+    "run_hooks",
+    "set_arguments",
+    "state",
+    "survey",
+    "unnamed_node",
+    "when_ready",
+)
+
+NO_NODE = "client code must call rospy.init_node() first"
+"""Text of the error of functions that need the node."""
+
+UNNAMED = "/unnamed"
+"""Name of the node before ``init_node``."""
+
+_READY_SECONDS = 2.0
+
+
+class State:
+    """The variables of the process.
+
+    Attributes:
+        lock: Lock that is held while an attribute changes.
+        context: Connection to the network; None until it is needed.
+        node: The node; None before ``init_node``.
+        unnamed: Node that calls services before ``init_node``.
+        arguments: Command line of ``init_node``, or that of the process.
+        params: Parameters as seen before ``init_node``.
+        init_call: Arguments of ``init_node``, which a second call must repeat.
+        waiting: Functions to call with the node as soon as it exists, in order.
+        publishers: Shared publishers of rospy, by topic and message class.
+        subscriptions: Shared subscriptions of rospy, by topic and message class.
+        services: Services of this process, by name.
+        python_level: Level of Python's logger ``rosout`` when it was last read.
+        local: Per thread, the message that is being delivered and its origin.
+        lifecycle: Whether the shutdown hooks run or have run.
+        hooks: Shutdown hooks by stage, in order of registration.
+        hook_thread: The thread that runs the shutdown hooks.
+        is_shutdown: Whether the hooks of the program, those of the first stage, have run.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.context: Context | None = None
+        self.node: Node | None = None
+        self.unnamed: Node | None = None
+        self.arguments: remap.Arguments | None = None
+        self.params: Params | None = None
+        self.init_call: tuple[Any, ...] | None = None
+        self.waiting: list[Callable[[Node], object]] = []
+        self.publishers: dict[tuple[str, type[Any]], Any] = {}
+        self.subscriptions: dict[tuple[str, type[Any]], Any] = {}
+        self.services: dict[str, Any] = {}
+        self.python_level = 0
+        self.local = threading.local()
+        self.lifecycle = Lifecycle("the node of rospy")
+        self.hooks: dict[str, list[Callable[..., object]]] = {
+            "client": [],
+            "preshutdown": [],
+            "shutdown": [],
+        }
+        self.hook_thread: threading.Thread | None = None
+        self.is_shutdown = False
+
+
+state = State()
+"""The state of this process."""
+
+
+class _Context(Context):
+    """A context that runs rospy's shutdown hooks first, while everything still works."""
+
+    def shutdown(self, reason: str = "") -> None:
+        """Run rospy's hooks, then shut down; shutting down again is not an error."""
+        run_hooks(reason or self.reason or "atexit")
+        super().shutdown(reason)
+
+
+def run_hooks(reason: str) -> None:
+    """Run the shutdown hooks once, in order of registration.
+
+    As in rospy, the node does not count as shut down while the hooks of the program run, so they
+    may publish, call services and sleep. A second caller waits for the first.
+
+    Args:
+        reason: Reason of the shutdown: a text, or the name of a signal.
+    """
+    if reason in signal.Signals.__members__:
+        reason = f"signal-{signal.Signals[reason].value}"
+    state.lifecycle.close(lambda: _run_hooks(reason))
+
+
+def _run_hooks(reason: str) -> None:
+    state.hook_thread = threading.current_thread()
+    try:
+        for hook in state.hooks["client"]:
+            _call(hook)
+        state.is_shutdown = True
+        for hook in (*state.hooks["preshutdown"], *state.hooks["shutdown"]):
+            _call(hook, reason)
+    finally:
+        state.is_shutdown = True
+
+
+def _call(hook: Callable[..., object], *args: str) -> None:
+    try:
+        hook(*args)
+    except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+        if state.node is not None:
+            state.node.log.report(f"shutdown hook {hook!r} failed", error)
+        else:
+            sys.excepthook(type(error), error, error.__traceback__)
+
+
+def arguments() -> remap.Arguments:
+    """Return the parsed command line."""
+    if state.arguments is None:
+        state.arguments = remap.parse(sys.argv[1:])
+    return state.arguments
+
+
+def set_arguments(argv: Sequence[str]) -> None:
+    """Replace the command line of the process.
+
+    Args:
+        argv: Command line without the program name.
+    """
+    with state.lock:
+        state.arguments = remap.parse(argv)
+        if state.context is not None:
+            state.context.arguments = state.arguments
+
+
+def context() -> Context:
+    """Return the context of the process, opened on first use and closed at exit.
+
+    Raises:
+        TransportError: The session cannot be opened.
+        UsageError: An environment variable has an invalid value.
+    """
+    with state.lock:
+        if state.context is None:
+            opened = _Context()
+            opened.arguments = arguments()
+            state.context = opened
+        return state.context
+
+
+def ready_context() -> Context:
+    """Return the context once it is linked to its neighbours, or after 2 seconds.
+
+    Raises:
+        TransportError: The session cannot be opened.
+    """
+    opened = context()
+    opened.settled.wait(_READY_SECONDS)
+    return opened
+
+
+def survey() -> Survey:
+    """Return the nodes and endpoints that are alive now.
+
+    Raises:
+        TransportError: The session cannot be opened.
+        WaitTimeout: The network does not answer.
+    """
+    from rosz.introspect.survey import Survey
+
+    opened = ready_context()
+    view = opened.graph.refresh()
+    return Survey(opened.domain, view, {(p.zid, p.node_id): p for p in view.processes()})
+
+
+def node_uri(zid: str, node_id: int, host: str) -> str:
+    """Return the URI of a node.
+
+    In ROS 1 it is the address of the node's XML-RPC server. Here nothing listens there.
+
+    Args:
+        zid: Zenoh id of the session of the node.
+        node_id: Number of the node in its session.
+        host: Host name.
+    """
+    return f"rosz://{host}/{zid}/{node_id}"
+
+
+def has_node() -> bool:
+    """Return whether ``init_node`` has been called."""
+    return state.node is not None
+
+
+def node() -> Node:
+    """Return the node of this process.
+
+    Raises:
+        ROSInitException: ``init_node`` has not been called.
+    """
+    if state.node is None:
+        raise ROSInitException(NO_NODE)
+    return state.node
+
+
+def unnamed_node() -> Node:
+    """Return the node, or before ``init_node`` an anonymous node that can call services."""
+    if state.node is not None:
+        return state.node
+    with state.lock:
+        if state.unnamed is None:
+            # With a unique name: of two nodes of one name, the older one is shut down.
+            state.unnamed = Node(UNNAMED.strip("/"), anonymous=True, context=context())
+        return state.unnamed
+
+
+def params() -> Params:
+    """Return the parameters as the node sees them; as ``/unnamed`` does before ``init_node``."""
+    if state.node is not None:
+        return state.node.params
+    with state.lock:
+        if state.params is None:
+            state.params = Params(context().params, UNNAMED, arguments().resolved_remaps(UNNAMED))
+        return state.params
+
+
+def params_of(name: str) -> Params:
+    """Return the parameters as a node sees them, without remappings.
+
+    Args:
+        name: Full name of the node.
+    """
+    return Params(ready_context().params, name)
+
+
+def is_shutdown() -> bool:
+    """Return whether the node is shut down."""
+    return state.is_shutdown or (state.context is not None and state.context.is_shutdown)
+
+
+def cooperate() -> None:
+    """Record that the program checks for the shutdown, so Ctrl-C need not raise an exception.
+
+    A check made by a shutdown hook does not count.
+    """
+    if state.context is not None and not state.lifecycle.closing:
+        state.context.cooperative = True
+
+
+def when_ready(act: Callable[[Node], object]) -> None:
+    """Call a function with the node: now, or in ``init_node``; not at all after the shutdown."""
+    if is_shutdown():
+        return
+    with state.lock:
+        if state.node is None:
+            state.waiting.append(act)
+            return
+    try:
+        act(state.node)
+    except ClosedError:
+        # The shutdown may have begun since the first check.
+        if not is_shutdown():
+            raise
