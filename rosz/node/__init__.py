@@ -1,8 +1,8 @@
 """Nodes and their parts: publishers, subscriptions, services, clients, timers, a log.
 
 Other packages of rosz may also import these modules directly: `clock`, `control`, `entity`, `log`,
-`log_handlers`, `logger`, `service`, `signals` and `standard`. They serve the ROS 1 and ROS 2 names,
-and commands that would otherwise load more than they need.
+`log_handlers`, `logger`, `service`, `signals`, `standard` and `type_description`. They serve the
+ROS 1 and ROS 2 names, bags and bridges, and commands that would otherwise load more than they need.
 """
 
 from rosz.node.client import Client

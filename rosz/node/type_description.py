@@ -1,8 +1,13 @@
-"""How a type is defined, as ROS 2 describes it (REP 2016)."""
+"""How a type is defined: ROS 2's service ``get_type_description``, both sides (REP 2016)."""
 
 from __future__ import annotations
 
-from rosz.errors import RoszError
+import time
+from typing import Any
+
+import msgspec
+
+from rosz.errors import RoszError, TypeNotFound
 from rosz.idl import (
     Catalog,
     MessageSpec,
@@ -19,30 +24,131 @@ from rosz.msgs.type_description_interfaces.msg import (
     TypeSource,
 )
 from rosz.msgs.type_description_interfaces.srv import (
+    GetTypeDescription,
     GetTypeDescriptionRequest,
     GetTypeDescriptionResponse,
 )
+from rosz.node.client import Client
+from rosz.node.core import NodeCore
+from rosz.qos import SERVICES
+from rosz.session import clamp_timeout
 from rosz.typestore import TypeStore
+from rosz.wire import NO_HASH, Token
 
-__all__ = ("describe_type",)
+__all__ = ("TypeDefinition", "describe_type", "request_definition", "request_type")
+
+_SERVICE = "get_type_description"
+_TEXTS = frozenset({"msg", "srv"})
+
+
+class TypeDefinition(msgspec.Struct, frozen=True):
+    """The definition of a message or service type, as another node has it.
+
+    Attributes:
+        name: ``pkg/msg/Name`` or ``pkg/srv/Name``.
+        text: Text of the definition.
+        others: Texts of the types in it, by name.
+    """
+
+    name: str
+    text: str
+    others: dict[str, str]
+
+
+def request_definition(node: NodeCore, entity: Token, timeout: float = 10.0) -> TypeDefinition:
+    """Request the definition of an entity's type from the node that the entity belongs to.
+
+    Nodes of rosz and of ROS 2 Jazzy or later have it; those of ROS 2 Humble do not.
+
+    Args:
+        node: The node that requests it.
+        entity: Token of a publisher, subscription, service or client.
+        timeout: Time limit in seconds.
+
+    Raises:
+        WaitTimeout: The other node did not serve or did not respond in time.
+        ServiceError: The other node ended before it responded.
+        TypeNotFound: The other node has no such type, or no text of its definition.
+        ClosedError: The node is closed.
+        UsageError: The timeout is not a number.
+    """
+    name = entity.type_name
+    deadline = time.monotonic() + clamp_timeout(timeout)
+    version = "" if entity.type_hash == NO_HASH else entity.type_hash
+    service = f"{entity.node_name}/{_SERVICE}"
+    with node.keep(Client(node, service, GetTypeDescription, SERVICES, timeout)) as client:
+        client.wait_for_service(timeout)
+        left = deadline - time.monotonic()
+        response = client.call(GetTypeDescriptionRequest(name, version, True), left)
+    if not response.successful:
+        raise TypeNotFound(name, f"node '{entity.node_name}': {response.failure_reason}")
+    texts = {
+        source.type_name: source.raw_file_contents
+        for source in response.type_sources
+        if source.encoding in _TEXTS
+    }
+    if name not in texts:
+        raise TypeNotFound(name, f"node '{entity.node_name}' sent no text of its definition")
+    return TypeDefinition(name, texts.pop(name), texts)
+
+
+def request_type(node: NodeCore, entity: Token, timeout: float = 10.0) -> type[Any]:
+    """Return the class of an entity's type, compiled from the other node's definition if need be.
+
+    The class that is known here is returned if its type hash is that of the entity.
+
+    Args:
+        node: The node that needs the class.
+        entity: Token of a publisher, subscription, service or client.
+        timeout: Time limit in seconds.
+
+    Raises:
+        WaitTimeout: The other node did not serve or did not respond in time.
+        ServiceError: The other node ended before it responded.
+        TypeNotFound: The other node has no such type, or no text of its definition.
+        DefinitionError: The definition is not well-formed.
+        ClosedError: The node is closed.
+        UsageError: The timeout is not a number.
+    """
+    types, name = node.context.types, entity.type_name
+    is_service = name.split("/")[1] == "srv"
+    found: type[Any] | None
+    try:
+        found = types.service(name) if is_service else types.message(name)
+    except RoszError:
+        found = None
+    if found is not None and entity.type_hash in {NO_HASH, found._type_hash}:
+        return found
+    definition = request_definition(node, entity, timeout)
+    compile_type = types.service_from_text if is_service else types.message_from_text
+    made: type[Any] = compile_type(name, definition.text, definition.others)
+    if entity.type_hash not in {NO_HASH, made._type_hash}:
+        raise TypeNotFound(
+            name,
+            f"the definition that node '{entity.node_name}' sent has the hash"
+            f" '{made._type_hash}', expected '{entity.type_hash}'",
+        )
+    return made
 
 
 def describe_type(
     types: TypeStore, request: GetTypeDescriptionRequest
 ) -> GetTypeDescriptionResponse:
-    """Answer how a message or service type is defined.
+    """Return the response to a request for the definition of a message or service type.
 
     Args:
-        types: All that are known.
-        request: The type's name, and the hash of the version that is asked for.
+        types: The types that are known here.
+        request: The name of the type, and the hash of the version that is wanted.
 
     Returns:
-        The response; a type that is not known, or not in that version, is a failure.
+        The response; a failure if the type, or that version of it, is not known.
     """
     name = request.type_name
     _, _, kind = name.rpartition("/")[0].partition("/")
-    if kind not in {"msg", "srv"}:
-        return _failure(f"'{name}' is no type; expected the form 'pkg/msg/Name' or 'pkg/srv/Name'")
+    if kind not in _TEXTS:
+        return _failure(
+            f"'{name}' is not a type; expected the form 'pkg/msg/Name' or 'pkg/srv/Name'"
+        )
     catalog = Catalog(types.definition)
     try:
         if kind == "srv":

@@ -251,8 +251,8 @@ def test_type_description_of_a_service(asker: Node) -> None:
     ("name", "type_hash", "reason"),
     [
         ("nothing/msg/X", "", "there is no package 'nothing'"),
-        ("x", "", "'x' is no type; expected the form 'pkg/msg/Name' or 'pkg/srv/Name'"),
-        ("std_msgs/String", "", "'std_msgs/String' is no type"),
+        ("x", "", "'x' is not a type; expected the form 'pkg/msg/Name' or 'pkg/srv/Name'"),
+        ("std_msgs/String", "", "'std_msgs/String' is not a type"),
         ("std_msgs/msg/String", "RIHS01_0", "the version of 'std_msgs/msg/String' here has the"),
     ],
 )

@@ -1,8 +1,10 @@
-"""Two nodes of one name: the older gives way and says why."""
+"""Two nodes of one name: the older shuts down and says why."""
 
 from __future__ import annotations
 
+import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from network import PATIENCE, Network, eventually
@@ -61,16 +63,23 @@ def test_same_base_name_elsewhere_is_another_node(network: Network) -> None:
         network.node("king", namespace="/north"),
         network.node("king", context=network.context(domain=7)),
     ]
-    nodes[0].context.graph.wait_for_node("/north/king", PATIENCE)
-    time.sleep(0.1)  # for what must not happen there is nothing to wait for
+    seen = threading.Event()
+    nodes[0].context.graph.listen_to_processes(
+        lambda other, _: seen.set() if other.node == "/last" else None
+    )
+    network.node("last")
+    assert seen.wait(PATIENCE)  # listeners are called in order: the king has seen all the others
+    takeovers = [t for t in threading.enumerate() if t.name.startswith("rosz-takeover")]
+    assert not takeovers
     assert not any(node.is_shutdown for node in nodes)
 
 
 def test_age_counts_and_not_the_clock(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     """A newer node takes over, though the clock of its machine is behind."""
-    monkeypatch.setattr(control, "_TOGETHER", 0)
-    old = network.node("king")
-    time.sleep(0.1)  # longer than two messages take
+    with monkeypatch.context() as earlier:
+        clock = SimpleNamespace(monotonic=lambda: time.monotonic() - 10, time_ns=time.time_ns)
+        earlier.setattr(control, "time", clock)
+        old = network.node("king")
     real = time.time_ns
     monkeypatch.setattr(time, "time_ns", lambda: real() - 3600 * 10**9)
     new = network.node("king")
