@@ -84,11 +84,9 @@ def _open_store(file: Path, stack: ExitStack) -> Store:
 
 def _set_core_params(replica: Replica) -> None:
     """Set the parameters that a ROS 1 core sets, unless somebody has set them before."""
-    from rosz.launch.run.network import ReplicaStore
-    from rosz.launch.run.parameters import core_params
+    from rosz.launch.run.network import core_params, write_params
 
-    store = ReplicaStore(replica)
     known = core_params(str(uuid.uuid1()))
-    missing = {name: value for name, value in known.items() if not store.has(name)}
+    missing = {name: value for name, value in known.items() if not replica.has(name)}
     if missing:
-        store.write(missing)
+        write_params(replica, missing)

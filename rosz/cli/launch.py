@@ -133,7 +133,7 @@ def command(
     if question is not None:
         sys.stdout.write(job.answer(*question))
         return 0
-    from rosz.launch.run import MachineCall, Options, Timeouts
+    from rosz.launch.run import MachineOption, Options, Timeouts
 
     options = Options(
         screen=screen,
@@ -144,7 +144,7 @@ def command(
         verbose=verbose,
         overview=not no_summary,
         title=not disable_title,
-        machines=tuple(map(MachineCall.parse, machine or ())),
+        machines=tuple(map(MachineOption.parse, machine or ())),
         silence=seconds("--lost-after", lost_after),
         timeouts=Timeouts(
             seconds("--sigint-timeout", sigint_timeout),

@@ -12,7 +12,7 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import LaunchError, TransportError, UsageError
 from rosz.introspect.connect import command_config
-from rosz.launch.run.control import order, statuses
+from rosz.launch.run import StatusClient
 from rosz.session import Session
 
 if TYPE_CHECKING:
@@ -42,17 +42,18 @@ def control(words: Sequence[str], *, status: bool, restart: str, stop: str, as_j
             f"no launch is running: nobody answers at {environment.rendezvous}"
         ) from error
     with session:
+        client = StatusClient(session, environment.domain)
         if restart:
-            order(session, environment.domain, "restart", restart)
+            client.request("restart", restart)
         elif stop:
-            order(session, environment.domain, "stop", stop)
+            client.request("stop", stop)
         else:
-            _show(session, environment.domain, as_json=as_json)
+            _show(client, environment.domain, as_json=as_json)
     return 0
 
 
-def _show(session: Session, domain: int, *, as_json: bool) -> None:
-    before = {(launch.host, launch.pid): launch for launch in statuses(session, domain)}
+def _show(client: StatusClient, domain: int, *, as_json: bool) -> None:
+    before = {(launch.host, launch.pid): launch for launch in client.statuses()}
     if not before:
         raise LaunchError(f"no launch is running in domain {domain}")
     if as_json:
@@ -60,7 +61,7 @@ def _show(session: Session, domain: int, *, as_json: bool) -> None:
         sys.stdout.write(f"{text.decode()}\n")
         return
     time.sleep(_SAMPLE_SECONDS)
-    for launch in statuses(session, domain):
+    for launch in client.statuses():
         earlier = before.get((launch.host, launch.pid), launch)
         sys.stdout.write(table(launch, earlier))
 

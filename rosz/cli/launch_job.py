@@ -16,7 +16,7 @@ from rosz.environment import Environment, package_index
 
 if TYPE_CHECKING:
     from rosz.launch.plan import Plan
-    from rosz.launch.run import Hub, Options, Workplace
+    from rosz.launch.run import Options, RouterProcess, Workplace
     from rosz.node.context import Context
 
 __all__ = ("Job",)
@@ -102,17 +102,17 @@ class Job:
 
     def run(self, options: Options, *, wait: bool) -> int:
         """Carry the plan out."""
-        from rosz.launch.run import Hub, interrupted_by_signals, wants_hub
+        from rosz.launch.run import RouterProcess, interrupted_by_signals, needs_router
 
         plan = self.plan()
-        if not wants_hub(len(plan.nodes), self.environment, self.environ):
+        if not needs_router(len(plan.nodes), self.environment, self.environ):
             return self._carry_out(plan, options, wait=wait)
-        with interrupted_by_signals(), Hub(self.environment, self.environ) as hub:
-            self.environment, self.environ = hub.environment, hub.environ
-            return self._carry_out(plan, options, wait=wait, hub=hub)
+        with interrupted_by_signals(), RouterProcess(self.environment, self.environ) as router:
+            self.environment, self.environ = router.environment, router.environ
+            return self._carry_out(plan, options, wait=wait, router=router)
 
     def _carry_out(
-        self, plan: Plan, options: Options, *, wait: bool, hub: Hub | None = None
+        self, plan: Plan, options: Options, *, wait: bool, router: RouterProcess | None = None
     ) -> int:
         from rosz.launch.run import Network, Runner
         from rosz.node.context import Context
@@ -123,7 +123,7 @@ class Job:
             runner = Runner(
                 plan,
                 self.workplace(),
-                Network.of(context, hub),
+                Network(context, router),
                 options,
                 out=sys.stdout,
                 err=sys.stderr,

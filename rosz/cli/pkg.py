@@ -76,7 +76,7 @@ def create_package(
     ] = False,
 ) -> None:
     """Create a package in the present folder, with a message, a talker and a launch file."""
-    from rosz.launch.run.template import create, create_bare
+    from rosz.workspace import create, create_bare
 
     facts = {"description": description, "maintainer": maintainer, "license_name": license_name}
     if bare:

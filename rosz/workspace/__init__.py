@@ -1,12 +1,19 @@
-"""Checks of the packages of a workspace: what a build would have told, where nothing is built.
+"""The packages of a workspace: create them, and check them.
 
-Each check yields problems with their places; `check` runs all of them over some packages. May
-import anything up to ``rosz.ros1``.
+Nothing is built here, so `check` finds the errors that a build would report. May import anything up
+to ``rosz.ros1``.
 """
 
-from rosz.workspace.check import Checked, check
-from rosz.workspace.find import find_packages
+from rosz.workspace.check import Checked, check, find_packages
+from rosz.workspace.create import create, create_bare, write_setup
 from rosz.workspace.problem import Problem
-from rosz.workspace.setup import write_setup
 
-__all__ = ("Checked", "Problem", "check", "find_packages", "write_setup")
+__all__ = (
+    "Checked",
+    "Problem",
+    "check",
+    "create",
+    "create_bare",
+    "find_packages",
+    "write_setup",
+)

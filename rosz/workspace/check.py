@@ -1,4 +1,4 @@
-"""All checks over some packages."""
+"""Check packages: find them, run all checks, and check their interface definitions."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ from pathlib import Path
 import msgspec
 
 from rosz.environment import Environment, package_index
-from rosz.idl import Catalog
-from rosz.packages import MANIFEST, Package, PackageIndex
+from rosz.errors import DefinitionError, NotFoundError, RoszError, TypeNotFound
+from rosz.idl import Catalog, parse_action, read_definition
+from rosz.packages import MANIFEST, Package, PackageIndex, crawl
 from rosz.typestore import TypeStore
-from rosz.workspace.configs import check_configs
-from rosz.workspace.definitions import check_definitions
-from rosz.workspace.launches import check_launches
 from rosz.workspace.manifest import check_manifest
-from rosz.workspace.problem import REMEDY, Problem, error
-from rosz.workspace.scripts import check_cmake, check_scripts
+from rosz.workspace.problem import REMEDY, Problem, error, from_error
+from rosz.workspace.programs import check_cmake, check_configs, check_launches, check_scripts
 
-__all__ = ("Checked", "check")
+__all__ = ("Checked", "check", "find_packages")
+
+
+_KINDS = ("msg", "srv", "action")
 
 
 class Checked(msgspec.Struct, frozen=True):
     """A package that was checked.
 
     Attributes:
-        name: Its name, or that of its folder where it tells none.
-        path: Its folder.
-        problems: What is wrong, sorted by place.
+        name: Name of the package, or of its folder if package.xml has none.
+        path: Folder of the package.
+        problems: Problems sorted by place.
     """
 
     name: str
@@ -39,12 +40,12 @@ class Checked(msgspec.Struct, frozen=True):
 def check(
     folders: Sequence[Path], environment: Environment, environ: Mapping[str, str]
 ) -> Iterator[Checked]:
-    """Check packages, and yield each as it is done.
+    """Check packages, and yield the result of each as soon as it is known.
 
     Args:
-        folders: The packages.
-        environment: Settings; says where other packages are.
-        environ: Variables, for launch files and .cfg files.
+        folders: Folders of the packages.
+        environment: Settings, with the path of other packages.
+        environ: Environment variables for launch files and .cfg files.
     """
     packages = {folder: _package(folder) for folder in folders}
     good = [package.path for package in packages.values() if package is not None]
@@ -57,7 +58,7 @@ def check(
         problems += check_scripts(folder)
         problems += check_cmake(folder)
         if package is not None:
-            problems += check_definitions(folder, package.name, catalog)
+            problems += _check_definitions(folder, package.name, catalog)
             problems += check_launches(folder, index, variables)
             if not problems or all(one.level == "warning" for one in problems):
                 problems += check_configs(folder, variables)
@@ -66,32 +67,99 @@ def check(
 
 
 def _each_remedy_once(problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Leave out what is mended by a command that has been told: a script that many nodes start."""
-    told: set[str] = set()
+    """Yield problems, but each command that fixes one only once, as for a script of many nodes."""
+    shown: set[str] = set()
     for problem in problems:
         _, _, command = problem.text.partition(REMEDY)
-        if not command or command not in told:
+        if not command or command not in shown:
             yield problem
-        told.add(command)
+        shown.add(command)
 
 
 def _package(folder: Path) -> Package | None:
-    """Return the package in a folder; none if its package.xml cannot be read, which is told."""
+    """Return the package in a folder, or None if its package.xml cannot be read."""
     found = PackageIndex([folder]).packages()
     return found[0] if found else None
 
 
 def _same_names(packages: Sequence[Package]) -> dict[Path, list[Problem]]:
-    """Return, for each package that has the name of another one, that it does."""
+    """Return the problems of packages that have the same name, by folder."""
     by_name: defaultdict[str, list[Path]] = defaultdict(list)
     for package in packages:
         by_name[package.name].append(package.path)
     return {
         path: [
-            error(path / MANIFEST, f"another package is called '{name}', too: {other}")
+            error(path / MANIFEST, f"another package is also called '{name}': {other}")
             for other in paths
             if other != path
         ]
         for name, paths in by_name.items()
         for path in paths
     }
+
+
+def _check_definitions(folder: Path, package: str, catalog: Catalog) -> Iterator[Problem]:
+    """Yield the problems of the interface definitions of a package."""
+    for kind in _KINDS:
+        for file in sorted((folder / kind).glob(f"*.{kind}")):
+            name = f"{package}/{kind}/{file.stem}"
+            try:
+                if kind == "msg":
+                    catalog.message(name)
+                elif kind == "srv":
+                    catalog.service(name)
+                else:
+                    _check_action(name, file, catalog)
+            except RoszError as fault:
+                yield from_error(fault, file)
+
+
+def _check_action(name: str, file: Path, catalog: Catalog) -> None:
+    definition = read_definition(file)
+    action = parse_action(name, definition.text, definition.path)
+    for part in (action.goal, action.result, action.feedback):
+        for field in part.fields:
+            if field.type.primitive:
+                continue
+            try:
+                catalog.message(field.type.base)
+            except TypeNotFound as fault:
+                reason = f"type '{field.type.written}' of field '{field.name}': {fault}"
+                raise DefinitionError(reason, str(file), field.line, field.column) from fault
+
+
+def find_packages(words: Sequence[str], cwd: Path, index: PackageIndex) -> list[Path]:
+    """Return the folders of packages, sorted, each once.
+
+    Args:
+        words: Folders that are or contain packages, or names of packages. Without any, all packages
+            of the workspace around the current folder.
+        cwd: Current folder.
+        index: All known packages.
+
+    Raises:
+        NotFoundError: If there is no such package, or no package at all.
+    """
+    found = sorted({folder.resolve() for folder in _folders(words, cwd, index)})
+    if not found:
+        where = ", ".join(words) or f"the workspace around {cwd}"
+        raise NotFoundError(
+            f"no package in {where}: expected folders with a {MANIFEST} below src; make one with"
+            " 'rosz pkg create NAME'"
+        )
+    return found
+
+
+def _folders(words: Sequence[str], cwd: Path, index: PackageIndex) -> Iterator[Path]:
+    if not words:
+        for root in Environment.read({}, cwd).package_roots:
+            yield from crawl(root)
+    for word in words:
+        path = cwd / word
+        if path.is_file():
+            raise NotFoundError(f"'{word}' is a file; expected a package or a folder")
+        if path.is_dir():
+            inside = path / "src" if (path / "src").is_dir() else path
+            yield from crawl(path if (path / MANIFEST).is_file() else inside)
+        else:
+            yield index.find(word).path

@@ -1,4 +1,4 @@
-"""Checking a package.xml (REP 127, REP 140, REP 149)."""
+"""Check a package.xml (REP 127, REP 140, REP 149)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class _Tag(msgspec.Struct):
 
 
 def check_manifest(folder: Path) -> Iterator[Problem]:
-    """Yield what is wrong in the package.xml of a package."""
+    """Yield the problems of the package.xml of a package."""
     path = folder / MANIFEST
     try:
         tags = _read(path.read_bytes())
@@ -54,11 +54,11 @@ def check_manifest(folder: Path) -> Iterator[Problem]:
 
 
 def _check_tags(path: Path, root: _Tag, tags: list[_Tag]) -> Iterator[Problem]:
-    """Yield what is missing, or there too often."""
+    """Yield the tags that are missing, or present too often."""
     counts = Counter(tag.name for tag in tags)
     for name in _REQUIRED:
         if not counts[name]:
-            # rospack and rosz find a package by its name alone; catkin wants all of them.
+            # rospack and rosz need only the name of a package; catkin requires all of them.
             make = error if name == "name" else warning
             yield make(path, f"<{name}> is missing", root.line, root.column)
     for name in _ONCE:
@@ -84,7 +84,7 @@ def _check_value(path: Path, folder: Path, tag: _Tag) -> Iterator[Problem]:
         yield error(path, f"<{tag.name}> is empty", tag.line, tag.column)
     elif tag.name == "name":
         if not _NAME.fullmatch(text):
-            reason = f"'{text}' is no good name: use lower-case letters, digits and '_'"
+            reason = f"'{text}' is not a good name: use lower-case letters, digits and '_'"
             yield warning(path, reason, tag.line, tag.column)
         if text != folder.name:
             reason = f"the package is called '{text}', its folder '{folder.name}'"
@@ -97,7 +97,7 @@ def _check_value(path: Path, folder: Path, tag: _Tag) -> Iterator[Problem]:
 
 
 def _read(data: bytes) -> list[_Tag]:
-    """Return the root and its children, with their texts and places."""
+    """Return the root and its children, with their text and position."""
     parser = expat.ParserCreate()
     tags: list[_Tag] = []
     open_tags: list[_Tag] = []

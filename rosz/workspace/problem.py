@@ -1,4 +1,4 @@
-"""Something wrong in a package, and where."""
+"""The problems that checks find in packages."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from rosz.errors import SourceError
 __all__ = ("REMEDY", "Problem", "error", "from_error", "warning")
 
 REMEDY = "; run: "
-"""What stands before the command that mends a problem."""
+"""Text before the command that fixes a problem."""
 
 
 class Problem(msgspec.Struct, frozen=True, order=True):
-    """Something wrong in a package, or likely to be.
+    """A problem in a package.
 
     Attributes:
-        path: The file or folder.
-        line: 1-based line, 0 for the whole file.
-        column: 1-based column, 0 where unknown.
+        path: Path of the file or folder.
+        line: 1-based line, or 0 for the whole file.
+        column: 1-based column, or 0 if unknown.
         level: ``error``, or ``warning`` for what still works with rosz.
-        text: What is wrong and what to do.
+        text: Description of the problem, and what to do.
     """
 
     path: str
@@ -39,17 +39,17 @@ class Problem(msgspec.Struct, frozen=True, order=True):
 
 
 def error(path: Path, text: str, line: int = 0, column: int = 0) -> Problem:
-    """Return a problem that keeps something from working."""
+    """Return a problem that prevents something from working."""
     return Problem(str(path), line, column, "error", text)
 
 
 def warning(path: Path, text: str, line: int = 0, column: int = 0) -> Problem:
-    """Return a problem that something else than rosz may have with the file."""
+    """Return a problem that programs other than rosz may have with the file."""
     return Problem(str(path), line, column, "warning", text)
 
 
 def from_error(fault: Exception, path: Path) -> Problem:
-    """Return what an exception says as a problem of a file; its own place counts if it has one."""
+    """Return the problem that an exception describes, at its own place if it has one."""
     if isinstance(fault, SourceError):
         return Problem(fault.path, fault.line, fault.column, "error", fault.reason)
     return error(path, str(fault))

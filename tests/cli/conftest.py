@@ -12,7 +12,7 @@ import pytest
 from network import Network, Program
 
 from rosz.launch.run.command import TAG
-from rosz.launch.run.family import kill_family
+from rosz.launch.run.host import ProcessTree
 from rosz.msgs.geometry_msgs.msg import Point, Pose, PoseStamped, Twist
 from rosz.msgs.std_msgs.msg import Header, String
 from rosz.node import Node
@@ -59,6 +59,6 @@ def launch(network: Network) -> Iterator[Start]:
             program.send(signal.SIGTERM)
         with suppress(subprocess.TimeoutExpired):
             program.process.wait(10)
-    kill_family(tag)  # what is left would keep the pipes open
+    ProcessTree(tag).kill()  # what is left would keep the pipes open
     for program in programs:
         program.close()

@@ -19,9 +19,9 @@ from network import PATIENCE, Network
 from rosz.cli.complete import complete, expand, split_line
 from rosz.cli.grammar import _HELPERS, _WORDS, _commands
 from rosz.introspect.shells import COMMANDS as ALIASES
-from rosz.launch.run.template import create
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_srvs.srv import SetBool
+from rosz.workspace import create
 
 from .shell import Shell
 

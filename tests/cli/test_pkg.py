@@ -57,8 +57,8 @@ def test_names_that_are_none(tmp_path: Path, name: str) -> None:
     done = rosz(tmp_path, "pkg", "create", name)
     assert done.returncode == 2
     assert done.stderr == (
-        f"rosz: '{name}' is no name of a package; expected lower-case letters, digits and '_', a"
-        " letter first\n"
+        f"rosz: '{name}' is not a valid package name; expected lower-case letters, digits and"
+        " '_', a letter first\n"
     )
     assert list(tmp_path.iterdir()) == []
 

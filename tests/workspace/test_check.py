@@ -8,9 +8,8 @@ import pytest
 
 from rosz.environment import Environment
 from rosz.errors import NotFoundError, UsageError
-from rosz.launch.run.template import create
 from rosz.packages import PackageIndex
-from rosz.workspace import check, find_packages, write_setup
+from rosz.workspace import check, create, find_packages, write_setup
 
 ROOT = str(Path(__file__).parents[2])
 
@@ -63,7 +62,7 @@ MANIFEST = (
         (MANIFEST.replace("1.0.0", "1"), "warning: version is '1'; expected three numbers"),
         (MANIFEST.replace("a@b", "a"), "warning: <maintainer> has no email"),
         (MANIFEST.replace("MIT", " "), "error: <license> is empty"),
-        (MANIFEST.replace("demo", "Demo"), "warning: 'Demo' is no good name"),
+        (MANIFEST.replace("demo", "Demo"), "warning: 'Demo' is not a good name"),
         (MANIFEST.replace("demo", "other"), "warning: the package is called 'other', its folder"),
         (MANIFEST.replace('"2"', '"9"'), "1:1: error: format is '9'; expected one of 1, 2, 3"),
         (MANIFEST.format("<name>demo</name>"), "error: <name> is there 2 times"),
@@ -117,8 +116,8 @@ def test_manifests(workspace: Path, text: str, expected: str) -> None:
             '#!/usr/bin/env python3\nprint "x"\n',
             "demo/scripts/a.py:2:1: error: this is Python 2 (print without parentheses)",
         ),
-        ("scripts/a.py!", "#!/bin/sh\nx = (\n", "demo/scripts/a.py:2:5: error: no valid Python"),
-        ("scripts/a.py!", "x = 1\n", "demo/scripts/a.py:1:1: warning: no first line says"),
+        ("scripts/a.py!", "#!/bin/sh\nx = (\n", "demo/scripts/a.py:2:5: error: not valid Python"),
+        ("scripts/a.py!", "x = 1\n", "demo/scripts/a.py:1:1: warning: its first line names no"),
         ("scripts/a!", "x = 1\n", "demo/scripts/a:1:1: error: executable, but neither"),
         ("scripts/a!", "#!/nowhere/sh\n", "demo/scripts/a:1:1: error: its interpreter '/nowhere/s"),
         ("scripts/a!", "#!\n", "demo/scripts/a:1:1: error: '#!' names no interpreter"),
@@ -132,13 +131,13 @@ def test_manifests(workspace: Path, text: str, expected: str) -> None:
             "#!/usr/bin/env python3\r\nx = 1\r\n",
             "demo/scripts/a.py:1: warning: lines end as on Windows",
         ),
-        ("src/lib.py", "x = \0\n", "demo/src/lib.py: error: no valid Python"),
+        ("src/lib.py", "x = \0\n", "demo/src/lib.py: error: not valid Python"),
         (
             "CMakeLists.txt",
             "project(demo)\nadd_executable(talker src/talker.cpp)\n",
             "demo/CMakeLists.txt:2: warning: 'talker' is C++",
         ),
-        ("cfg/A.cfg!", "ParameterGenerator(\n", "demo/cfg/A.cfg:1:19: error: no valid Python"),
+        ("cfg/A.cfg!", "ParameterGenerator(\n", "demo/cfg/A.cfg:1:19: error: not valid Python"),
     ],
 )
 def test_faults(workspace: Path, name: str, text: str, expected: str) -> None:
@@ -193,7 +192,7 @@ def test_two_packages_of_one_name(workspace: Path) -> None:
     folder = create(workspace / "src", "twin")
     text = (folder / "package.xml").read_text().replace("<name>twin", "<name>demo")
     (folder / "package.xml").write_text(text)
-    found = [line for line in problems(workspace) if "another package is called 'demo'" in line]
+    found = [line for line in problems(workspace) if "another package is also called 'demo'" in line]
     assert len(found) == 2
 
 
@@ -218,7 +217,7 @@ def test_files_of_catkin_stay(workspace: Path) -> None:
     (written,) = write_setup(workspace, {"bash": "true\n"})
     assert write_setup(workspace, {"bash": "true\n"}) == [written]
     written.write_text("# catkin's\n")
-    with pytest.raises(UsageError, match="is catkin's and stays"):
+    with pytest.raises(UsageError, match="was written by catkin and is kept"):
         write_setup(workspace, {"bash": "true\n"})
     assert written.read_text() == "# catkin's\n"
 

@@ -1,41 +1,44 @@
-"""Carrying launch plans out: parameters, processes, their output and their end.
+"""Run launch plans: parameters, processes, their output and their end.
 
-`Runner` takes a plan and a `Network`; ``order`` and ``statuses`` speak to a launch that runs. May
-import floors 0 to 5. Programs that are no part of the launch process: `relay`.
+`Runner` takes a plan and a `Network`; a `StatusClient` sends requests to running launches. May
+import floors 0 to 5. Public modules, which start-up needs alone: `command`, `agent`, `control`,
+`host` and `network`. `relay` is a program, which runs beside the launch.
 """
 
 from rosz.launch.run.command import Command, Workplace, run_command
-from rosz.launch.run.control import LaunchStatus, NodeStatus, order, statuses
-from rosz.launch.run.host import Child, Host, Job
-from rosz.launch.run.hub import Hub, wants_hub
-from rosz.launch.run.machines import MachineCall
-from rosz.launch.run.network import GraphReadiness, Network
-from rosz.launch.run.parameters import ParamStore, core_params
-from rosz.launch.run.process import Readiness, Timeouts
+from rosz.launch.run.control import LaunchStatus, NodeStatus, StatusClient
+from rosz.launch.run.host import Child, Host, ProcessSpec, ProcessTree
+from rosz.launch.run.loop import interrupted_by_signals
+from rosz.launch.run.machines import MachineOption
+from rosz.launch.run.network import (
+    Network,
+    RouterProcess,
+    core_params,
+    needs_router,
+    write_params,
+)
 from rosz.launch.run.runner import Options, Runner
-from rosz.launch.run.stopping import interrupted_by_signals
+from rosz.launch.run.supervisor import Timeouts
 
 __all__ = (
     "Child",
     "Command",
-    "GraphReadiness",
     "Host",
-    "Hub",
-    "Job",
     "LaunchStatus",
-    "MachineCall",
+    "MachineOption",
     "Network",
     "NodeStatus",
     "Options",
-    "ParamStore",
-    "Readiness",
+    "ProcessSpec",
+    "ProcessTree",
+    "RouterProcess",
     "Runner",
+    "StatusClient",
     "Timeouts",
     "Workplace",
     "core_params",
     "interrupted_by_signals",
-    "order",
+    "needs_router",
     "run_command",
-    "statuses",
-    "wants_hub",
+    "write_params",
 )

@@ -1,8 +1,8 @@
-"""The far side of a launch: started by ssh, spoken to over its pipes, and by nobody else.
+"""The agent of a launch on another machine, started by ssh and connected by its pipes.
 
-It starts and ends processes as the launch itself does on its own machine, and keeps their logs
-here. It ends, and they with it, when the launch says so by closing the pipe, when the launch or
-the link dies, and when nothing was heard for too long.
+It starts and ends processes as the launch does on its own machine, and keeps their logs there. It
+ends them and itself when the launch closes the pipe, when the launch or the connection dies, and
+when no message arrives for too long.
 """
 
 from __future__ import annotations
@@ -21,20 +21,19 @@ import msgspec
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.run.command import Workplace
-from rosz.launch.run.family import kill_family, usage
-from rosz.launch.run.folder import RunFolder
-from rosz.launch.run.host import Child, LocalHost
+from rosz.launch.run.host import Child, LocalHost, ProcessTree, Usage
 from rosz.launch.run.loop import Loop, Timer
-from rosz.launch.run.output import Output
-from rosz.launch.run.pipe import Lines, Outbox
+from rosz.launch.run.output import Output, RunFolder
 from rosz.launch.run.protocol import (
     PROTOCOL,
+    AgentVersion,
+    AgentWarning,
     Exited,
     Gone,
-    Hello,
+    LineReader,
     Measure,
     Measured,
-    Notice,
+    MessageWriter,
     Ready,
     Refused,
     Request,
@@ -49,28 +48,32 @@ from rosz.session import first_listening, is_listening
 
 __all__ = ("serve",)
 
-_LOOK_SECONDS = 0.02
-_SETUP_SECONDS = 60.0
-_REACH_SECONDS = 1.0
-_FLUSH_SECONDS = 1.0
+_CHECK_INTERVAL = 0.02
+_SETUP_TIMEOUT = 60.0
+_CONNECT_TIMEOUT = 1.0
+_CLOSE_TIMEOUT = 1.0
 
 
 class Agent:
     """The processes of one launch on this machine.
 
     Args:
-        requests: Where the launch's words come from.
-        answers: Where ours go.
-        screens: What the nodes' output comes from, by the descriptor that they write to.
-        environ: Variables of this process.
+        requests: Reader of the launch's requests.
+        reports: Descriptor for reports to the launch.
+        screens: Standard output (1) or error (2) of nodes, by the descriptor to read it from.
+        environ: Environment variables of this process.
     """
 
     def __init__(
-        self, requests: Lines, answers: int, screens: Mapping[int, int], environ: dict[str, str]
+        self,
+        requests: LineReader,
+        reports: int,
+        screens: Mapping[int, int],
+        environ: dict[str, str],
     ) -> None:
         self._loop = Loop()
         self._requests = requests
-        self._outbox = Outbox(answers, lambda: self._loop.post(self._listen))
+        self._writer = MessageWriter(reports)
         self._screens = screens
         self._environ = environ
         self._decoder = msgspec.json.Decoder(Request)
@@ -78,59 +81,60 @@ class Agent:
         self._output: Output | None = None
         self._host: LocalHost | None = None
         self._children: dict[int, Child] = {}
-        self._patience: Timer | None = None
+        self._timeout: Timer | None = None
         self._ending = False
 
     def run(self) -> None:
-        """Work until the launch, or the link to it, ends."""
+        """Run until the launch, or the connection to it, ends."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
             signal.signal(number, lambda *_: self._loop.post(self._end))
-        self._outbox.send(Hello(PROTOCOL, rosz_version(), socket.gethostname()))
-        self._loop.watch(self._requests.fd, self._heard)
-        self._listen()
-        self._expect()
+        self._writer.send(AgentVersion(PROTOCOL, rosz_version(), socket.gethostname()))
+        self._loop.watch(self._requests.fd, self._read_requests)
+        self._watch_screens()
+        self._restart_timeout()
         try:
             self._loop.run()
         finally:
             if self._setup is not None:
-                kill_family(self._setup.tag)
+                ProcessTree(self._setup.tag).kill()
             if self._output is not None:
                 self._output.close()
             for fd, sink in self._screens.items():
                 self._show(fd, sink)
-            self._outbox.close(_FLUSH_SECONDS)
+            self._writer.close(_CLOSE_TIMEOUT)
             self._loop.close()
 
-    def _heard(self) -> None:
+    def _read_requests(self) -> None:
         for line in self._requests.read():
-            self._obey(self._decoder.decode(line))
+            self._handle(self._decoder.decode(line))
         if self._requests.ended:
             self._end()
         else:
-            self._expect()
+            self._restart_timeout()
 
-    def _expect(self) -> None:
-        """End when nothing more is heard for too long."""
-        if self._patience is not None:
-            self._patience.cancel()
-        seconds = self._setup.silence if self._setup else _SETUP_SECONDS
-        self._patience = self._loop.later(seconds, self._end)
+    def _restart_timeout(self) -> None:
+        """End when no further message arrives in time."""
+        if self._timeout is not None:
+            self._timeout.cancel()
+        seconds = self._setup.silence if self._setup else _SETUP_TIMEOUT
+        self._timeout = self._loop.later(seconds, self._end)
 
-    def _listen(self) -> None:
-        """Pass on what nodes write to the screen, unless too much of it waits already."""
+    def _watch_screens(self) -> None:
         for fd, sink in self._screens.items():
             self._loop.unwatch(fd)
             self._loop.watch(fd, partial(self._show, fd, sink))
 
     def _show(self, fd: int, sink: int) -> None:
+        """Send output of nodes to the launch, and pause if too much of it waits."""
         with suppress(BlockingIOError):
             data = os.read(fd, 65536)
-            self._outbox.send(Shown(sink, data))
-        if self._outbox.full:
+            self._writer.send(Shown(sink, data))
+        if self._writer.full:
             for other in self._screens:
                 self._loop.unwatch(other)
+            self._writer.when_free(lambda: self._loop.post(self._watch_screens))
 
-    def _obey(self, request: Request) -> None:
+    def _handle(self, request: Request) -> None:
         if isinstance(request, Setup):
             self._set_up(request)
         elif isinstance(request, Start):
@@ -146,18 +150,11 @@ class Agent:
         self._setup = setup
         self._environ["ROS_DOMAIN_ID"] = str(setup.domain)
         environment = Environment.read(self._environ)
-        reaches = _reaches(environment, setup, self._environ.get("SSH_CONNECTION", ""))
-        if reaches and not _is_linked(environment):
+        reaches = _find_launch(environment, setup, self._environ.get("SSH_CONNECTION", ""))
+        if reaches and not _has_connection(environment):
             self._environ["ROSZ_CONNECT"] = reaches
             environment = Environment.read(self._environ)
-        folder: RunFolder | None = RunFolder(environment.log_dir, setup.run_id)
-        try:
-            assert folder is not None  # noqa: S101  # for the type checker
-            folder.create()
-        except LaunchError as error:
-            self._outbox.send(Notice(f"WARNING: {error}; going on without logs"))
-            folder = None
-        self._output = Output(self._loop, lambda text: self._outbox.send(Notice(text)))
+        self._output = Output(self._loop, lambda text: self._writer.send(AgentWarning(text)))
         workplace = Workplace(
             package_index(environment), environment, self._environ, str(Path.cwd())
         )
@@ -165,52 +162,57 @@ class Agent:
             self._loop,
             self._output,
             workplace,
-            folder=folder,
+            folder=self._make_folder(RunFolder(environment.log_dir, setup.run_id)),
             tag=setup.tag,
             prefixed=setup.prefixed,
         )
-        self._outbox.send(Ready(reaches))
+        self._writer.send(Ready(reaches))
+
+    def _make_folder(self, folder: RunFolder) -> RunFolder | None:
+        try:
+            folder.create()
+        except LaunchError as error:
+            self._writer.send(AgentWarning(f"WARNING: {error}; continuing without logs"))
+            return None
+        return folder
 
     def _start(self, request: Start) -> None:
-        assert self._host is not None  # noqa: S101  # a launch says `Setup` first
+        assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
         serial = request.serial
 
-        def ended(code: int, tail: tuple[str, ...]) -> None:
-            self._outbox.send(Exited(serial, code, tail))
-            self._look(serial)
+        def exited(code: int, tail: tuple[str, ...]) -> None:
+            self._writer.send(Exited(serial, code, tail))
+            self._check_gone(serial)
 
         try:
-            child = self._host.start(request.job, ended)
+            child = self._host.start(request.job, exited)
         except RoszError as error:
-            self._outbox.send(Refused(serial, str(error)))
+            self._writer.send(Refused(serial, str(error)))
             return
         self._children[serial] = child
-        self._outbox.send(Started(serial, child.pid, child.shown, child.logs))
+        self._writer.send(Started(serial, child.pid, child.shown, child.logs))
 
-    def _look(self, serial: int) -> None:
-        """Tell when nothing of a process is left."""
+    def _check_gone(self, serial: int) -> None:
+        """Report when a process and all its descendants have ended."""
         child = self._children[serial]
         if child.remains():
-            self._loop.later(_LOOK_SECONDS, partial(self._look, serial))
+            self._loop.later(_CHECK_INTERVAL, partial(self._check_gone, serial))
             return
         del self._children[serial]
-        self._outbox.send(Gone(serial))
+        self._writer.send(Gone(serial))
         if self._ending and not self._children:
             self._loop.stop()
 
     def _measure(self) -> None:
-        assert self._setup is not None  # noqa: S101  # a launch says `Setup` first
-        tag = self._setup.tag
-        used = {
-            mark.removeprefix(f"{tag}:").partition(":")[0]: total
-            for mark, total in usage(tag).items()
-        }
-        self._outbox.send(
-            Measured({int(owner): total for owner, total in used.items() if owner.isdigit()})
-        )
+        assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
+
+        def send(used: dict[int, Usage]) -> None:
+            self._writer.send(Measured(used))
+
+        self._host.measure(send)
 
     def _end(self) -> None:
-        """End all processes, then the loop; again is no error."""
+        """End all processes, then the loop; a second call has no effect."""
         if self._ending:
             return
         self._ending = True
@@ -228,8 +230,8 @@ class Agent:
             child.signal(number)
 
 
-def _is_linked(environment: Environment) -> bool:
-    """Tell whether this machine has its own way to others."""
+def _has_connection(environment: Environment) -> bool:
+    """Return whether the settings of this machine say how to reach others."""
     return bool(
         environment.connect
         or environment.listen
@@ -239,20 +241,20 @@ def _is_linked(environment: Environment) -> bool:
     )
 
 
-def _reaches(environment: Environment, setup: Setup, connection: str) -> str:
-    """Return what nodes here link to: what this machine is set to, or else where the launch is.
+def _find_launch(environment: Environment, setup: Setup, connection: str) -> str:
+    """Return what nodes here connect to: by the settings of this machine, otherwise the launch.
 
     Args:
         environment: Settings of this machine.
-        setup: Has the places where the launch may be.
-        connection: ``SSH_CONNECTION``, which begins with the address that the launch calls from.
+        setup: Settings of the launch, with the endpoints where it may be.
+        connection: ``SSH_CONNECTION``, which begins with the address of the launch.
     """
     if environment.connect:
         return ",".join(environment.connect)
     if environment.multicast:
-        return "whom multicast finds"
+        return "peers found by multicast"
     if environment.listen or environment.zenoh_config:
-        return "whom this machine's settings name"
+        return "peers named in the settings of this machine"
     if is_listening(environment.rendezvous):
         return environment.rendezvous
     caller = connection.partition(" ")[0]
@@ -260,18 +262,18 @@ def _reaches(environment: Environment, setup: Setup, connection: str) -> str:
     meet = [
         place.replace("/:", f"/{caller}:") for place in setup.meet if caller or "/:" not in place
     ]
-    return first_listening(meet, _REACH_SECONDS) if meet else ""
+    return first_listening(meet, _CONNECT_TIMEOUT) if meet else ""
 
 
 def serve() -> None:
-    """Be the agent of the launch at the other end of standard input and output."""
-    requests, answers = os.dup(0), os.dup(1)
+    """Run the agent of the launch at the other end of standard input and output."""
+    requests, reports = os.dup(0), os.dup(1)
     screens = {}
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.close(nothing)
     for sink in (1, 2):
-        # What is left of the agent itself on standard error is for whoever reads ssh's.
+        # The agent's own errors still go to the standard error of ssh.
         if sink == 2:  # noqa: PLR2004
             sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
         ours, theirs = os.pipe()
@@ -279,4 +281,4 @@ def serve() -> None:
         os.dup2(theirs, sink)
         os.close(theirs)
         screens[ours] = sink
-    Agent(Lines(requests), answers, screens, dict(os.environ)).run()
+    Agent(LineReader(requests), reports, screens, dict(os.environ)).run()

@@ -1,6 +1,6 @@
-"""From a node of the plan, or the words of ``rosz run``, to what the system executes.
+"""The commands that run nodes of a plan, and the programs of ``rosz run``.
 
-A Python script runs under the interpreter that runs rosz, with the ROS 1 names importable
+A Python script runs with the interpreter that runs rosz, and can import ROS 1's modules
 (``python -m rosz.script SCRIPT``); any other program runs as it is.
 """
 
@@ -24,7 +24,7 @@ from rosz.packages import Package, PackageIndex
 __all__ = ("TAG", "Command", "Workplace", "is_python", "run_command")
 
 TAG = "ROSZ_LAUNCH"
-"""Variable by which all descendants of a launched process are known again."""
+"""Environment variable with the tag by which descendants of a launched process are found."""
 
 _SHEBANG_BYTES = 256
 _PYTHON = re.compile(r"python[0-9.]*")
@@ -32,15 +32,15 @@ _SCRIPT = ("-m", "rosz.script")
 
 
 class Command(msgspec.Struct, frozen=True):
-    """Something to execute.
+    """A command to execute.
 
     Attributes:
         argv: Program and arguments.
-        shown: The same as messages show it: the script, not its interpreter.
-        environ: All variables.
+        shown: The same for messages: the script without its interpreter.
+        environ: All environment variables.
         cwd: Folder to start in.
-        python: Whether it is a script run by rosz.
-        direct: Whether it gets the terminal of the launch itself, as a debugger needs.
+        python: Whether it is a Python script that rosz runs.
+        direct: Whether it gets the terminal of the launch, which a debugger needs.
     """
 
     argv: tuple[str, ...]
@@ -52,13 +52,13 @@ class Command(msgspec.Struct, frozen=True):
 
 
 class Workplace(msgspec.Struct, frozen=True):
-    """What commands are made from, beside the plan.
+    """The packages and settings from which commands are made.
 
     Attributes:
-        packages: Where executables are looked up.
+        packages: The known packages.
         environment: Settings of this process.
-        environ: Variables of this process.
-        cwd: Folder that the launch was started in.
+        environ: Environment variables of this process.
+        cwd: Folder in which the launch was started.
     """
 
     packages: PackageIndex
@@ -67,16 +67,16 @@ class Workplace(msgspec.Struct, frozen=True):
     cwd: str
 
     def command(self, node: NodePlan, *, log_file: Path | None, tag: str) -> Command:
-        """Return how to start a node.
+        """Return the command of a node.
 
         Args:
             node: The node.
-            log_file: Where it is told to keep its log; None leaves that to the node.
-            tag: Marks the process and its descendants.
+            log_file: Path for the node's own log, or None to leave it to the node.
+            tag: Tag of the process and its descendants.
 
         Raises:
-            PackageNotFound: There is no such package.
-            ExecutableNotFound: The package has no such executable.
+            PackageNotFound: If there is no such package.
+            ExecutableNotFound: If the package has no such executable.
         """
         environ = base_environ(self.environ, self.environment)
         environ.pop("ROS_NAMESPACE", None)
@@ -105,34 +105,34 @@ class Workplace(msgspec.Struct, frozen=True):
         """Return the path of an executable.
 
         Raises:
-            PackageNotFound: There is no such package.
-            ExecutableNotFound: The package has no such executable.
+            PackageNotFound: If there is no such package.
+            ExecutableNotFound: If the package has no such executable.
         """
         return str(locate(self.packages.find(package), executable))
 
-    def _cwd(self, wish: str, program: Path | None) -> str:
-        if wish.lower() == "node" and program is not None:
+    def _cwd(self, choice: str, program: Path | None) -> str:
+        if choice.lower() == "node" and program is not None:
             return str(program.parent)
-        if wish.lower() == "ros_home":
+        if choice.lower() == "ros_home":
             return str(self.environment.home) if program is not None else self.cwd
-        return str(Path(self.cwd, wish))
+        return str(Path(self.cwd, choice))
 
 
 def run_command(
     workplace: Workplace, package: str, executable: str, args: Sequence[str], prefix: str = ""
 ) -> Command:
-    """Return how ``rosz run`` starts a program: here and now, in place of this process.
+    """Return the command of ``rosz run``, which replaces this process.
 
     Args:
-        workplace: Where to look.
+        workplace: The packages and settings.
         package: Name of the package.
         executable: Name of the file, or its path within the package.
         args: Arguments as given.
-        prefix: What to put before it, split as a shell does.
+        prefix: Command to put before it, split as a shell does.
 
     Raises:
-        PackageNotFound: There is no such package.
-        ExecutableNotFound: The package has no such executable.
+        PackageNotFound: If there is no such package.
+        ExecutableNotFound: If the package has no such executable.
     """
     program = locate(workplace.packages.find(package), executable)
     before = tuple(shlex.split(prefix))
@@ -148,10 +148,12 @@ def run_command(
 
 
 def base_environ(environ: Mapping[str, str], environment: Environment) -> dict[str, str]:
-    """Return the variables of a child: ours, and where packages are, which its folder cannot tell.
+    """Return the environment variables of a child: those of this process, and the package path.
+
+    The child may start in another folder, from which it would find other packages.
 
     Args:
-        environ: Variables of this process.
+        environ: Environment variables of this process.
         environment: Settings of this process.
     """
     roots = os.pathsep.join(str(root) for root in environment.package_roots)
@@ -159,10 +161,10 @@ def base_environ(environ: Mapping[str, str], environment: Environment) -> dict[s
 
 
 def locate(package: Package, name: str) -> Path:
-    """Return an executable by its name, or by its path within the package.
+    """Return the path of an executable by its name, or by its path within the package.
 
     Raises:
-        ExecutableNotFound: It is not there, or may not be executed.
+        ExecutableNotFound: If it does not exist, or is not executable.
     """
     if "/" not in name:
         return package.executable(name)
@@ -172,29 +174,29 @@ def locate(package: Package, name: str) -> Path:
     if path.is_file():
         raise ExecutableNotFound(f"'{path}' is not executable; run: chmod +x {path}")
     raise ExecutableNotFound(
-        f"package '{package.name}' has no file '{path}'; give the name of the executable alone to"
-        " have it looked for"
+        f"package '{package.name}' has no file '{path}'; give only the name of the executable to"
+        " search for it"
     )
 
 
 def is_python(program: Path) -> bool:
-    """Tell whether a program is a Python script, by its suffix or its first line."""
+    """Return whether a program is a Python script, by its suffix or its first line."""
     if program.suffix == ".py":
         return True
     try:
         with program.open("rb") as file:
             first = file.readline(_SHEBANG_BYTES)
-    except OSError:  # it may be executed without being readable: then it is no script
+    except OSError:  # executable but not readable, so not a script
         return False
     return first.startswith(b"#!") and b"python" in first
 
 
 def _start(prefix: Sequence[str], program: Path, *, python: bool) -> tuple[str, ...]:
-    """Return the words up to the program's own arguments."""
+    """Return the words before the program's own arguments."""
     if not python:
         return (*prefix, str(program))
     if prefix and _PYTHON.fullmatch(Path(prefix[0]).name):
-        # "python3 -m pdb", "python -u": the interpreter is asked for by name, its options count.
+        # "python3 -m pdb", "python -u": a named interpreter keeps its options.
         return (sys.executable, *prefix[1:], *_SCRIPT, str(program))
-    # -P keeps modules that lie in the folder of the launch from hiding those of Python.
+    # -P keeps modules in the folder of the launch from hiding Python's own.
     return (*prefix, sys.executable, "-P", *_SCRIPT, str(program))

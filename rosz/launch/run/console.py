@@ -1,28 +1,145 @@
-"""What the launch itself says, in roslaunch's words: to the screen, and to its log."""
+"""The launch's own messages: to the screen in roslaunch's words, and to the log of the launch.
+
+A terminal may accept no output for a long time, for example while it is paged. Messages are
+therefore written on a thread, and a launch ends and restarts nodes whether or not they are read.
+"""
 
 from __future__ import annotations
 
+import faulthandler
+import os
+import select
+import threading
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TextIO
 
-from rosz.launch.run.folder import LaunchLog
-from rosz.launch.run.screen import Screen
+from rosz.worker import Worker
 
-__all__ = ("Console",)
+__all__ = ("Console", "ConsoleWriter", "LaunchLog")
 
 _BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
-_END_SECONDS = 1.0
-"""How long the end waits for a screen that takes nothing."""
+_CLOSE_TIMEOUT = 1.0
+_WRITE_TIMEOUT = 0.05
+"""Time in seconds to wait for a text, so that what nodes write next comes after it."""
+_CAPACITY = 1024 * 1024
+"""Number of waiting characters at which the writer is full."""
+
+
+class ConsoleWriter:
+    """Writes texts to streams in order, on a thread."""
+
+    def __init__(self) -> None:
+        self._worker = Worker[tuple[TextIO, str, threading.Event]](
+            "rosz console", _write, capacity=_CAPACITY, size=lambda item: len(item[1])
+        )
+        self._last = threading.Event()
+        self._last.set()
+        self._stuck = False
+
+    def write(self, stream: TextIO, text: str) -> None:
+        """Write a text, now or as soon as the stream accepts it."""
+        if self._worker.closed:
+            return
+        self._stuck = self._stuck and not self._last.is_set()
+        self._last = threading.Event()
+        self._worker.submit((stream, text, self._last))
+        if not self._stuck:
+            self._stuck = not self._last.wait(_WRITE_TIMEOUT)
+
+    @property
+    def full(self) -> bool:
+        """Whether so much text waits that less urgent output should wait."""
+        return self._worker.full
+
+    def when_free(self, callback: Callable[[], None]) -> None:
+        """Call a function once, here or on the thread, when the writer is not full."""
+        self._worker.when_free(callback)
+
+    def close(self, timeout: float) -> None:
+        """Write what waits for at most ``timeout`` seconds; a second call waits again."""
+        self._worker.close(timeout)
+
+
+def _write(item: tuple[TextIO, str, threading.Event]) -> None:
+    stream, text, written = item
+    try:
+        try:
+            fd = stream.fileno()
+        except OSError:  # a stream in memory
+            stream.write(text)
+            return
+        # Not through the stream's buffer, whose lock would delay the end of the process.
+        data = memoryview(text.encode(stream.encoding or "utf-8", "backslashreplace"))
+        while data:
+            try:
+                data = data[os.write(fd, data) :]
+            except BlockingIOError:
+                select.select([], [fd], [])
+    except (OSError, ValueError):
+        return  # the terminal is closed; the launch must still end its nodes
+    finally:
+        written.set()
+
+
+class LaunchLog:
+    """The log file of the launch process itself.
+
+    Args:
+        path: File to append to.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file: TextIO | None = path.open("a", encoding="utf-8")
+
+    def write(self, level: str, text: str) -> None:
+        """Append a line; a full disk does not stop the launch."""
+        if self._file is None:
+            return
+        try:
+            self._file.write(f"[{_timestamp()}] [{level}] {text}\n")
+            self._file.flush()
+        except OSError:
+            self.close()
+
+    def dump_stacks(self, reason: str) -> None:
+        """Append the stacks of all threads; safe in a signal handler, even within `write`."""
+        if self._file is None:
+            return
+        fd = self._file.fileno()
+        line = f"[{_timestamp()}] [INFO] {reason}; the stacks of all threads:\n"
+        try:
+            os.write(fd, line.encode())
+        except OSError:  # a full disk does not stop the launch
+            return
+        faulthandler.dump_traceback(fd)
+
+    def close(self) -> None:
+        """Close the file; a second call has no effect."""
+        file, self._file = self._file, None
+        if file is not None:
+            try:
+                file.close()
+            except OSError:  # the disk is full, and what was not flushed is lost
+                return
 
 
 class Console:
-    """Two streams; colours where they are terminals.
+    """The output streams of a launch, with colours on terminals.
 
     Args:
-        out: For what goes well.
-        err: For what does not.
+        out: Stream for normal messages.
+        err: Stream for errors.
         verbose: Whether notes are printed too.
         color: Whether terminals get colours.
+
+    Attributes:
+        log: The log file of the launch, or None.
     """
 
     def __init__(
@@ -32,54 +149,54 @@ class Console:
         self._color = color
         self._out = out
         self._err = err
-        self._screen = Screen()
+        self._writer = ConsoleWriter()
         self.log: LaunchLog | None = None
 
     @property
-    def is_terminal(self) -> bool:
-        """Whether somebody looks on."""
-        return self._out.isatty()
+    def full(self) -> bool:
+        """Whether so much output waits that nodes of other machines should wait."""
+        return self._writer.full
+
+    def when_free(self, callback: Callable[[], None]) -> None:
+        """Call a function once, here or on another thread, when the console is not full."""
+        self._writer.when_free(callback)
 
     def say(self, text: str = "") -> None:
         """Print a line."""
         self._print(self._out, text, "", "INFO")
 
-    def show(self, sink: int, text: str) -> None:
-        """Print what nodes of another machine wrote, to standard output (1) or error (2)."""
-        self._put(self._out if sink == 1 else self._err, text)
-
-    @property
-    def full(self) -> bool:
-        """Whether more is to be shown than the screen takes, so that nodes should wait."""
-        return self._screen.full
-
-    def when_free(self, told: Callable[[], None]) -> None:
-        """Have something called once, on another thread, when it is not full any more."""
-        self._screen.when_free(told)
-
     def strong(self, text: str) -> None:
-        """Print a line that matters."""
+        """Print an important line."""
         self._print(self._out, text, _BOLD, "INFO")
 
     def error(self, text: str) -> None:
-        """Print a line about something that went wrong."""
+        """Print a line about an error."""
         self._print(self._err, text, _RED, "ERROR")
 
-    def title(self, text: str) -> None:
-        """Name the terminal's window."""
-        if self.is_terminal:
-            self._put(self._out, f"\033]2;{text}\007")
-
     def note(self, text: str) -> None:
-        """Print a line that only those want to see who asked for it."""
+        """Print a line if the launch is verbose; otherwise only log it."""
         if self._verbose:
             self.say(text)
         elif self.log is not None:
             self.log.write("INFO", text)
 
+    def show(self, sink: int, text: str) -> None:
+        """Print output of nodes on another machine, to standard output (1) or error (2)."""
+        self._writer.write(self._out if sink == 1 else self._err, text)
+
+    def title(self, text: str) -> None:
+        """Set the title of the terminal's window."""
+        if self._out.isatty():
+            self._writer.write(self._out, f"\033]2;{text}\007")
+
+    def dump_stacks(self, reason: str) -> None:
+        """Write the stacks of all threads to the log; safe in a signal handler."""
+        if self.log is not None:
+            self.log.dump_stacks(reason)
+
     def close(self) -> None:
-        """Have everything shown, and close the log; again is no error."""
-        self._screen.close(_END_SECONDS)
+        """Print what waits, and close the log; a second call has no effect."""
+        self._writer.close(_CLOSE_TIMEOUT)
         if self.log is not None:
             self.log.close()
 
@@ -88,8 +205,9 @@ class Console:
             self.log.write(level, text)
         if colour and self._color and stream.isatty():
             text = f"{colour}{text}{_PLAIN}"
-        self._put(stream, f"{text}\n")
+        # One write for each message, so that lines of nodes do not appear within it.
+        self._writer.write(stream, f"{text}\n")
 
-    def _put(self, stream: TextIO, text: str) -> None:
-        # One write per message, so that lines of nodes never come to lie within it.
-        self._screen.write(stream, text)
+
+def _timestamp() -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S")

@@ -1,6 +1,6 @@
-"""Questions and orders to a running launch, from another terminal.
+"""The status of running launches, and requests to restart or stop their nodes.
 
-A launch answers on ``@rosz/<domain>/launch/<run id>/<session>``; requests and answers are JSON.
+A launch replies on ``@rosz/<domain>/launch/<run id>/<session>``; requests and replies are JSON.
 """
 
 from __future__ import annotations
@@ -14,27 +14,25 @@ from typing import Literal
 import msgspec
 
 from rosz.errors import LaunchError, NotFoundError, RoszError, WaitTimeout, near_miss
-from rosz.launch.run.family import Usage
+from rosz.launch.run.host import Usage
 from rosz.launch.run.loop import Loop, Timer
-from rosz.launch.run.process import Process
-from rosz.launch.run.summary import exit_reason
-from rosz.launch.run.supervisor import Supervisor
+from rosz.launch.run.supervisor import Process, Supervisor, describe_exit
 from rosz.lifecycle import Closable
 from rosz.session import Query, Reply, Session
 from rosz.wire import own_key
 
-__all__ = ("LaunchStatus", "NodeStatus", "Order", "Panel", "order", "statuses")
+__all__ = ("LaunchStatus", "NodeStatus", "StatusClient", "StatusRequest", "StatusServer")
 
-_STATUS_SECONDS = 2.0
-_ORDER_SECONDS = 60.0
-_MEASURE_SECONDS = 1.0
+_STATUS_TIMEOUT = 2.0
+_ACTION_TIMEOUT = 60.0
+_MEASURE_TIMEOUT = 1.0
 
 
-class Order(msgspec.Struct, frozen=True):
-    """What is asked of a launch.
+class StatusRequest(msgspec.Struct, frozen=True):
+    """A request to a launch.
 
     Attributes:
-        action: ``status``, or ``restart`` or ``stop`` of a node.
+        action: ``status``, or ``restart`` or ``stop`` for a node.
         node: Full name of the node.
     """
 
@@ -49,13 +47,13 @@ class NodeStatus(msgspec.Struct, frozen=True):
         name: Full name.
         type: ``package/type``, or the command.
         state: ``waiting``, ``running``, ``stopping``, ``respawning``, ``ended`` or ``failed``.
-        detail: Why it ended or failed; empty while it runs.
-        pid: Process id; 0 when it does not run.
-        restarts: How often it was started again.
-        uptime: Seconds since its latest start; 0 when it does not run.
-        cpu: Seconds of processor time that it and its descendants have used.
-        memory: Bytes that they hold.
-        machine: Where it runs: the address of another machine, or the name of the launch's own.
+        detail: Reason why it ended or failed, or "" while it runs.
+        pid: Process id, or 0 if it does not run.
+        restarts: Number of restarts.
+        uptime: Time since its latest start in seconds, or 0 if it does not run.
+        cpu: Processor time that it and its descendants have used in seconds.
+        memory: Memory that they hold in bytes.
+        machine: Address of the other machine, or the name of the launch's own.
     """
 
     name: str
@@ -78,8 +76,8 @@ class LaunchStatus(msgspec.Struct, frozen=True):
         host: Name of the machine.
         pid: Process id of the launch.
         files: Launch files, as absolute paths.
-        sampled: When the figures were taken, in seconds of that machine's monotonic clock.
-        nodes: Its nodes, in order.
+        sampled: Time of the figures in seconds of that machine's monotonic clock.
+        nodes: Nodes in order.
     """
 
     run_id: str
@@ -90,15 +88,15 @@ class LaunchStatus(msgspec.Struct, frozen=True):
     nodes: tuple[NodeStatus, ...]
 
 
-class Panel:
-    """The answering side.
+class StatusServer:
+    """Replies to requests about one launch.
 
     Args:
-        session: Where questions come from.
-        domain: The ROS domain.
+        session: Session that receives the requests.
+        domain: ROS domain.
         run_id: Id of the run.
-        loop: Where orders are carried out.
-        supervisor: Who carries them out.
+        loop: Loop of the launch.
+        supervisor: Supervisor of the launch.
         files: Launch files.
     """
 
@@ -118,29 +116,29 @@ class Panel:
         self._files = files
         self._key = own_key(domain, "launch", run_id, session.zid)
         self._queryable: Closable = session.queryable(
-            self._key, lambda query: loop.post(lambda: self._serve(query))
+            self._key, lambda query: loop.post(lambda: self._handle(query))
         )
 
-    def _serve(self, query: Query) -> None:
+    def _handle(self, query: Query) -> None:
         try:
-            asked = msgspec.json.decode(query.payload or b"", type=Order)
-            self._carry_out(asked, lambda: self._measure(lambda used: self._answer(query, used)))
+            request = msgspec.json.decode(query.payload or b"", type=StatusRequest)
+            self._run(request, lambda: self._measure(lambda used: self._reply(query, used)))
         except (msgspec.MsgspecError, RoszError) as error:
             with query:
                 query.reply_error(str(error))
 
-    def _carry_out(self, asked: Order, done: Callable[[], None]) -> None:
-        if asked.action == "status":
+    def _run(self, request: StatusRequest, done: Callable[[], None]) -> None:
+        if request.action == "status":
             done()
         elif self._supervisor.closing:
             raise LaunchError("this launch is ending")
-        elif asked.action == "restart":
-            self._supervisor.restart(self._supervisor.find(asked.node), done)
+        elif request.action == "restart":
+            self._supervisor.restart(self._supervisor.find(request.node), done)
         else:
-            self._supervisor.stop(self._supervisor.find(asked.node), done)
+            self._supervisor.stop(self._supervisor.find(request.node), done)
 
     def _measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
-        """Have all machines count what is used there; those that take too long are left out."""
+        """Collect the resources used on all machines, except those that take too long."""
         total: dict[int, Usage] = {}
         waiting = len(self._supervisor.hosts)
         timer: Timer | None = None
@@ -162,11 +160,11 @@ class Panel:
         if not waiting:
             done(total)
             return
-        timer = self._loop.later(_MEASURE_SECONDS, finish)
+        timer = self._loop.later(_MEASURE_TIMEOUT, finish)
         for host in self._supervisor.hosts:
             host.measure(add)
 
-    def _answer(self, query: Query, used: dict[int, Usage]) -> None:
+    def _reply(self, query: Query, used: dict[int, Usage]) -> None:
         with query:
             query.reply(self._key, msgspec.json.encode(self._status(used)))
 
@@ -187,7 +185,7 @@ class Panel:
         node = process.node
         detail = process.error
         if process.over and not detail:
-            detail = exit_reason(process.code)
+            detail = describe_exit(process.code)
         return NodeStatus(
             name=node.full_name,
             type=f"{node.package}/{node.type}" if node.package else " ".join(node.command),
@@ -202,74 +200,83 @@ class Panel:
         )
 
     def close(self) -> None:
-        """Answer no more; again is no error."""
+        """Reply no more; a second call has no effect."""
         self._queryable.close()
 
 
-def statuses(session: Session, domain: int) -> list[LaunchStatus]:
-    """Return all running launches of a domain.
-
-    Raises:
-        LaunchError: What a launch answers makes no sense.
-        WaitTimeout: A launch is there but does not answer.
-    """
-    return [status for _, status in _running(session, domain)]
-
-
-def order(session: Session, domain: int, action: Literal["restart", "stop"], node: str) -> None:
-    """Have a node restarted or stopped by the launch that runs it.
+class StatusClient:
+    """Sends requests to running launches.
 
     Args:
-        session: The network.
-        domain: The ROS domain.
-        action: What to do.
-        node: Name of the node.
-
-    Raises:
-        NotFoundError: No running launch has such a node.
-        LaunchError: The launch refuses, or the node could not be started again.
-        WaitTimeout: The launch does not answer.
+        session: Session that sends the requests.
+        domain: ROS domain.
     """
-    name = f"/{node.strip('/')}"
-    running = _running(session, domain)
-    known = [entry.name for _, status in running for entry in status.nodes]
-    if name not in known:
-        listing = f"; there are {', '.join(sorted(known))}" if known else "; no launch is running"
-        raise NotFoundError(f"no launch runs a node '{name}'{near_miss(name, known) or listing}")
-    for key, status in running:
-        if any(entry.name == name for entry in status.nodes):
-            _order(session, key, Order(action, name))
+
+    def __init__(self, session: Session, domain: int) -> None:
+        self._session = session
+        self._domain = domain
+
+    def statuses(self) -> list[LaunchStatus]:
+        """Return all running launches of the domain.
+
+        Raises:
+            LaunchError: If a launch sends a reply that is not valid.
+            WaitTimeout: If a launch runs but does not reply.
+        """
+        return [status for _, status in self._running()]
+
+    def request(self, action: Literal["restart", "stop"], node: str) -> None:
+        """Restart or stop a node, and wait until that is done.
+
+        Args:
+            action: The action.
+            node: Name of the node.
+
+        Raises:
+            NotFoundError: If no running launch has such a node.
+            LaunchError: If the launch refuses, or the node could not be started again.
+            WaitTimeout: If the launch does not reply.
+        """
+        name = f"/{node.strip('/')}"
+        running = self._running()
+        known = [entry.name for _, status in running for entry in status.nodes]
+        if name not in known:
+            listing = f"; there are {', '.join(sorted(known))}" if known else ""
+            hint = near_miss(name, known) or listing or "; no launch is running"
+            raise NotFoundError(f"no launch runs a node '{name}'{hint}")
+        for key, status in running:
+            if any(entry.name == name for entry in status.nodes):
+                self._send(key, StatusRequest(action, name))
+
+    def _send(self, key: str, request: StatusRequest) -> None:
+        payload = msgspec.json.encode(request)
+        replies = self._session.get(key, payload=payload, timeout=_ACTION_TIMEOUT)
+        if not replies:
+            raise LaunchError(f"the launch of '{request.node}' ended without a reply")
+        if not replies[0].ok:
+            raise LaunchError(replies[0].payload.decode(errors="replace"))
+        status = _decode_status(replies[0])
+        after = next(entry for entry in status.nodes if entry.name == request.node)
+        if request.action == "restart" and after.state != "running":
+            raise LaunchError(f"'{request.node}' did not start again: {after.detail}")
+
+    def _running(self) -> list[tuple[str, LaunchStatus]]:
+        replies = self._session.get(
+            own_key(self._domain, "launch", "*", "*"),
+            payload=msgspec.json.encode(StatusRequest("status")),
+            timeout=_STATUS_TIMEOUT,
+        )
+        found = [(reply.key, _decode_status(reply)) for reply in replies if reply.ok]
+        if replies and not found:
+            raise WaitTimeout("answer from a running launch", _STATUS_TIMEOUT)
+        return sorted(found, key=lambda pair: (pair[1].host, pair[1].pid))
 
 
-def _order(session: Session, key: str, asked: Order) -> None:
-    replies = session.get(key, payload=msgspec.json.encode(asked), timeout=_ORDER_SECONDS)
-    if not replies:
-        raise LaunchError(f"the launch of '{asked.node}' ended without an answer")
-    if not replies[0].ok:
-        raise LaunchError(replies[0].payload.decode(errors="replace"))
-    status = _read(replies[0])
-    after = next(entry for entry in status.nodes if entry.name == asked.node)
-    if asked.action == "restart" and after.state != "running":
-        raise LaunchError(f"'{asked.node}' did not start again: {after.detail}")
-
-
-def _running(session: Session, domain: int) -> list[tuple[str, LaunchStatus]]:
-    replies = session.get(
-        own_key(domain, "launch", "*", "*"),
-        payload=msgspec.json.encode(Order("status")),
-        timeout=_STATUS_SECONDS,
-    )
-    found = [(reply.key, _read(reply)) for reply in replies if reply.ok]
-    if replies and not found:
-        raise WaitTimeout("answer from a running launch", _STATUS_SECONDS)
-    return sorted(found, key=lambda pair: (pair[1].host, pair[1].pid))
-
-
-def _read(reply: Reply) -> LaunchStatus:
+def _decode_status(reply: Reply) -> LaunchStatus:
     try:
         return msgspec.json.decode(reply.payload, type=LaunchStatus)
     except msgspec.MsgspecError as error:
         raise LaunchError(
-            f"what a launch answers at '{reply.key}' makes no sense: {error}; is it of another"
+            f"the reply of a launch at '{reply.key}' is not valid: {error}; does it run another"
             " version of rosz?"
         ) from error

@@ -1,12 +1,20 @@
-"""Machines that processes run on: this one is `LocalHost`, others are of `remote`."""
+"""The machines that processes run on: `LocalHost` is this one, `rosz.launch.run.remote` has others.
+
+Everything that a launch starts carries a tag in its environment, which descendants inherit. Where
+the system shows environments (``/proc``), a `ProcessTree` finds them by it, also those that left
+their process group or whose parent has ended.
+"""
 
 from __future__ import annotations
 
 import errno
 import getpass
+import math
 import os
+import signal
 import socket
 import subprocess
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -17,29 +25,180 @@ import msgspec
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.plan.model import MachinePlan, NodePlan
 from rosz.launch.run.command import TAG, Command, Workplace
-from rosz.launch.run.family import Census, Usage, group_lives, usage
-from rosz.launch.run.folder import RunFolder
 from rosz.launch.run.loop import Loop
-from rosz.launch.run.output import Output, Streams
+from rosz.launch.run.output import Output, RunFolder, Streams
 
-__all__ = ("Child", "Confirmed", "Ended", "Host", "Job", "LocalHost", "is_local")
+__all__ = (
+    "Child",
+    "Host",
+    "LocalHost",
+    "OnExit",
+    "OnStart",
+    "ProcessSpec",
+    "ProcessTree",
+    "Usage",
+    "group_alive",
+    "is_local",
+)
 
-Ended = Callable[[int, tuple[str, ...]], None]
-"""Gets the exit code, negative for a signal, and the last lines of the output."""
+OnExit = Callable[[int, tuple[str, ...]], None]
+"""Called with the exit code, negative for a signal, and the last lines of the output."""
 
-Confirmed = Callable[[RoszError | None], None]
-"""Gets why a process could not be started, or None once it has."""
+OnStart = Callable[[RoszError | None], None]
+"""Called with None once a process has started, or with the reason why it could not be."""
 
-_HERE = frozenset({"", "localhost", "127.0.0.1", "::1"})
+_LOCAL_NAMES = frozenset({"", "localhost", "127.0.0.1", "::1"})
+
+_PROC = Path("/proc")
+_TICKS = os.sysconf("SC_CLK_TCK")
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+_STATE, _GROUP, _UTIME, _STIME, _VSIZE, _RSS = 0, 2, 11, 12, 20, 21
+_CACHE_SECONDS = 0.05
+_KILL_ATTEMPTS, _KILL_INTERVAL = 10, 0.002
+"""How often to look again for processes without an environment; some never have one."""
 
 
-class Job(msgspec.Struct, frozen=True):
+class Usage(msgspec.Struct, frozen=True):
+    """The resources that a process and its descendants use.
+
+    Attributes:
+        processes: Number of processes.
+        cpu: Processor time so far in seconds.
+        memory: Memory held now in bytes.
+    """
+
+    processes: int = 0
+    cpu: float = 0.0
+    memory: int = 0
+
+
+class ProcessTree:
+    """The processes that carry a tag, or one below it, in their environment.
+
+    Args:
+        tag: The tag.
+    """
+
+    def __init__(self, tag: str) -> None:
+        self.tag = tag
+        self._cached_at = -math.inf
+        self._cached: dict[int, str] = {}
+
+    def tags(self) -> dict[int, str]:
+        """Return the whole tags of the processes by process id."""
+        return self._scan()[0]
+
+    def below(self, tag: str) -> list[int]:
+        """Return the processes that carry a tag or one below it, from a scan a moment ago."""
+        if time.monotonic() - self._cached_at > _CACHE_SECONDS:
+            self._cached = self.tags()
+            self._cached_at = time.monotonic()
+        return [pid for pid, other in self._cached.items() if _is_below(other, tag)]
+
+    def kill(self) -> None:
+        """Kill all processes, including those that appear meanwhile."""
+        killed: set[int] = set()
+        attempts = _KILL_ATTEMPTS
+        while attempts:
+            found, unclear = self._scan()
+            fresh = set(found) - killed
+            for pid in fresh:
+                with suppress(ProcessLookupError, PermissionError):
+                    os.kill(pid, signal.SIGKILL)
+            killed |= fresh
+            if not fresh:
+                if not unclear:
+                    return
+                attempts -= 1
+                time.sleep(_KILL_INTERVAL)
+
+    def usage(self) -> dict[str, Usage]:
+        """Return the resources used by the processes, by whole tag."""
+        totals: dict[str, Usage] = {}
+        for pid, tag in self.tags().items():
+            with suppress(OSError, IndexError, ValueError):  # it ended meanwhile
+                fields = _stat(str(pid))
+                before = totals.get(tag, Usage())
+                totals[tag] = Usage(
+                    before.processes + 1,
+                    before.cpu + (int(fields[_UTIME]) + int(fields[_STIME])) / _TICKS,
+                    before.memory + int(fields[_RSS]) * _PAGE,
+                )
+        return totals
+
+    def _scan(self) -> tuple[dict[int, str], bool]:
+        """Return the whole tags, and whether some process shows no environment at the moment.
+
+        That is so in the instant in which a process executes another program.
+        """
+        found: dict[int, str] = {}
+        unclear = False
+        name = TAG.encode() + b"="
+        wanted = name + self.tag.encode()
+        for pid in _processes():
+            with suppress(OSError):  # it ended meanwhile, or belongs to another user
+                environ = Path(_PROC, pid, "environ").read_bytes()
+                # Ended processes and threads of the kernel have no environment and no memory.
+                unclear = unclear or (not environ and _stat(pid)[_VSIZE] != "0")
+                if wanted not in environ:
+                    continue
+                for variable in environ.split(b"\0"):
+                    tag = variable.removeprefix(name).decode(errors="replace")
+                    if variable.startswith(wanted) and _is_below(tag, self.tag):
+                        found[int(pid)] = tag
+        return found, unclear
+
+
+def _is_below(tag: str, parent: str) -> bool:
+    return tag == parent or tag.startswith(f"{parent}:")
+
+
+def group_alive(group: int) -> bool:
+    """Return whether a process group, whose leader has been reaped, has running members.
+
+    Members that have ended but have not been reaped by their new parent do not count.
+    """
+    with suppress(ChildProcessError):
+        while os.waitpid(-group, os.WNOHANG)[0]:
+            pass
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    pids = _processes()
+    return not pids or any(_runs_in(pid, group) for pid in pids)
+
+
+def _runs_in(pid: str, group: int) -> bool:
+    try:
+        fields = _stat(pid)
+    except OSError:  # it ended meanwhile
+        return False
+    return int(fields[_GROUP]) == group and fields[_STATE] not in {"Z", "X"}
+
+
+def _stat(pid: str) -> list[str]:
+    """Return the fields of ``/proc/PID/stat`` after the name of the program."""
+    text = Path(_PROC, pid, "stat").read_text(errors="replace")
+    return text.rpartition(")")[2].split()
+
+
+def _processes() -> list[str]:
+    try:
+        return [entry.name for entry in _PROC.iterdir() if entry.name.isdigit()]
+    except FileNotFoundError:  # a system without /proc: only process groups are known
+        return []
+
+
+class ProcessSpec(msgspec.Struct, frozen=True):
     """A process to start.
 
     Attributes:
-        node: What.
-        owner: Its number in this launch.
-        label: What messages call it.
+        node: The node from the plan.
+        owner: Number of the process in this launch.
+        label: Name that messages show.
         again: Whether it ran before in this launch.
     """
 
@@ -50,7 +209,7 @@ class Job(msgspec.Struct, frozen=True):
 
 
 class Child(Protocol):
-    """A process that was started, with all that it starts itself."""
+    """A started process with its descendants."""
 
     @property
     def pid(self) -> int:
@@ -58,50 +217,50 @@ class Child(Protocol):
 
     @property
     def shown(self) -> str:
-        """Command line as messages show it."""
+        """Command line that messages show."""
 
     @property
     def logs(self) -> str:
-        """What matches its logs on its machine; empty where none are kept."""
+        """Pattern of the paths of its logs on its machine, or "" if there are none."""
 
     @property
     def place(self) -> str:
-        """Address of its machine; empty for this one."""
+        """Address of its machine, or "" for this one."""
 
     @property
     def pending(self) -> bool:
-        """Whether its machine has not said yet that it runs."""
+        """Whether its machine has not confirmed yet that it runs."""
 
     def signal(self, number: int) -> None:
-        """Signal it and its descendants; those that are gone are no error."""
+        """Send a signal to it and its descendants; those that have ended are ignored."""
 
     def remains(self) -> bool:
-        """Tell whether it or a descendant is still there."""
+        """Return whether it or a descendant still runs."""
 
 
 class Host(Protocol):
-    """A machine that processes can be started on."""
+    """A machine that can start processes."""
 
     @property
     def place(self) -> str:
-        """Its address; empty for this machine."""
+        """Address, or "" for this machine."""
 
-    def start(self, job: Job, ended: Ended, confirmed: Confirmed) -> Child:
+    def start(self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart) -> Child:
         """Start a process.
 
         Args:
-            job: What.
-            ended: Called on the loop when the process itself has ended.
-            confirmed: Called on the loop where the child was pending, when it is not any more.
+            spec: The process.
+            on_exit: Called on the loop when the process itself has ended.
+            on_start: Called on the loop for a pending child, when it is no longer pending.
 
         Raises:
-            PackageNotFound: The machine has no such package.
-            ExecutableNotFound: The package has no such executable.
-            LaunchError: The system refuses to start it.
+            PackageNotFound: If the machine has no such package.
+            ExecutableNotFound: If the package has no such executable.
+            LaunchError: If the system refuses to start it.
         """
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
-        """Have what its processes have used counted, by their owners' numbers."""
+        """Call a function with the resources that the processes use, by owner."""
 
 
 class LocalChild:
@@ -109,53 +268,53 @@ class LocalChild:
 
     Args:
         process: The process.
-        command: How it was started.
-        census: Where its descendants are found that left the group.
-        logs: What matches its logs.
+        command: The command that it runs.
+        tree: The processes of this launch, to find descendants outside the group.
+        logs: Pattern of the paths of its logs.
     """
 
     place = ""
     pending = False
 
     def __init__(
-        self, process: subprocess.Popen[bytes], command: Command, census: Census, logs: str
+        self, process: subprocess.Popen[bytes], command: Command, tree: ProcessTree, logs: str
     ) -> None:
         self.logs = logs
         self._process = process
-        self._census = census
-        self._mark = command.environ[TAG]
+        self._tree = tree
+        self._tag = command.environ[TAG]
         self._group_gone = False
         self.pid = process.pid
         self.shown = " ".join(command.shown)
 
     def signal(self, number: int) -> None:
-        """Signal the group and all descendants; what belongs to another user is left."""
-        # The number of a group is taken for as long as the group has a member, or the leader has
-        # not been reaped, so this cannot hit a stranger.
+        """Signal the group and all descendants, except those of another user."""
+        # The number of a group is in use for as long as the group has a member, or its leader has
+        # not been reaped, so this cannot reach an unrelated process.
         if self._group_remains():
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.pid, number)
-        for pid in self._strays():
+        for pid in self._outside_group():
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, number)
 
     def remains(self) -> bool:
-        """Tell whether the group still has members, or a descendant lives outside it."""
-        return self._group_remains() or bool(self._strays())
+        """Return whether the group has members, or a descendant runs outside it."""
+        return self._group_remains() or bool(self._outside_group())
 
     def _group_remains(self) -> bool:
         if self._group_gone:
             return False
         if self._process.poll() is None:
             return True
-        # Gone is for good: another process may get the number next.
-        self._group_gone = not group_lives(self.pid)
+        # Remembered, because another group may get the number next.
+        self._group_gone = not group_alive(self.pid)
         return not self._group_gone
 
-    def _strays(self) -> list[int]:
-        return [pid for pid in self._census.below(self._mark) if _group_of(pid) != self.pid]
+    def _outside_group(self) -> list[int]:
+        return [pid for pid in self._tree.below(self._tag) if _group_of(pid) != self.pid]
 
-    def code(self) -> int:
+    def reap(self) -> int:
         """Reap the process, which has ended, and return its exit code."""
         return self._process.wait()
 
@@ -164,11 +323,11 @@ class LocalHost:
     """This machine.
 
     Args:
-        loop: Where the ends of processes are awaited.
-        output: What brings output to the screen.
-        workplace: What commands are made from.
-        folder: Where logs are kept; None when they cannot be.
-        tag: Marks everything that this launch starts.
+        loop: Loop that waits for the processes.
+        output: Relay of their output.
+        workplace: Source of their commands.
+        folder: Folder of their logs, or None if logs cannot be kept.
+        tag: Tag of everything that this launch starts.
         prefixed: Whether lines on the screen begin with the name of their node.
     """
 
@@ -188,84 +347,74 @@ class LocalHost:
         self._output = output
         self._workplace = workplace
         self._folder = folder
-        self._tag = tag
-        self._census = Census(tag)
+        self._tree = ProcessTree(tag)
         self._prefixed = prefixed
 
-    def start(self, job: Job, ended: Ended, confirmed: Confirmed | None = None) -> LocalChild:
-        """Start a process; the arguments and errors are those of `Host.start`."""
-        del confirmed  # it runs when this returns
-        log_file = self._folder.node_log(job.label) if self._folder else None
-        tag = f"{self._tag}:{job.owner}"
-        command = self._workplace.command(job.node, log_file=log_file, tag=tag)
-        cwd = self._prepare(command.cwd)
-        streams = self._streams(job, command)
+    def start(
+        self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart | None = None
+    ) -> LocalChild:
+        """Start a process; see `Host.start` for the arguments and errors."""
+        del on_start  # the process runs when this returns
+        log_file = self._folder.node_log(spec.label) if self._folder else None
+        tag = f"{self._tree.tag}:{spec.owner}"
+        command = self._workplace.command(spec.node, log_file=log_file, tag=tag)
+        _make_folder(command.cwd)
+        streams = self._open_streams(spec, command)
         try:
             process = subprocess.Popen(
                 command.argv,
                 stdin=streams.stdin,
                 stdout=streams.stdout,
                 stderr=streams.stderr,
-                env=_buffering(command, streams),
-                cwd=cwd,
+                env=_with_line_buffering(command, streams),
+                cwd=command.cwd,
                 start_new_session=True,
             )
         except (OSError, ValueError) as error:
-            raise _refused(job, command, error) from error
+            raise _start_error(spec, command, error) from error
         finally:
             streams.close()
-        logs = self._folder.pattern(job.label) if self._folder else ""
-        child = LocalChild(process, command, self._census, logs)
+        logs = self._folder.pattern(spec.label) if self._folder else ""
+        child = LocalChild(process, command, self._tree, logs)
 
         def exited() -> None:
-            code = child.code()
-            self._output.drain(job.owner, lambda tail: ended(code, tail or self._logged(job)))
+            code = child.reap()
+            self._output.drain(spec.owner, lambda tail: on_exit(code, tail or self._logged(spec)))
 
         self._loop.watch_exit(process.pid, exited)
         return child
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
-        """Count what its processes have used, by their owners' numbers."""
-        totals = usage(self._tag)
-        owners = {mark.removeprefix(f"{self._tag}:"): total for mark, total in totals.items()}
+        """Call a function with the resources that the processes use, by owner."""
+        totals = self._tree.usage()
+        owners = {tag.removeprefix(f"{self._tree.tag}:"): total for tag, total in totals.items()}
         done({int(owner): total for owner, total in owners.items() if owner.isdigit()})
 
-    def _streams(self, job: Job, command: Command) -> Streams:
-        prefix = f"[{job.label}] " if self._prefixed else ""
+    def _open_streams(self, spec: ProcessSpec, command: Command) -> Streams:
+        prefix = f"[{spec.label}] " if self._prefixed else ""
         if command.direct and os.isatty(0):
             return self._output.direct()
-        shown = job.node.output == "screen"
-        file = self._folder.stdout_log(job.label) if self._folder and not shown else None
+        shown = spec.node.output == "screen"
+        file = self._folder.stdout_log(spec.label) if self._folder and not shown else None
         try:
             if shown:
-                return self._output.screen(job.owner, prefix)
-            return self._output.log(job.owner, prefix, file, "a" if job.again else "w")
+                return self._output.screen(spec.owner, prefix)
+            return self._output.log(spec.owner, prefix, file, "a" if spec.again else "w")
         except OSError as error:
             where = "the screen" if shown else f"'{file}'"
             raise LaunchError(
-                f"cannot write the output of '{job.label}' to {where}: {error.strerror}"
+                f"cannot write the output of '{spec.label}' to {where}: {error.strerror}"
             ) from error
 
-    def _logged(self, job: Job) -> tuple[str, ...]:
+    def _logged(self, spec: ProcessSpec) -> tuple[str, ...]:
         """Return the last lines that a process wrote to its file."""
-        if self._folder is None or job.node.output == "screen":
+        if self._folder is None or spec.node.output == "screen":
             return ()
-        return _last_lines(self._folder.stdout_log(job.label))
-
-    @staticmethod
-    def _prepare(cwd: str) -> str:
-        try:
-            Path(cwd).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise LaunchError(
-                f"cannot start in '{cwd}': {error.strerror}; set ROS_HOME to a folder that can be"
-                " written to"
-            ) from error
-        return cwd
+        return _last_lines(self._folder.stdout_log(spec.label))
 
 
 def is_local(machine: MachinePlan | None) -> bool:
-    """Tell whether a machine is this one, by its address, with the user that this process runs as.
+    """Return whether a machine is this one, by its address and user.
 
     As in roslaunch, another user of this machine is reached over ssh.
     """
@@ -274,14 +423,14 @@ def is_local(machine: MachinePlan | None) -> bool:
     if machine.user and machine.user != getpass.getuser():
         return False
     address = machine.address.lower()
-    return address in _HERE or address == socket.gethostname().lower() or _is_ours(address)
+    return address in _LOCAL_NAMES or address == socket.gethostname().lower() or _is_own(address)
 
 
-def _is_ours(address: str) -> bool:
-    """Tell whether a name or address leads to an interface of this machine."""
+def _is_own(address: str) -> bool:
+    """Return whether a name or address belongs to an interface of this machine."""
     try:
         found = socket.getaddrinfo(address, 0, type=socket.SOCK_DGRAM)
-    except OSError:  # nobody knows it; ssh may, by its own configuration
+    except OSError:  # an unknown name; the user's ssh configuration may define it
         return False
     for family, kind, _, _, place in found:
         with socket.socket(family, kind) as probe, suppress(OSError):
@@ -290,35 +439,46 @@ def _is_ours(address: str) -> bool:
     return False
 
 
-def _buffering(command: Command, streams: Streams) -> Mapping[str, str]:
-    """Have a Python program that rosz does not run itself write its lines as it prints them."""
+def _make_folder(cwd: str) -> None:
+    try:
+        Path(cwd).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LaunchError(
+            f"cannot start in '{cwd}': {error.strerror}; set ROS_HOME to a folder that can be"
+            " written to"
+        ) from error
+
+
+def _with_line_buffering(command: Command, streams: Streams) -> Mapping[str, str]:
+    """Return variables that make a Python program not run by rosz write lines at once."""
     if command.python or streams.terminal:
         return command.environ
     return {"PYTHONUNBUFFERED": "1", **command.environ}
 
 
 def _group_of(pid: int) -> int:
-    """Return the process group of a process, or that of nobody when it is gone."""
+    """Return the process group of a process, or 0 if it has ended."""
     try:
         return os.getpgid(pid)
     except ProcessLookupError:
         return 0
 
 
-def _refused(job: Job, command: Command, error: OSError | ValueError) -> LaunchError:
+def _start_error(spec: ProcessSpec, command: Command, error: OSError | ValueError) -> LaunchError:
     number = error.errno if isinstance(error, OSError) else None
     if number == errno.ENOEXEC:
         return LaunchError(
-            f"unable to launch [{job.label}]: '{command.argv[0]}' is no program; if it is a script,"
-            " its first line must name what runs it, such as '#!/bin/sh'"
+            f"unable to launch [{spec.label}]: '{command.argv[0]}' is not a program; if it is a"
+            " script, its first line must name its interpreter, such as '#!/bin/sh'"
         )
     reason = error.strerror if isinstance(error, OSError) else str(error)
     hint = ""
-    if number == errno.ENOENT and job.node.launch_prefix:
-        hint = f"; is '{job.node.launch_prefix[0]}' of its launch-prefix installed?"
+    if number == errno.ENOENT and spec.node.launch_prefix:
+        hint = f"; is '{spec.node.launch_prefix[0]}' of its launch-prefix installed?"
     elif number == errno.ENOENT:
         hint = "; does its first line name an interpreter that is installed?"
-    return LaunchError(f"unable to launch [{job.label}]: {reason}: {' '.join(command.shown)}{hint}")
+    shown = " ".join(command.shown)
+    return LaunchError(f"unable to launch [{spec.label}]: {reason}: {shown}{hint}")
 
 
 def _last_lines(file: Path, count: int = 12, size: int = 4096) -> tuple[str, ...]:
@@ -326,7 +486,7 @@ def _last_lines(file: Path, count: int = 12, size: int = 4096) -> tuple[str, ...
         with file.open("rb") as stream:
             stream.seek(max(0, os.fstat(stream.fileno()).st_size - size))
             data = stream.read(size)
-    except OSError:  # nothing was written
+    except OSError:  # there is no file
         return ()
     lines = [line.rstrip() for line in data.decode(errors="replace").splitlines()]
     return tuple([line for line in lines if line][-count:])

@@ -1,7 +1,7 @@
-"""One thread that waits for everything a launch waits for: children, pipes, timers, requests.
+"""The event loop of a launch, and the signals that end a launch.
 
-Nothing here polls. Other threads and signal handlers hand work over with `Loop.post`; all else
-belongs to the thread that runs the loop.
+One thread waits for children, pipes, timers and requests, without polling. Other threads and signal
+handlers pass work to it with `Loop.post`; everything else belongs to the thread of the loop.
 """
 
 from __future__ import annotations
@@ -10,26 +10,30 @@ import heapq
 import itertools
 import os
 import selectors
+import signal
 import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
 
-__all__ = ("Loop", "Timer")
+__all__ = ("Loop", "Timer", "interrupted_by_signals", "stopped_by_signals")
 
 Action = Callable[[], None]
 
-_LONGEST_WAIT = 3600.0
-"""Seconds of one wait: the system counts milliseconds in 32 bits, which timers may exceed."""
+_MAX_WAIT = 3600.0
+"""Limit of one wait in seconds: the system counts milliseconds in 32 bits."""
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 class Timer:
-    """A call that will be made once, unless cancelled.
+    """A function that will be called once, unless cancelled.
 
     Args:
-        action: What to call.
+        action: The function.
     """
 
     __slots__ = ("action",)
@@ -38,12 +42,12 @@ class Timer:
         self.action: Action | None = action
 
     def cancel(self) -> None:
-        """Take it back; when it is over that is no error."""
+        """Cancel the call; a call already made is not an error."""
         self.action = None
 
 
 class Loop:
-    """Waits and calls back, on the thread that runs it."""
+    """Waits for events and calls functions, on the thread that runs it."""
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
@@ -58,37 +62,37 @@ class Loop:
         self._stopped = False
 
     def now(self) -> float:
-        """Return the time that timers go by, in seconds."""
+        """Return the time that timers use, in seconds."""
         return time.monotonic()
 
     def later(self, seconds: float, action: Action) -> Timer:
-        """Have something called after so many seconds."""
+        """Call a function after a delay in seconds."""
         timer = Timer(action)
         heapq.heappush(self._timers, (self.now() + seconds, next(self._order), timer))
         return timer
 
     def post(self, action: Action) -> None:
-        """Have something called soon; from any thread or signal handler, also when closed."""
+        """Call a function soon; safe from any thread or signal handler, also after `close`."""
         self._posted.append(action)
         try:
             self._waker.send(b"\0")
         except OSError:
-            return  # full: it wakes anyway; closed: nobody is left to wake
+            return  # full: the loop wakes anyway; closed: there is no loop to wake
 
     def watch(self, fd: int, action: Action) -> None:
-        """Have something called whenever a descriptor can be read."""
+        """Call a function whenever a descriptor can be read."""
         self._selector.register(fd, selectors.EVENT_READ, action)
 
     def unwatch(self, fd: int) -> None:
-        """End a `watch`; again is no error."""
+        """End a `watch`; a second call has no effect."""
         if fd in self._selector.get_map():
             self._selector.unregister(fd)
 
     def watch_exit(self, pid: int, action: Action) -> None:
-        """Have something called once when a child has ended; the child is left to be reaped."""
+        """Call a function once when a child has ended; the caller reaps the child."""
         try:
             fd = os.pidfd_open(pid)
-        except (AttributeError, OSError):  # another kernel: a thread waits instead
+        except (AttributeError, OSError):  # an older kernel: a thread waits instead
             threading.Thread(
                 target=self._await_exit, args=(pid, action), name=f"wait-{pid}", daemon=True
             ).start()
@@ -104,29 +108,29 @@ class Loop:
         self.watch(fd, ended)
 
     def _await_exit(self, pid: int, action: Action) -> None:
-        with suppress(ChildProcessError):  # reaped already: it has ended
+        with suppress(ChildProcessError):  # already reaped, so it has ended
             os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
         self.post(action)
 
     def stop(self) -> None:
-        """Make `run` return after the present round, or at once when it is called next."""
+        """Make `run` return after the current round, or at once when it is called next."""
         self._stopped = True
 
     def run(self) -> None:
-        """Wait and call back until `stop`."""
+        """Wait for events and call functions until `stop`."""
         while not self._stopped:
             self.step()
         self._stopped = False
 
     def step(self, timeout: float | None = None) -> None:
-        """Do one round: wait for something, at most so many seconds, and call back."""
+        """Run one round: wait for an event, at most ``timeout`` seconds, and call functions."""
         if self._timers:
-            left = min(max(0.0, self._timers[0][0] - self.now()), _LONGEST_WAIT)
+            left = min(max(0.0, self._timers[0][0] - self.now()), _MAX_WAIT)
             timeout = left if timeout is None else min(left, timeout)
         if self._posted:
             timeout = 0.0
         for key, _ in self._selector.select(timeout):
-            # An earlier call of this round may have ended the watch.
+            # An earlier function of this round may have ended the watch.
             if self._selector.get_map().get(key.fd) is key:
                 key.data()
         self._run_timers()
@@ -149,10 +153,76 @@ class Loop:
             return
 
     def close(self) -> None:
-        """Release the descriptors of the loop; again is no error."""
+        """Release the descriptors of the loop; a second call has no effect."""
         self._selector.close()
         for fd in self._children:
             os.close(fd)
         self._children.clear()
         self._waker.close()
         self._woken.close()
+
+
+@contextmanager
+def stopped_by_signals(
+    loop: Loop,
+    shutdown: Callable[[], None],
+    kill: Callable[[], None],
+    dump_stacks: Callable[[str], None],
+) -> Iterator[None]:
+    r"""Let the first signal shut a launch down, and the second one kill its processes.
+
+    SIGQUIT (Ctrl-\) kills them at once. A SIGHUP that is ignored, as under ``nohup``, stays
+    ignored. Outside the main thread this installs nothing.
+
+    Args:
+        loop: Loop that calls the first two functions.
+        shutdown: Called at the first signal.
+        kill: Called at each further signal, and at SIGQUIT.
+        dump_stacks: Called in the signal handler before ``kill``, with the name of the signal.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    seen = threading.Event()
+
+    def handle(number: int, _frame: object) -> None:
+        again = " again" if seen.is_set() else ""
+        seen.set()
+        if not again and number != signal.SIGQUIT:
+            loop.post(shutdown)
+            return
+        dump_stacks(f"{signal.Signals(number).name}{again}")
+        loop.post(kill)
+
+    with _handled_by(handle):
+        yield
+
+
+@contextmanager
+def interrupted_by_signals() -> Iterator[None]:
+    """Let these signals raise `KeyboardInterrupt`, so that what has been started is ended.
+
+    Inside `stopped_by_signals`, the handlers of that one count.
+    """
+
+    def handle(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with _handled_by(handle):
+        yield
+
+
+@contextmanager
+def _handled_by(handle: Callable[[int, Any], None]) -> Iterator[None]:
+    before: dict[signal.Signals, Any] = {}
+    for number in _SIGNALS:
+        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            before[number] = signal.signal(number, handle)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

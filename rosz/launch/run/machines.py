@@ -1,10 +1,16 @@
-"""The machines of a launch: where they are, and bringing all of them up at once."""
+"""The addresses of other machines, and the system's ssh that reaches them.
+
+The user's ssh configuration, keys, agent and known hosts are used, as in a terminal. ssh never asks
+a question (``BatchMode``), because a launch could not answer it.
+"""
 
 from __future__ import annotations
 
+import math
 import re
+import shlex
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Self
 
 import msgspec
@@ -12,30 +18,35 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import UsageError, near_miss
 from rosz.launch.plan.model import MachinePlan, Place, Plan
-from rosz.launch.run.console import Console
-from rosz.launch.run.loop import Loop
-from rosz.launch.run.protocol import Setup
-from rosz.launch.run.remote import RemoteHost, await_hosts
 from rosz.wire import Endpoint
 
-__all__ = ("MachineCall", "Machines", "meeting_places", "moved")
+__all__ = (
+    "MachineOption",
+    "launch_endpoints",
+    "move_machines",
+    "ssh_command",
+    "ssh_failure",
+)
 
-_CALL = re.compile(
+_OPTION = re.compile(
     r"(?:(?P<name>[^=@]+)=)?(?:(?P<user>[^@]+)@)?"
     r"(?P<address>\[[^]]+\]|[^-@:=\s][^@:=\s]*)(?::(?P<port>[0-9]{1,5}))?"
 )
+_AGENT = "rosz launch --agent"
 _SSH_PORT = 22
+_SSH_FAILED, _NOT_EXECUTABLE, _NOT_FOUND = 255, 126, 127
+_ALIVE_COUNT = 3
 _TIMEOUT = 10.0
 
 
-class MachineCall(msgspec.Struct, frozen=True):
-    """Where a machine is, as given on a command line: ``[NAME=][USER@]ADDRESS[:PORT]``.
+class MachineOption(msgspec.Struct, frozen=True):
+    """The address of a machine from a command line: ``[NAME=][USER@]ADDRESS[:PORT]``.
 
     Attributes:
-        name: What files call it; empty for where all nodes run that name no machine.
+        name: Name in the launch files, or "" for the machine of all nodes that name none.
         address: Host name or address.
-        user: Login name; empty for ssh's own choice.
-        port: Port of its ssh server.
+        user: Login name, or "" for that of ssh.
+        port: Port of the ssh server.
     """
 
     name: str
@@ -45,12 +56,12 @@ class MachineCall(msgspec.Struct, frozen=True):
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Read it from a command line.
+        """Return the machine that the text of an option describes.
 
         Raises:
-            UsageError: It is none.
+            UsageError: If the text does not have the form above.
         """
-        match = _CALL.fullmatch(text)
+        match = _OPTION.fullmatch(text)
         if match is None or text.startswith("-"):
             raise UsageError(f"--machine is '{text}'; expected [NAME=][USER@]ADDRESS[:PORT]")
         return cls(
@@ -61,32 +72,32 @@ class MachineCall(msgspec.Struct, frozen=True):
         )
 
 
-def moved(plan: Plan, calls: Sequence[MachineCall]) -> Plan:
-    """Return the plan with machines where a command line says they are.
+def move_machines(plan: Plan, options: Sequence[MachineOption]) -> Plan:
+    """Return the plan with the machines of a command line.
 
     Raises:
-        UsageError: No file declares a machine of that name.
+        UsageError: If no file declares a machine of that name.
     """
-    for call in calls:
-        plan = _with_default(plan, call) if not call.name else _with_moved(plan, call)
+    for option in options:
+        plan = _set_address(plan, option) if option.name else _set_default(plan, option)
     return plan
 
 
-def _with_default(plan: Plan, call: MachineCall) -> Plan:
-    """Have all nodes that name no machine run on one."""
+def _set_default(plan: Plan, option: MachineOption) -> Plan:
+    """Return the plan with all nodes that name no machine on the given one."""
     machine = MachinePlan(
-        name=call.address,
-        address=call.address,
+        name=option.address,
+        address=option.address,
         env_loader="",
-        ssh_port=call.port,
-        user=call.user,
+        ssh_port=option.port,
+        user=option.user,
         password="",
         timeout=_TIMEOUT,
         assignable=True,
         place=Place("--machine"),
     )
     nodes = tuple(
-        # An <executable> is a command of this machine, whatever machines there are.
+        # An <executable> is a command of this machine.
         node
         if node.machine or node.command
         else msgspec.structs.replace(node, machine=machine.name)
@@ -96,83 +107,118 @@ def _with_default(plan: Plan, call: MachineCall) -> Plan:
     return msgspec.structs.replace(plan, nodes=nodes, machines=(*others, machine))
 
 
-def _with_moved(plan: Plan, call: MachineCall) -> Plan:
-    """Have a machine that the files declare be somewhere else."""
+def _set_address(plan: Plan, option: MachineOption) -> Plan:
+    """Return the plan with another address for a machine that the files declare."""
     declared = {machine.name: machine for machine in plan.machines}
-    known = declared.get(call.name)
+    known = declared.get(option.name)
     if known is None:
-        hint = near_miss(call.name, declared) or f"; they declare {', '.join(declared) or 'none'}"
-        raise UsageError(f"--machine: no file declares a machine '{call.name}'{hint}")
+        hint = near_miss(option.name, declared) or f"; they declare {', '.join(declared) or 'none'}"
+        raise UsageError(f"--machine: no file declares a machine '{option.name}'{hint}")
     fresh = msgspec.structs.replace(
-        known, address=call.address, ssh_port=call.port, user=call.user or known.user
+        known, address=option.address, ssh_port=option.port, user=option.user or known.user
     )
     machines = tuple(fresh if machine is known else machine for machine in plan.machines)
     return msgspec.structs.replace(plan, machines=machines)
 
 
-def meeting_places(environment: Environment) -> tuple[str, ...]:
-    """Return where other machines may find what this one is linked to, best first.
+def launch_endpoints(environment: Environment) -> tuple[str, ...]:
+    """Return the endpoints by which other machines may reach this launch, best first.
 
-    An endpoint without an address, such as ``tcp/:7447``, is on the machine that asks.
+    An endpoint without an address, such as ``tcp/:7447``, is on this machine, under the address by
+    which the other machine knows it.
     """
-    places = []
-    for endpoint in (*environment.listen, environment.rendezvous):
-        place = Endpoint(endpoint)
-        if not place.is_tcp:
+    found = []
+    for text in (*environment.listen, environment.rendezvous):
+        endpoint = Endpoint(text)
+        if not endpoint.is_tcp:
             continue
-        if place.is_any_address or place.is_local:
-            # Keys are for a name, and seldom for an address.
+        if endpoint.is_any_address or endpoint.is_local:
+            # Certificates are issued for a name, and rarely for an address.
             names = [socket.gethostname()] if environment.keys is not None else []
-            places += [f"{place.protocol}/{name}:{place.port}" for name in (*names, "")]
+            found += [f"{endpoint.protocol}/{name}:{endpoint.port}" for name in (*names, "")]
         else:
-            places.append(endpoint)
-    places += [place for place in environment.connect if "/localhost" not in place]
-    return tuple(dict.fromkeys(places))
+            found.append(text)
+    found += [text for text in environment.connect if "/localhost" not in text]
+    return tuple(dict.fromkeys(found))
 
 
-class Machines:
-    """All other machines of one launch.
+def ssh_command(machine: MachinePlan, silence: float) -> list[str]:
+    """Return the command that starts an agent on a machine.
 
     Args:
-        loop: Where their answers are awaited.
-        console: Where it is said what happens to them.
+        machine: The machine. Without an env-loader, a login shell sets up the environment.
+        silence: Time in seconds without an answer after which the connection counts as dead.
     """
+    command = ["ssh", "-T", "-o", "BatchMode=yes"]
+    command += ["-o", f"ConnectTimeout={math.ceil(machine.timeout)}"]
+    command += ["-o", f"ServerAliveInterval={max(1, math.floor(silence / _ALIVE_COUNT))}"]
+    command += ["-o", f"ServerAliveCountMax={_ALIVE_COUNT}"]
+    if machine.ssh_port != _SSH_PORT:
+        command += ["-p", str(machine.ssh_port)]
+    if machine.user:
+        command += ["-l", machine.user]
+    if machine.env_loader:
+        there = f"exec {shlex.quote(machine.env_loader)} {_AGENT}"
+    else:
+        there = f"exec sh -l -c {shlex.quote(f'exec {_AGENT}')}"
+    return [*command, "--", machine.address, there]
 
-    def __init__(self, loop: Loop, console: Console) -> None:
-        self._loop = loop
-        self._console = console
-        self._hosts: list[RemoteHost] = []
 
-    def call(self, machines: Mapping[str, MachinePlan], setup: Setup) -> dict[str, RemoteHost]:
-        """Start the agents of all machines, and wait until they are there.
+def ssh_failure(machine: MachinePlan, code: int, output: str) -> str:
+    """Return why there is no agent on a machine, and what to do.
 
-        Args:
-            machines: The machines by name.
-            setup: What the agents have to know.
+    Args:
+        machine: The machine.
+        code: Exit code of ssh.
+        output: Error output of ssh and of the other machine.
+    """
+    address = machine.address
+    by_hand = " ".join(
+        [
+            "ssh",
+            *(["-p", str(machine.ssh_port)] if machine.ssh_port != _SSH_PORT else []),
+            f"{machine.user}@{address}" if machine.user else address,
+        ]
+    )
+    last = output.strip().splitlines()[-1].strip() if output.strip() else ""
+    if code == _SSH_FAILED:
+        for words, meaning in _meanings(machine, by_hand):
+            if words in output:
+                return meaning
+        return f"ssh to '{address}' failed: {last or 'it gave no reason'}; try: {by_hand}"
+    loader = machine.env_loader
+    if loader and code in {_NOT_FOUND, _NOT_EXECUTABLE} and f"{loader}:" in output:
+        return f"env-loader '{loader}' cannot be run on '{address}': {last}"
+    if code == _NOT_FOUND:
+        return (
+            f"no rosz on '{address}': install it there, on the PATH of a login shell, or name a"
+            ' script in <machine env-loader="..."> that sets the PATH and ends with: exec "$@"'
+        )
+    return f"the agent on '{address}' ended with exit code {code}: {last or 'it gave no reason'}"
 
-        Raises:
-            LaunchError: One does not come up.
-        """
-        called = {}
-        for number, (name, machine) in enumerate(machines.items()):
-            if machine.password:
-                self._console.error(
-                    f"WARNING: {machine.place}: the password of machine '{name}' is not used: a"
-                    " launch file is no place for one; give that machine your key instead, once:"
-                    f" ssh-copy-id {f'{machine.user}@' if machine.user else ''}{machine.address}"
-                )
-            there = msgspec.structs.replace(setup, tag=f"{setup.tag}:at{number}")
-            host = RemoteHost(
-                machine, f"{machine.address}-{number}", self._loop, self._console, there
-            )
-            self._hosts.append(host)
-            called[name] = host
-        await_hosts(self._hosts, self._loop)
-        return called
 
-    def close(self) -> None:
-        """End all agents with what they run; again is no error."""
-        for host in self._hosts:
-            host.hang_up()
-        for host in self._hosts:
-            host.close()
+def _meanings(machine: MachinePlan, by_hand: str) -> list[tuple[str, str]]:
+    address = machine.address
+    user = f"user '{machine.user}'" if machine.user else "the user"
+    where = by_hand.removeprefix("ssh ")
+    place = f"{address}:{machine.ssh_port}"
+    return [
+        (
+            "IDENTIFICATION HAS CHANGED",
+            f"'{address}' shows another host key than known_hosts has: if it was reinstalled, run:"
+            f" ssh-keygen -R {address}; if not, another machine answers there",
+        ),
+        (
+            "Host key verification failed",
+            f"the host key of '{address}' is not known: run '{by_hand}' once, and compare its"
+            " fingerprint",
+        ),
+        (
+            "Permission denied",
+            f"'{address}' does not let {user} in without a password: run: ssh-copy-id {where}",
+        ),
+        ("Could not resolve", f"'{address}' is not a known host name; see /etc/hosts or the DNS"),
+        ("Connection refused", f"no ssh server answers at {place}; is openssh-server running?"),
+        ("No route to host", f"'{address}' cannot be reached; is it on, and on this network?"),
+        ("timed out", f"'{address}' does not answer within {machine.timeout:g} s"),
+    ]

@@ -1,7 +1,7 @@
-"""Where nodes write to: the screen, by way of the relay, or a file of the run's folder.
+"""The output of nodes: to the screen through the relay process, or to a file of the run's folder.
 
-A node that writes to a terminal is given one of its own, so that it keeps its colours and its
-line-wise output; one whose launch writes to a file or pipe is given a pipe.
+A node whose launch writes to a terminal gets a terminal of its own, so that it keeps its colours
+and writes line by line; otherwise it gets a pipe.
 """
 
 from __future__ import annotations
@@ -20,30 +20,83 @@ from typing import Any, Literal
 
 import msgspec
 
+from rosz.errors import LaunchError
 from rosz.launch.run.loop import Loop, Timer
 
-__all__ = ("Output", "Streams")
+__all__ = ("Output", "RunFolder", "Streams")
 
-_DRAIN_SECONDS = 0.5
-"""How long the relay may take to show the last lines before a death is reported without them."""
-_END_SECONDS = 5.0
-"""How long a screen that takes nothing, such as a stopped terminal, holds up the end."""
-_LEAST_LIFE_SECONDS = 1.0
-"""A relay that dies sooner would die again."""
-_ASK_SECONDS = 0.5
-"""How long the relay may take to hear a request, unless it is known to hear none."""
+_DRAIN_TIMEOUT = 0.5
+"""Time in seconds to wait for the last lines of a process before its end is reported."""
+_CLOSE_TIMEOUT = 5.0
+"""Time in seconds to wait for a screen that accepts nothing, such as a paused terminal."""
+_MIN_LIFE = 1.0
+"""Time in seconds: a relay that ends sooner is not started again."""
+_SEND_TIMEOUT = 0.5
+"""Time in seconds for the relay to receive a request, unless the last one failed."""
 
-Told = Callable[[tuple[str, ...]], None]
+_OnDrained = Callable[[tuple[str, ...]], None]
+
+
+class RunFolder:
+    """The log folder of one run, ``<log folder>/<run id>``, and the link ``latest`` to it.
+
+    Args:
+        log_dir: Log folder.
+        run_id: Id of the run.
+    """
+
+    def __init__(self, log_dir: Path, run_id: str) -> None:
+        self.path = log_dir / run_id
+
+    def create(self) -> None:
+        """Create the folder, and let ``latest`` point to it.
+
+        Raises:
+            LaunchError: If it cannot be created or written to.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._point_latest()
+        except OSError as error:
+            raise LaunchError(
+                f"cannot keep logs in '{self.path}': {error.strerror}; set ROS_LOG_DIR to a folder"
+                " that can be written to"
+            ) from error
+
+    def _point_latest(self) -> None:
+        latest = self.path.parent / "latest"
+        if latest.exists() and not latest.is_symlink():
+            return  # a real folder of the user
+        fresh = latest.with_name(f".latest-{os.getpid()}")
+        fresh.unlink(missing_ok=True)
+        fresh.symlink_to(self.path.name)
+        fresh.replace(latest)
+
+    def node_log(self, label: str) -> Path:
+        """Return the path of the log that a process writes itself."""
+        return self.path / f"{_file_name(label)}.log"
+
+    def stdout_log(self, label: str) -> Path:
+        """Return the path for the standard output of a process that is not shown."""
+        return self.path / f"{_file_name(label)}-stdout.log"
+
+    def pattern(self, label: str) -> str:
+        """Return the pattern of all logs of a process, as messages show it."""
+        return str(self.path / f"{_file_name(label)}*.log")
+
+
+def _file_name(label: str) -> str:
+    return label.replace("/", "-")
 
 
 class Streams(msgspec.Struct, frozen=True):
-    """Descriptors for a process about to start; close them once it has.
+    """The descriptors for a process about to start, to be closed once it has started.
 
     Attributes:
-        stdin: To read from; None where it may read what the launch reads.
-        stdout: To write to; None where it writes right where the launch does.
-        stderr: As stdout.
-        terminal: Whether what the process writes to is a terminal.
+        stdin: Descriptor to read from, or None for that of the launch.
+        stdout: Descriptor to write to, or None for that of the launch.
+        stderr: Descriptor to write errors to, or None for that of the launch.
+        terminal: Whether the process writes to a terminal.
     """
 
     stdin: int | None
@@ -52,33 +105,33 @@ class Streams(msgspec.Struct, frozen=True):
     terminal: bool
 
     def close(self) -> None:
-        """Close this side of the descriptors."""
+        """Close the descriptors in this process."""
         for fd in (self.stdin, self.stdout, self.stderr):
             if fd is not None:
                 os.close(fd)
 
 
 class Output:
-    """The relay process, and what is asked of it.
+    """The launch's side of the relay process.
 
     Args:
-        loop: Where its answers are awaited.
-        warn: Told when it has died.
+        loop: Loop that waits for its replies.
+        warn: Function that reports its death.
     """
 
     def __init__(self, loop: Loop, warn: Callable[[str], None]) -> None:
         self._loop = loop
         self._warn = warn
-        self._waiting: dict[int, tuple[Told, Timer]] = {}
+        self._waiting: dict[int, tuple[_OnDrained, Timer]] = {}
         self._unread = b""
         self._terminals = (os.isatty(1), os.isatty(2))
         self._same = _same_file(1, 2)
-        self._begin()
+        self._start()
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         self._began = self._loop.now()
         self._requests, theirs = socket.socketpair()
-        self._requests.settimeout(_ASK_SECONDS)
+        self._requests.settimeout(_SEND_TIMEOUT)
         script = Path(__file__).with_name("relay.py")
         with theirs:
             self._process = subprocess.Popen(
@@ -88,14 +141,14 @@ class Output:
                 start_new_session=True,
                 cwd="/",
             )
-        self._loop.watch(self._requests.fileno(), self._answered)
+        self._loop.watch(self._requests.fileno(), self._receive)
 
     def screen(self, owner: int, prefix: str) -> Streams:
-        """Return streams that end up on the screen.
+        """Return streams for a process whose output is shown on the screen.
 
         Args:
             owner: Number of the process, for `drain`.
-            prefix: What to put before each line.
+            prefix: Text to put before each line.
         """
         if all(self._terminals) and self._same:
             terminal = self._terminal(owner, 1, prefix)
@@ -106,16 +159,16 @@ class Output:
         return Streams(_input(), out, err, terminal=False)
 
     def log(self, owner: int, prefix: str, file: Path | None, mode: Literal["w", "a"]) -> Streams:
-        """Return streams whose standard output ends up in a file, and only errors on the screen.
+        """Return streams for a process whose standard output goes to a file, and errors are shown.
 
         Args:
             owner: Number of the process, for `drain`.
-            prefix: What to put before each line on the screen.
-            file: Where to; None discards it.
-            mode: ``w`` to begin the file anew, ``a`` to go on with it.
+            prefix: Text to put before each line on the screen.
+            file: Path of the file, or None to discard the output.
+            mode: ``w`` to replace the file, ``a`` to append.
 
         Raises:
-            OSError: The file cannot be written.
+            OSError: If the file cannot be written.
         """
         how = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if mode == "w" else os.O_APPEND)
         out = os.open(file or os.devnull, how, 0o644)
@@ -126,13 +179,13 @@ class Output:
 
     @staticmethod
     def direct() -> Streams:
-        """Return the streams of the launch itself, as a debugger in the same terminal needs."""
+        """Return the streams of the launch itself, which a debugger in the same terminal needs."""
         return Streams(None, None, None, terminal=os.isatty(1))
 
     def _terminal(self, owner: int, sink: int, prefix: str) -> int | None:
         try:
             ours, theirs = os.openpty()
-        except OSError:  # none left, or none in this container: a pipe does, without colours
+        except OSError:  # no terminal available: a pipe works, without colours
             return None
         _pass_through(theirs)
         with contextlib.suppress(OSError):
@@ -151,83 +204,83 @@ class Output:
         return os.open(os.devnull, os.O_WRONLY)
 
     def _add(self, owner: int, sink: int, prefix: str, fd: int) -> bool:
-        heard = self._ask({"op": "add", "id": owner, "sink": sink, "prefix": prefix}, fd)
+        sent = self._send({"op": "add", "id": owner, "sink": sink, "prefix": prefix}, fd)
         os.close(fd)
-        return heard
+        return sent
 
-    def _ask(self, request: dict[str, Any], *fds: int) -> bool:
-        """Tell whether the relay takes requests; without it the screen is lost, not the run."""
+    def _send(self, request: dict[str, Any], *fds: int) -> bool:
+        """Send a request, and return whether the relay received it; nodes run on without it."""
         try:
             socket.send_fds(self._requests, [json.dumps(request).encode() + b"\n"], fds)
-        except OSError:  # it was killed, or waits for a screen that has long taken nothing
+        except OSError:  # it was killed, or is blocked by a screen that accepts nothing
             self._requests.settimeout(0)
             return False
-        self._requests.settimeout(_ASK_SECONDS)
+        self._requests.settimeout(_SEND_TIMEOUT)
         return True
 
-    def drain(self, owner: int, told: Told) -> None:
-        """Have all that a process wrote shown, then be told its last lines.
+    def drain(self, owner: int, done: _OnDrained) -> None:
+        """Show all that a process wrote, then call a function with its last lines.
 
         Args:
             owner: Number of the process.
-            told: Called on the loop, after half a second at the latest.
+            done: Called on the loop, after half a second at the latest.
         """
-        timer = self._loop.later(_DRAIN_SECONDS, lambda: self._tell(owner, ()))
-        self._waiting[owner] = (told, timer)
-        self._ask({"op": "drain", "id": owner})
+        timer = self._loop.later(_DRAIN_TIMEOUT, lambda: self._drained(owner, ()))
+        self._waiting[owner] = (done, timer)
+        self._send({"op": "drain", "id": owner})
 
-    def _tell(self, owner: int, tail: tuple[str, ...]) -> None:
-        told, timer = self._waiting.pop(owner, (None, None))
-        if told is not None and timer is not None:
+    def _drained(self, owner: int, tail: tuple[str, ...]) -> None:
+        done, timer = self._waiting.pop(owner, (None, None))
+        if done is not None and timer is not None:
             timer.cancel()
-            told(tail)
+            done(tail)
 
-    def _answered(self) -> None:
+    def _receive(self) -> None:
         try:
             data = self._requests.recv(65536)
         except ConnectionError:
             data = b""
         if not data:
-            self._lost()
+            self._restart()
         *lines, self._unread = (self._unread + data).split(b"\n")
         for line in lines:
-            answer = json.loads(line)
-            self._tell(answer["id"], tuple(answer["tail"]))
+            reply = json.loads(line)
+            self._drained(reply["id"], tuple(reply["tail"]))
 
-    def _lost(self) -> None:
-        """Begin anew after the death of the relay, unless it has only just begun."""
+    def _restart(self) -> None:
+        """Start the relay again after its death, unless it died right after its start."""
         self._loop.unwatch(self._requests.fileno())
         code = self._process.wait()
         self._unread = b""
-        told = f"what shows the output of nodes (pid {self._process.pid}) has died ({code}): nodes"
-        if self._loop.now() - self._began < _LEAST_LIFE_SECONDS:
-            self._warn(f"{told} write to nobody from now on")
+        text = f"the relay of the nodes' output (pid {self._process.pid}) has died ({code}): nodes"
+        if self._loop.now() - self._began < _MIN_LIFE:
+            self._warn(f"{text} started from now on have no output")
             return
         self._warn(
-            f"{told} that run now write to nobody, and may end of it; those that start from now on"
-            " are shown again ('rosz launch --restart NODE')"
+            f"{text} that run now have lost their output, and may end because of it; nodes that"
+            " start from now on are shown again ('rosz launch --restart NODE')"
         )
         self._requests.close()
-        self._begin()
+        self._start()
 
     def close(self) -> None:
-        """Have everything shown, and end the relay; again is no error."""
+        """Show everything, and end the relay; a second call has no effect."""
         if self._requests.fileno() < 0:
             return
         self._loop.unwatch(self._requests.fileno())
-        self._ask({"op": "end"})
+        self._send({"op": "end"})
         self._requests.close()
         try:
-            self._process.wait(_END_SECONDS)
-        except subprocess.TimeoutExpired:  # its screen takes nothing any more
+            self._process.wait(_CLOSE_TIMEOUT)
+        except subprocess.TimeoutExpired:  # its screen accepts nothing
             self._process.kill()
             self._process.wait()
 
 
 def _input() -> int | None:
-    """Return what nodes read: the terminal of the launch, as in ROS 1, or nothing.
+    """Return the standard input of nodes: None for the launch's terminal, as in ROS 1, or nothing.
 
-    A pipe is none of theirs: over ssh it carries what the launch tells the agent.
+    Nodes do not get a pipe: over ssh it carries the requests of the launch.
     """
     return None if os.isatty(0) else os.open(os.devnull, os.O_RDONLY)
 
@@ -240,7 +293,7 @@ def _same_file(first: int, second: int) -> bool:
 
 
 def _pass_through(terminal: int) -> None:
-    """Have a terminal pass bytes on as they are: no echo, no translation of line ends."""
+    """Make a terminal pass bytes unchanged: no echo, no translation of line ends."""
     settings = termios.tcgetattr(terminal)
     settings[0] = settings[1] = settings[3] = 0
     termios.tcsetattr(terminal, termios.TCSANOW, settings)

@@ -1,27 +1,32 @@
-"""What a launch and its agent on another machine say to each other: JSON, one message per line.
+"""The messages between a launch and its agent on another machine: JSON, one per line, over pipes.
 
-The launch says `Setup` first, then whatever is to be done; the agent says `Hello` first, as soon as
-it runs. What comes before `Hello` is what the other machine prints at a login, and no message.
+The launch sends `Setup` first, then its other requests. The agent sends `AgentVersion` as soon as
+it runs. Anything before that is text that the other machine prints at a login.
 """
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 import msgspec
 
-from rosz.launch.run.family import Usage
-from rosz.launch.run.host import Job
-from rosz.launch.run.process import Timeouts
+from rosz.launch.run.host import ProcessSpec, Usage
+from rosz.launch.run.supervisor import Timeouts
+from rosz.worker import Worker
 
 __all__ = (
     "PROTOCOL",
+    "AgentVersion",
+    "AgentWarning",
     "Exited",
     "Gone",
-    "Hello",
+    "LineReader",
     "Measure",
     "Measured",
-    "Notice",
+    "MessageWriter",
     "Ping",
     "Ready",
     "Refused",
@@ -36,20 +41,25 @@ __all__ = (
 )
 
 PROTOCOL: Final = 1
-"""Changes whenever an older side would not understand a newer one."""
+"""Version of the messages; it changes when an older side would not understand a newer one."""
+
+_CHUNK = 65536
+_MAX_LINE = 64 * 1024 * 1024
+_CAPACITY = 1024 * 1024
+"""Number of waiting bytes at which a writer is full."""
 
 
 class Setup(msgspec.Struct, frozen=True, tag="setup"):
-    """What an agent has to know of the launch.
+    """The settings of the launch that an agent needs.
 
     Attributes:
-        run_id: Id of the run, which names the folder for logs.
-        tag: Marks everything that the agent starts.
-        domain: The ROS domain.
-        meet: Endpoints where the launch may be found; those that end in ``:PORT`` alone, such as
-            ``tcp/:7447``, are on the machine that the agent was called from.
-        silence: Seconds without a word from the launch after which it counts as dead.
-        timeouts: How long processes may take to end.
+        run_id: Id of the run, which is the name of the log folder.
+        tag: Tag of everything that the agent starts.
+        domain: ROS domain.
+        meet: Endpoints where the launch may be found; those without an address, such as
+            ``tcp/:7447``, are on the machine from which the agent was started.
+        silence: Time in seconds without a message from the launch after which it counts as dead.
+        timeouts: Time that processes have to end.
         prefixed: Whether lines begin with the name of their node.
     """
 
@@ -63,14 +73,19 @@ class Setup(msgspec.Struct, frozen=True, tag="setup"):
 
 
 class Start(msgspec.Struct, frozen=True, tag="start"):
-    """Start a process; `serial` names it from now on, and never another one."""
+    """A request to start a process.
+
+    Attributes:
+        serial: Number of the process in all later messages, never used again.
+        job: The process.
+    """
 
     serial: int
-    job: Job
+    job: ProcessSpec
 
 
 class Signal(msgspec.Struct, frozen=True, tag="signal"):
-    """Signal a process and its descendants."""
+    """A request to signal a process and its descendants."""
 
     serial: int
     number: int
@@ -81,19 +96,19 @@ class Ping(msgspec.Struct, frozen=True, tag="ping"):
 
 
 class Measure(msgspec.Struct, frozen=True, tag="measure"):
-    """Say what the processes have used."""
+    """A request for the resources that processes use."""
 
 
 Request = Setup | Start | Signal | Ping | Measure
 
 
-class Hello(msgspec.Struct, frozen=True, tag="hello"):
-    """The agent runs.
+class AgentVersion(msgspec.Struct, frozen=True, tag="hello"):
+    """The report that the agent runs.
 
     Attributes:
-        protocol: Its `PROTOCOL`.
+        protocol: `PROTOCOL` of the agent.
         version: Version of rosz there.
-        host: Name of the machine by itself.
+        host: Host name of the machine.
     """
 
     protocol: int
@@ -102,29 +117,29 @@ class Hello(msgspec.Struct, frozen=True, tag="hello"):
 
 
 class Ready(msgspec.Struct, frozen=True, tag="ready"):
-    """The agent has understood `Setup`.
+    """The report that the agent has handled `Setup`.
 
     Attributes:
-        reaches: Where its nodes link to; empty where they will not find this launch.
+        reaches: Endpoint that its nodes connect to, or "" if they will not find this launch.
     """
 
     reaches: str
 
 
-class Notice(msgspec.Struct, frozen=True, tag="notice"):
-    """Something that somebody should know."""
+class AgentWarning(msgspec.Struct, frozen=True, tag="notice"):
+    """A warning for the user."""
 
     text: str
 
 
 class Started(msgspec.Struct, frozen=True, tag="started"):
-    """A process runs.
+    """The report that a process runs.
 
     Attributes:
-        serial: Which one.
-        pid: Its id there.
-        shown: Its command line as messages show it.
-        logs: What matches its logs there; empty where none are kept.
+        serial: Number of the process.
+        pid: Process id there.
+        shown: Command line that messages show.
+        logs: Pattern of the paths of its logs there, or "" if there are none.
     """
 
     serial: int
@@ -134,21 +149,21 @@ class Started(msgspec.Struct, frozen=True, tag="started"):
 
 
 class Refused(msgspec.Struct, frozen=True, tag="refused"):
-    """A process could not be started."""
+    """The report that a process could not be started."""
 
     serial: int
     text: str
 
 
 class Shown(msgspec.Struct, frozen=True, tag="shown"):
-    """Something for the screen: whole lines for standard output (1) or error (2)."""
+    """Output of nodes for standard output (1) or error (2) of the launch."""
 
     sink: int
     data: bytes
 
 
 class Exited(msgspec.Struct, frozen=True, tag="exited"):
-    """A process has ended; descendants of it may be left."""
+    """The report that a process has ended; descendants may still run."""
 
     serial: int
     code: int
@@ -156,25 +171,109 @@ class Exited(msgspec.Struct, frozen=True, tag="exited"):
 
 
 class Gone(msgspec.Struct, frozen=True, tag="gone"):
-    """Nothing of a process is left."""
+    """The report that a process and all its descendants have ended."""
 
     serial: int
 
 
 class Measured(msgspec.Struct, frozen=True, tag="measured"):
-    """What processes have used, by their owners' numbers."""
+    """The resources that processes use, by owner."""
 
     used: dict[int, Usage]
 
 
-Report = Hello | Ready | Notice | Started | Refused | Shown | Exited | Gone | Measured
+Report = AgentVersion | Ready | AgentWarning | Started | Refused | Shown | Exited | Gone | Measured
 
 
 def rosz_version() -> str:
-    """Return the version of rosz on this machine, as far as it is known."""
+    """Return the version of rosz on this machine, or "unknown"."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
         return version("rosz")
     except PackageNotFoundError:  # run from its sources
         return "unknown"
+
+
+class MessageWriter:
+    """Writes messages to a pipe in order, on a thread, as the pipe may be slow or blocked.
+
+    Args:
+        fd: Descriptor of the pipe; the writer closes it at the end.
+    """
+
+    def __init__(self, fd: int) -> None:
+        self._fd = fd
+        self._broken = False
+        self._encoder = msgspec.json.Encoder()
+        self._worker = Worker[bytes]("rosz messages", self._write, capacity=_CAPACITY, size=len)
+
+    @property
+    def full(self) -> bool:
+        """Whether so much waits that less urgent messages should wait."""
+        return self._worker.full
+
+    def when_free(self, callback: Callable[[], None]) -> None:
+        """Call a function once, here or on the thread, when the writer is not full."""
+        self._worker.when_free(callback)
+
+    def send(self, message: msgspec.Struct) -> None:
+        """Send a message as soon as possible; it is lost if nobody reads any more."""
+        self._worker.submit(self._encoder.encode(message) + b"\n")
+
+    def _write(self, line: bytes) -> None:
+        if self._broken:
+            return
+        try:
+            data = memoryview(line)
+            while data:
+                data = data[os.write(self._fd, data) :]
+        except OSError:  # the other side has ended; the end of its own pipe reports that
+            self._broken = True
+        if self._broken or not line:
+            self._broken = True
+            with suppress(OSError):
+                os.close(self._fd)
+
+    def close(self, timeout: float) -> None:
+        """Send what waits for at most ``timeout`` seconds, and close the pipe.
+
+        A second call only waits.
+        """
+        self._worker.submit(b"")
+        self._worker.close(timeout)
+
+
+class LineReader:
+    """Reads lines from a pipe without blocking.
+
+    Args:
+        fd: Descriptor to read.
+
+    Attributes:
+        fd: The descriptor.
+        ended: Whether the pipe has ended.
+    """
+
+    def __init__(self, fd: int) -> None:
+        self.fd = fd
+        self.ended = False
+        self._rest = b""
+        os.set_blocking(fd, False)
+
+    def read(self) -> list[bytes]:
+        """Return the lines that have arrived."""
+        try:
+            data = os.read(self.fd, _CHUNK)
+        except BlockingIOError:
+            return []
+        except OSError:
+            data = b""
+        if not data:
+            self.ended = True
+            rest, self._rest = self._rest, b""
+            return [rest] if rest else []
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if len(self._rest) > _MAX_LINE:
+            lines, self._rest = [*lines, self._rest], b""
+        return lines

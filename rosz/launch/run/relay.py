@@ -1,14 +1,14 @@
-"""The program that brings the output of nodes to the screen.
+"""A program that copies the output of nodes to the screen.
 
-It runs on its own, beside the launch (``python -I -S relay.py``), so that a launch that is killed
-leaves its nodes with somewhere to write to. It ends when the launch says so, or when the launch and
-all nodes are gone. Lines come out whole: what two nodes say at the same time is never mixed within
-a line. Of each node it remembers the last lines, for the summary.
+It is a process of its own (``python -I -S relay.py``), so that nodes can still write when their
+launch is killed. It ends when the launch requests it, or when the launch and all nodes have ended.
+Lines stay whole: output of two nodes is never mixed within a line. The last lines of each node are
+kept for the summary.
 
-Requests come over a stream socket, one JSON object per line, descriptors along with them::
+Requests arrive on a stream socket, one JSON object per line, together with descriptors::
 
     {"op": "add", "id": 7, "sink": 1, "prefix": "[talker] "}     with the descriptor to read
-    {"op": "drain", "id": 7}     answered, once nothing is left to read, by {"id": 7, "tail": […]}
+    {"op": "drain", "id": 7}     the reply, once all is read, is {"id": 7, "tail": […]}
     {"op": "end"}                drain all, then end
 """
 
@@ -29,9 +29,9 @@ from collections import deque
 from typing import Any
 
 CHUNK = 65536
-LONGEST_LINE = 65536
+MAX_LINE = 65536
 PARTIAL_SECONDS = 0.05
-"""How long an unfinished line waits for its end before it is shown as it is."""
+"""Time in seconds to wait for the rest of a line before its beginning is shown."""
 TAIL_LINES = 12
 TAIL_COLUMNS = 400
 
@@ -40,13 +40,13 @@ _ESCAPES = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\
 
 
 class Source:
-    """One descriptor that nodes write to.
+    """A descriptor that nodes write to.
 
     Args:
-        fd: What to read.
-        owner: Number of the process it belongs to.
-        sink: Descriptor to write to: 1 or 2.
-        prefix: What to put before each line.
+        fd: Descriptor to read.
+        owner: Number of the process.
+        sink: Descriptor to write to, 1 or 2.
+        prefix: Text to put before each line.
     """
 
     def __init__(self, fd: int, owner: int, sink: int, prefix: bytes) -> None:
@@ -57,33 +57,33 @@ class Source:
         self.partial = b""
         self.since = 0.0
 
-    def take(self, data: bytes) -> bytes:
-        """Add what was read; return the whole lines that are ready."""
+    def add(self, data: bytes) -> bytes:
+        """Add data, and return the whole lines that are ready."""
         data = self.partial + data
         end = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
-        if not end and len(data) > LONGEST_LINE:
+        if not end and len(data) > MAX_LINE:
             end = len(data)
         self.partial = data[end:]
         self.since = time.monotonic() if self.partial else 0.0
         return data[:end]
 
     def rest(self) -> bytes:
-        """Return what has no end of line yet, and forget it."""
+        """Remove and return the line that has no end yet."""
         data, self.partial, self.since = self.partial, b"", 0.0
         return data
 
-    def dress(self, data: bytes) -> bytes:
-        """Put the prefix before each line."""
+    def add_prefix(self, data: bytes) -> bytes:
+        """Return data with the prefix before each line."""
         if not self.prefix or not data:
             return data
         return b"".join(self.prefix + line for line in data.splitlines(keepends=True))
 
 
 class Relay:
-    """Reads all sources and the requests until told to end.
+    """Copies all sources, and handles requests.
 
     Args:
-        requests: The socket to the launch.
+        requests: Socket to the launch.
     """
 
     def __init__(self, requests: socket.socket) -> None:
@@ -95,19 +95,19 @@ class Relay:
         self.descriptors: deque[int] = deque()
         self.unread = b""
         self.attached = True
-        self.deaf: set[int] = set()
+        self.broken: set[int] = set()
 
     def run(self) -> None:
-        """Work until the launch ends it, or the launch and all sources are gone."""
+        """Run until the launch requests the end, or the launch and all sources have ended."""
         while self.attached or self.sources:
-            for key, _ in self.selector.select(self._patience()):
+            for key, _ in self.selector.select(self._timeout()):
                 if key.data is None:
-                    self._listen()
+                    self._receive()
                 elif key.fd in self.sources:
                     self._read(key.data)
             self._show_partial()
 
-    def _patience(self) -> float | None:
+    def _timeout(self) -> float | None:
         waiting = [source.since for source in self.sources.values() if source.since]
         if not waiting:
             return None
@@ -119,7 +119,7 @@ class Relay:
             if source.since and source.since + PARTIAL_SECONDS <= now:
                 self._show(source, source.rest())
 
-    def _listen(self) -> None:
+    def _receive(self) -> None:
         try:
             data, descriptors, _, _ = socket.recv_fds(self.requests, CHUNK, 64)
         except ConnectionError:
@@ -129,16 +129,16 @@ class Relay:
             self._detach()
         *lines, self.unread = (self.unread + data).split(b"\n")
         for line in lines:
-            self._obey(json.loads(line))
+            self._handle(json.loads(line))
 
     def _detach(self) -> None:
         if self.attached:
             self.attached = False
             self.selector.unregister(self.requests)
 
-    def _obey(self, request: dict[str, Any]) -> None:
+    def _handle(self, request: dict[str, Any]) -> None:
         if request["op"] == "add":
-            if not self.descriptors:  # none was left for it here: the node writes to nobody
+            if not self.descriptors:  # no descriptor was free here: the node's output is lost
                 return
             fd = self.descriptors.popleft()
             os.set_blocking(fd, False)
@@ -159,7 +159,7 @@ class Relay:
                 pass
             self._show(source, source.rest())
         tail = list(self.tails.get(owner, ()))
-        with contextlib.suppress(OSError):  # the launch is gone: nobody waits for the answer
+        with contextlib.suppress(OSError):  # the launch has ended and needs no reply
             self.requests.sendall(json.dumps({"id": owner, "tail": tail}).encode() + b"\n")
 
     def _finish(self, source: Source) -> None:
@@ -169,7 +169,7 @@ class Relay:
             self._drop(source)
 
     def _read(self, source: Source) -> bool:
-        """Read what is there; tell whether there may be more."""
+        """Read once, and return whether there may be more to read."""
         try:
             data = os.read(source.fd, CHUNK)
         except BlockingIOError:
@@ -179,7 +179,7 @@ class Relay:
         if not data:
             self._drop(source)
             return False
-        self._show(source, source.take(data))
+        self._show(source, source.add(data))
         return True
 
     def _drop(self, source: Source) -> None:
@@ -191,7 +191,7 @@ class Relay:
     def _show(self, source: Source, data: bytes) -> None:
         if not data:
             return
-        self._write(source.sink, source.dress(data))
+        self._write(source.sink, source.add_prefix(data))
         tail = self.tails[source.owner]
         for line in _LINE_END.split(data[-TAIL_LINES * TAIL_COLUMNS :]):
             text = _ESCAPES.sub("", line.decode(errors="replace")).rstrip()
@@ -200,20 +200,20 @@ class Relay:
 
     def _write(self, sink: int, data: bytes) -> None:
         view = memoryview(data)
-        while view and sink not in self.deaf:
+        while view and sink not in self.broken:
             try:
                 view = view[os.write(sink, view) :]
             except BlockingIOError:
                 select.select([], [sink], [])
-            except OSError:  # the terminal is closed; the nodes go on without it
-                self.deaf.add(sink)
+            except OSError:  # the terminal is closed; nodes run on without it
+                self.broken.add(sink)
 
 
 def main() -> None:
-    """Serve the socket whose descriptor is the first argument."""
+    """Handle the requests from the socket whose descriptor is the first argument."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    # It holds two descriptors for each node, the launch one.
+    # It holds two descriptors for each node.
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     Relay(socket.socket(fileno=int(sys.argv[1]))).run()

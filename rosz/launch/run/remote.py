@@ -1,4 +1,4 @@
-"""Other machines: a launch's side of the agents there, over the pipes of the system's ssh."""
+"""Other machines: the launch's side of the agents there, over the pipes of the system's ssh."""
 
 from __future__ import annotations
 
@@ -6,25 +6,26 @@ import codecs
 import itertools
 import os
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 
 import msgspec
 
 from rosz.errors import LaunchError
 from rosz.launch.plan.model import MachinePlan
 from rosz.launch.run.console import Console
-from rosz.launch.run.family import Usage
-from rosz.launch.run.host import Confirmed, Ended, Job
-from rosz.launch.run.loop import Loop, Timer
-from rosz.launch.run.pipe import Lines, Outbox
+from rosz.launch.run.host import OnExit, OnStart, ProcessSpec, Usage
+from rosz.launch.run.loop import Loop
+from rosz.launch.run.machines import ssh_command, ssh_failure
 from rosz.launch.run.protocol import (
     PROTOCOL,
+    AgentVersion,
+    AgentWarning,
     Exited,
     Gone,
-    Hello,
+    LineReader,
     Measure,
     Measured,
-    Notice,
+    MessageWriter,
     Ping,
     Ready,
     Refused,
@@ -36,16 +37,15 @@ from rosz.launch.run.protocol import (
     Started,
     rosz_version,
 )
-from rosz.launch.run.ssh import ssh_command, ssh_failure
 
-__all__ = ("RemoteChild", "RemoteHost", "await_hosts")
+__all__ = ("LOST", "Machines", "RemoteChild", "RemoteHost")
 
 LOST = 255
-"""Exit code of a process whose machine is lost, which is that of ssh then."""
+"""Exit code of a process whose machine is lost, the same as that of ssh."""
 
 _PINGS = 4
-_SAID = 40
-_END_SECONDS = 5.0
+_KEPT_LINES = 40
+_CLOSE_TIMEOUT = 5.0
 
 
 class RemoteChild:
@@ -53,13 +53,13 @@ class RemoteChild:
 
     Args:
         host: The machine.
-        serial: What it is called between here and there.
-        ended: Called when it has ended.
-        confirmed: Called when it has been started, or refused.
+        serial: Number of the process in messages.
+        on_exit: Called once when it has ended.
+        on_start: Called once when it has been started, or refused.
     """
 
     def __init__(
-        self, host: RemoteHost, serial: int, ended: Ended, confirmed: Confirmed | None
+        self, host: RemoteHost, serial: int, on_exit: OnExit, on_start: OnStart | None
     ) -> None:
         self.pid = 0
         self.shown = ""
@@ -67,34 +67,47 @@ class RemoteChild:
         self.place = host.place
         self.pending = True
         self.gone = False
-        self.ended: Ended | None = ended
-        self.confirmed: Confirmed | None = confirmed
+        self._on_exit: OnExit | None = on_exit
+        self._on_start = on_start
         self._host = host
         self._serial = serial
 
     def signal(self, number: int) -> None:
-        """Signal it and its descendants."""
+        """Send a signal to it and its descendants."""
         self._host.send(Signal(self._serial, number))
 
     def remains(self) -> bool:
-        """Tell whether it or a descendant is still there."""
+        """Return whether it or a descendant still runs."""
         return not self.gone
+
+    def started(self, error: LaunchError | None) -> None:
+        """Report that it has been started, or why not."""
+        self.pending = False
+        on_start, self._on_start = self._on_start, None
+        if on_start is not None:
+            on_start(error)
+
+    def exited(self, code: int, tail: tuple[str, ...]) -> None:
+        """Report that it has ended."""
+        on_exit, self._on_exit = self._on_exit, None
+        if on_exit is not None:
+            on_exit(code, tail)
 
 
 class RemoteHost:
-    """A machine that ssh leads to.
+    """A machine reached by ssh.
 
     Args:
         machine: The machine.
-        name: What messages call the link to it.
-        loop: Where its answers are awaited.
-        console: Where its output goes, and what happens to it is said.
-        setup: What its agent has to know.
+        name: Name of the connection in messages.
+        loop: Loop that waits for its messages.
+        console: Output for its nodes and for reports.
+        setup: Settings for its agent.
 
     Attributes:
-        place: Its address.
-        error: Why it cannot be used; empty as long as it can.
-        ready: Whether its agent waits for orders.
+        place: Address.
+        error: Reason why it cannot be used, or "".
+        ready: Whether its agent accepts requests.
     """
 
     def __init__(
@@ -111,29 +124,29 @@ class RemoteHost:
         self._serials = itertools.count(1)
         self._children: dict[int, RemoteChild] = {}
         self._measuring: list[Callable[[dict[int, Usage]], None]] = []
-        self._said: list[str] = []
-        self._greeted = False
+        self._errors: list[str] = []
+        self._connected = False
         self._closing = False
         self._decoder = msgspec.json.Decoder(Report)
-        # What comes is cut anywhere, also within a letter.
+        # Output may be cut anywhere, even within a character.
         utf8 = codecs.getincrementaldecoder("utf-8")
         self._texts = {sink: utf8("replace") for sink in (1, 2)}
-        self._ssh = self._call()
+        self._ssh = self._run_ssh()
         assert self._ssh.stdin is not None  # noqa: S101  # all three are pipes
         assert self._ssh.stdout is not None  # noqa: S101
         assert self._ssh.stderr is not None  # noqa: S101
-        self._out = Lines(self._ssh.stdout.fileno())
-        self._err = Lines(self._ssh.stderr.fileno())
-        self._outbox = Outbox(os.dup(self._ssh.stdin.fileno()))
+        self._out = LineReader(self._ssh.stdout.fileno())
+        self._err = LineReader(self._ssh.stderr.fileno())
+        self._writer = MessageWriter(os.dup(self._ssh.stdin.fileno()))
         self._ssh.stdin.close()
-        loop.watch(self._out.fd, self._heard)
-        loop.watch(self._err.fd, self._overheard)
-        loop.watch_exit(self._ssh.pid, self._ended)
+        loop.watch(self._out.fd, self._read_reports)
+        loop.watch(self._err.fd, self._read_errors)
+        loop.watch_exit(self._ssh.pid, self._ssh_ended)
         self.send(setup)
-        self._patience: Timer | None = loop.later(machine.timeout, self._late)
+        self._timeout = loop.later(machine.timeout, self._timed_out)
         self._ping()
 
-    def _call(self) -> subprocess.Popen[bytes]:
+    def _run_ssh(self) -> subprocess.Popen[bytes]:
         machine = self._machine
         user = f", user[{machine.user}]" if machine.user else ""
         where = f"{self.place}:{machine.ssh_port}{user}"
@@ -155,17 +168,17 @@ class RemoteHost:
         except OSError as error:
             raise LaunchError(f"{machine.place}: cannot run ssh: {error.strerror}") from error
 
-    def start(self, job: Job, ended: Ended, confirmed: Confirmed) -> RemoteChild:
-        """Start a process; the arguments and errors are those of `Host.start`."""
+    def start(self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart) -> RemoteChild:
+        """Start a process; see `Host.start` for the arguments and errors."""
         if self.error:
             raise LaunchError(self.error)
         serial = next(self._serials)
-        child = self._children[serial] = RemoteChild(self, serial, ended, confirmed)
-        self.send(Start(serial, job))
+        child = self._children[serial] = RemoteChild(self, serial, on_exit, on_start)
+        self.send(Start(serial, spec))
         return child
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
-        """Have what its processes have used counted, by owner; nothing when it is lost."""
+        """Call a function with the resources of its processes, which are none if it is lost."""
         if self.error:
             done({})
             return
@@ -173,88 +186,95 @@ class RemoteHost:
         self.send(Measure())
 
     def send(self, message: msgspec.Struct) -> None:
-        """Send something to the agent; to one that is lost it is lost as well."""
+        """Send a request to the agent; it is dropped if the machine is lost."""
         if not self.error:
-            self._outbox.send(message)
+            self._writer.send(message)
 
     def _ping(self) -> None:
         if not self.error and not self._closing:
             self.send(Ping())
             self._loop.later(self._silence / _PINGS, self._ping)
 
-    def _late(self) -> None:
+    def _timed_out(self) -> None:
         self._fail(f"'{self.place}' does not answer within {self._machine.timeout:g} s")
 
-    def _heard(self) -> None:
+    def _read_reports(self) -> None:
         for line in self._out.read():
-            self._take(line)
+            self._handle(line)
         if self._out.ended:
             self._loop.unwatch(self._out.fd)
         elif self._console.full:
             self._loop.unwatch(self._out.fd)
-            self._console.when_free(lambda: self._loop.post(self._listen))
+            self._console.when_free(lambda: self._loop.post(self._resume_reading))
 
-    def _listen(self) -> None:
-        """Go on with what comes, after more of it came than the screen took."""
+    def _resume_reading(self) -> None:
+        """Read on after a pause, in which the console was full."""
         if self._out.fd >= 0 and not self._out.ended:
             self._loop.unwatch(self._out.fd)
-            self._loop.watch(self._out.fd, self._heard)
+            self._loop.watch(self._out.fd, self._read_reports)
 
-    def _overheard(self) -> None:
+    def _read_errors(self) -> None:
         for line in self._err.read():
-            text = line.decode(errors="replace").rstrip()
-            self._said = [*self._said[-_SAID:], text]
-            if self._greeted and text:
+            text = self._keep_line(line)
+            if self._connected and text:
                 self._console.error(f"remote[{self._name}]: {text}")
         if self._err.ended:
             self._loop.unwatch(self._err.fd)
 
-    def _take(self, line: bytes) -> None:
+    def _keep_line(self, line: bytes) -> str:
+        """Keep a line that may explain a failure, and return it as text."""
+        text = line.decode(errors="replace").rstrip()
+        self._errors = [*self._errors[-_KEPT_LINES:], text]
+        return text
+
+    def _handle(self, line: bytes) -> None:
         try:
             report = self._decoder.decode(line)
         except msgspec.MsgspecError:
-            if self._greeted:
-                self._fail(f"what comes from '{self.place}' makes no sense: {line[:80]!r}")
-            else:  # printed by a login; it may tell why there will be no agent
-                self._said = [*self._said[-_SAID:], line.decode(errors="replace").rstrip()]
+            if self._connected:
+                self._fail(f"'{self.place}' sent a message that is not valid: {line[:80]!r}")
+            else:  # text of a login, which may explain why there will be no agent
+                self._keep_line(line)
             return
-        if isinstance(report, Hello):
-            self._greet(report)
+        if isinstance(report, AgentVersion):
+            self._check_version(report)
         elif isinstance(report, Ready):
-            self._settle(report)
-        elif isinstance(report, Notice):
+            self._set_ready(report)
+        elif isinstance(report, AgentWarning):
             self._console.error(f"remote[{self._name}]: {report.text}")
         elif isinstance(report, Shown):
             self._console.show(report.sink, self._texts[report.sink].decode(report.data))
         elif isinstance(report, Measured):
-            waiting, self._measuring = self._measuring, []
-            for done in waiting:
-                done(report.used)
+            self._report_usage(report.used)
         else:
             self._update(report)
 
-    def _greet(self, hello: Hello) -> None:
+    def _report_usage(self, used: dict[int, Usage]) -> None:
+        waiting, self._measuring = self._measuring, []
+        for done in waiting:
+            done(used)
+
+    def _check_version(self, agent: AgentVersion) -> None:
         here = rosz_version()
-        if hello.protocol != PROTOCOL:
+        if agent.protocol != PROTOCOL:
             self._fail(
-                f"rosz {hello.version} on '{self.place}' does not go with rosz {here} here: its"
-                f" agent speaks protocol {hello.protocol}, expected {PROTOCOL}; install the same"
+                f"rosz {agent.version} on '{self.place}' does not work with rosz {here} here: its"
+                f" agent speaks protocol {agent.protocol}, expected {PROTOCOL}; install the same"
                 " version on both"
             )
             return
-        self._greeted = True
-        if hello.version != here:
+        self._connected = True
+        if agent.version != here:
             self._console.error(
-                f"WARNING: remote[{self._name}]: rosz {hello.version} there, {here} here"
+                f"WARNING: remote[{self._name}]: rosz {agent.version} there, {here} here"
             )
 
-    def _settle(self, ready: Ready) -> None:
-        if self._patience is not None:
-            self._patience.cancel()
+    def _set_ready(self, ready: Ready) -> None:
+        self._timeout.cancel()
         self.ready = True
         self._console.say(f"remote[{self._name}]: ssh connection created")
         if ready.reaches:
-            self._console.note(f"remote[{self._name}]: nodes there link to {ready.reaches}")
+            self._console.note(f"remote[{self._name}]: nodes there connect to {ready.reaches}")
         else:
             self._console.error(
                 f"WARNING: remote[{self._name}]: nodes there will not find this launch: run 'rosz"
@@ -266,82 +286,61 @@ class RemoteHost:
         if child is None:
             return
         if isinstance(report, Started):
-            child.pending = False
             child.pid, child.shown, child.logs = report.pid, report.shown, report.logs
-            self._confirm(child, None)
-        elif isinstance(report, Refused):
-            child.pending, child.gone = False, True
-            del self._children[report.serial]
-            self._confirm(child, LaunchError(f"on '{self.place}': {report.text}"))
+            child.started(None)
         elif isinstance(report, Exited):
-            self._bury(child, report.code, report.tail)
+            child.exited(report.code, report.tail)
         else:
             child.gone = True
             del self._children[report.serial]
+            if isinstance(report, Refused):
+                child.started(LaunchError(f"on '{self.place}': {report.text}"))
 
-    @staticmethod
-    def _confirm(child: RemoteChild, error: LaunchError | None) -> None:
-        confirmed, child.confirmed = child.confirmed, None
-        if confirmed is not None:
-            confirmed(error)
-
-    @staticmethod
-    def _bury(child: RemoteChild, code: int, tail: tuple[str, ...]) -> None:
-        ended, child.ended = child.ended, None
-        if ended is not None:
-            ended(code, tail)
-
-    def _ended(self) -> None:
-        """Take note that ssh has ended, whatever the reason."""
+    def _ssh_ended(self) -> None:
         code = self._ssh.wait()
-        self._heard()
-        self._overheard()
+        self._read_reports()
+        self._read_errors()
         if self._closing:
             return
-        said = "\n".join(self._said)
-        if not self._greeted:
-            self._fail(ssh_failure(self._machine, code, said))
-        elif "not responding" in said or "Broken pipe" in said or "reset" in said:
+        output = "\n".join(self._errors)
+        if not self._connected:
+            self._fail(ssh_failure(self._machine, code, output))
+        elif "not responding" in output or "Broken pipe" in output or "reset" in output:
             self._fail(f"'{self.place}' is lost: it does not answer any more")
         else:
             self._fail(f"'{self.place}' is lost: its agent has ended, or the machine went down")
 
     def _fail(self, why: str) -> None:
-        """Give the machine up, with all that runs there."""
+        """Give up the machine and all processes there."""
         if self.error:
             return
-        machine = self._machine
-        self.error = f"machine '{machine.name}': {why}"
-        if self._patience is not None:
-            self._patience.cancel()
+        self.error = f"machine '{self._machine.name}': {why}"
+        self._timeout.cancel()
         if self.ready:
             self._console.error(f"remote[{self._name}]: {why}")
         self._ssh.kill()
-        waiting, self._measuring = self._measuring, []
-        for done in waiting:
-            done({})
+        self._report_usage({})
         children, self._children = self._children, {}
         for child in children.values():
             child.gone = True
             if child.pending:
-                self._confirm(child, LaunchError(self.error))
+                child.started(LaunchError(self.error))
             else:
-                self._bury(child, LOST, (self.error,))
+                child.exited(LOST, (self.error,))
 
-    def hang_up(self) -> None:
-        """Have the agent end with all that it runs, without waiting for it."""
+    def disconnect(self) -> None:
+        """Let the agent end with all that it runs, without waiting for it."""
         self._closing = True
-        if self._patience is not None:
-            self._patience.cancel()
-        self._outbox.close(0)
+        self._timeout.cancel()
+        self._writer.close(0)
 
     def close(self) -> None:
-        """End the agent and the link; again is no error."""
-        self.hang_up()
+        """End the agent and the connection; a second call has no effect."""
+        self.disconnect()
         if self._out.fd < 0:
             return
         try:
-            self._ssh.wait(0 if self.error else _END_SECONDS)
+            self._ssh.wait(0 if self.error else _CLOSE_TIMEOUT)
         except subprocess.TimeoutExpired:
             self._ssh.kill()
             self._ssh.wait()
@@ -353,14 +352,54 @@ class RemoteHost:
                 stream.close()
 
 
-def await_hosts(hosts: Sequence[RemoteHost], loop: Loop) -> None:
-    """Wait until all agents are there.
+class Machines:
+    """All other machines of one launch.
 
-    Raises:
-        LaunchError: One does not come up; the message says why of each.
+    Args:
+        loop: Loop that waits for their messages.
+        console: Output for their nodes and for reports.
     """
-    while any(not host.ready and not host.error for host in hosts):
-        loop.step()
-    errors = [host.error for host in hosts if host.error]
-    if errors:
-        raise LaunchError("\n".join(errors))
+
+    def __init__(self, loop: Loop, console: Console) -> None:
+        self._loop = loop
+        self._console = console
+        self._hosts: list[RemoteHost] = []
+
+    def connect(self, machines: Mapping[str, MachinePlan], setup: Setup) -> dict[str, RemoteHost]:
+        """Start the agents of all machines, and wait until they are ready.
+
+        Args:
+            machines: The machines by name.
+            setup: Settings for the agents.
+
+        Raises:
+            LaunchError: If an agent does not start; the message gives the reason for each.
+        """
+        hosts = {}
+        for number, (name, machine) in enumerate(machines.items()):
+            if machine.password:
+                self._console.error(
+                    f"WARNING: {machine.place}: the password of machine '{name}' is not used: a"
+                    " launch file is not the place for one; give that machine your key instead,"
+                    f" once: ssh-copy-id {f'{machine.user}@' if machine.user else ''}"
+                    f"{machine.address}"
+                )
+            there = msgspec.structs.replace(setup, tag=f"{setup.tag}:at{number}")
+            host = RemoteHost(
+                machine, f"{machine.address}-{number}", self._loop, self._console, there
+            )
+            self._hosts.append(host)
+            hosts[name] = host
+        while any(not host.ready and not host.error for host in self._hosts):
+            self._loop.step()
+        errors = [host.error for host in self._hosts if host.error]
+        if errors:
+            raise LaunchError("\n".join(errors))
+        return hosts
+
+    def close(self) -> None:
+        """End all agents with what they run; a second call has no effect."""
+        for host in self._hosts:
+            host.disconnect()
+        for host in self._hosts:
+            host.close()

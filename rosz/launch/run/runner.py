@@ -1,4 +1,4 @@
-"""Carrying a plan out: parameters first, then processes, until all of it is over."""
+"""Run a plan: parameters first, then processes, until all have ended."""
 
 from __future__ import annotations
 
@@ -7,51 +7,48 @@ import re
 import secrets
 import socket
 import uuid
-from collections.abc import Callable
-from typing import TextIO
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from typing import Any, TextIO
 
 import msgspec
 
 from rosz.errors import LaunchError, ParamNotFound, UsageError
 from rosz.launch.plan.model import NodePlan, Plan
-from rosz.launch.run import summary
 from rosz.launch.run.command import TAG, Workplace
-from rosz.launch.run.console import Console
-from rosz.launch.run.control import Panel
-from rosz.launch.run.family import kill_family
-from rosz.launch.run.folder import LaunchLog, RunFolder
-from rosz.launch.run.host import Host, LocalHost, is_local
-from rosz.launch.run.loop import Loop
-from rosz.launch.run.machines import MachineCall, Machines, meeting_places, moved
-from rosz.launch.run.network import Network
-from rosz.launch.run.output import Output
-from rosz.launch.run.parameters import RUN_ID, carry_out, core_params, launch_uri
-from rosz.launch.run.process import Timeouts
+from rosz.launch.run.console import Console, LaunchLog
+from rosz.launch.run.control import StatusServer
+from rosz.launch.run.host import Host, LocalHost, ProcessTree, is_local
+from rosz.launch.run.loop import Loop, stopped_by_signals
+from rosz.launch.run.machines import MachineOption, launch_endpoints, move_machines
+from rosz.launch.run.network import RUN_ID, Network, core_params, launch_uri, set_params
+from rosz.launch.run.output import Output, RunFolder
 from rosz.launch.run.protocol import Setup
-from rosz.launch.run.stopping import stopped_by_signals
-from rosz.launch.run.supervisor import Supervisor
+from rosz.launch.run.remote import Machines
+from rosz.launch.run.supervisor import Process, Supervisor, Timeouts
 
-__all__ = ("Options", "Runner", "forced")
+__all__ = ("Options", "Runner", "apply_options", "describe_casualties", "describe_plan")
 
-_RUN_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]{0,63}")
+_RUN_ID_PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]{0,63}")
+_MAX_VALUE_WIDTH = 20
 
 
 class Options(msgspec.Struct, frozen=True, kw_only=True):
-    """How a plan is carried out.
+    """The options of a launch.
 
     Attributes:
-        screen: All nodes write to the screen.
-        log: No node writes its standard output to the screen.
-        required: All nodes are required.
-        local: Nodes of other machines are left out.
-        prefixed: Lines on the screen begin with the name of their node.
-        verbose: The command line of each process is printed.
-        overview: What the launch will do is printed first.
-        title: The terminal's window is named after the launch.
-        machines: Where machines are, against what the files say.
-        silence: Seconds without a word from another machine after which it counts as lost, and
-            ends what it runs.
-        timeouts: How long processes may take to end.
+        screen: Whether all nodes write to the screen.
+        log: Whether no node writes its standard output to the screen.
+        required: Whether all nodes are required.
+        local: Whether nodes of other machines are left out.
+        prefixed: Whether lines on the screen begin with the name of their node.
+        verbose: Whether the command line of each process is printed.
+        overview: Whether the plan is printed first.
+        title: Whether the terminal's window is named after the launch.
+        machines: Addresses of machines, in place of those in the files.
+        silence: Time in seconds without a message from another machine after which it counts as
+            lost, and its agent ends what runs there.
+        timeouts: Time that processes have to end.
     """
 
     screen: bool = False
@@ -62,18 +59,18 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
     verbose: bool = False
     overview: bool = True
     title: bool = True
-    machines: tuple[MachineCall, ...] = ()
+    machines: tuple[MachineOption, ...] = ()
     silence: float = 30.0
     timeouts: Timeouts = Timeouts()
 
 
-def forced(plan: Plan, options: Options) -> Plan:
-    """Return the plan with what the options force upon all nodes.
+def apply_options(plan: Plan, options: Options) -> Plan:
+    """Return the plan changed by the options that affect nodes.
 
     Raises:
-        UsageError: All are to be required, and one is to respawn; or a machine is unknown.
+        UsageError: If all nodes are to be required and one respawns, or a machine is unknown.
     """
-    plan = moved(plan, options.machines)
+    plan = move_machines(plan, options.machines)
     nodes = plan.nodes
     if options.local:
         nodes = tuple(node for node in nodes if is_local(plan.machine(node.machine)))
@@ -95,12 +92,15 @@ class Runner:
     """One launch.
 
     Args:
-        plan: What to run.
-        workplace: Where from.
-        network: Where to.
-        options: How.
-        out: Where it is said what goes well.
-        err: Where it is said what does not.
+        plan: The plan.
+        workplace: The packages and settings for commands.
+        network: The parameters and the graph.
+        options: The options.
+        out: Stream for normal messages.
+        err: Stream for errors.
+
+    Raises:
+        UsageError: If the options do not fit the plan.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class Runner:
         out: TextIO,
         err: TextIO,
     ) -> None:
-        self._plan = forced(plan, options)
+        self._plan = apply_options(plan, options)
         self._workplace = workplace
         self._network = network
         self._options = options
@@ -123,28 +123,28 @@ class Runner:
         self._machines = Machines(self._loop, self._console)
         self._stop: Callable[[], None] = self._loop.stop
         own = secrets.token_hex(8)
-        # Within a node of another launch, that one can still find all that this one starts.
+        # A launch within a node of another one carries its tag, so that the outer launch can still
+        # find everything that this one starts.
         outer = workplace.environ.get(TAG)
         self._tag = f"{outer}:{own}" if outer else own
         self.run_id = ""
 
     def stop(self) -> None:
-        """End the launch; from any thread."""
+        """End the launch; safe from any thread."""
         self._loop.post(self._end)
 
     def _end(self) -> None:
-        self._stop()
+        self._stop()  # which `_supervise` replaces
 
     def run(self) -> int:
         """Run until the end.
 
         Returns:
-            The exit code: 1 when a node could not be started, or a required one failed; else 0.
+            The exit code: 1 if a node could not be started, or a required one failed; otherwise 0.
 
         Raises:
-            LaunchError: The launch cannot be carried out.
-            ParamError: A parameter is not acceptable.
-            UsageError: The options do not fit the plan.
+            LaunchError: If the launch cannot run.
+            ParamError: If a value is not a parameter value.
         """
         output = Output(self._loop, self._console.error)
         try:
@@ -160,9 +160,9 @@ class Runner:
         return 1 if supervisor.failed else 0
 
     def _prepare(self, output: Output) -> Supervisor:
-        """Do all that comes before the first process."""
+        """Do everything that comes before the first process."""
         console, network = self._console, self._network
-        fresh = self._find_run()
+        is_new_run = self._find_run()
         folder = self._make_folder()
         self._introduce()
         local = LocalHost(
@@ -173,25 +173,25 @@ class Runner:
             tag=self._tag,
             prefixed=self._options.prefixed,
         )
-        hosts = self._hosts(local)
-        if network.hub is not None:
+        hosts = self._connect_machines(local)
+        if network.router is not None:
             console.say("auto-starting new core")
-            console.strong(f"process[core]: started with pid [{network.hub.pid}]")
-            network.hub.keep(self._loop, console)
-        if fresh:
+            console.strong(f"process[core]: started with pid [{network.router.pid}]")
+            network.router.keep_running(self._loop, console)
+        if is_new_run:
             console.strong(f"setting {RUN_ID} to {self.run_id}")
-        extra = core_params(self.run_id) if fresh else {}
-        carry_out(self._plan, network.store, console, {**extra, **launch_uri(os.getpid())})
-        return self._supervisor(hosts)
+        extra = core_params(self.run_id) if is_new_run else {}
+        set_params(self._plan, network, console, {**extra, **launch_uri(os.getpid())})
+        return self._make_supervisor(hosts)
 
     def _find_run(self) -> bool:
-        """Find out which run this is; tell whether it is a new one."""
+        """Set the id of the run, and return whether the run is new."""
         try:
-            found = self._network.store.get(RUN_ID)
+            found = self._network.get(RUN_ID)
         except ParamNotFound:
             found = None
-        # Anybody may have set it, and it becomes part of paths and keys.
-        if isinstance(found, str) and _RUN_ID.fullmatch(found):
+        # Checked, as anybody may have set it, and it becomes part of paths and keys.
+        if isinstance(found, str) and _RUN_ID_PATTERN.fullmatch(found):
             self.run_id = found
             return False
         self.run_id = str(uuid.uuid1())
@@ -204,7 +204,7 @@ class Runner:
             folder.create()
             self._console.log = LaunchLog(folder.path / name)
         except (LaunchError, OSError) as error:
-            self._console.error(f"WARNING: {error}; going on without logs")
+            self._console.error(f"WARNING: {error}; continuing without logs")
             return None
         self._console.say(f"... logging to {folder.path / name}")
         return folder
@@ -215,35 +215,35 @@ class Runner:
             console.title(",".join(plan.files))
         if self._options.overview:
             machines = any(not is_local(machine) for machine in plan.machines)
-            console.say(summary.overview(plan, machines=machines))
+            console.say(describe_plan(plan, machines=machines))
         for notice in (*plan.warnings, *plan.deprecations):
             console.error(f"WARNING: {notice}")
 
-    def _hosts(self, local: Host) -> Callable[[NodePlan], Host]:
-        """Return what gives the machine of a node; other machines are called here.
+    def _connect_machines(self, local: Host) -> Callable[[NodePlan], Host]:
+        """Connect to other machines, and return a function from nodes to machines.
 
         Raises:
-            LaunchError: A machine cannot be used.
+            LaunchError: If a machine cannot be used.
         """
         setup = Setup(
             run_id=self.run_id,
             tag=self._tag,
             domain=self._workplace.environment.domain,
-            meet=meeting_places(self._workplace.environment),
+            meet=launch_endpoints(self._workplace.environment),
             silence=self._options.silence,
             timeouts=self._options.timeouts,
             prefixed=self._options.prefixed,
         )
-        wanted = dict.fromkeys(node.machine for node in self._plan.nodes)
+        names = dict.fromkeys(node.machine for node in self._plan.nodes)
         others = {
             name: machine
-            for name in wanted
+            for name in names
             if (machine := self._plan.machine(name)) is not None and not is_local(machine)
         }
-        called = self._machines.call(others, setup)
-        return lambda node: called.get(node.machine, local)
+        hosts = self._machines.connect(others, setup)
+        return lambda node: hosts.get(node.machine, local)
 
-    def _supervisor(self, hosts: Callable[[NodePlan], Host]) -> Supervisor:
+    def _make_supervisor(self, hosts: Callable[[NodePlan], Host]) -> Supervisor:
         alone = self._network.alone
         if not self._plan.nodes:
             self._console.strong("No processes to monitor")
@@ -255,14 +255,14 @@ class Runner:
             self._loop,
             self._console,
             timeouts=self._options.timeouts,
-            readiness=self._network.readiness,
+            holds=self._network.holds,
             stay=alone and not self._plan.nodes,
         )
 
     def _supervise(self, supervisor: Supervisor) -> None:
         self._stop = supervisor.shutdown
-        network = self._network
-        panel = network.session and Panel(
+        network, console = self._network, self._console
+        server = network.session and StatusServer(
             network.session,
             network.domain,
             self.run_id,
@@ -270,21 +270,70 @@ class Runner:
             supervisor,
             files=self._plan.files,
         )
-        with stopped_by_signals(self._loop, self._console, self.stop, supervisor.kill):
+        with stopped_by_signals(self._loop, self.stop, supervisor.kill, console.dump_stacks):
             try:
                 supervisor.start()
                 self._loop.run()
             finally:
                 supervisor.kill()
-                kill_family(self._tag)
-                if panel is not None:
-                    panel.close()
+                ProcessTree(self._tag).kill()
+                if server is not None:
+                    server.close()
 
     def _conclude(self, supervisor: Supervisor) -> None:
         console = self._console
         console.say("shutting down processing monitor...")
         console.say("... shutting down processing monitor complete")
-        text = summary.fallen(supervisor.fallen)
+        text = describe_casualties(supervisor.casualties)
         if text:
             console.error(text)
         console.strong("done")
+
+
+def describe_plan(plan: Plan, *, machines: bool = False) -> str:
+    """Return a summary of a plan as roslaunch prints it.
+
+    Args:
+        plan: The plan.
+        machines: Whether to list machines, as roslaunch does if some are not this one.
+    """
+    parts = ["\nSUMMARY\n========"]
+    if plan.clear:
+        cleared = sorted(f" * {name.rstrip('/')}/" for name in plan.clear)
+        parts.append("CLEAR PARAMETERS\n" + "\n".join(cleared))
+    if plan.params:
+        lines = sorted(f" * {param.name}: {_shorten(param.value)}" for param in plan.params)
+        parts.append("PARAMETERS\n" + "\n".join(lines))
+    if machines:
+        parts.append("MACHINES\n" + "\n".join(sorted(f" * {m.name}" for m in plan.machines)))
+    parts.append("NODES\n" + "\n".join(_list_nodes(plan.nodes)))
+    return "\n\n".join(parts) + "\n"
+
+
+def _list_nodes(nodes: Iterable[NodePlan]) -> list[str]:
+    by_namespace: defaultdict[str, list[str]] = defaultdict(list)
+    for node in nodes:
+        what = f"{node.package}/{node.type}" if node.package else " ".join(node.command)
+        by_namespace[f"{node.namespace.rstrip('/')}/"].append(f"    {node.name} ({what})")
+    return [line for ns in sorted(by_namespace) for line in (f"  {ns}", *sorted(by_namespace[ns]))]
+
+
+def _shorten(value: Any) -> str:
+    """Return a value in at most 20 printable characters."""
+    text = str(value)
+    if len(text) > _MAX_VALUE_WIDTH:
+        text = text[: _MAX_VALUE_WIDTH - 3] + "..."
+    stripped = text.rstrip()
+    if all(" " <= char <= "~" for char in stripped):
+        return stripped if stripped != text and not text.isprintable() else text
+    return "<...>"
+
+
+def describe_casualties(processes: Iterable[Process]) -> str:
+    """Return which processes failed or died, why, and their last output; "" if none did."""
+    parts = []
+    for process in processes:
+        lines = [f" * {process.node.full_name} [{process.label}] {process.describe_end()}"]
+        lines += [f"     {line}" for line in process.tail]
+        parts.append("\n".join(lines))
+    return "\n".join(["\nDIED", *parts]) if parts else ""

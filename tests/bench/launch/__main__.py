@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT))
 
 from rosz.launch.run.command import TAG  # noqa: E402  # of this tree
-from rosz.launch.run.family import kill_family  # noqa: E402
+from rosz.launch.run.host import ProcessTree  # noqa: E402
 
 ROSZ = [sys.executable, "-P", "-m", "rosz", "launch"]
 PATIENCE = 60.0
@@ -188,7 +188,7 @@ class Bench:
             stderr=subprocess.STDOUT,
             text=True,
         ) as process:
-            watchdog = threading.Timer(PATIENCE, kill_family, (tag,))
+            watchdog = threading.Timer(PATIENCE, ProcessTree(tag).kill)
             watchdog.start()
             try:
                 yield process
@@ -197,7 +197,7 @@ class Bench:
                 if process.poll() is None:
                     process.send_signal(signal.SIGTERM)
                     process.communicate(timeout=PATIENCE)
-                kill_family(tag)
+                ProcessTree(tag).kill()
 
 
 def free_port() -> int:

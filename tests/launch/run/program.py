@@ -17,8 +17,14 @@ from rosz.launch.run import Network, Options, Runner, Workplace
 from rosz.packages import PackageIndex
 
 
-class NoStore:
-    """Parameters that are written and never read."""
+class NoNetwork(Network):
+    """Parameters that are written and never read, and conditions that are never true."""
+
+    def __init__(self) -> None:
+        self.session = None
+        self.domain = 0
+        self.alone = True
+        self.router = None
 
     def get(self, name: str) -> Any:
         raise ParamNotFound(name)
@@ -32,10 +38,6 @@ class NoStore:
     def dump(self, name: str) -> str:
         return name
 
-
-class Never:
-    """Conditions that never hold."""
-
     def holds(self, condition: Condition) -> bool:
         return not str(condition)
 
@@ -47,7 +49,7 @@ def main() -> int:
     environment = Environment(home=folder / "home", log_dir=folder / "log")
     packages = PackageIndex([Path(root) for root in sys.argv[4:]])
     workplace = Workplace(packages, environment, dict(os.environ), str(folder))
-    network = Network(store=NoStore(), readiness=Never())
+    network = NoNetwork()
     return Runner(plan, workplace, network, options, out=sys.stdout, err=sys.stderr).run()
 
 

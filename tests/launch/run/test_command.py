@@ -14,7 +14,7 @@ from rosz.launch.plan.model import NodePlan
 from rosz.launch.run import Workplace, run_command
 from rosz.packages import PackageIndex
 
-from .scene import HERE, shell
+from .in_thread import HERE, shell
 
 SCRIPT = (sys.executable, "-P", "-m", "rosz.script")
 

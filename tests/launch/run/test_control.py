@@ -1,4 +1,4 @@
-"""A running launch answers from another session: what runs, and please restart or stop that."""
+"""Requests to a running launch: its status, and restarting or stopping nodes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from rosz.errors import LaunchError, NotFoundError
-from rosz.launch.run import Network, order, statuses
+from rosz.launch.run import Network, StatusClient
 from rosz.session import Query, Session, SessionConfig
 from rosz.wire import own_key
 
-from .scene import Facts, MemoryStore, alive, launch, program, shell, wait_until
+from .in_thread import MemoryNetwork, alive, launch, program, shell, wait_until
 
 DOMAIN = 3
 
@@ -30,15 +30,15 @@ def rendezvous() -> str:
 @pytest.fixture
 def network(rendezvous: str) -> Iterator[Network]:
     with Session.open(SessionConfig(rendezvous=rendezvous)) as session:
-        yield Network(store=MemoryStore(), readiness=Facts(), session=session, domain=DOMAIN)
+        yield MemoryNetwork(session, DOMAIN)
 
 
 @pytest.fixture
-def asker(rendezvous: str, network: Network) -> Iterator[Session]:
+def client(rendezvous: str, network: Network) -> Iterator[StatusClient]:
     assert network.session is not None
     config = SessionConfig(mode="client", rendezvous=rendezvous, must_connect=True)
     with Session.open(config) as session:
-        yield session
+        yield StatusClient(session, DOMAIN)
 
 
 SLEEPERS = [
@@ -48,11 +48,10 @@ SLEEPERS = [
 ]
 
 
-def test_status(tmp_path: Path, network: Network, asker: Session) -> None:
+def test_status(tmp_path: Path, network: Network, client: StatusClient) -> None:
     with launch(tmp_path, *SLEEPERS, network=network) as run:
         run.err.wait_for("[space/b-2] process has died")
-        (status,) = statuses(asker, DOMAIN)
-        assert statuses(asker, DOMAIN + 1) == []
+        (status,) = client.statuses()
     assert (status.run_id, status.pid) == (run.runner.run_id, os.getpid())
     a, b, c = status.nodes
     assert (a.name, a.type, a.state, a.detail) == ("/a", "sh -c exec sleep 600", "running", "")
@@ -63,46 +62,44 @@ def test_status(tmp_path: Path, network: Network, asker: Session) -> None:
     assert (b.pid, b.memory, b.uptime) == (0, 0, 0)
     assert (c.name, c.state, c.pid) == ("/c", "failed", 0)
     assert c.detail.startswith("unable to launch [c-3]: No such file or directory")
-    assert statuses(asker, DOMAIN) == []
+    assert client.statuses() == []
 
 
-def test_restart(tmp_path: Path, network: Network, asker: Session) -> None:
+def test_restart(tmp_path: Path, network: Network, client: StatusClient) -> None:
     with launch(tmp_path, *SLEEPERS, network=network) as run:
         first = run.pid("a-1")
         run.err.wait_for("[space/b-2] process has died")
-        order(asker, DOMAIN, "restart", "a")
+        client.request("restart", "a")
         assert not alive(first)
-        (status,) = statuses(asker, DOMAIN)
+        (status,) = client.statuses()
         assert (status.nodes[0].restarts, status.nodes[0].state) == (1, "running")
-        order(asker, DOMAIN, "restart", "/space/b")
+        client.request("restart", "/space/b")
         run.err.wait_for("[space/b-2] process has died", times=2)
 
 
-def test_stop(tmp_path: Path, network: Network, asker: Session) -> None:
+def test_stop(tmp_path: Path, network: Network, client: StatusClient) -> None:
     with launch(tmp_path, *SLEEPERS, network=network) as run:
         pid = run.pid("a-1")
         run.err.wait_for("[space/b-2] process has died")
-        order(asker, DOMAIN, "stop", "/a")
+        client.request("stop", "/a")
         assert not alive(pid)
         assert run.join() == 1  # of c, which could not be started
     assert "all processes on machine have died" in run.out.getvalue()
 
 
-def test_orders_that_cannot_be_carried_out(
-    tmp_path: Path, network: Network, asker: Session
-) -> None:
+def test_requests_that_fail(tmp_path: Path, network: Network, client: StatusClient) -> None:
     with pytest.raises(NotFoundError, match=r"no launch runs a node '/a'; no launch is running"):
-        order(asker, DOMAIN, "stop", "a")
+        client.request("stop", "a")
     with launch(tmp_path, *SLEEPERS, network=network) as run:
         run.pid("a-1")
         with pytest.raises(NotFoundError, match=r"'/space/bb'; did you mean '/space/b'\?"):
-            order(asker, DOMAIN, "restart", "/space/bb")
+            client.request("restart", "/space/bb")
         with pytest.raises(LaunchError, match=r"'/c' did not start again: unable to launch"):
-            order(asker, DOMAIN, "restart", "c")
+            client.request("restart", "c")
 
 
-def test_a_launch_that_ends_answers_no_more(
-    tmp_path: Path, network: Network, asker: Session
+def test_a_launch_that_ends_refuses_requests(
+    tmp_path: Path, network: Network, client: StatusClient
 ) -> None:
     ready = tmp_path / "ready"
     slow = shell("s", f"trap 'sleep 0.7; exit 0' INT; touch {ready}; sleep 600 & wait")
@@ -112,11 +109,11 @@ def test_a_launch_that_ends_answers_no_more(
         run.runner.stop()
         run.out.wait_for("killing on exit")
         with pytest.raises(LaunchError, match="this launch is ending"):
-            order(asker, DOMAIN, "restart", "/s")
+            client.request("restart", "/s")
         run.join()
 
 
-def test_an_answer_that_makes_no_sense(network: Network, asker: Session) -> None:
+def test_a_reply_that_is_not_valid(network: Network, client: StatusClient) -> None:
     assert network.session is not None
     key = own_key(DOMAIN, "launch", "1", network.session.zid)
 
@@ -126,6 +123,6 @@ def test_an_answer_that_makes_no_sense(network: Network, asker: Session) -> None
 
     with (
         closing(network.session.queryable(key, answer)),
-        pytest.raises(LaunchError, match=f"answers at '{key}' makes no sense: .*version"),
+        pytest.raises(LaunchError, match=f"reply of a launch at '{key}' is not valid: .*version"),
     ):
-        statuses(asker, DOMAIN)
+        client.statuses()

@@ -11,7 +11,7 @@ import pytest
 
 from rosz.launch.run.loop import Loop
 
-from .scene import PATIENCE
+from .in_thread import PATIENCE
 
 
 @pytest.fixture

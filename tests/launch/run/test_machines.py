@@ -1,4 +1,4 @@
-"""Where machines are, how they are called, and what it means when they are not reached."""
+"""The addresses of machines, the command line of ssh, and its errors."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from rosz.environment import Environment
 from rosz.errors import UsageError
 from rosz.launch.plan.model import MachinePlan, NodePlan, Plan
 from rosz.launch.run.host import is_local
-from rosz.launch.run.machines import MachineCall, meeting_places, moved
-from rosz.launch.run.pipe import Lines, Outbox
-from rosz.launch.run.protocol import Notice
-from rosz.launch.run.ssh import ssh_command, ssh_failure
+from rosz.launch.run.machines import (
+    MachineOption,
+    launch_endpoints,
+    move_machines,
+    ssh_command,
+    ssh_failure,
+)
+from rosz.launch.run.protocol import AgentWarning, LineReader, MessageWriter
 
-from .scene import HERE, shell
+from .in_thread import HERE, shell
 
 
 def machine(**settings: object) -> MachinePlan:
@@ -35,40 +39,42 @@ def machine(**settings: object) -> MachinePlan:
 
 
 @pytest.mark.parametrize(
-    ("text", "call"),
+    ("text", "option"),
     [
-        ("robot", MachineCall("", "robot")),
-        ("root@robot:2222", MachineCall("", "robot", "root", 2222)),
-        ("far=robot", MachineCall("far", "robot")),
-        ("far=me@[fe80::1]:22", MachineCall("far", "fe80::1", "me", 22)),
-        ("10.0.0.7", MachineCall("", "10.0.0.7")),
+        ("robot", MachineOption("", "robot")),
+        ("root@robot:2222", MachineOption("", "robot", "root", 2222)),
+        ("far=robot", MachineOption("far", "robot")),
+        ("far=me@[fe80::1]:22", MachineOption("far", "fe80::1", "me", 22)),
+        ("10.0.0.7", MachineOption("", "10.0.0.7")),
     ],
 )
-def test_a_machine_on_a_command_line(text: str, call: MachineCall) -> None:
-    assert MachineCall.parse(text) == call
+def test_a_machine_on_a_command_line(text: str, option: MachineOption) -> None:
+    assert MachineOption.parse(text) == option
 
 
 @pytest.mark.parametrize("text", ["", "a b", "robot:port", "-oProxyCommand=evil", "@robot", "x="])
-def test_what_is_no_machine(text: str) -> None:
+def test_texts_that_are_not_a_machine(text: str) -> None:
     with pytest.raises(UsageError, match=r"expected \[NAME=\]\[USER@\]ADDRESS\[:PORT\]"):
-        MachineCall.parse(text)
+        MachineOption.parse(text)
 
 
 def test_nodes_move_with_their_machines() -> None:
     node = NodePlan(package="p", type="t", name="n", namespace="/", place=HERE)
     bound = NodePlan(package="p", type="t", name="m", namespace="/", place=HERE, machine="far")
     plan = Plan(nodes=(node, bound, shell("s", "true")), machines=(machine(user="me"),))
-    there = moved(plan, [MachineCall("", "base", "you"), MachineCall("far", "tower", port=23)])
+    there = move_machines(
+        plan, [MachineOption("", "base", "you"), MachineOption("far", "tower", port=23)]
+    )
     assert [one.machine for one in there.nodes] == ["base", "far", ""]
     base, far = there.machine("base"), there.machine("far")
     assert base is not None
     assert far is not None
     assert (base.address, base.user, base.ssh_port) == ("base", "you", 22)
     assert (far.address, far.user, far.ssh_port) == ("tower", "me", 23)
-    assert moved(plan, []) == plan
+    assert move_machines(plan, []) == plan
 
 
-def test_ssh_is_called_so_that_nothing_is_asked() -> None:
+def test_ssh_asks_no_questions() -> None:
     words = ssh_command(machine(ssh_port=2222, user="me", password="secret"), 30.0)
     assert words[:2] == ["ssh", "-T"]
     assert "BatchMode=yes" in words
@@ -81,7 +87,7 @@ def test_ssh_is_called_so_that_nothing_is_asked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("code", "said", "told"),
+    ("code", "output", "expected"),
     [
         (255, "ssh: connect to host robot port 22: No route to host", "cannot be reached"),
         (255, "kex_exchange_identification: banner\nwhat now", "failed: what now; try: ssh robot"),
@@ -90,11 +96,11 @@ def test_ssh_is_called_so_that_nothing_is_asked() -> None:
         (1, "ModuleNotFoundError: No module named 'zenoh'", "exit code 1: ModuleNotFoundError"),
     ],
 )
-def test_what_ssh_means(code: int, said: str, told: str) -> None:
-    assert told in ssh_failure(machine(), code, said)
+def test_errors_of_ssh_are_explained(code: int, output: str, expected: str) -> None:
+    assert expected in ssh_failure(machine(), code, output)
 
 
-def test_who_is_here() -> None:
+def test_local_machines() -> None:
     assert is_local(None)
     assert is_local(machine(address="127.0.1.1"))
     assert not is_local(machine(address="localhost", user="somebody-else"))
@@ -102,26 +108,27 @@ def test_who_is_here() -> None:
     assert not is_local(machine(address="no.such.host.invalid"))
 
 
-def test_where_others_find_a_launch() -> None:
+def test_endpoints_for_other_machines() -> None:
     default = Environment()
-    assert meeting_places(default) == ("tcp/:7447",)
+    assert launch_endpoints(default) == ("tcp/:7447",)
     settings = Environment(
         rendezvous="unixsock-stream//run/z.sock",
         listen=("tcp/0.0.0.0:9", "tls/10.0.0.1:10"),
         connect=("tcp/base:7447", "tcp/localhost:1"),
     )
-    assert meeting_places(settings) == ("tcp/:9", "tls/10.0.0.1:10", "tcp/base:7447")
+    assert launch_endpoints(settings) == ("tcp/:9", "tls/10.0.0.1:10", "tcp/base:7447")
 
 
-def test_a_pipe_that_nobody_reads_holds_up_nobody() -> None:
+def test_a_blocked_pipe_blocks_nobody() -> None:
     ours, theirs = os.pipe()
     freed = threading.Event()
-    outbox = Outbox(theirs, freed.set)
+    writer = MessageWriter(theirs)
     for number in range(3000):
-        outbox.send(Notice(f"{number} {'x' * 1000}"))
-    assert outbox.full
-    lines, seen = Lines(ours), []
-    reader = threading.Thread(target=outbox.close, args=(10,))
+        writer.send(AgentWarning(f"{number} {'x' * 1000}"))
+    assert writer.full
+    writer.when_free(freed.set)
+    lines, seen = LineReader(ours), []
+    reader = threading.Thread(target=writer.close, args=(10,))
     reader.start()
     while not lines.ended:
         seen += lines.read()

@@ -15,8 +15,8 @@ import pytest
 
 from rosz.launch.run.output import Output
 
-from .outside import outside
-from .scene import PATIENCE, alive, launch, program, shell, wait_until
+from .in_process import launch_process
+from .in_thread import PATIENCE, alive, launch, program, shell, wait_until
 
 CHATTER = (
     "import sys, time\n"
@@ -28,7 +28,7 @@ CHATTER = (
 
 def test_screen_shows_lines_as_they_are(tmp_path: Path) -> None:
     node = shell("n", "echo one; echo two >&2; printf three", output="screen")
-    with outside(tmp_path, node) as run:
+    with launch_process(tmp_path, node) as run:
         assert run.finish() == 0
     assert "\none\ntwo\nthree" in run.text
     assert run.text.index("three") < run.text.index("[n-1] process has finished cleanly")
@@ -36,7 +36,7 @@ def test_screen_shows_lines_as_they_are(tmp_path: Path) -> None:
 
 def test_streams_stay_apart(tmp_path: Path) -> None:
     node = shell("n", "echo one; echo two >&2", output="screen")
-    with outside(tmp_path, node, separate=True) as run:
+    with launch_process(tmp_path, node, separate=True) as run:
         assert run.finish() == 0
     assert "\none\n" in run.text
     assert "\ntwo\n" not in run.text
@@ -44,7 +44,7 @@ def test_streams_stay_apart(tmp_path: Path) -> None:
 
 
 def test_log_goes_to_a_file_and_errors_to_the_screen(tmp_path: Path) -> None:
-    with outside(tmp_path, shell("a/b", "echo one; echo two >&2", namespace="/ns")) as run:
+    with launch_process(tmp_path, shell("a/b", "echo one; echo two >&2", namespace="/ns")) as run:
         assert run.finish() == 0
     assert "\none\n" not in run.text
     assert "\ntwo\n" in run.text
@@ -52,24 +52,24 @@ def test_log_goes_to_a_file_and_errors_to_the_screen(tmp_path: Path) -> None:
 
 
 def test_a_respawned_node_goes_on_with_its_file(tmp_path: Path) -> None:
-    with outside(tmp_path, shell("n", "echo one", respawn=True, respawn_max=2)) as run:
+    with launch_process(tmp_path, shell("n", "echo one", respawn=True, respawn_max=2)) as run:
         assert run.finish() == 0
     assert (tmp_path / "log/latest/n-1-stdout.log").read_text() == "one\none\none\n"
 
 
 def test_screen_and_log_can_be_forced(tmp_path: Path) -> None:
     nodes = shell("a", "echo one"), shell("b", "echo two", output="screen")
-    with outside(tmp_path, *nodes, options='{"screen": true}') as run:
+    with launch_process(tmp_path, *nodes, options='{"screen": true}') as run:
         run.finish()
     assert "\none\n" in run.text
-    with outside(tmp_path, *nodes, options='{"log": true}') as run:
+    with launch_process(tmp_path, *nodes, options='{"log": true}') as run:
         run.finish()
     assert "\ntwo\n" not in run.text
 
 
 def test_a_prefix_names_the_node_on_each_line(tmp_path: Path) -> None:
     node = shell("n", "printf 'one\\ntwo\\n\\nlast'; echo oh >&2", output="screen")
-    with outside(tmp_path, node, options='{"prefixed": true}') as run:
+    with launch_process(tmp_path, node, options='{"prefixed": true}') as run:
         run.finish()
     lines = [line for line in run.text.splitlines() if line.startswith("[n-1] ")]
     assert lines[:4] == ["[n-1] one", "[n-1] two", "[n-1] ", "[n-1] lastoh"]
@@ -77,7 +77,7 @@ def test_a_prefix_names_the_node_on_each_line(tmp_path: Path) -> None:
 
 def test_lines_of_two_nodes_are_never_mixed(tmp_path: Path) -> None:
     nodes = [program(c, sys.executable, "-S", "-c", CHATTER, c, output="screen") for c in "abcd"]
-    with outside(tmp_path, *nodes) as run:
+    with launch_process(tmp_path, *nodes) as run:
         assert run.finish() == 0
     for c in "abcd":
         assert len(re.findall(rf"^{c * 40}\.$", run.text, re.MULTILINE)) == 200
@@ -85,13 +85,13 @@ def test_lines_of_two_nodes_are_never_mixed(tmp_path: Path) -> None:
 
 def test_an_unfinished_line_is_shown(tmp_path: Path) -> None:
     node = shell("n", "printf 'password: '; exec sleep 600", output="screen")
-    with outside(tmp_path, node) as run:
+    with launch_process(tmp_path, node) as run:
         run.expect(r"password: $")
 
 
 def test_much_output_arrives_whole(tmp_path: Path) -> None:
     node = shell("n", "seq 200000; seq 3 >&2", output="screen")
-    with outside(tmp_path, node, separate=True) as run:
+    with launch_process(tmp_path, node, separate=True) as run:
         run.expect(r"done\n$")
         assert run.finish() == 0
     numbers = [line for line in run.text.splitlines() if line.isdigit()]
@@ -100,7 +100,7 @@ def test_much_output_arrives_whole(tmp_path: Path) -> None:
 
 def test_a_line_without_end_does_not_fill_memory(tmp_path: Path) -> None:
     node = shell("n", "head -c 3000000 /dev/zero | tr '\\0' x", output="screen")
-    with outside(tmp_path, node) as run:
+    with launch_process(tmp_path, node) as run:
         run.expect(r"done\n$")
         assert run.finish() == 0
     assert run.text.count("x") >= 3000000
@@ -108,7 +108,7 @@ def test_a_line_without_end_does_not_fill_memory(tmp_path: Path) -> None:
 
 def test_nodes_of_a_terminal_have_a_terminal(tmp_path: Path) -> None:
     script = "test -t 1 && test -t 2 && echo both are; stty size <&1; printf '\\033[32mgreen\\n'"
-    with outside(tmp_path, shell("n", script, output="screen"), terminal=True) as run:
+    with launch_process(tmp_path, shell("n", script, output="screen"), terminal=True) as run:
         run.finish()
     assert "both are\r\n" in run.text
     assert "\033[32mgreen\r\n" in run.text
@@ -116,13 +116,13 @@ def test_nodes_of_a_terminal_have_a_terminal(tmp_path: Path) -> None:
 
 
 def test_no_colours_without_a_terminal(tmp_path: Path) -> None:
-    with outside(tmp_path, shell("n", "exit 3")) as run:
+    with launch_process(tmp_path, shell("n", "exit 3")) as run:
         run.finish()
     assert "\033" not in run.text
 
 
 def test_deaths_are_red_on_a_terminal(tmp_path: Path) -> None:
-    with outside(tmp_path, shell("n", "exit 3"), terminal=True) as run:
+    with launch_process(tmp_path, shell("n", "exit 3"), terminal=True) as run:
         run.finish()
     assert "\033[31m[n-1] process has died [pid " in run.text
 
@@ -130,13 +130,13 @@ def test_deaths_are_red_on_a_terminal(tmp_path: Path) -> None:
 def test_python_writes_at_once_where_output_is_piped(tmp_path: Path) -> None:
     script = "import time; print('early'); time.sleep(600)"
     node = program("n", sys.executable, "-S", "-c", script, output="screen")
-    with outside(tmp_path, node) as run:
+    with launch_process(tmp_path, node) as run:
         run.expect("early\n")
 
 
 def test_nodes_outlive_a_killed_launch(tmp_path: Path) -> None:
     node = shell("n", "while :; do echo tick; sleep 0.05; done", output="screen")
-    with outside(tmp_path, node) as run:
+    with launch_process(tmp_path, node) as run:
         run.expect(r"started with pid")
         run.expect("tick\n")
         run.process.send_signal(signal.SIGKILL)
@@ -162,7 +162,7 @@ def _relays_of(pipe: int) -> list[str]:
 
 
 def test_a_relay_is_found_while_it_runs(tmp_path: Path) -> None:
-    with outside(tmp_path, shell("n", "echo hello; exec sleep 600", output="screen")) as run:
+    with launch_process(tmp_path, shell("n", "echo hello; exec sleep 600", output="screen")) as run:
         run.expect(r"\nhello\n")
         assert len(_relays_of(run._reading)) == 1
 
@@ -171,13 +171,13 @@ def test_a_relay_is_found_while_it_runs(tmp_path: Path) -> None:
 def test_another_relay_takes_the_place_of_one_that_died(tmp_path: Path, *, terminal: bool) -> None:
     script = "while :; do echo tick || exit 3; sleep 0.05; done"
     node = shell("n", script, output="screen", respawn=True)
-    with outside(tmp_path, node, shell("m", "exec sleep 600"), terminal=terminal) as run:
+    with launch_process(tmp_path, node, shell("m", "exec sleep 600"), terminal=terminal) as run:
         run.expect(r"tick\r?\n")
         relay = _relay_below(run.process.pid)
         wait_until(lambda: _age(relay) > 1.5, "some life")
         os.kill(relay, signal.SIGKILL)
         run.expect(
-            rf"what shows the output of nodes \(pid {relay}\) has died \(-9\): nodes that run"
+            rf"the relay of the nodes' output \(pid {relay}\) has died \(-9\): nodes that run"
         )
         run.expect(r"\[n-1\] restarting process(.*\n)+tick\r?\n")
         assert alive(run.pids()[1])
@@ -189,11 +189,11 @@ def test_another_relay_takes_the_place_of_one_that_died(tmp_path: Path, *, termi
 def test_a_relay_that_dies_at_once_is_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosz.launch.run.output._LEAST_LIFE_SECONDS", 1000.0)
+    monkeypatch.setattr("rosz.launch.run.output._MIN_LIFE", 1000.0)
     with launch(tmp_path, shell("n", "exec sleep 600", output="screen")) as run:
         pid = run.pid("n-1")
         os.kill(_relay_below(os.getpid()), signal.SIGKILL)
-        run.err.wait_for("has died (-9): nodes write to nobody from now on")
+        run.err.wait_for("has died (-9): nodes started from now on have no output")
         assert alive(pid)
         assert run.stop() == 0
 
@@ -215,7 +215,7 @@ def _age(pid: int) -> float:
 def test_a_relay_whose_screen_is_gone_lets_nodes_go_on(tmp_path: Path) -> None:
     count = tmp_path / "count"
     script = f"while :; do echo tick; echo >> {count}; done"
-    with outside(tmp_path, shell("n", script, output="screen"), terminal=True) as run:
+    with launch_process(tmp_path, shell("n", script, output="screen"), terminal=True) as run:
         run.expect("\ntick\r\n")
         os.close(run._reading)
         run._reading = os.open(os.devnull, os.O_RDONLY)
@@ -230,7 +230,7 @@ def test_many_nodes_and_few_descriptors(tmp_path: Path) -> None:
     """What brings output to the screen holds more of them than the launch."""
     nodes = [shell(f"n{i}", f"echo up{i}; exec sleep 600", output="screen") for i in range(40)]
     limit = ("sh", "-c", 'ulimit -S -n 64; exec "$@"', "sh")
-    with outside(tmp_path, *nodes, prefix=limit, separate=True) as run:
+    with launch_process(tmp_path, *nodes, prefix=limit, separate=True) as run:
         for i in range(40):
             run.expect(rf"\bup{i}\n")
     assert (tmp_path / "err").read_text() == ""
@@ -259,7 +259,7 @@ def test_a_screen_that_takes_nothing_holds_up_no_launch(tmp_path: Path, *, termi
     count = tmp_path / "count"
     loud = f"echo >> {count}; seq 100; exit 3"
     nodes = STALLING, shell("m", loud, output="screen", respawn=True)
-    with outside(tmp_path, *nodes, terminal=terminal) as run:
+    with launch_process(tmp_path, *nodes, terminal=terminal) as run:
         run.expect(r"m-2\]: started with pid")
         run.expect("ticking")
         wait_until(count.exists, "first start")

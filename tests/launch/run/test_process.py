@@ -1,25 +1,24 @@
-"""A process and those that come after each other in it, on a machine that answers as it likes."""
+"""Processes that cannot be ended, and reports that arrive too late."""
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable, Iterator
 
 import pytest
 
 from rosz.errors import LaunchError, RoszError
-from rosz.launch.plan.model import Wait
-from rosz.launch.run.family import Usage
-from rosz.launch.run.host import Confirmed, Ended, Job
+from rosz.launch.run.console import Console
+from rosz.launch.run.host import OnExit, OnStart, ProcessSpec, Usage
 from rosz.launch.run.loop import Loop
-from rosz.launch.run.process import Process, State, Timeouts
-from rosz.launch.run.summary import reason
+from rosz.launch.run.supervisor import Process, State, Supervisor, Timeouts
 
-from .scene import program
+from .in_thread import program
 
 
 class Stuck:
-    """A child that nothing ends, as in a driver that hangs or behind a link that is cut."""
+    """A child that does not end, as in a blocked driver or on a machine that is lost."""
 
     shown = logs = place = ""
 
@@ -36,33 +35,39 @@ class Stuck:
 
 
 class Machine:
-    """Starts such children, and keeps what they are to be told."""
+    """A machine that starts such children, and keeps the callbacks."""
 
     place = "far"
 
     def __init__(self, *, pending: bool) -> None:
         self._pending = pending
         self.children: list[Stuck] = []
-        self.told: list[tuple[Ended, Confirmed]] = []
+        self.callbacks: list[tuple[OnExit, OnStart]] = []
 
-    def start(self, job: Job, ended: Ended, confirmed: Confirmed) -> Stuck:
-        del job
+    def start(self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart) -> Stuck:
+        del spec
         self.children.append(Stuck(len(self.children) + 1, pending=self._pending))
-        self.told.append((ended, confirmed))
+        self.callbacks.append((on_exit, on_start))
         return self.children[-1]
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
         done({})
 
 
-class Record:
-    """What a process tells."""
+class Record(Supervisor):
+    """A supervisor that records what one process reports."""
 
-    def __init__(self) -> None:
+    def __init__(self, loop: Loop, machine: Machine) -> None:
+        super().__init__(
+            [program("n", "x")],
+            lambda _: machine,
+            loop,
+            Console(io.StringIO(), io.StringIO()),
+            timeouts=Timeouts(0.01, 0.01),
+            holds=lambda _: True,
+        )
         self.said: list[str] = []
-
-    def waiting(self, process: Process, wait: Wait) -> None:
-        del process, wait
+        (self.process,) = self.processes
 
     def started(self, process: Process) -> None:
         del process
@@ -76,15 +81,9 @@ class Record:
         del process
         self.said.append("died")
 
-    def respawning(self, process: Process) -> None:
+    def finished(self, process: Process) -> None:
         del process
-
-    def escalating(self, process: Process, number: int) -> None:
-        del process, number
-
-    def settled(self, process: Process) -> None:
-        del process
-        self.said.append("settled")
+        self.said.append("finished")
 
 
 @pytest.fixture
@@ -94,35 +93,33 @@ def loop() -> Iterator[Loop]:
     made.close()
 
 
-def test_what_nothing_ends_ended_when_it_was_given_up(loop: Loop) -> None:
-    machine, record = Machine(pending=False), Record()
-    process = Process(
-        program("n", "x"), "n-1", 1, machine, loop, record, timeouts=Timeouts(0.01, 0.01)
-    )
+def test_a_process_that_does_not_end_is_given_up(loop: Loop) -> None:
+    machine = Machine(pending=False)
+    record = Record(loop, machine)
+    process = record.process
     process.begin()
     process.stop()
     while not process.over:
         loop.step(5.0)
     assert process.ended > process.began
     assert re.fullmatch(
-        r"did not end when asked to, and was killed after [1-9][0-9.]* s", reason(process)
+        r"did not end when asked to, and was killed after [1-9][0-9.]* s", process.describe_end()
     )
 
 
 @pytest.mark.parametrize("pending", [False, True], ids=["here", "there"])
-def test_what_was_given_up_says_nothing_of_what_came_after_it(loop: Loop, pending: bool) -> None:
-    machine, record = Machine(pending=pending), Record()
-    process = Process(
-        program("n", "x"), "n-1", 1, machine, loop, record, timeouts=Timeouts(0.01, 0.01)
-    )
+def test_late_reports_of_a_process_do_not_affect_its_successor(loop: Loop, pending: bool) -> None:
+    machine = Machine(pending=pending)
+    record = Record(loop, machine)
+    process = record.process
     process.begin()
     process.restart()
     while len(machine.children) == 1:
         loop.step(5.0)
     before = [*record.said]
-    ended, confirmed = machine.told[0]
-    confirmed(LaunchError("refused"))
-    ended(-9, ())
+    on_exit, on_start = machine.callbacks[0]
+    on_start(LaunchError("refused"))
+    on_exit(-9, ())
     assert process.state is State.RUNNING
     assert process.alive
     assert record.said == before

@@ -1,4 +1,4 @@
-"""A launch's side of an agent, which a script stands in for."""
+"""The launch's side of an agent, which a script replaces."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 from rosz.launch.plan.model import MachinePlan
 from rosz.launch.run.console import Console
 from rosz.launch.run.loop import Loop
-from rosz.launch.run.process import Timeouts
-from rosz.launch.run.protocol import PROTOCOL, Hello, Ready, Setup, Shown, rosz_version
+from rosz.launch.run.protocol import PROTOCOL, AgentVersion, Ready, Setup, Shown, rosz_version
 from rosz.launch.run.remote import RemoteHost
+from rosz.launch.run.supervisor import Timeouts
 
-from .scene import HERE
+from .in_thread import HERE
 
 SETUP = Setup(
     run_id="1", tag="t", domain=0, meet=(), silence=30.0, timeouts=Timeouts(), prefixed=False
@@ -33,12 +33,12 @@ FAR = MachinePlan(
 )
 
 
-def test_a_letter_that_comes_in_two_parts_is_shown_whole(
+def test_a_character_that_arrives_in_two_parts_is_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = "größe\nend\n".encode()
     said = [
-        Hello(PROTOCOL, rosz_version(), "far"),
+        AgentVersion(PROTOCOL, rosz_version(), "far"),
         Ready("tcp/far:7447"),
         Shown(1, whole[:3]),
         Shown(2, "ü\n".encode()),

@@ -19,8 +19,8 @@ import pytest
 from rosz.launch.plan import SystemContext, plan
 from rosz.packages import PackageIndex
 
-from .outside import PROGRAM, ROOT
-from .scene import PATIENCE
+from .in_process import PROGRAM, ROOT
+from .in_thread import PATIENCE
 
 pytestmark = pytest.mark.skipif(
     shutil.which("roslaunch") is None, reason="roslaunch is not installed (python3-roslaunch)"

@@ -12,17 +12,17 @@ import pytest
 from rosz.errors import LaunchError, ParamError
 from rosz.launch.plan.model import Notice, Plan
 
-from .scene import HERE, MemoryStore, launch, param, setup, shell
+from .in_thread import HERE, MemoryNetwork, launch, param, setup, shell
 
 
 def test_parameters_are_one_batch_before_any_node(tmp_path: Path) -> None:
-    store = MemoryStore(run_id="5-f", old={"x": 1})
+    network = MemoryNetwork(run_id="5-f", old={"x": 1})
     plan = Plan(
         params=(param("/a", 1), param("~b", [1, 2]), param("/old/x", 2)), clear=("/old", "/gone")
     )
-    with launch(tmp_path, shell("n", "exit 0"), plan=plan, store=store) as run:
+    with launch(tmp_path, shell("n", "exit 0"), plan=plan, network=network) as run:
         run.join()
-    ((values, deleted),) = store.batches
+    ((values, deleted),) = network.batches
     uri = values.popitem()
     assert deleted == ["/old", "/gone"]
     assert uri == ("/old/x", 2)
@@ -31,41 +31,41 @@ def test_parameters_are_one_batch_before_any_node(tmp_path: Path) -> None:
 
 
 def test_a_bad_parameter_starts_nothing(tmp_path: Path) -> None:
-    class Refusing(MemoryStore):
+    class Refusing(MemoryNetwork):
         def write(self, *_args: object) -> None:
             raise ParamError("'/' cannot be 1")
 
     started = tmp_path / "started"
     with (
         pytest.raises(ParamError),
-        launch(tmp_path, shell("n", f"touch {started}"), store=Refusing()) as run,
+        launch(tmp_path, shell("n", f"touch {started}"), network=Refusing()) as run,
     ):
         run.join()
     assert not started.exists()
 
 
 def test_what_a_core_sets_is_set_once(tmp_path: Path) -> None:
-    store = MemoryStore()
-    with launch(tmp_path, shell("n", "exit 0"), store=store) as first:
+    network = MemoryNetwork()
+    with launch(tmp_path, shell("n", "exit 0"), network=network) as first:
         first.join()
-    with launch(tmp_path, shell("n", "exit 0"), store=store) as second:
+    with launch(tmp_path, shell("n", "exit 0"), network=network) as second:
         second.join()
-    assert store.values["/run_id"] == first.runner.run_id == second.runner.run_id
+    assert network.values["/run_id"] == first.runner.run_id == second.runner.run_id
     assert re.fullmatch(r"[0-9a-f-]{36}", first.runner.run_id)
-    assert store.values["/rosdistro"] == "noetic\n"
-    assert store.values["/rosversion"] == "1.17.4\n"
+    assert network.values["/rosdistro"] == "noetic\n"
+    assert network.values["/rosversion"] == "1.17.4\n"
     assert f"setting /run_id to {first.runner.run_id}\n" in first.out.getvalue()
     assert "setting /run_id" not in second.out.getvalue()
     host = re.sub(r"[^a-z0-9]", "_", socket.gethostname().lower())
-    assert store.values[f"/roslaunch/uris/host_{host}__{os.getpid()}"].startswith("rosz://")
+    assert network.values[f"/roslaunch/uris/host_{host}__{os.getpid()}"].startswith("rosz://")
 
 
 @pytest.mark.parametrize("run_id", [7, "../evil", ""])
 def test_a_run_id_that_is_no_folder_is_replaced(tmp_path: Path, run_id: object) -> None:
-    store = MemoryStore(run_id=run_id)
-    with launch(tmp_path, shell("n", "exit 0"), store=store) as run:
+    network = MemoryNetwork(run_id=run_id)
+    with launch(tmp_path, shell("n", "exit 0"), network=network) as run:
         run.join()
-    assert store.values["/run_id"] == run.runner.run_id != run_id
+    assert network.values["/run_id"] == run.runner.run_id != run_id
 
 
 def test_the_folder_of_a_run(tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_without_logs_it_goes_on(tmp_path: Path) -> None:
         assert run.join() == 0
     assert re.match(
         r"WARNING: cannot keep logs in '/.*': Not a directory; set ROS_LOG_DIR to a folder that can"
-        r" be written to; going on without logs\n",
+        r" be written to; continuing without logs\n",
         run.err.getvalue(),
     )
     assert "[n-1] process has finished cleanly\n[" not in run.out.getvalue()
@@ -96,7 +96,7 @@ def test_without_logs_it_goes_on(tmp_path: Path) -> None:
 
 def test_set_up_comes_first(tmp_path: Path) -> None:
     target = tmp_path / "dump.yaml"
-    store = MemoryStore(a=1, b=2)
+    network = MemoryNetwork(a=1, b=2)
     steps = (
         setup("dump", "/a", str(target)),
         setup("delete", "/a"),
@@ -104,11 +104,11 @@ def test_set_up_comes_first(tmp_path: Path) -> None:
         setup("dump", "/a", str(target)),
     )
     plan = Plan(setup=steps, params=(param("/a", 3),))
-    with launch(tmp_path, shell("n", "exit 0"), plan=plan, store=store) as run:
+    with launch(tmp_path, shell("n", "exit 0"), plan=plan, network=network) as run:
         run.join()
     assert target.read_text() == "1\n"
-    assert store.values["/a"] == 3
-    assert store.batches[0] == ({}, ["/a"])
+    assert network.values["/a"] == 3
+    assert network.batches[0] == ({}, ["/a"])
     assert run.err.getvalue() == (
         "test.launch:3:5: parameter '/a' is not set, so it is not deleted\n"
         "test.launch:3:5: parameter '/a' is not set, so it is not dumped\n"
@@ -119,7 +119,7 @@ def test_a_dump_that_cannot_be_written_stops_the_launch(tmp_path: Path) -> None:
     plan = Plan(setup=(setup("dump", "/a", "/no/such/folder/x"),))
     with (
         pytest.raises(LaunchError, match=r"test\.launch:3:5: cannot dump to '/no/such/folder/x'"),
-        launch(tmp_path, plan=plan, store=MemoryStore(a=1)) as run,
+        launch(tmp_path, plan=plan, network=MemoryNetwork(a=1)) as run,
     ):
         run.join()
 
@@ -134,11 +134,11 @@ def test_a_dump_goes_to_files_alone(tmp_path: Path, kind: str) -> None:
         os.mkfifo(target)
     else:
         target.mkdir()
-    reason = f"is a link to '{precious}'" if kind == "link" else "is no regular file"
+    reason = f"is a link to '{precious}'" if kind == "link" else "is not a regular file"
     plan = Plan(setup=(setup("dump", "/a", str(target)),))
     with (
         pytest.raises(LaunchError, match=rf"cannot dump to '{target}': it {reason}"),
-        launch(tmp_path, plan=plan, store=MemoryStore(a=1)) as run,
+        launch(tmp_path, plan=plan, network=MemoryNetwork(a=1)) as run,
     ):
         run.join()
     assert precious.read_text() == "mine\n"
@@ -147,10 +147,10 @@ def test_a_dump_goes_to_files_alone(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("found", ["../../up", "", "a" * 70_000, "-", "a/b", 7, "ä"])
 def test_a_run_id_that_is_none(tmp_path: Path, found: object) -> None:
     """Anybody on the network may have set it."""
-    store = MemoryStore(run_id=found)
-    with launch(tmp_path, shell("n", "exit 0"), store=store) as run:
+    network = MemoryNetwork(run_id=found)
+    with launch(tmp_path, shell("n", "exit 0"), network=network) as run:
         assert run.join() == 0
-    assert store.values["/run_id"] == run.runner.run_id != found
+    assert network.values["/run_id"] == run.runner.run_id != found
     assert (tmp_path / "log" / run.runner.run_id).is_dir()
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from .outside import outside
-from .scene import alive, program, shell, wait_until
+from .in_process import launch_process
+from .in_thread import alive, program, shell, wait_until
 
 SLEEPERS = [
     shell(name, "trap 'exit 0' INT; echo up; while :; do sleep 0.02; done") for name in "abc"
@@ -31,7 +31,7 @@ STUBBORN = program(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_all(tmp_path: Path, number: int) -> None:
-    with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+    with launch_process(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
         run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         begin = time.monotonic()
@@ -43,7 +43,7 @@ def test_a_signal_ends_all(tmp_path: Path, number: int) -> None:
 
 
 def test_a_second_signal_kills(tmp_path: Path) -> None:
-    with outside(tmp_path, STUBBORN) as run:
+    with launch_process(tmp_path, STUBBORN) as run:
         run.expect("up\n")
         run.process.send_signal(signal.SIGINT)
         run.expect("killing on exit")
@@ -59,7 +59,7 @@ def test_a_second_signal_kills(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("asked_before", [False, True])
 def test_quitting_kills_at_once(tmp_path: Path, *, asked_before: bool) -> None:
-    with outside(tmp_path, STUBBORN, *SLEEPERS) as run:
+    with launch_process(tmp_path, STUBBORN, *SLEEPERS) as run:
         run.expect(r"c-4\]: started with pid")
         run.expect("up\n")
         if asked_before:
@@ -76,7 +76,7 @@ def test_quitting_kills_at_once(tmp_path: Path, *, asked_before: bool) -> None:
 
 def test_the_terminal_s_quit_key_leaves_no_node(tmp_path: Path) -> None:
     prefix = ("setsid", "-c", "-w")
-    with outside(tmp_path, *SLEEPERS, terminal=True, prefix=prefix) as run:
+    with launch_process(tmp_path, *SLEEPERS, terminal=True, prefix=prefix) as run:
         run.expect(r"process\[c-3\]: started with pid \[\d+\]")
         os.write(run._reading, b"\x1c")
         assert run.finish() == 0
@@ -85,7 +85,7 @@ def test_the_terminal_s_quit_key_leaves_no_node(tmp_path: Path) -> None:
 
 def test_a_closed_terminal_ends_all(tmp_path: Path) -> None:
     # setsid -c makes the terminal the controlling one, so that closing it hangs the launch up.
-    with outside(tmp_path, *SLEEPERS, terminal=True, prefix=("setsid", "-c", "-w")) as run:
+    with launch_process(tmp_path, *SLEEPERS, terminal=True, prefix=("setsid", "-c", "-w")) as run:
         run.expect(r"process\[c-3\]: started with pid \[\d+\]")
         os.close(run._reading)
         run._reading = os.open(os.devnull, os.O_RDONLY)
@@ -94,7 +94,7 @@ def test_a_closed_terminal_ends_all(tmp_path: Path) -> None:
 
 
 def test_nohup_is_honoured(tmp_path: Path) -> None:
-    with outside(tmp_path, *SLEEPERS, options='{"screen": true}', prefix=("nohup",)) as run:
+    with launch_process(tmp_path, *SLEEPERS, options='{"screen": true}', prefix=("nohup",)) as run:
         run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         run.process.send_signal(signal.SIGHUP)
@@ -104,7 +104,7 @@ def test_nohup_is_honoured(tmp_path: Path) -> None:
 
 
 def test_a_killed_launch_leaves_its_nodes_running(tmp_path: Path) -> None:
-    with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+    with launch_process(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
         run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         run.process.kill()
@@ -113,7 +113,7 @@ def test_a_killed_launch_leaves_its_nodes_running(tmp_path: Path) -> None:
 
 
 def test_a_killed_node_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
-    with outside(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
+    with launch_process(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
         run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
         first, *rest = run.pids()
@@ -126,7 +126,7 @@ def test_a_killed_node_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
 
 def test_stubborn_nodes_are_gone_within_the_time_outs(tmp_path: Path) -> None:
     options = '{"timeouts": {"sigint": 0.5, "sigterm": 0.3}}'
-    with outside(tmp_path, STUBBORN, options=options) as run:
+    with launch_process(tmp_path, STUBBORN, options=options) as run:
         run.expect("up\n")
         begin = time.monotonic()
         run.process.send_signal(signal.SIGINT)
@@ -139,7 +139,7 @@ def test_an_ignored_sigint_of_the_shell_does_not_reach_nodes(tmp_path: Path) -> 
     """A launch in the background of a script starts with SIGINT ignored; its nodes must not."""
     script = 'trap "" INT; exec "$@"'
     node = shell("n", "echo up; exec sleep 600", output="screen")
-    with outside(tmp_path, node, prefix=("sh", "-c", script, "sh")) as run:
+    with launch_process(tmp_path, node, prefix=("sh", "-c", script, "sh")) as run:
         run.expect("up\n")
         run.process.send_signal(signal.SIGINT)
         assert run.finish() == 0

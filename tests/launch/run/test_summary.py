@@ -1,4 +1,4 @@
-"""What is said at the start and at the end."""
+"""The summary of a plan at the start, and of exit codes at the end."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from rosz.launch.plan.model import MachinePlan, Plan
-from rosz.launch.run.summary import exit_reason, overview
+from rosz.launch.run.runner import describe_plan
+from rosz.launch.run.supervisor import describe_exit
 
-from .scene import HERE, param, shell
+from .in_thread import HERE, param, shell
 
 
 @pytest.mark.parametrize(
@@ -30,8 +31,8 @@ from .scene import HERE, param, shell
         (b"ab", "b'ab'"),
     ],
 )
-def test_values_are_cut_as_roslaunch_cuts_them(value: Any, shown: str) -> None:
-    assert f"\n * /p: {shown}\n" in overview(Plan(params=(param("/p", value),)))
+def test_values_are_shortened_as_in_roslaunch(value: Any, shown: str) -> None:
+    assert f"\n * /p: {shown}\n" in describe_plan(Plan(params=(param("/p", value),)))
 
 
 def test_sections() -> None:
@@ -42,13 +43,13 @@ def test_sections() -> None:
         machines=(machine,),
         nodes=(shell("n2", "x"), shell("n1", "x", namespace="/b"), shell("n1", "y")),
     )
-    assert overview(plan, machines=True) == (
+    assert describe_plan(plan, machines=True) == (
         "\nSUMMARY\n========\n\nCLEAR PARAMETERS\n * /a/\n * /b/\n"
         "\nPARAMETERS\n * /y: 2\n * /z: 1\n"
         "\nMACHINES\n * base\n\nNODES\n  /\n    n1 (sh -c y)\n    n2 (sh -c x)\n"
         "  /b/\n    n1 (sh -c x)\n"
     )
-    assert "MACHINES" not in overview(plan)
+    assert "MACHINES" not in describe_plan(plan)
 
 
 @pytest.mark.parametrize(
@@ -62,4 +63,4 @@ def test_sections() -> None:
     ],
 )
 def test_exit_codes(code: int | None, text: str) -> None:
-    assert exit_reason(code) == text
+    assert describe_exit(code) == text

@@ -14,7 +14,7 @@ from rosz.errors import LaunchError, UsageError
 from rosz.launch.plan.model import Condition, MachinePlan, NodePlan, Plan, Wait
 from rosz.launch.run import Timeouts
 
-from .scene import HERE, Facts, alive, launch, program, shell, wait_until
+from .in_thread import HERE, MemoryNetwork, alive, launch, program, shell, wait_until
 
 STUBBORN = (
     sys.executable,
@@ -206,7 +206,7 @@ def test_a_program_without_a_first_line_is_explained(tmp_path: Path) -> None:
     script.chmod(0o755)
     with launch(tmp_path, program("s", str(script))) as run:
         assert run.join() == 1
-    assert "first line must name what runs it, such as '#!/bin/sh'" in run.err.getvalue()
+    assert "first line must name its interpreter, such as '#!/bin/sh'" in run.err.getvalue()
 
 
 def test_a_bad_launch_prefix_is_explained(tmp_path: Path) -> None:
@@ -217,13 +217,13 @@ def test_a_bad_launch_prefix_is_explained(tmp_path: Path) -> None:
 
 def test_wait_for_holds_a_node_back(tmp_path: Path) -> None:
     wait = Wait((Condition("topic", "/scan"), Condition("param", "/go")), 30.0, HERE)
-    facts = Facts()
+    network = MemoryNetwork()
     nodes = [shell("late", "exit 0", wait_for=(wait,)), shell("early", "exit 0")]
-    with launch(tmp_path, *nodes, facts=facts) as run:
+    with launch(tmp_path, *nodes, network=network) as run:
         run.out.wait_for("[late-1] waiting for topic /scan or param /go (at most 30 s)\n")
         run.out.wait_for("[early-2] process has finished cleanly")
         assert "process[late-1]" not in run.out.getvalue()
-        facts.true.add("param /go")
+        network.true.add("param /go")
         assert run.join() == 0
     assert "process[late-1]: started" in run.out.getvalue()
 

@@ -1,4 +1,4 @@
-"""What a launch says reaches its screen in order, and nobody waits for a screen that hangs."""
+"""Messages of a launch are printed in order, and a blocked terminal does not block the launch."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import TextIO
 
 import pytest
 
-from rosz.launch.run.screen import Screen
+from rosz.launch.run.console import ConsoleWriter
 
-from .scene import PATIENCE
+from .in_thread import PATIENCE
 
 LONG = "x" * 100_000 + "\n"
-"""More than a pipe takes."""
+"""More than a pipe holds."""
 
 
 class Pipe:
-    """A pipe that nobody reads until told to."""
+    """A pipe that is only read on request."""
 
     def __init__(self) -> None:
         self._reading, writing = os.pipe()
@@ -48,59 +48,59 @@ def pipe() -> Iterator[Pipe]:
         yield made
 
 
-def test_a_text_is_there_when_write_returns() -> None:
-    screen, stream = Screen(), io.StringIO()
+def test_a_text_is_written_when_write_returns() -> None:
+    writer, stream = ConsoleWriter(), io.StringIO()
     for number in range(100):
-        screen.write(stream, f"{number}\n")
+        writer.write(stream, f"{number}\n")
         assert stream.getvalue().endswith(f"{number}\n")
-    screen.close(PATIENCE)
-    screen.write(stream, "late")
-    screen.close(PATIENCE)
+    writer.close(PATIENCE)
+    writer.write(stream, "late")
+    writer.close(PATIENCE)
     assert stream.getvalue() == "".join(f"{number}\n" for number in range(100))
 
 
-def test_nobody_waits_and_nothing_is_lost(pipe: Pipe) -> None:
-    screen, freed = Screen(), threading.Event()
+def test_a_blocked_stream_blocks_nobody_and_loses_nothing(pipe: Pipe) -> None:
+    writer, freed = ConsoleWriter(), threading.Event()
     began = time.monotonic()
     texts = [LONG, *(f"{number} ä\n" for number in range(1000)), *[LONG] * 20]
     for text in texts:
-        screen.write(pipe.stream, text)
+        writer.write(pipe.stream, text)
     assert time.monotonic() - began < 5.0
-    assert screen.full
-    screen.when_free(freed.set)
+    assert writer.full
+    writer.when_free(freed.set)
     assert not freed.is_set()
     whole = "".join(texts)
     assert pipe.read(len(whole.encode())) == whole
     assert freed.wait(PATIENCE)
-    screen.close(PATIENCE)
-    assert not screen.full
+    writer.close(PATIENCE)
+    assert not writer.full
     again = threading.Event()
-    screen.when_free(again.set)
+    writer.when_free(again.set)
     assert again.is_set()
 
 
-def test_the_end_waits_no_longer_than_it_may(pipe: Pipe) -> None:
-    screen = Screen()
-    screen.write(pipe.stream, LONG)
+def test_close_waits_no_longer_than_its_timeout(pipe: Pipe) -> None:
+    writer = ConsoleWriter()
+    writer.write(pipe.stream, LONG)
     began = time.monotonic()
-    screen.close(0.1)
+    writer.close(0.1)
     assert time.monotonic() - began < 5.0
     pipe.hang_up()
-    screen.close(PATIENCE)  # or it would write to whoever gets the descriptor next
+    writer.close(PATIENCE)  # or it would write to whoever gets the descriptor next
 
 
-def test_a_screen_that_is_gone_is_no_error(pipe: Pipe) -> None:
-    screen, other = Screen(), io.StringIO()
+def test_a_closed_stream_is_ignored(pipe: Pipe) -> None:
+    writer, other = ConsoleWriter(), io.StringIO()
     pipe.hang_up()
-    screen.write(pipe.stream, "nobody reads this\n")
-    screen.write(other, "but this\n")
-    screen.close(PATIENCE)
+    writer.write(pipe.stream, "nobody reads this\n")
+    writer.write(other, "but this\n")
+    writer.close(PATIENCE)
     assert other.getvalue() == "but this\n"
 
 
-def test_letters_that_a_stream_has_not(pipe: Pipe) -> None:
-    screen = Screen()
+def test_characters_outside_the_encoding_are_escaped(pipe: Pipe) -> None:
+    writer = ConsoleWriter()
     with os.fdopen(os.dup(pipe.stream.fileno()), "w", encoding="ascii") as stream:
-        screen.write(stream, "ä\n")
+        writer.write(stream, "ä\n")
         assert pipe.read(5) == "\\xe4\n"
-    screen.close(PATIENCE)
+    writer.close(PATIENCE)

@@ -1,4 +1,4 @@
-"""What tests of the runner share: a store in memory, a console to wait on, launches in a thread."""
+"""Launches on a thread of the test, with a network in memory and a console to wait on."""
 
 from __future__ import annotations
 
@@ -18,19 +18,36 @@ from rosz.errors import ParamNotFound
 from rosz.launch.plan.model import Condition, NodePlan, ParamPlan, Place, Plan, SetupPlan
 from rosz.launch.run import Network, Options, Runner, Workplace
 from rosz.packages import PackageIndex
+from rosz.session import Session
 
 PATIENCE = 20.0
-"""Seconds after which a test gives up on something that normally takes milliseconds."""
+"""Time limit in seconds for something that normally takes milliseconds."""
 
 HERE = Place("test.launch", 3, 5)
 
 
-class MemoryStore:
-    """Parameters in a dictionary, flat, with a record of what was asked."""
+class MemoryNetwork(Network):
+    """Parameters in a flat dictionary, and conditions that a test makes true.
 
-    def __init__(self, **values: Any) -> None:
+    Args:
+        session: Session that replies to requests, or None.
+        domain: ROS domain.
+        **values: Parameters.
+
+    Attributes:
+        values: Parameters by name.
+        batches: All writes: values and deleted names.
+        true: Conditions that are true.
+    """
+
+    def __init__(self, session: Session | None = None, domain: int = 0, **values: Any) -> None:
+        self.session = session
+        self.domain = domain
+        self.alone = True
+        self.router = None
         self.values: dict[str, Any] = {f"/{name}": value for name, value in values.items()}
         self.batches: list[tuple[dict[str, Any], list[str]]] = []
+        self.true: set[str] = set()
 
     def get(self, name: str) -> Any:
         if name not in self.values:
@@ -50,13 +67,6 @@ class MemoryStore:
 
     def dump(self, name: str) -> str:
         return f"{self.get(name)}\n"
-
-
-class Facts:
-    """Conditions that a test makes true."""
-
-    def __init__(self) -> None:
-        self.true: set[str] = set()
 
     def holds(self, condition: Condition) -> bool:
         return str(condition) in self.true
@@ -83,7 +93,7 @@ class Transcript(io.StringIO):
 
 
 def wait_until(condition: Any, what: str) -> None:
-    """Wait for something that nobody tells of, such as the end of somebody else's process."""
+    """Wait for a condition without an event, such as the end of another process's child."""
     deadline = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < deadline, f"no {what} within {PATIENCE} s"
@@ -91,7 +101,7 @@ def wait_until(condition: Any, what: str) -> None:
 
 
 def alive(pid: int) -> bool:
-    """Tell whether a process runs; one that has ended and was not reaped does not."""
+    """Return whether a process runs; one that has ended and was not reaped does not."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except FileNotFoundError:
@@ -100,7 +110,7 @@ def alive(pid: int) -> bool:
 
 
 def program(name: str, *words: str, **settings: Any) -> NodePlan:
-    """Return the plan of a process that is no ROS node."""
+    """Return the plan of a process that is not a ROS node."""
     defaults: dict[str, Any] = {
         "package": "",
         "type": "",
@@ -126,31 +136,32 @@ def setup(action: Any, name: str, file: str = "") -> SetupPlan:
 
 
 class Launch:
-    """A runner in a thread of its own."""
+    """A runner on a thread of its own."""
 
     def __init__(
         self,
         folder: Path,
         plan: Plan,
         *,
-        store: MemoryStore | None = None,
-        facts: Facts | None = None,
+        network: Network | None = None,
         packages: PackageIndex | None = None,
         environ: Mapping[str, str] | None = None,
         **options: Any,
     ) -> None:
-        self.store = store or MemoryStore()
-        self.facts = facts or Facts()
         self.out = Transcript()
         self.err = Transcript()
         self.code: int | None = None
         self.raised: BaseException | None = None
         variables = dict(os.environ if environ is None else environ)
-        network = options.pop("network", None) or Network(store=self.store, readiness=self.facts)
         environment = Environment(home=folder / "home", log_dir=folder / "log", package_roots=())
         workplace = Workplace(packages or PackageIndex([]), environment, variables, str(folder))
         self.runner = Runner(
-            plan, workplace, network, Options(**options), out=self.out, err=self.err
+            plan,
+            workplace,
+            network or MemoryNetwork(),
+            Options(**options),
+            out=self.out,
+            err=self.err,
         )
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -176,7 +187,7 @@ class Launch:
         return self.code
 
     def pid(self, label: str, times: int = 1) -> int:
-        """Return the process id that a process was started with, the last of so many times."""
+        """Return the process id of the latest start of a process, after ``times`` starts."""
         start = f"process[{label}]: started with pid ["
         text = self.out.wait_for(start, times)
         return int(text.split(start)[times].partition("]")[0])
@@ -186,7 +197,7 @@ class Launch:
 def launch(
     folder: Path, *nodes: NodePlan, plan: Plan | None = None, **rest: Any
 ) -> Iterator[Launch]:
-    """Run a launch while the block runs, and see that it ends."""
+    """Run a launch while the block runs, and check that it ends."""
     base = plan or Plan()
     running = Launch(folder, msgspec.structs.replace(base, nodes=(*base.nodes, *nodes)), **rest)
     try:

@@ -15,16 +15,16 @@ from pathlib import Path
 
 from rosz.launch.plan.model import NodePlan, Plan
 from rosz.launch.run.command import TAG
-from rosz.launch.run.family import kill_family
+from rosz.launch.run.host import ProcessTree
 
-from .scene import PATIENCE
+from .in_thread import PATIENCE
 
 PROGRAM = Path(__file__).with_name("program.py")
 ROOT = Path(__file__).parents[3]
 
 
-class Outside:
-    """A running launch, whose output is read as it comes.
+class LaunchProcess:
+    """A running launch, whose output is read as it arrives.
 
     Args:
         process: The launch.
@@ -49,7 +49,7 @@ class Outside:
     def _read(self) -> bool:
         try:
             data = os.read(self._reading, 65536)
-        except OSError:  # a terminal whose other side is gone
+        except OSError:  # a terminal whose other side is closed
             data = b""
         self.text += data.decode(errors="replace")
         return bool(data)
@@ -62,28 +62,28 @@ class Outside:
         return code
 
     def pids(self) -> list[int]:
-        """Return the process ids of all that was started."""
+        """Return the process ids of all started processes."""
         return [int(pid) for pid in re.findall(r"started with pid \[(\d+)\]", self.text)]
 
 
 @contextmanager
-def outside(
+def launch_process(
     folder: Path,
     *nodes: NodePlan,
     options: str = "{}",
     terminal: bool = False,
     prefix: tuple[str, ...] = (),
     separate: bool = False,
-) -> Iterator[Outside]:
-    """Run a launch in a process of its own, and leave nothing of it behind.
+) -> Iterator[LaunchProcess]:
+    """Run a launch in a process of its own, and leave no process behind.
 
     Args:
-        folder: Where it keeps what it writes.
-        nodes: What to run.
-        options: As JSON.
+        folder: Folder for its files.
+        *nodes: Nodes to run.
+        options: Options as JSON.
         terminal: Whether it writes to a terminal.
-        prefix: What to put before its command.
-        separate: Whether its errors go elsewhere than its output: to ``FOLDER/err``.
+        prefix: Words to put before its command.
+        separate: Whether its errors go to the file ``FOLDER/err``.
     """
     tag = secrets.token_hex(8)
     plan = folder / "plan.json"
@@ -101,12 +101,12 @@ def outside(
     os.close(theirs)
     if err is not None:
         err.close()
-    running = Outside(process, ours)
+    running = LaunchProcess(process, ours)
     try:
         yield running
     finally:
         if process.poll() is None:
             process.kill()
             process.wait()
-        kill_family(tag)
+        ProcessTree(tag).kill()
         os.close(ours)

@@ -1,4 +1,4 @@
-"""Descendants are known by their mark, wherever they moved."""
+"""Descendants are found by their tag, also outside their process group."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from rosz.launch.run.family import Census, Usage, family, group_lives, kill_family, usage
+from rosz.launch.run.host import ProcessTree, Usage, group_alive
 
-from .scene import alive, wait_until
+from .in_thread import alive, wait_until
 
 
 @pytest.fixture
@@ -36,28 +36,28 @@ def parent(tag: str) -> Iterator[subprocess.Popen[bytes]]:
         assert process.stdout is not None
         assert process.stdout.readline() == b"up\n"
         yield process
-        kill_family(tag)
+        ProcessTree(tag).kill()
 
 
 def test_all_descendants_are_found(tag: str, parent: subprocess.Popen[bytes]) -> None:
-    wait_until(lambda: len(family(tag)) == 2, "both processes")
-    assert parent.pid in family(tag)
+    wait_until(lambda: len(ProcessTree(tag).tags()) == 2, "both processes")
+    assert parent.pid in ProcessTree(tag).tags()
     # The child shows no environment in the instant in which it becomes another program.
-    wait_until(lambda: family(f"{tag}:1") == family(tag), "one answer")
-    assert family(f"{tag}:11") == {}
-    assert family(tag[:-1]) == {}
-    assert set(family(tag).values()) == {f"{tag}:1"}
+    wait_until(lambda: ProcessTree(f"{tag}:1").tags() == ProcessTree(tag).tags(), "one answer")
+    assert ProcessTree(f"{tag}:11").tags() == {}
+    assert ProcessTree(tag[:-1]).tags() == {}
+    assert set(ProcessTree(tag).tags().values()) == {f"{tag}:1"}
 
 
 def test_all_descendants_are_killed(tag: str, parent: subprocess.Popen[bytes]) -> None:
-    wait_until(lambda: len(family(tag)) == 2, "both processes")
-    pids = list(family(tag))
-    kill_family(tag)
+    wait_until(lambda: len(ProcessTree(tag).tags()) == 2, "both processes")
+    pids = list(ProcessTree(tag).tags())
+    ProcessTree(tag).kill()
     parent.wait(10)
     wait_until(lambda: not any(map(alive, pids)), "end of both")
 
 
-def test_who_becomes_another_program_is_killed_as_well(
+def test_a_process_that_executes_another_program_is_killed(
     tag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with subprocess.Popen(["sleep", "600"]) as changing:
@@ -65,43 +65,45 @@ def test_who_becomes_another_program_is_killed_as_well(
         entry.mkdir()
         (entry / "environ").write_bytes(b"")
         (entry / "stat").write_text(Path(f"/proc/{changing.pid}/stat").read_text())
-        monkeypatch.setattr("rosz.launch.run.family._PROC", tmp_path)
+        monkeypatch.setattr("rosz.launch.run.host._PROC", tmp_path)
         shown = f"A=1\0ROSZ_LAUNCH={tag}:1\0".encode()
         monkeypatch.setattr(time, "sleep", lambda _: (entry / "environ").write_bytes(shown))
-        kill_family(tag)
+        ProcessTree(tag).kill()
         monkeypatch.undo()
         assert changing.wait(10) == -signal.SIGKILL
 
 
-def test_who_has_no_environment_holds_up_nothing(tag: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_without_environment_does_not_delay(
+    tag: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with subprocess.Popen(["sleep", "600"], env={}) as bare:
         looks: list[float] = []
         monkeypatch.setattr(time, "sleep", looks.append)
-        kill_family(tag)
+        ProcessTree(tag).kill()
         monkeypatch.undo()
         assert 1 <= len(looks) <= 20
         assert bare.poll() is None
         bare.kill()
 
 
-def test_marks_of_an_inner_launch_belong_to_the_outer(tag: str) -> None:
+def test_tags_of_an_inner_launch_are_below_the_outer(tag: str) -> None:
     environ = {**os.environ, "ROSZ_LAUNCH": f"{tag}:3:abc:1"}
     with subprocess.Popen(["sleep", "600"], env=environ) as inner:
-        assert Census(tag).below(f"{tag}:3") == [inner.pid]
-        assert Census(tag).below(f"{tag}:3:abc") == [inner.pid]
-        assert Census(tag).below(f"{tag}:1") == []
-        kill_family(f"{tag}:3")
+        assert ProcessTree(tag).below(f"{tag}:3") == [inner.pid]
+        assert ProcessTree(tag).below(f"{tag}:3:abc") == [inner.pid]
+        assert ProcessTree(tag).below(f"{tag}:1") == []
+        ProcessTree(f"{tag}:3").kill()
         assert inner.wait(10) == -signal.SIGKILL
 
 
-def test_usage_is_counted_per_mark(tag: str) -> None:
+def test_usage_is_counted_by_tag(tag: str) -> None:
     environ = {**os.environ, "ROSZ_LAUNCH": f"{tag}:7"}
     script = "x = bytearray(50_000_000)\nwhile True: pass"
     with subprocess.Popen([sys.executable, "-S", "-c", script], env=environ) as busy:
         seen: dict[str, Usage] = {}
 
         def is_busy() -> bool:
-            seen.update(usage(tag))
+            seen.update(ProcessTree(tag).usage())
             used = seen.get(f"{tag}:7")
             return used is not None and used.cpu > 0.05 and used.memory > 50_000_000
 
@@ -137,9 +139,9 @@ def test_a_group_of_zombies_does_not_live() -> None:
         assert holder.stdin is not None
         assert holder.stdout is not None
         group = int(holder.stdout.readline())
-        assert group_lives(group)
+        assert group_alive(group)
         print(file=holder.stdin, flush=True)
         assert holder.stdout.readline() == "over\n"
         os.killpg(group, 0)
-        assert not group_lives(group)
+        assert not group_alive(group)
         print(file=holder.stdin, flush=True)

@@ -1,18 +1,20 @@
-"""A new package: one that runs at once, or the bare one that catkin's tutorials begin with.
+"""Create packages, and the setup scripts of a workspace.
 
-The first has a message of its own, a node that publishes it and a launch file that starts that.
+`create` makes a package that can be run at once: a message, a node that publishes it and a launch
+file that starts the node. `create_bare` makes the two files that catkin's tutorials begin with.
 """
 
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
 from rosz.errors import LaunchError, UsageError
 
-__all__ = ("create", "create_bare")
+__all__ = ("create", "create_bare", "write_setup")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
@@ -66,6 +68,21 @@ _LAUNCH = """\
 </launch>
 """
 
+_MARK = "# written by rosz pkg check --setup"
+_POSIX = """\
+{mark}: the packages of this workspace are found, and ROS 1's commands mean rosz
+case ":${{ROSZ_PACKAGE_PATH-}}:" in
+  *:{source}:*) ;;
+  *) export ROSZ_PACKAGE_PATH={source}"${{ROSZ_PACKAGE_PATH:+:$ROSZ_PACKAGE_PATH}}" ;;
+esac
+"""
+_FISH = """\
+{mark}: the packages of this workspace are found, and ROS 1's commands mean rosz
+if not contains {source} (string split : -- "$ROSZ_PACKAGE_PATH")
+    set -gx ROSZ_PACKAGE_PATH (string trim --right --chars : -- {source}:"$ROSZ_PACKAGE_PATH")
+end
+"""
+
 
 def create(
     parent: Path,
@@ -76,22 +93,22 @@ def create(
     maintainer: str = "",
     license_name: str = "",
 ) -> Path:
-    """Create a package that runs at once.
+    """Create a package that can be run at once.
 
     Args:
-        parent: Folder to create it in.
-        name: Its name.
+        parent: Folder to create the package in.
+        name: Name of the package.
         dependencies: Names of packages that it needs.
-        description: What it is.
-        maintainer: Who looks after it.
-        license_name: Under what terms.
+        description: Description for package.xml.
+        maintainer: Name of the maintainer.
+        license_name: Name of the license.
 
     Returns:
-        Its folder.
+        The folder of the package.
 
     Raises:
-        UsageError: The name is no name of a package.
-        LaunchError: The folder exists, or cannot be written.
+        UsageError: If the name is not valid.
+        LaunchError: If the folder exists, or cannot be written.
     """
     files = {
         "package.xml": _manifest(name, dependencies, description, maintainer, license_name),
@@ -113,22 +130,22 @@ def create_bare(
     maintainer: str = "",
     license_name: str = "",
 ) -> list[Path]:
-    """Create a package as catkin_create_pkg does: two files, and folders for what is to come.
+    """Create a package as catkin_create_pkg does: two files, and empty folders.
 
     Args:
-        parent: Folder to create it in.
-        name: Its name.
+        parent: Folder to create the package in.
+        name: Name of the package.
         dependencies: Names of packages that it needs.
-        description: What it is.
-        maintainer: Who looks after it.
-        license_name: Under what terms.
+        description: Description for package.xml.
+        maintainer: Name of the maintainer.
+        license_name: Name of the license.
 
     Returns:
-        What there is now: files, then folders.
+        The files, then the folders.
 
     Raises:
-        UsageError: The name is no name of a package.
-        LaunchError: The folder exists, or cannot be written.
+        UsageError: If the name is not valid.
+        LaunchError: If the folder exists, or cannot be written.
     """
     components = f" COMPONENTS {' '.join(dependencies)}" if dependencies else ""
     files = {
@@ -149,8 +166,8 @@ def _manifest(
 ) -> str:
     if not _NAME.fullmatch(name):
         raise UsageError(
-            f"'{name}' is no name of a package; expected lower-case letters, digits and '_', a"
-            " letter first"
+            f"'{name}' is not a valid package name; expected lower-case letters, digits and"
+            " '_', a letter first"
         )
     return _MANIFEST.format(
         name=name,
@@ -173,3 +190,31 @@ def _write(folder: Path, files: Mapping[str, str]) -> Path:
     except OSError as error:
         raise LaunchError(f"cannot create '{error.filename}': {error.strerror}") from error
     return folder
+
+
+def write_setup(workspace: Path, scripts: Mapping[str, str]) -> list[Path]:
+    """Write the files ``devel/setup.<shell>`` that users source after ``catkin_make``.
+
+    Args:
+        workspace: Folder that contains ``src``.
+        scripts: Shell code that defines ROS 1's commands, by the suffix of the file.
+
+    Returns:
+        The files.
+
+    Raises:
+        UsageError: If a file there was written by catkin.
+    """
+    folder = workspace / "devel"
+    source = shlex.quote(str(workspace / "src"))
+    files = {folder / f"setup.{shell}": text for shell, text in scripts.items()}
+    for file in files:
+        if file.exists() and not file.read_text("utf-8", "replace").startswith(_MARK):
+            raise UsageError(
+                f"'{file}' was written by catkin and is kept; to let rosz write it, remove {folder}"
+            )
+    folder.mkdir(exist_ok=True)
+    for file, text in files.items():
+        head = _FISH if file.suffix == ".fish" else _POSIX
+        file.write_text(head.format(mark=_MARK, source=source) + text, encoding="utf-8")
+    return list(files)

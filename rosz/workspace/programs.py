@@ -1,0 +1,231 @@
+"""Checks of the programs of a package, and of the launch files that start them.
+
+Programs: executable bits, first lines, Python's syntax, C++ programs that nothing builds. Launch
+files: each is planned with the defaults of its args. Files of dynamic_reconfigure (``.cfg``) are
+programs, which are run. Nothing else is run.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from rosz.errors import NotFoundError, RoszError
+from rosz.launch.plan import NodePlan, SystemContext, describe_args, plan
+from rosz.launch.run.command import is_python, locate
+from rosz.packages import PackageIndex
+from rosz.ros1.python2 import explain
+from rosz.workspace.problem import Problem, error, from_error, warning
+
+__all__ = ("check_cmake", "check_configs", "check_launches", "check_scripts")
+
+_SCRIPT_FOLDERS = frozenset({"scripts", "script", "nodes", "node", "bin", "test", "tests"})
+_SKIPPED_FOLDERS = frozenset({"__pycache__", "node_modules", "build", "devel", "install"})
+_HEAD_BYTES = 4096
+_BINARY = b"\x7fELF"
+_EXECUTABLE = re.compile(rb"^\s*(?:catkin_|cuda_)?add_executable\s*\(\s*([^\s)]+)", re.MULTILINE)
+_CFG_TIMEOUT = 20.0
+_GENERATOR = b"ParameterGenerator"
+_FRAME = re.compile(r'^\s*File "(.+)", line (\d+)', re.MULTILINE)
+_LAUNCH_PATTERNS = ("*.launch", "*.launch.xml", "*.test")
+
+
+def check_scripts(folder: Path) -> Iterator[Problem]:
+    """Yield the problems of the programs of a package."""
+    for file in _files(folder):
+        try:
+            with file.open("rb") as opened:
+                head = opened.read(_HEAD_BYTES)
+        except OSError as fault:
+            yield warning(file, f"cannot be read: {fault.strerror}")
+            continue
+        yield from _check_start(folder, file, head)
+        if is_python(file) or file.suffix == ".cfg":
+            yield from _check_python(file)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for parent, names, files in os.walk(folder):
+        names[:] = sorted(n for n in names if not n.startswith(".") and n not in _SKIPPED_FOLDERS)
+        yield from (Path(parent, name) for name in sorted(files) if not name.startswith("."))
+
+
+def _check_start(folder: Path, file: Path, head: bytes) -> Iterator[Problem]:
+    """Yield the problems that prevent a file from being started."""
+    first = head.split(b"\n", 1)[0]
+    executable = os.access(file, os.X_OK)
+    if not first.startswith(b"#!"):
+        if executable and file.suffix == ".py":
+            text = "its first line names no interpreter: put '#!/usr/bin/env python3' there"
+            yield warning(file, text, 1, 1)
+        elif executable and _is_started(folder, file) and not head.startswith(_BINARY):
+            yield error(file, "executable, but neither a program nor a script with '#!'", 1, 1)
+        return
+    if not executable and _is_started(folder, file):
+        yield error(file, f"not executable; run: chmod +x {file}")
+    if first.endswith(b"\r"):
+        yield warning(
+            file,
+            f"lines end as on Windows, which does not work with '#!': sed -i 's/\\r$//' {file}",
+            1,
+        )
+    yield from _check_interpreter(file, first[2:].decode(errors="replace").split())
+
+
+def _is_started(folder: Path, file: Path) -> bool:
+    """Return whether a file is in a folder for programs."""
+    place = file.relative_to(folder).parent.parts
+    return not place or place == ("src",) or bool(_SCRIPT_FOLDERS & set(place))
+
+
+def _check_interpreter(file: Path, words: list[str]) -> Iterator[Problem]:
+    if not words:
+        yield error(file, "'#!' names no interpreter; write '#!/usr/bin/env python3'", 1, 1)
+        return
+    program = words[0]
+    if Path(program).name == "env":
+        rest = [word for word in words[1:] if not word.startswith("-") and "=" not in word]
+        program = rest[0] if rest else "env"
+    if shutil.which(program) is None:
+        # rosz runs Python scripts with its own interpreter.
+        if "python" in program:
+            text = f"'{program}' is not on this machine: only rosz can start it; use 'python3'"
+            yield warning(file, text, 1, 1)
+        else:
+            yield error(file, f"its interpreter '{program}' is not on this machine", 1, 1)
+
+
+def _check_python(file: Path) -> Iterator[Problem]:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            compile(file.read_bytes(), str(file), "exec", dont_inherit=True)
+    except SyntaxError as fault:
+        plain = explain(fault, str(file))
+        if plain is not None:
+            yield from_error(plain, file)
+        else:
+            text = f"not valid Python: {fault.msg}"
+            yield error(file, text, fault.lineno or 0, fault.offset or 0)
+    except ValueError as fault:  # null bytes
+        yield error(file, f"not valid Python: {fault}")
+
+
+def check_cmake(folder: Path) -> Iterator[Problem]:
+    """Yield the C++ programs of a package, which rosz does not build."""
+    file = folder / "CMakeLists.txt"
+    try:
+        data = file.read_bytes()
+    except OSError:
+        return
+    for match in _EXECUTABLE.finditer(data):
+        line = data.count(b"\n", 0, match.start(1)) + 1
+        name = match[1].decode(errors="replace")
+        yield warning(file, f"'{name}' is C++: rosz does not build it, and has no C++ API", line)
+
+
+def check_configs(folder: Path, environ: Mapping[str, str]) -> Iterator[Problem]:
+    """Yield the problems of the .cfg files of a package.
+
+    Args:
+        folder: Folder of the package.
+        environ: Environment variables to run them with.
+    """
+    for file in sorted(folder.rglob("*.cfg")):
+        if not file.is_file() or _GENERATOR not in file.read_bytes():
+            continue  # another kind of configuration
+        if not os.access(file, os.X_OK):
+            yield warning(file, f"not executable, which catkin requires; run: chmod +x {file}")
+        if find_spec("rosz.ros1.dynamic_reconfigure") is not None:
+            yield from _run_config(file, environ)
+
+
+def _run_config(file: Path, environ: Mapping[str, str]) -> Iterator[Problem]:
+    command = [sys.executable, "-P", "-m", "rosz.ros1", str(file)]
+    with tempfile.TemporaryDirectory(prefix="rosz-cfg-") as scratch:
+        try:
+            done = subprocess.run(
+                command,
+                cwd=scratch,
+                env={**environ, "PYTHONDONTWRITEBYTECODE": "1"},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=_CFG_TIMEOUT,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            yield error(
+                file, f"still runs after {_CFG_TIMEOUT:g} s; it should only describe settings"
+            )
+            return
+    if done.returncode:
+        lines = [int(line) for path, line in _FRAME.findall(done.stderr) if path == str(file)]
+        said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        yield error(file, _without_place(said[-1], file), lines[-1] if lines else 0)
+
+
+def _without_place(text: str, file: Path) -> str:
+    return re.sub(rf"^(rosz: )?({re.escape(str(file))}(:\d+)*: )?", "", text)
+
+
+class _DryContext(SystemContext):
+    """A context that runs no commands."""
+
+    def run(self, command: Sequence[str]) -> bytes:  # noqa: ARG002  # what it overrides
+        """Return an empty output."""
+        return b""
+
+
+def check_launches(
+    folder: Path, index: PackageIndex, environ: Mapping[str, str]
+) -> Iterator[Problem]:
+    """Yield the problems of the launch files of a package.
+
+    Args:
+        folder: Folder of the package.
+        index: All known packages.
+        environ: Environment variables.
+    """
+    context = _DryContext(index, environ, folder, lambda base: f"{base}_1")
+    for file in sorted({file for pattern in _LAUNCH_PATTERNS for file in folder.rglob(pattern)}):
+        try:
+            missing = [a.name for a in describe_args([file], {}, context) if a.default is None]
+            # A file with required args is meant to be included by another one.
+            found = None if missing else plan([file], {}, context)
+        except RoszError as fault:
+            yield from_error(fault, file)
+            continue
+        if found is not None:
+            for notice in found.warnings:
+                place = notice.place
+                yield warning(Path(place.file), notice.text, place.line, place.column)
+            for node in found.processes:
+                yield from _check_node(node, index, lambda path: path.is_relative_to(folder))
+
+
+def _check_node(
+    node: NodePlan, index: PackageIndex, is_ours: Callable[[Path], bool]
+) -> Iterator[Problem]:
+    """Yield the problems that prevent a node from being started."""
+    if node.command or node.machine:
+        return
+    place = Path(node.place.file), node.place.line, node.place.column
+    try:
+        package = index.find(node.package)
+    except RoszError as fault:
+        yield warning(place[0], f"node '{node.name}': {fault}", *place[1:])
+        return
+    try:
+        locate(package, node.type)
+    except NotFoundError as fault:
+        make = error if is_ours(package.path) else warning
+        yield make(place[0], f"node '{node.name}': {fault}", *place[1:])
