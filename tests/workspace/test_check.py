@@ -192,7 +192,9 @@ def test_two_packages_of_one_name(workspace: Path) -> None:
     folder = create(workspace / "src", "twin")
     text = (folder / "package.xml").read_text().replace("<name>twin", "<name>demo")
     (folder / "package.xml").write_text(text)
-    found = [line for line in problems(workspace) if "another package is also called 'demo'" in line]
+    found = [
+        line for line in problems(workspace) if "another package is also called 'demo'" in line
+    ]
     assert len(found) == 2
 
 
