@@ -1,40 +1,40 @@
-"""Every error that rosz raises on purpose.
+"""The errors that rosz raises.
 
-One root, so that ``except RoszError`` catches all that rosz reports and nothing else::
+They have one root, so that ``except RoszError`` catches what rosz reports and nothing else::
 
     RoszError
     ├── UsageError                  a command or call was used wrongly (exit code 2)
-    ├── InvalidName                 no valid graph resource name (also ValueError)
-    ├── SourceError                 something in a file: path, line, column
+    ├── InvalidName                 not a valid graph resource name (also ValueError)
+    ├── SourceError                 an error in a text: path, line, column
     │   ├── DefinitionError         .msg, .srv
     │   ├── YamlError               YAML
     │   ├── LaunchFileError         launch XML, with the chain of includes
     │   └── PackageError            package.xml
-    ├── NotFoundError               a thing that was asked for by name (also LookupError)
+    ├── NotFoundError               nothing has the requested name (also LookupError)
     │   ├── PackageNotFound
     │   ├── ExecutableNotFound
     │   ├── TypeNotFound            no such message or service type
     │   └── ParamNotFound           (also KeyError)
-    ├── MessageError                a message is not as its type wants it (also ValueError)
-    │   ├── EncodeError             a value of ours does not fit its type
-    │   └── DecodeError             bytes of theirs are damaged
-    ├── TransportError              the session cannot do what was asked (also ConnectionError)
-    │   └── NoReplica               nobody holds the parameter store
-    ├── ClosedError                 the thing used has been closed or shut down
+    ├── MessageError                a message does not fit its type (also ValueError)
+    │   ├── EncodeError             a value does not fit its field
+    │   └── DecodeError             received bytes are not a message of the type
+    ├── TransportError              the session cannot open or communicate (also ConnectionError)
+    │   └── NoReplica               no process holds the parameter store
+    ├── ClosedError                 the object has been closed or shut down
     ├── TimeMovedBackwards          ROS time was set back during a sleep
-    ├── WaitTimeout                 a wait ended without its event (also TimeoutError)
-    ├── ServiceError                a service answered with an error, or nobody serves it
+    ├── WaitTimeout                 an event did not happen in time (also TimeoutError)
+    ├── ServiceError                a service call failed
     │   └── ServiceNotFound
-    ├── ParamError                  a parameter value or write is not acceptable
+    ├── ParamError                  a parameter value or write is not allowed
     ├── StoreError                  a file of parameters cannot be used
-    ├── TransformError              a transform between two frames cannot be given
+    ├── TransformError              a transform between two frames is not available
     │   ├── FrameNotFound           no such frame
     │   ├── FramesNotConnected      the frames belong to separate trees
-    │   ├── ExtrapolationNeeded     nothing is known that early or that late
-    │   └── TransformArgument       what is no frame, or no transform
+    │   ├── ExtrapolationNeeded     the time is before or after all known transforms
+    │   └── TransformArgument       not a valid frame or transform
     └── LaunchError                 a launch or a process in it failed
 
-Texts are lower case, quote the offending value, say what was expected and what to do next.
+Texts are lower case, quote the wrong value, and say what was expected and what to do next.
 """
 
 from __future__ import annotations
@@ -78,35 +78,35 @@ __all__ = (
 
 
 def near_miss(word: str, known: Iterable[str]) -> str:
-    """Suggest the known word closest to a mistyped one.
+    """Return a suggestion of the known word that is closest to a mistyped one.
 
     Args:
-        word: What was written.
-        known: What would have been right.
+        word: The mistyped word.
+        known: The valid words.
 
     Returns:
-        ``"; did you mean 'x'?"``, or an empty text where nothing is close.
+        ``"; did you mean 'x'?"``, or an empty string where no word is close.
     """
-    from difflib import get_close_matches  # which takes its time, and mostly nothing is wrong
+    from difflib import get_close_matches  # slow to load, and rarely needed
 
     close = get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f"; did you mean '{close[0]}'?" if close else ""
 
 
 class RoszError(Exception):
-    """Root of all errors that rosz raises on purpose."""
+    """Root of all errors that rosz raises."""
 
 
 class UsageError(RoszError):
-    """A command line or a call that cannot mean anything; exit code 2."""
+    """A command line or a call that is not valid; commands exit with code 2."""
 
 
 class InvalidName(RoszError, ValueError):
-    """A text that is no valid graph resource name (ROS wiki, Names).
+    """A text that is not a valid graph resource name (ROS wiki, Names).
 
     Attributes:
         name: The text.
-        reason: What is wrong with it.
+        reason: Reason why it is not valid.
     """
 
     def __init__(self, name: str, reason: str) -> None:
@@ -116,13 +116,13 @@ class InvalidName(RoszError, ValueError):
 
 
 class SourceError(RoszError):
-    """Something wrong in a text that a person wrote.
+    """An error in a text that a person wrote.
 
     Attributes:
-        reason: What is wrong, what was expected, what to do.
-        path: The file, or a name such as ``<string>`` for a text without one.
-        line: 1-based line, 0 where unknown.
-        column: 1-based column, 0 where unknown.
+        reason: Description of the error, what was expected, and what to do.
+        path: Path of the file, or a name such as ``<string>``.
+        line: Line, from 1; 0 if unknown.
+        column: Column, from 1; 0 if unknown.
     """
 
     def __init__(self, reason: str, path: str = "<string>", line: int = 0, column: int = 0) -> None:
@@ -143,11 +143,11 @@ class SourceError(RoszError):
 
 
 class DefinitionError(SourceError):
-    """A .msg or .srv text that does not follow the grammar, or names an unknown type."""
+    """A definition that does not follow the grammar, or names an unknown type."""
 
 
 class YamlError(SourceError):
-    """A YAML text that cannot be read, or a value in it that has no meaning here."""
+    """A YAML text that cannot be read, or a value in it that is not allowed."""
 
 
 class PackageError(SourceError):
@@ -175,14 +175,14 @@ class LaunchFileError(SourceError):
 
 
 class NotFoundError(RoszError, LookupError):
-    """A thing asked for by name that is not there."""
+    """Nothing has the requested name."""
 
 
 class PackageNotFound(NotFoundError):
-    """No package of that name on the package path.
+    """No package on the package path has the requested name.
 
     Attributes:
-        package: The name.
+        package: Name of the package.
     """
 
     def __init__(
@@ -195,14 +195,14 @@ class PackageNotFound(NotFoundError):
 
 
 class ExecutableNotFound(NotFoundError):
-    """A package has no such executable, or it may not be executed."""
+    """A package has no such executable, or the file is not executable."""
 
 
 class TypeNotFound(NotFoundError):
-    """No message or service type of that name is known.
+    """No message or service type has the requested name.
 
     Attributes:
-        type_name: The name that was asked for.
+        type_name: Name of the type.
     """
 
     def __init__(self, type_name: str, reason: str = "") -> None:
@@ -211,10 +211,10 @@ class TypeNotFound(NotFoundError):
 
 
 class ParamNotFound(NotFoundError, KeyError):
-    """No parameter of that name is set.
+    """No parameter of the requested name is set.
 
     Attributes:
-        name: The resolved name.
+        name: Resolved name of the parameter.
     """
 
     def __init__(self, name: str, known: Iterable[str] = ()) -> None:
@@ -227,16 +227,16 @@ class ParamNotFound(NotFoundError, KeyError):
 
 
 class MessageError(RoszError, ValueError):
-    """A message that is not as its type wants it."""
+    """A message that does not fit its type."""
 
 
 class EncodeError(MessageError):
     """A value that does not fit the type of its field.
 
     Attributes:
-        type_name: The message type being encoded.
+        type_name: Message type that is encoded.
         field: Path of the field, such as ``poses[3].position.x``.
-        reason: What was expected against what was given.
+        reason: Expected and given value.
     """
 
     def __init__(self, type_name: str, field: str, reason: str) -> None:
@@ -247,12 +247,12 @@ class EncodeError(MessageError):
 
 
 class DecodeError(MessageError):
-    """Bytes that are no valid message of the type.
+    """Bytes that are not a valid message of the type.
 
     Attributes:
-        type_name: The message type being decoded.
-        offset: Offset in bytes from the start of the payload, header included; -1 where unknown.
-        reason: What was expected against what was there.
+        type_name: Message type that is decoded.
+        offset: Offset in bytes from the start of the payload, header included; -1 if unknown.
+        reason: Expected and found bytes.
     """
 
     def __init__(self, type_name: str, offset: int, reason: str) -> None:
@@ -264,23 +264,23 @@ class DecodeError(MessageError):
 
 
 class TransportError(RoszError, ConnectionError):
-    """The session cannot open, or cannot do what was asked of it."""
+    """The session cannot open, or cannot communicate."""
 
 
 class NoReplica(TransportError):
-    """Nobody on this network holds the parameter store."""
+    """No process on this network holds the parameter store."""
 
 
 class ClosedError(RoszError):
-    """The node, session or endpoint has been closed."""
+    """The node, session, publisher or other object has been closed."""
 
 
 class TimeMovedBackwards(RoszError):
-    """ROS time was set back, as by a simulation that starts over, during a sleep.
+    """ROS time was set back during a sleep, as by a simulation that restarts.
 
     Attributes:
-        before: ROS time when the sleep began, in nanoseconds.
-        after: ROS time that it was set back to.
+        before: ROS time at the beginning of the sleep, in nanoseconds.
+        after: ROS time that it was set back to, in nanoseconds.
     """
 
     def __init__(self, before: int, after: int) -> None:
@@ -293,11 +293,11 @@ class TimeMovedBackwards(RoszError):
 
 
 class WaitTimeout(RoszError, TimeoutError):
-    """A wait ended without its event.
+    """An event did not happen in time.
 
     Attributes:
-        what: What was waited for.
-        seconds: How long, in seconds.
+        what: Description of the event.
+        seconds: Time limit in seconds.
     """
 
     def __init__(self, what: str, seconds: float, hint: str = "") -> None:
@@ -307,15 +307,15 @@ class WaitTimeout(RoszError, TimeoutError):
 
 
 class ServiceError(RoszError):
-    """A service call that failed: the server's own text, or why there was no answer."""
+    """A service call failed; the text is the server's, or says why there was no response."""
 
 
 class ServiceNotFound(ServiceError):
-    """Nobody serves that name."""
+    """No node serves a service of the requested name."""
 
 
 class ParamError(RoszError):
-    """A parameter value or write that is not acceptable."""
+    """A parameter value or write that is not allowed."""
 
 
 class StoreError(RoszError):
@@ -323,11 +323,11 @@ class StoreError(RoszError):
 
 
 class TransformError(RoszError):
-    """A transform between two coordinate frames that cannot be given."""
+    """A transform between two coordinate frames is not available."""
 
 
 class FrameNotFound(TransformError):
-    """No transform has told of a frame of that name."""
+    """No known transform has a frame of the requested name."""
 
 
 class FramesNotConnected(TransformError):
@@ -335,11 +335,11 @@ class FramesNotConnected(TransformError):
 
 
 class ExtrapolationNeeded(TransformError):
-    """A transform at a time that is before or after all that is known."""
+    """A transform at a time before or after all known transforms."""
 
 
 class TransformArgument(TransformError):
-    """What is no name of a frame, or no transform."""
+    """An argument that is not a valid frame name or transform."""
 
 
 class LaunchError(RoszError):

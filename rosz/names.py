@@ -1,8 +1,7 @@
 """Graph resource names by ROS 1's rules (ROS wiki, Names).
 
 A name is *global* (``/a/b``), *relative* (``a/b``), *private* (``~a``) or *base* (``a``).
-Resolution is against the full name of a node: its namespace for relative names, the name itself for
-private ones.
+Relative names are resolved in the namespace of a node, private ones in the name of the node.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ _PART = re.compile(r"[A-Za-z0-9_/]", re.ASCII)
 
 
 def is_valid(name: str) -> bool:
-    """Tell whether a text is a legal graph resource name; the empty one is."""
+    """Return whether a text is a legal graph resource name; the empty one is."""
     return not name or (_VALID.fullmatch(name) is not None and "//" not in name)
 
 
@@ -42,7 +41,7 @@ def check(name: str) -> str:
     """Return the name if it is legal.
 
     Raises:
-        InvalidName: It is not; the message names the first offending character.
+        InvalidName: It is not legal; the text names the first wrong character.
     """
     if is_valid(name):
         return name
@@ -60,7 +59,7 @@ def check_base(name: str) -> str:
     """Return the name if it is a legal base name: no slash, no tilde, not empty.
 
     Raises:
-        InvalidName: It is not.
+        InvalidName: It is not legal.
     """
     if _BASE.fullmatch(name):
         return name
@@ -73,10 +72,10 @@ def check_base(name: str) -> str:
 
 
 def check_resource(name: str) -> str:
-    """Return a resolved name if a topic or service can have it: any but the root.
+    """Return a resolved name unless it is the root, which no topic or service can have.
 
     Raises:
-        InvalidName: It is the root.
+        InvalidName: The name is the root.
     """
     if name == "/":
         raise InvalidName(name, "it is the root namespace; expected the name of something in it")
@@ -84,17 +83,17 @@ def check_resource(name: str) -> str:
 
 
 def is_global(name: str) -> bool:
-    """Tell whether a name starts at the root."""
+    """Return whether a name starts at the root."""
     return name.startswith("/")
 
 
 def is_private(name: str) -> bool:
-    """Tell whether a name is private to its node (``~name``)."""
+    """Return whether a name is private to its node (``~name``)."""
     return name.startswith("~")
 
 
 def canonical(name: str) -> str:
-    """Drop repeated and trailing slashes; the root stays ``/``."""
+    """Return a name without repeated and trailing slashes; the root stays ``/``."""
     if not name or name == "/":
         return name
     parts = [part for part in name.split("/") if part]
@@ -117,7 +116,7 @@ def basename(name: str) -> str:
 
 
 def join(ns: str, name: str) -> str:
-    """Put a name into a namespace; a global or private name stays as it is."""
+    """Return a name in a namespace; global and private names stay as they are."""
     if is_global(name) or is_private(name):
         return name
     if not ns:
@@ -126,15 +125,12 @@ def join(ns: str, name: str) -> str:
 
 
 def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> str:
-    """Resolve a name as a node sees it, then apply the node's remappings.
+    """Return the global name that a name has for a node, after the node's remappings.
 
     Args:
-        name: Any legal name; the empty one means the node's namespace.
+        name: Any legal name; the empty one stands for the node's namespace.
         node: Full name of the node.
-        remaps: Resolved name to resolved name.
-
-    Returns:
-        A global name.
+        remaps: Remappings from resolved name to resolved name.
 
     Raises:
         InvalidName: ``name`` is not legal.
@@ -165,6 +161,6 @@ def short_type(name: str) -> str:
 
 
 def anonymous(base: str, host: str, pid: int, moment: int) -> str:
-    """Make a base name unique to a process and a moment, in the form ROS 1 uses."""
+    """Return a base name that is unique to a process and a time, in ROS 1's form."""
     suffix = re.sub(r"[^A-Za-z0-9_]", "_", host)
     return f"{base}_{suffix}_{pid}_{moment}"

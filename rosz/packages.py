@@ -1,7 +1,7 @@
 """ROS packages on disk: folders with a package.xml (REP 127, REP 149).
 
-The index looks in the folders that it is given, in order, and the first package of a name wins, as
-``rospack`` has it. Nothing is read before it is asked for.
+The index searches its folders in order, and the first package of a name wins, as in ``rospack``.
+Nothing is read before it is needed.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ _NO_CODE = frozenset({"__pycache__", "node_modules"})
 
 
 class Package(msgspec.Struct, frozen=True):
-    """One package.
+    """A package.
 
     Attributes:
-        name: Its name by its package.xml.
-        path: Its folder.
+        name: Name in its package.xml.
+        path: Folder of the package.
     """
 
     name: str
     path: Path
 
     def _folders(self) -> list[Path]:
-        """List where files may be: the folder itself, and ``lib/<name>`` of an install space."""
+        """Return the folders of files: its own, and ``lib/<name>`` of an install space."""
         prefix = self.path.parent.parent
         installed = prefix / "lib" / self.name
         return [installed, self.path] if self.path.parent.name == "share" else [self.path]
@@ -47,18 +47,18 @@ class Package(msgspec.Struct, frozen=True):
                     yield Path(folder, file)
 
     def executables(self) -> list[str]:
-        """Return the names of all files of the package that may be executed, sorted."""
+        """Return the names of all executable files of the package, sorted."""
         return sorted({file.name for file in self._files() if _is_executable(file)})
 
     def files(self, name: str) -> list[Path]:
-        """Return all files of a name anywhere in the package."""
+        """Return all files of a name in the package."""
         return [file for file in self._files() if file.name == name]
 
     def executable(self, name: str) -> Path:
-        """Find an executable file by its name anywhere in the package, as rosrun does.
+        """Return an executable file by its name, from anywhere in the package, as rosrun does.
 
         Raises:
-            ExecutableNotFound: There is none, or it lacks the executable bit.
+            ExecutableNotFound: There is none, or the file is not executable.
         """
         found = self.files(name)
         for file in found:
@@ -77,7 +77,7 @@ class Package(msgspec.Struct, frozen=True):
         )
 
     def within(self, name: str) -> Path:
-        """Return the path of something in the package, by its path from the package's folder.
+        """Return a path in the package, given relative to the package's folder.
 
         Raises:
             NotFoundError: The path leads out of the package.
@@ -90,10 +90,10 @@ class Package(msgspec.Struct, frozen=True):
         return path
 
     def file(self, name: str) -> Path:
-        """Find a file by its name anywhere in the package, as ``roslaunch PKG FILE`` does.
+        """Return a file by its name, from anywhere in the package, as ``roslaunch`` does.
 
         Raises:
-            NotFoundError: There is none, or the name leads out of the package.
+            NotFoundError: There is none, or the path leads out of the package.
         """
         direct = self.within(name)
         if direct.is_file():
@@ -108,11 +108,11 @@ class Package(msgspec.Struct, frozen=True):
 
 
 class PackageIndex:
-    """The packages found in a list of folders.
+    """The packages in a list of folders.
 
     Args:
-        roots: Folders that are packages or hold some at any depth; earlier ones win. Or what gives
-            them, when they are asked for.
+        roots: Folders that are packages or hold some at any depth, earlier ones first; or a
+            function that returns them when they are needed.
     """
 
     def __init__(self, roots: Sequence[Path] | Callable[[], Sequence[Path]]) -> None:
@@ -129,7 +129,7 @@ class PackageIndex:
 
     @property
     def broken(self) -> list[PackageError]:
-        """What is wrong with each package.xml that cannot be read."""
+        """The error of each package.xml that cannot be read."""
         return self._crawled[1]
 
     @cached_property
@@ -137,23 +137,23 @@ class PackageIndex:
         known: dict[str, Package] = {}
         broken: list[PackageError] = []
         for root in self.roots:
-            # Of two packages of a name the one nearer to the root wins.
+            # Of two packages of one name, the one nearer to the root wins.
             for folder in sorted(crawl(root), key=lambda folder: len(folder.parts)):
                 try:
                     package = Package(_name_in(folder / MANIFEST), folder)
                 except PackageError as error:
-                    # One that cannot be read keeps nobody from using the others, as in rospack.
+                    # A package that cannot be read does not hide the others, as in rospack.
                     broken.append(error)
                 else:
                     known.setdefault(package.name, package)
         return known, broken
 
     def find(self, name: str) -> Package:
-        """Return the package of that name.
+        """Return the package of a name.
 
         Raises:
-            PackageNotFound: It is in none of the folders.
-            PackageError: A folder of that name has a package.xml that cannot be read.
+            PackageNotFound: No folder has such a package.
+            PackageError: The package.xml in a folder of that name cannot be read.
         """
         if "_crawled" not in self.__dict__:
             quick = self._beside(name)
@@ -167,7 +167,10 @@ class PackageIndex:
         raise PackageNotFound(name, self._known, [str(root) for root in self.roots])
 
     def _beside(self, name: str) -> Package | None:
-        """Find a package in a folder of its own name right in the first root, without a crawl."""
+        """Return a package directly in the first root, if its folder has its name.
+
+        This saves searching all folders.
+        """
         if not name or "/" in name or not self.roots:
             return None
         folder = self.roots[0] / name
@@ -190,7 +193,7 @@ def _is_executable(file: Path) -> bool:
 
 
 def crawl(root: Path) -> Iterator[Path]:
-    """Walk to the folders that hold a package.xml; a package holds no further ones."""
+    """Yield the folders that hold a package.xml; packages are not searched for further ones."""
     for folder, names, files in os.walk(root, followlinks=True):
         if MANIFEST in files:
             names.clear()
@@ -202,8 +205,8 @@ def crawl(root: Path) -> Iterator[Path]:
 
 
 def _name_in(manifest: Path) -> str:
-    # Expat itself: what is built on it imports modules that may be on their way in just now, as an
-    # import hook looks for packages here.
+    # Expat itself, since an import hook looks for packages here: libraries that are built on expat
+    # import modules that may be loading just now.
     from xml.parsers import expat
 
     opened: list[str] = []

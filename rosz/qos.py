@@ -1,4 +1,4 @@
-"""Quality of service of a topic or service endpoint, in ROS 2's terms (REP 2003, rmw)."""
+"""Quality of service of publishers, subscriptions and services (REP 2003, rmw)."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ __all__ = (
 )
 
 FOREVER = 9223372036_854775807
-"""Nanoseconds that rmw takes for "no limit"."""
+"""Number of nanoseconds that rmw uses for "no limit"."""
 
 
 class QoS(msgspec.Struct, frozen=True):
-    """What an endpoint promises or asks for.
+    """The quality of service that an entity offers or requests.
 
     Attributes:
-        depth: Samples kept, newest first.
-        reliability: ``best_effort`` may drop on a lossy link.
+        depth: Number of newest samples kept.
+        reliability: ``best_effort`` may drop samples on a lossy link.
         durability: ``transient_local`` keeps ``depth`` samples for late joiners.
-        history: ``keep_all`` never drops and makes a publisher wait instead.
-        deadline: Nanoseconds between samples; information only.
-        lifespan: Nanoseconds for which a sample is of use; information only.
-        liveliness: ``automatic`` or ``manual_by_topic``; information only.
-        lease: Nanoseconds; information only.
+        history: ``keep_all`` never drops samples, and makes a publisher wait instead.
+        deadline: Nanoseconds between samples; for information only.
+        lifespan: Nanoseconds that a sample is valid; for information only.
+        liveliness: ``automatic`` or ``manual_by_topic``; for information only.
+        lease: Nanoseconds; for information only.
     """
 
     depth: int = 10
@@ -56,7 +56,7 @@ class QoS(msgspec.Struct, frozen=True):
 
     @property
     def latched(self) -> bool:
-        """Whether late joiners get what was published before."""
+        """Whether late joiners receive earlier samples."""
         return self.durability == "transient_local"
 
 
@@ -70,10 +70,10 @@ ROSOUT = QoS(depth=1000, durability="transient_local", lifespan=10_000_000_000)
 
 
 def for_queue(size: int) -> QoS:
-    """Return the QoS for a queue of ROS 1, of so many samples; 0 means no limit there.
+    """Return the QoS of a ROS 1 queue_size, where 0 means no limit.
 
     Raises:
-        UsageError: No queue has that size.
+        UsageError: The size is negative or not an integer.
     """
     try:
         size = operator.index(size)

@@ -1,7 +1,7 @@
 """The command-line arguments of a node (ROS wiki, Remapping Arguments).
 
-``from:=to`` remaps a name, ``_param:=value`` sets a private parameter, ``__key:=value`` is for rosz
-itself; everything else belongs to the program.
+``from:=to`` remaps a name, ``_param:=value`` sets a private parameter, ``__key:=value`` is for
+rosz itself; everything else belongs to the program.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ __all__ = ("Arguments", "parse")
 
 
 class Arguments(msgspec.Struct, frozen=True):
-    """A node's command line, sorted by meaning; texts are as they were written.
+    """The command line of a node, sorted by kind; texts are as written.
 
     Attributes:
-        remaps: Name to name, unresolved.
-        params: Private parameter, without its leading underscore, to YAML text.
-        special: ``__name``, ``__ns``, ``__log`` … to value.
-        rest: The arguments that are none of these, in order.
+        remaps: Remappings from name to name, unresolved.
+        params: YAML texts by private parameter, without the leading underscore.
+        special: Values by ``__name``, ``__ns``, ``__log`` and the like.
+        rest: Other arguments, in order.
     """
 
     remaps: dict[str, str] = {}
@@ -31,11 +31,11 @@ class Arguments(msgspec.Struct, frozen=True):
     rest: tuple[str, ...] = ()
 
     def node_name(self, name: str, environment_namespace: str = "") -> str:
-        """Return the full name of a node called ``name`` in its program.
+        """Return the full name of a node.
 
         Args:
-            name: The base name that the program chose.
-            environment_namespace: ``ROS_NAMESPACE``, which ``__ns`` overrides.
+            name: Base name that the program chose.
+            environment_namespace: Value of ``ROS_NAMESPACE``, which ``__ns`` overrides.
 
         Raises:
             InvalidName: A name or namespace is not legal.
@@ -45,10 +45,10 @@ class Arguments(msgspec.Struct, frozen=True):
         return names.canonical(f"/{ns}/{base}")
 
     def resolved_remaps(self, node: str) -> Mapping[str, str]:
-        """Resolve both sides of every remapping as the node of that full name sees them.
+        """Return the remappings with both sides resolved for the node of a full name.
 
         Raises:
-            InvalidName: A side is not a legal name.
+            InvalidName: A side of a remapping is not legal.
         """
         return {
             names.resolve(old, node): names.resolve(new, node) for old, new in self.remaps.items()
@@ -56,9 +56,9 @@ class Arguments(msgspec.Struct, frozen=True):
 
 
 def parse(argv: Sequence[str]) -> Arguments:
-    """Sort a command line without its program name.
+    """Parse a command line without its program name.
 
-    One of ours that leads to nothing (``a:=``, ``__name:=``) counts for nothing, as in rospy.
+    Arguments with an empty right side (``a:=``, ``__name:=``) are ignored, as in rospy.
     """
     remaps: dict[str, str] = {}
     params: dict[str, str] = {}

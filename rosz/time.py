@@ -1,7 +1,7 @@
 """ROS 1's arithmetic for times and durations (genpy, ``rospy.Time`` and ``rospy.Duration``).
 
-The classes here have no fields of their own: they are bases of the generated messages
-builtin_interfaces/Time and Duration, whose fields ``sec`` and ``nanosec`` they also offer as
+The classes have no fields of their own: they are bases of the generated messages
+builtin_interfaces/Time and Duration, whose fields ``sec`` and ``nanosec`` they also provide as
 ``secs`` and ``nsecs``. Results are in normal form: nanoseconds from 0 to 999 999 999, the sign in
 the seconds.
 """
@@ -24,22 +24,22 @@ def normal(secs: int, nsecs: int) -> tuple[int, int]:
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Split seconds into normal form, towards zero as genpy does."""
+    """Return seconds in normal form, rounded towards zero as in genpy."""
     whole = int(seconds)
     return normal(whole, int((seconds - whole) * _NS))
 
 
 class ClassicConstructor(msgspec.StructMeta):
-    """Metaclass of times that are built as ROS 1 builds them.
+    """Metaclass of times with ROS 1's constructor.
 
     ``Time(1.5)``, ``Time(1, 500)`` and ``Time(secs=1)``; the result is in normal form.
     """
 
     def __call__(cls, secs: float = 0, nsecs: int = 0) -> Any:  # noqa: N805  # a metaclass
-        """Build a time or duration.
+        """Make a time or duration.
 
         Raises:
-            ValueError: Seconds are a float and nanoseconds are given too.
+            ValueError: Seconds are a float, and nanoseconds are given too.
             TypeError: The time is before the epoch.
         """
         if isinstance(secs, numbers.Integral):
@@ -56,7 +56,7 @@ class ClassicConstructor(msgspec.StructMeta):
 
 
 class StampValue:
-    """What times and durations share."""
+    """Base of times and durations."""
 
     if not TYPE_CHECKING:  # the fields are those of the message classes below
         __slots__ = ()
@@ -94,7 +94,7 @@ class StampValue:
 
     @classmethod
     def from_sec(cls, float_secs: float) -> Self:
-        """Return the value of so many seconds.
+        """Return a value from a number of seconds.
 
         Raises:
             TypeError: A time would be before the epoch.
@@ -103,7 +103,7 @@ class StampValue:
 
     @classmethod
     def from_nsec(cls, nanoseconds: int) -> Self:
-        """Return the value of so many nanoseconds.
+        """Return a value from a number of nanoseconds.
 
         Raises:
             TypeError: A time would be before the epoch.
@@ -119,19 +119,19 @@ class StampValue:
         return self.sec * _NS + self.nanosec
 
     def is_zero(self) -> bool:
-        """Tell whether it is zero."""
+        """Return whether it is zero."""
         return self.sec == 0 and self.nanosec == 0
 
     def set(self, secs: int, nsecs: int) -> None:
-        """Set both parts, as they are."""
+        """Set seconds and nanoseconds without normalising them."""
         self.sec, self.nanosec = secs, nsecs
 
     def canon(self) -> None:
-        """Bring parts that were set by hand into normal form."""
+        """Normalise seconds and nanoseconds."""
         self.sec, self.nanosec = normal(self.sec, self.nanosec)
 
     def _comparable(self, other: object) -> int | None:
-        """Return the other's nanoseconds where it is of the same sort."""
+        """Return the nanoseconds of another value if it is of the same kind."""
         raise NotImplementedError(type(other).__name__)
 
     def __bool__(self) -> bool:
@@ -200,7 +200,7 @@ class TimeValue(StampValue):
 
 
 class DurationValue(StampValue):
-    """A span of time, perhaps a negative one."""
+    """A span of time, which may be negative."""
 
     if not TYPE_CHECKING:
         __slots__ = ()
@@ -209,7 +209,7 @@ class DurationValue(StampValue):
         super().__init_subclass__(**options)
         shared = StampValue
         if shared._duration_class is None:  # noqa: SLF001  # of this module
-            # The message class comes first: it is what a difference of times is.
+            # The first subclass is the message class, the type of a difference of times.
             shared._duration_class = cls  # noqa: SLF001
 
     def _comparable(self, other: object) -> int | None:
