@@ -1,7 +1,7 @@
-"""What is wrong with a system of nodes: one check per fault, each naming it with its evidence.
+"""Checks for faults in a system of nodes; each names a fault with its evidence.
 
-The machine first (shared memory, sockets, endpoints), then what the tokens of the network show,
-then what the nodes answer. May import anything up to ``rosz.introspect``.
+``machine`` looks at this machine, ``tokens`` at what nodes declare, ``replies`` at what they reply.
+May import everything up to ``rosz.introspect``.
 """
 
 from rosz.doctor.examine import Examination, examine

@@ -1,4 +1,4 @@
-"""The examination: every check once, from the machine to the nodes."""
+"""All checks in order, from the machine to the nodes."""
 
 from __future__ import annotations
 
@@ -7,9 +7,28 @@ from pathlib import Path
 
 import msgspec
 
-from rosz.doctor.endpoints import check_connect, check_rendezvous, check_socket_files
-from rosz.doctor.ends import (
+from rosz.doctor.finding import Finding, warning
+from rosz.doctor.machine import (
+    LEAST_FREE,
+    check_connect,
+    check_rendezvous,
+    check_room,
+    check_segments,
+    check_socket_files,
+    check_stopped,
+)
+from rosz.doctor.replies import (
+    check_clocks,
+    check_replicas,
+    check_sight,
+    check_silent,
+    check_stamps,
+    check_versions,
+    query_nodes,
+)
+from rosz.doctor.tokens import (
     check_clock,
+    check_domains,
     check_duplicates,
     check_hashes,
     check_hashless,
@@ -18,12 +37,6 @@ from rosz.doctor.ends import (
     check_types,
     check_unreadable,
 )
-from rosz.doctor.finding import Finding, warning
-from rosz.doctor.interview import check_answers, check_clocks, check_sight, interview
-from rosz.doctor.memory import LEAST_FREE, check_room, check_segments
-from rosz.doctor.network import check_domains, check_replicas, check_versions
-from rosz.doctor.stamps import check_stamps
-from rosz.doctor.stopped import check_stopped
 from rosz.environment import Environment, package_index
 from rosz.errors import TransportError
 from rosz.introspect.connect import open_session
@@ -34,29 +47,29 @@ from rosz.wire import Kind
 
 __all__ = ("Examination", "examine")
 
-LISTEN_SECONDS = 1.0
+_LISTEN_SECONDS = 1.0
 
 
 class Examination(msgspec.Struct, kw_only=True):
-    """What is looked at, and what came out.
+    """The settings and the size of an examination.
 
     Attributes:
-        environment: Settings.
-        listen: Seconds to listen to samples of ROS 2 nodes for, at most.
-        memory: Where shared memory is.
-        least_free: Bytes of it that must be free.
-        nodes: How many nodes were found.
+        environment: Settings of this machine.
+        listen: Time limit for samples of ROS 2 nodes, in seconds.
+        memory: Folder of shared memory.
+        least_free: Number of bytes of it that must be free.
+        nodes: Number of nodes found.
     """
 
     environment: Environment
-    listen: float = LISTEN_SECONDS
+    listen: float = _LISTEN_SECONDS
     memory: Path = SEGMENTS
     least_free: int = LEAST_FREE
     nodes: int = 0
 
 
 def examine(examination: Examination) -> Iterator[Finding]:
-    """Yield what is found, as it is found."""
+    """Yield findings as the checks find them."""
     environment = examination.environment
     yield from check_room(examination.memory, examination.least_free)
     yield from check_segments(examination.memory)
@@ -96,19 +109,19 @@ def _examine_network(session: Session, examination: Examination) -> Iterator[Fin
     yield from check_packages(survey, _Hashes(environment).find, environment.distro)
     yield from check_clock(survey)
     yield from check_one_sided(survey)
-    answers = interview(session, environment.domain) if survey.processes else {}
-    yield from check_answers(session, survey, answers)
-    yield from check_sight(session, survey, answers)
-    yield from check_clocks(survey, answers)
+    replies = query_nodes(session, environment.domain) if survey.processes else {}
+    yield from check_silent(session, survey, replies)
+    yield from check_sight(session, survey, replies)
+    yield from check_clocks(survey, replies)
     yield from check_replicas(session, environment.domain)
     yield from check_stamps(session, survey, examination.listen)
 
 
 class _Hashes:
-    """The hashes of the types known here.
+    """The hashes of the types that are known here.
 
     Args:
-        environment: Where packages are.
+        environment: Settings, which name the package path.
     """
 
     def __init__(self, environment: Environment) -> None:
@@ -118,8 +131,8 @@ class _Hashes:
         """Return the hash of a type.
 
         Raises:
-            TypeNotFound: It is not known.
-            DefinitionError: Its package has a definition that is not well-formed.
+            TypeNotFound: The type is not known.
+            DefinitionError: A definition in its package is not well-formed.
         """
         if kind in {Kind.PUBLISHER, Kind.SUBSCRIPTION}:
             return self._types.message(type_name)._type_hash

@@ -1,4 +1,4 @@
-"""What the doctor has found: its name, what shows it, and what to do."""
+"""Findings of the doctor: a name, the evidence, and what to do."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ __all__ = ("Finding", "Level", "error", "listed", "warning")
 
 Level = Literal["error", "warning"]
 _SHOWN = 8
-"""Lines of evidence beyond which the rest is only counted."""
+"""Number of lines of evidence that are shown to people."""
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """Something that is wrong, or may be.
+    """A fault, or something that may be one.
 
     Attributes:
-        name: Short and stable, for programs: ``clock-offset``.
-        level: ``error`` for what keeps something from working; ``warning`` for what may be meant.
-        text: What it is, in a line.
-        evidence: What shows it, a line each.
-        remedy: What to do.
+        name: Short stable name for programs, such as ``clock-offset``.
+        level: ``error`` for a fault; ``warning`` for what may be intended.
+        text: Description in one line.
+        evidence: Lines of evidence.
+        remedy: What to do about it.
     """
 
     name: str
@@ -33,16 +33,16 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def error(name: str, text: str, evidence: Iterable[str], remedy: str) -> Finding:
-    """Return a finding about what keeps something from working."""
+    """Return a finding about a fault."""
     return Finding(name, "error", text, tuple(evidence), remedy)
 
 
 def warning(name: str, text: str, evidence: Iterable[str], remedy: str) -> Finding:
-    """Return a finding about what may be meant."""
+    """Return a finding about what may be intended."""
     return Finding(name, "warning", text, tuple(evidence), remedy)
 
 
 def listed(lines: tuple[str, ...]) -> tuple[str, ...]:
-    """Return evidence for people, what is too much of it only counted."""
+    """Return lines of evidence for people, with the number of those left out."""
     more = len(lines) - _SHOWN
     return (*lines[:_SHOWN], f"and {more} more") if more > 1 else lines

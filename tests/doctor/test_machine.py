@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 from network import Network
 
-from rosz.doctor.memory import check_segments
+from rosz.doctor.machine import check_segments
 from rosz.session import why_refused
 
 from .conftest import Doctor

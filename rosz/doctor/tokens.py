@@ -1,18 +1,21 @@
-"""What the tokens of topics, services and nodes show by themselves."""
+"""Checks on the liveliness tokens of nodes, topics and services."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 
 from rosz.doctor.finding import Finding, error, warning
-from rosz.errors import RoszError, TypeNotFound, near_miss
+from rosz.errors import DecodeError, RoszError, TypeNotFound, near_miss
 from rosz.introspect.survey import Survey
 from rosz.names import short_type
-from rosz.wire import NO_HASH, Kind, Token
+from rosz.session import Session
+from rosz.wire import NO_HASH, Kind, Token, parse_token, tokens_key
 
 __all__ = (
     "check_clock",
+    "check_domains",
     "check_duplicates",
     "check_hashes",
     "check_hashless",
@@ -24,13 +27,20 @@ __all__ = (
 
 _BOTH_SIDES = ((Kind.PUBLISHER, Kind.SUBSCRIPTION), (Kind.SERVICE, Kind.CLIENT))
 _HASH_SHOWN = 15
+_REPLY_TIMEOUT = 1.0
+_OTHER = {
+    Kind.PUBLISHER: Kind.SUBSCRIPTION,
+    Kind.SUBSCRIPTION: Kind.PUBLISHER,
+    Kind.SERVICE: Kind.CLIENT,
+    Kind.CLIENT: Kind.SERVICE,
+}
 _CLOCK = "/clock"
-# What a node offers whether or not anybody wants it.
+# Topics that nodes publish whether or not anybody subscribes.
 _OFFERED = frozenset({"/rosout", "/rosout_agg", "/parameter_events", _CLOCK, "/diagnostics"})
 
 
 def _by_name(survey: Survey) -> Iterator[tuple[str, str, list[Token]]]:
-    """Yield what it is, the name, and the ends, of every topic and service."""
+    """Yield the kind, the name and the tokens of every topic and service."""
     for word, kinds in zip(("topic", "service"), _BOTH_SIDES, strict=True):
         groups: defaultdict[str, list[Token]] = defaultdict(list)
         for token in survey.view.entities(*kinds):
@@ -63,7 +73,7 @@ def check_types(survey: Survey) -> Iterator[Finding]:
 
 
 def check_hashes(survey: Survey) -> Iterator[Finding]:
-    """Find topics and services of one type of which sides have different definitions."""
+    """Find topics and services whose sides have different definitions of one type."""
     for word, name, tokens in _by_name(survey):
         for type_name in sorted({token.type_name for token in tokens}):
             same = [t for t in tokens if t.type_name == type_name and t.type_hash != NO_HASH]
@@ -79,11 +89,11 @@ def check_hashes(survey: Survey) -> Iterator[Finding]:
 
 
 def check_hashless(survey: Survey, distro: str) -> Iterator[Finding]:
-    """Find nodes of an rmw_zenoh that is too old to tell type hashes.
+    """Find nodes of an old rmw_zenoh, whose tokens have no type hashes.
 
     Args:
-        survey: Who is there.
-        distro: ``ROS_DISTRO`` here.
+        survey: The nodes that are running.
+        distro: Value of ``ROS_DISTRO`` here.
     """
     old = [token for token in survey.view.entities() if token.type_hash == NO_HASH]
     if old and distro != "humble":
@@ -97,7 +107,7 @@ def check_hashless(survey: Survey, distro: str) -> Iterator[Finding]:
 
 
 def check_unreadable(survey: Survey) -> Iterator[Finding]:
-    """Find tokens that have another form than those of rmw_zenoh today."""
+    """Find tokens whose form is not rmw_zenoh's present one."""
     if survey.damaged:
         yield error(
             "unreadable-tokens",
@@ -108,7 +118,7 @@ def check_unreadable(survey: Survey) -> Iterator[Finding]:
 
 
 def check_duplicates(survey: Survey) -> Iterator[Finding]:
-    """Find nodes of one name."""
+    """Find several nodes of one name."""
     found: defaultdict[str, set[str]] = defaultdict(set)
     for token in survey.view.tokens:
         found[token.node_name].add(f"{survey.address(token)}, node {token.node_id}")
@@ -124,7 +134,7 @@ def check_duplicates(survey: Survey) -> Iterator[Finding]:
 
 
 def check_one_sided(survey: Survey) -> Iterator[Finding]:
-    """Find topics where one side waits for the other, and services that nobody serves."""
+    """Find topics with one side only, and services that no node serves."""
     unheard: list[Token] = []
     unsaid: list[Token] = []
     for _, name, tokens in _by_name(survey):
@@ -152,7 +162,7 @@ def check_one_sided(survey: Survey) -> Iterator[Finding]:
 
 
 def check_clock(survey: Survey) -> Iterator[Finding]:
-    """Find nodes whose time stands still: they wait for a /clock that nobody publishes."""
+    """Find nodes whose time stands still, since no node publishes /clock."""
     ends = [end for end in survey.view.entities(*_BOTH_SIDES[0]) if end.name == _CLOCK]
     if ends and all(end.kind is Kind.SUBSCRIPTION for end in ends):
         yield error(
@@ -165,7 +175,7 @@ def check_clock(survey: Survey) -> Iterator[Finding]:
 
 
 def _alone(survey: Survey, lonely: Iterable[Token], others: list[Token]) -> list[str]:
-    """Say what each waits for, and what on the other side it may have meant."""
+    """Return a line for each token: what it waits for, and a name that was perhaps meant."""
     lines = set()
     for token in lonely:
         kin = [other.name for other in others if other.type_name == token.type_name]
@@ -177,13 +187,13 @@ def _alone(survey: Survey, lonely: Iterable[Token], others: list[Token]) -> list
 def check_packages(
     survey: Survey, hash_of: Callable[[Kind, str], str], distro: str = ""
 ) -> Iterator[Finding]:
-    """Find types that are not known here, or known by another definition.
+    """Find types that are not known here, or have another definition here.
 
     Args:
-        survey: Who is there.
-        hash_of: Returns the hash of a type by what uses it and its full name, or raises
-            `TypeNotFound`.
-        distro: ``ROS_DISTRO`` here.
+        survey: The nodes that are running.
+        hash_of: Function that returns the hash of a type by the kind of a token that uses it and
+            its full name, or raises `TypeNotFound`.
+        distro: Value of ``ROS_DISTRO`` here.
     """
     users: defaultdict[tuple[str, str], list[Token]] = defaultdict(list)
     for token in survey.view.entities():
@@ -221,3 +231,55 @@ def check_packages(
                     ],
                     f"bring the package '{package}' to the version that they have",
                 )
+
+
+def check_domains(session: Session, survey: Survey) -> Iterator[Finding]:
+    """Find nodes in other domains that seem to belong to this one."""
+    others: list[Token] = []
+    for key in session.live_tokens(tokens_key("*"), _REPLY_TIMEOUT):
+        with suppress(DecodeError):  # check_unreadable reports those of this domain
+            token = parse_token(key)
+            if token.domain != survey.domain:
+                others.append(token)
+    if not others:
+        return
+    remedy = (
+        f"set ROS_DOMAIN_ID to one number for all that belong together; here it is {survey.domain}"
+    )
+    if not survey.view.tokens:
+        yield error(
+            "wrong-domain",
+            f"nobody is in domain {survey.domain}, but there are nodes in others",
+            _by_domain(others),
+            remedy,
+        )
+        return
+    lines = [
+        f"{token.name}: {token.node_name} of domain {token.domain} is what"
+        f" {mate.node_name} of domain {survey.domain} lacks"
+        for token in others
+        if token.qos is not None
+        for mate in _lacking(survey, token)
+    ]
+    if lines:
+        yield error(
+            "wrong-domain",
+            "nodes of another domain are what nodes of this one wait for",
+            sorted(set(lines)),
+            remedy,
+        )
+
+
+def _by_domain(tokens: list[Token]) -> list[str]:
+    names: dict[int, set[str]] = {}
+    for token in tokens:
+        names.setdefault(token.domain, set()).add(token.node_name)
+    return [f"domain {domain}: {', '.join(sorted(names[domain]))}" for domain in sorted(names)]
+
+
+def _lacking(survey: Survey, token: Token) -> list[Token]:
+    """Return the tokens here for which one of another domain is the missing other side."""
+    if survey.view.entities(token.kind, name=token.name):
+        return []
+    found = survey.view.entities(_OTHER[token.kind], name=token.name)
+    return [mate for mate in found if mate.type_name == token.type_name]

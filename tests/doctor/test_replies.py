@@ -19,7 +19,7 @@ from rosz.session import Query, Session, is_stopped
 from rosz.wire import endpoint_key, pack
 
 from .conftest import Doctor
-from .test_ends import stranger
+from .test_tokens import stranger
 
 NODE = """
     import sys

@@ -1,0 +1,232 @@
+"""Checks on this machine: shared memory, stopped processes, endpoints."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import stat
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from rosz.doctor.finding import Finding, error, warning
+from rosz.environment import Environment
+from rosz.errors import TransportError
+from rosz.session import (
+    SEGMENTS,
+    LocalPeers,
+    Session,
+    SessionConfig,
+    describe_process,
+    is_stopped,
+    keys_of,
+    why_refused,
+)
+from rosz.wire import Endpoint, ProcessToken
+
+__all__ = (
+    "LEAST_FREE",
+    "check_connect",
+    "check_rendezvous",
+    "check_room",
+    "check_segments",
+    "check_socket_files",
+    "check_stopped",
+    "stopped_note",
+)
+
+LEAST_FREE = 8 << 20
+"""Bytes of shared memory that a few images need."""
+
+_MIB = 1 << 20
+_LOCK_SECONDS = 2.0
+"""Seconds in which the process that creates a segment locks it."""
+
+
+def check_room(folder: Path = SEGMENTS, least: int = LEAST_FREE) -> Iterator[Finding]:
+    """Find shared memory that is full.
+
+    Args:
+        folder: Folder of shared memory.
+        least: Number of bytes that must be free.
+    """
+    try:
+        found = os.statvfs(folder)
+    except OSError:
+        return  # not Linux: shared memory is elsewhere
+    free, size = found.f_bavail * found.f_frsize, found.f_blocks * found.f_frsize
+    if free < least:
+        yield error(
+            "shared-memory-full",
+            f"{folder} is full: {free / _MIB:.0f} MiB of {size / _MIB:.0f} MiB are free",
+            _largest(folder),
+            f"remove what is left over there, or give it more: mount -o remount,size=1G {folder}"
+            " (docker run --shm-size=1g); without ROSZ_SHM nothing of rosz needs it",
+        )
+
+
+def check_segments(folder: Path = SEGMENTS, born: float = _LOCK_SECONDS) -> Iterator[Finding]:
+    """Find segments of Zenoh that no process holds any more.
+
+    Args:
+        folder: Folder of shared memory.
+        born: Age in seconds below which a segment may still be in the making.
+    """
+    left: list[str] = []
+    with suppress(OSError):
+        for path in sorted(folder.glob("*.zenoh")):
+            with suppress(OSError):  # removed meanwhile, or not readable
+                if path.stat().st_ctime < time.time() - born and _is_unused(path):
+                    left.append(f"{path}, {path.stat().st_size} bytes")
+    if left:
+        count = "1 segment" if len(left) == 1 else f"{len(left)} segments"
+        yield warning(
+            "stale-lock",
+            f"{count} of shared memory left by processes that died",
+            left,
+            "they go when the next rosz process of their owner starts; or remove them by hand",
+        )
+
+
+def _is_unused(path: Path) -> bool:
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+    return True
+
+
+def _largest(folder: Path) -> list[str]:
+    sizes: list[tuple[int, str]] = []
+    with suppress(OSError):
+        for path in folder.iterdir():
+            with suppress(OSError):
+                sizes.append((path.stat().st_size, path.name))
+    return [f"{folder / name}: {size / _MIB:.1f} MiB" for size, name in sorted(sizes)[:-4:-1]]
+
+
+def check_stopped(environment: Environment) -> Iterator[Finding]:
+    """Find processes of this machine that are stopped, as by Ctrl-Z."""
+    peers = LocalPeers.read(environment.rendezvous)
+    stopped = sorted({peer.pid for peer in peers.stopped})
+    if not stopped:
+        return
+    held = f", which holds the meeting point {environment.rendezvous}"
+    ids = " ".join(map(str, stopped))
+    yield error(
+        "stopped-process",
+        "what is stopped, as by Ctrl-Z, hears nothing and answers nobody",
+        (
+            f"{describe_process(pid)}{held if pid == peers.stopped_holder else ''}"
+            for pid in stopped
+        ),
+        f"let it go on with 'fg' in its terminal or 'kill -CONT {ids}', or end it with"
+        f" 'kill -9 {ids}'",
+    )
+
+
+def stopped_note(process: ProcessToken) -> str:
+    """Return a note if the process of a node is stopped and runs on this machine."""
+    here = process.host == socket.gethostname()
+    return ": it is stopped" if here and is_stopped(process.pid) else ""
+
+
+_CONNECT_SECONDS = 1.0
+_GREETING_SECONDS = 1.0
+_PLAIN = frozenset({"tcp", "unixsock-stream"})
+
+
+def check_rendezvous(environment: Environment) -> Iterator[Finding]:
+    """Find a program at the rendezvous that is not Zenoh."""
+    endpoint = environment.rendezvous
+    if not why_refused(endpoint, _CONNECT_SECONDS) and not _greets(endpoint, environment):
+        yield error(
+            "rendezvous-held",
+            f"something that is not Zenoh, or hangs, holds the rendezvous {endpoint}",
+            [f"it accepts connections and says nothing within {_GREETING_SECONDS:g} s"],
+            f"find it with 'ss -ltnp' and end it, or set ROSZ_RENDEZVOUS to another endpoint for"
+            f" all processes in place of {endpoint}",
+        )
+
+
+def check_connect(environment: Environment) -> Iterator[Finding]:
+    """Find endpoints in ``ROSZ_CONNECT`` at which no Zenoh listens."""
+    for endpoint in environment.connect:
+        reason = why_refused(endpoint, _CONNECT_SECONDS)
+        if not reason and not _greets(endpoint, environment):
+            reason = f"what listens there says nothing within {_GREETING_SECONDS:g} s: it hangs, or"
+            reason += " it is not Zenoh"
+        if reason:
+            yield error(
+                "nobody-listens",
+                f"ROSZ_CONNECT names {endpoint}, where no Zenoh answers",
+                [reason],
+                "on that machine run 'rosz core --listen tcp/0.0.0.0:7447', or set ROSZ_LISTEN"
+                " there; check the name, the port, and the firewalls between",
+            )
+
+
+def check_socket_files(environment: Environment) -> Iterator[Finding]:
+    """Find unix sockets that dead processes left at endpoints to listen at."""
+    for endpoint in (environment.rendezvous, *environment.listen):
+        place = Endpoint(endpoint)
+        path = Path(place.address)
+        if not place.is_unix or not _is_socket(path) or not why_refused(endpoint, _CONNECT_SECONDS):
+            continue
+        lock = Path(f"{path}.lock")
+        ours = os.access(path.parent, os.W_OK) and _is_free(lock)
+        make = warning if ours else error
+        yield make(
+            "stale-lock",
+            f"the process that listened at {path} died and left its socket",
+            [
+                f"{path}: {why_refused(endpoint, _CONNECT_SECONDS)}",
+                f"{lock}: {'not locked' if ours else 'held by another process or user'}",
+            ],
+            f"rm {path} {lock}" + ("; the next process to start does it" if ours else ""),
+        )
+
+
+def _greets(endpoint: str, environment: Environment) -> bool:
+    """Return whether a Zenoh session opens at an endpoint; true where it needs certificates."""
+    if Endpoint(endpoint).protocol not in _PLAIN:
+        return True
+    config = SessionConfig(
+        mode="client",
+        rendezvous=endpoint,
+        must_connect=True,
+        open_timeout=_GREETING_SECONDS,
+        keys=keys_of(environment),
+        override=environment.zenoh_override,
+    )
+    try:
+        Session.open(config).close()
+    except TransportError:
+        return False
+    return True
+
+
+def _is_socket(path: Path) -> bool:
+    try:
+        return stat.S_ISSOCK(path.stat().st_mode)
+    except OSError:
+        return False
+
+
+def _is_free(lock: Path) -> bool:
+    try:
+        file = os.open(lock, os.O_RDWR)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(file)
+    return True

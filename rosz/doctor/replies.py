@@ -1,0 +1,408 @@
+"""Checks on what nodes, parameter replicas and routers reply, and on the stamps of samples.
+
+The stamps tell the clock, and the release, of nodes that do not take requests.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import threading
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import partial
+
+import msgspec
+
+from rosz.doctor.finding import Finding, error, warning
+from rosz.doctor.machine import stopped_note
+from rosz.errors import DecodeError
+from rosz.introspect.survey import Survey, process_address, take_survey
+from rosz.node.control import NodeInfo, Request, control_key
+from rosz.params.keys import Keys, Member
+from rosz.params.wire import Sync, SyncAnswer, decode, encode
+from rosz.session import Sample, Session
+from rosz.wire import Kind, Token, endpoint_key, unpack
+
+__all__ = (
+    "check_clocks",
+    "check_replicas",
+    "check_sight",
+    "check_silent",
+    "check_stamps",
+    "check_versions",
+    "query_nodes",
+)
+
+_NODE_TIMEOUT = 1.5
+_AGAIN = 0.4
+"""Seconds after which samples and tokens on their way have arrived."""
+
+_CLOCK_SECONDS = 0.1
+"""Offset of a clock from which transforms and synchronised topics begin to fail."""
+
+_Node = tuple[str, int]
+_Pairs = set[tuple[str, str]]
+
+
+class _NodeReply(msgspec.Struct, frozen=True):
+    """The reply of a node.
+
+    Attributes:
+        info: Information about the node.
+        offset: Offset of its clock from the one here, in nanoseconds.
+        doubt: Possible error of the offset, half the time that the reply took, in nanoseconds.
+    """
+
+    info: NodeInfo
+    offset: int
+    doubt: int
+
+
+def query_nodes(session: Session, domain: int) -> dict[_Node, _NodeReply]:
+    """Query all rosz nodes at once, and return their replies by session and node id."""
+    replies: dict[_Node, _NodeReply] = {}
+    request = msgspec.msgpack.encode(Request("info"))
+    asked, began = time.time_ns(), time.monotonic_ns()
+    key = control_key(domain, "*", "*")
+    for reply in session.query(key, timeout=_NODE_TIMEOUT, payload=request):
+        if not reply.ok:
+            continue
+        journey = time.monotonic_ns() - began
+        try:
+            info = msgspec.msgpack.decode(reply.payload, type=NodeInfo)
+            zid, number = reply.key.split("/")[-2:]
+            node = zid, int(number)
+        except (msgspec.MsgspecError, ValueError):  # not the reply of a node
+            continue
+        offset = info.now - asked - journey // 2 if info.now else 0
+        replies[node] = _NodeReply(info, offset, journey // 2)
+    return replies
+
+
+def check_silent(
+    session: Session, survey: Survey, replies: dict[_Node, _NodeReply]
+) -> Iterator[Finding]:
+    """Find nodes that are listed and do not reply."""
+    silent = set(survey.processes) - set(replies)
+    if not silent:
+        return
+    silent &= set(take_survey(session, survey.domain, processes=True).processes)
+    silent -= set(query_nodes(session, survey.domain))
+    barred = _barred(session, survey, silent, replies)
+    silent -= barred
+    if barred:
+        yield warning(
+            "silent-machine",
+            f"{len(barred)} nodes are listed, and none of their machines answers",
+            sorted(_name(survey, node) for node in barred),
+            "nothing, if the rules there are not to let this machine control nodes (control: in"
+            " rules.yaml); else they hang, or the link to their machine is broken",
+        )
+    if silent:
+        yield error(
+            "unreachable-node",
+            f"{len(silent)} nodes are listed and do not answer",
+            sorted(_name(survey, node) + _state(survey, node) for node in silent),
+            "they hang, are stopped (Ctrl-Z: 'fg' lets them go on), or the link to their machine"
+            " is broken: check it with ping, and end them with 'rosz node kill'",
+        )
+
+
+def _barred(
+    session: Session, survey: Survey, silent: set[_Node], replies: dict[_Node, _NodeReply]
+) -> set[_Node]:
+    """Return the nodes that access rules may keep from replying: all those of a machine."""
+    if not session.secured:
+        return set()
+    known = {node: process.host for node, process in survey.processes.items()}
+    speak = {known.get(node, "") for node in replies} | {socket.gethostname()}
+    return {node for node in silent if node in known and known[node] not in speak}
+
+
+def check_sight(
+    session: Session, survey: Survey, replies: dict[_Node, _NodeReply]
+) -> Iterator[Finding]:
+    """Find nodes that do not see other running nodes."""
+    stopped = session.out_of_reach()
+    if not _blind(survey, replies, stopped):
+        return
+    time.sleep(_AGAIN)
+    survey, replies = (
+        take_survey(session, survey.domain, processes=True),
+        query_nodes(session, survey.domain),
+    )
+    blind = _blind(survey, replies, stopped)
+    if not blind:
+        return
+    lines: list[str] = []
+    for here, there in sorted(blind):
+        if (there, here) not in blind:
+            lines.append(f"{_names(survey, here)} does not see {_names(survey, there)}: one way")
+        elif here < there:
+            lines.append(
+                f"{_names(survey, here)} and {_names(survey, there)} do not see each other"
+            )
+    yield error(
+        "unreachable-peer",
+        "nodes that are there do not see each other",
+        lines,
+        "their machines reach a third one but not each other: run 'rosz core' on each and connect"
+        " them (--connect), or open the firewall and let ROSZ_LISTEN name an address that the"
+        " others reach; access rules in a Zenoh configuration can cause it, too",
+    )
+
+
+def _blind(
+    survey: Survey, replies: dict[_Node, _NodeReply], stopped: set[str]
+) -> set[tuple[str, str]]:
+    """Return pairs of sessions of which one does not see the other, stopped ones aside."""
+    there = {zid for zid, _ in survey.processes} - stopped
+    sees = {zid: {zid, *reply.info.sees} for (zid, _), reply in replies.items() if zid in there}
+    return {
+        (zid, other)
+        for zid, seen in sees.items()
+        for other in there - seen
+        if _tells_sight(replies, zid)
+    }
+
+
+def _tells_sight(replies: dict[_Node, _NodeReply], zid: str) -> bool:
+    """Return whether the nodes of a session reply whom they see; older releases do not."""
+    return any(reply.info.sees for (each, _), reply in replies.items() if each == zid)
+
+
+def check_clocks(survey: Survey, replies: dict[_Node, _NodeReply]) -> Iterator[Finding]:
+    """Find machines whose clock differs from the one here."""
+    best: dict[str, tuple[_Node, _NodeReply]] = {}
+    for node, reply in replies.items():
+        zid = node[0]
+        if reply.info.now and (zid not in best or reply.doubt < best[zid][1].doubt):
+            best[zid] = node, reply
+    lines: defaultdict[str, list[str]] = defaultdict(list)
+    for node, reply in best.values():
+        if abs(reply.offset) - reply.doubt > _CLOCK_SECONDS * _SECOND:
+            way = "ahead of" if reply.offset > 0 else "behind"
+            seconds = abs(reply.offset) / _SECOND
+            lines[reply.info.host].append(
+                f"{_name(survey, node)}: its clock is {seconds:.2f} s {way} the one here"
+                f" (± {reply.doubt / _SECOND:.2f} s)"
+            )
+    for host, evidence in sorted(lines.items()):
+        yield error(
+            "clock-offset",
+            f"the clock of {host} is not the one here: transforms and stamps do not match",
+            sorted(evidence),
+            "synchronise the clocks of all machines (chrony, or 'timedatectl set-ntp true')",
+        )
+
+
+def _name(survey: Survey, node: _Node) -> str:
+    process = survey.processes.get(node)
+    return (
+        f"session {node[0]}" if process is None else f"{process.node} ({process_address(process)})"
+    )
+
+
+def _state(survey: Survey, node: _Node) -> str:
+    process = survey.processes.get(node)
+    return "" if process is None else stopped_note(process)
+
+
+def _names(survey: Survey, zid: str) -> str:
+    """Return a description of a session by its nodes."""
+    mine = sorted((p for p in survey.processes.values() if p.zid == zid), key=lambda p: p.node)
+    if not mine:
+        return f"session {zid}"
+    more = f" and {len(mine) - 1} more" if len(mine) > 1 else ""
+    return f"{mine[0].node}{more} ({process_address(mine[0])})"
+
+
+_AHEAD = 0.1
+"""Seconds that a stamp may be ahead of its arrival."""
+
+_BEHIND = 1.0
+"""Seconds that a stamp may be behind its arrival; no sample should take that long."""
+
+_SECOND = 1_000_000_000
+
+
+class _First(msgspec.Struct):
+    """The first sample of a topic.
+
+    Attributes:
+        age: Nanoseconds between its stamp and its arrival.
+        damage: Reason why its attachment cannot be read.
+    """
+
+    age: int = 0
+    damage: str = ""
+
+
+def check_stamps(session: Session, survey: Survey, seconds: float) -> Iterator[Finding]:
+    """Find ROS 2 nodes whose samples have stamps of another clock or an old form.
+
+    Args:
+        session: The session to subscribe with.
+        survey: The nodes that are running.
+        seconds: Time limit for the first sample of each topic, in seconds.
+    """
+    mine = {zid for zid, _ in survey.processes}
+    foreign = [token for token in survey.view.entities(Kind.PUBLISHER) if token.zid not in mine]
+    heard = _listen(session, foreign, seconds) if seconds > 0 else []
+    off = [
+        f"{_who(survey, token)}: its stamps are {abs(first.age) / _SECOND:.2f} s"
+        f" {'ahead of' if first.age < 0 else 'behind'} the clock here"
+        for token, first in heard
+        if not first.damage and not -_AHEAD * _SECOND <= first.age <= _BEHIND * _SECOND
+    ]
+    if off:
+        yield error(
+            "clock-offset",
+            "clocks of nodes are not the one here: transforms and stamps do not match",
+            sorted(off),
+            "synchronise the clocks of all machines (chrony, or 'timedatectl set-ntp true')",
+        )
+    old = [f"{_who(survey, token)}: {first.damage}" for token, first in heard if first.damage]
+    if old:
+        yield error(
+            "old-rmw-zenoh",
+            "nodes send samples in a form that is not that of rmw_zenoh today",
+            sorted(old),
+            "update rmw_zenoh there to that of a current ROS 2 release",
+        )
+
+
+def _listen(
+    session: Session, publishers: list[Token], seconds: float
+) -> list[tuple[Token, _First]]:
+    """Return the first sample of each topic that has one in time."""
+    found: dict[str, tuple[Token, _First]] = {}
+    arrived = threading.Condition()
+    topics = {
+        endpoint_key(token.domain, token.name, token.type_name, token.type_hash): token
+        for token in publishers
+    }
+
+    def receive(key: str, sample: Sample) -> None:
+        first = _look(sample)
+        with arrived:
+            found.setdefault(key, (topics[key], first))
+            arrived.notify_all()
+
+    subscribers = [session.subscriber(key, partial(receive, key)) for key in topics]
+    try:
+        with arrived:
+            arrived.wait_for(lambda: len(found) == len(topics), seconds)
+            return list(found.values())
+    finally:
+        for subscriber in subscribers:
+            subscriber.close()
+
+
+def _look(sample: Sample) -> _First:
+    now = time.time_ns()
+    try:
+        return _First(age=now - unpack(sample.attachment).source_time)
+    except DecodeError as fault:
+        return _First(damage=fault.reason)
+
+
+def _who(survey: Survey, token: Token) -> str:
+    return f"{token.node_name} ({survey.address(token)}) on {token.name}"
+
+
+_OLDEST_ZENOH = (1, 4)
+"""Release that rmw_zenoh of ROS 2 Humble and Jazzy began with in its present form."""
+
+_TIMEOUT = 1.0
+_ADMIN_SECONDS = 0.5
+_LOOKS = 4
+_PAUSE = 0.25
+_BUCKET = 8
+_VERSION = re.compile(r"v?(\d+)\.(\d+)")
+
+
+def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
+    """Find parameter replicas that differ from the others, or do not reply."""
+    keys = Keys(domain)
+    for look in range(_LOOKS):
+        if look:
+            time.sleep(_PAUSE)  # a write on its way reaches all meanwhile
+        members = [keys.member(token) for token in session.live_tokens(keys.tokens, _TIMEOUT)]
+        digests = _digests(session, keys, members)
+        if len(members) == len(digests) and len(set(digests.values())) <= 1:
+            return
+    silent = [member for member in members if member.zid not in digests]
+    if silent:
+        yield error(
+            "replica-silent",
+            "replicas of the parameters do not reply: a write waits for them in vain",
+            sorted(f"{member.label} (session {member.zid})" for member in silent),
+            "they hang or are stopped: let them go on, or end them",
+        )
+    counts = Counter(digests.values())
+    if len(counts) > 1:
+        usual = counts.most_common(1)[0][0]
+        yield error(
+            "replica-out-of-step",
+            "replicas of the parameters differ, and stay so",
+            sorted(
+                f"{member.label} (session {member.zid}): other writes in"
+                f" {_differing(usual, digests[member.zid])} of {len(usual) // _BUCKET} buckets"
+                for member in members
+                if digests.get(member.zid, usual) != usual
+            ),
+            "it does not hear what the others write, or they do not hear it: check the link to its"
+            " machine, then start it again",
+        )
+
+
+def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, bytes]:
+    """Query all replicas at once, and return their digests by session."""
+    request = encode(Sync())
+    asked = [
+        (
+            member.zid,
+            session.query(keys.sync(member.zid), timeout=_TIMEOUT, payload=request),
+        )
+        for member in members
+    ]
+    return {
+        zid: decode(reply.payload, SyncAnswer).digest
+        for zid, replies in asked
+        for reply in replies
+        if reply.ok
+    }
+
+
+def _differing(one: bytes, other: bytes) -> int:
+    return sum(
+        one[start : start + _BUCKET] != other[start : start + _BUCKET]
+        for start in range(0, max(len(one), len(other)), _BUCKET)
+    )
+
+
+def check_versions(session: Session) -> Iterator[Finding]:
+    """Find routers and peers of an old Zenoh, as far as they have an admin space."""
+    old: list[str] = []
+    for reply in session.get("@/*/*", timeout=_ADMIN_SECONDS):
+        _, zid, *kind = reply.key.split("/") if reply.ok else ("", "")
+        if kind not in (["router"], ["peer"]):
+            continue
+        with suppress(ValueError, AttributeError):  # not JSON, or without a version
+            version = str(json.loads(reply.payload).get("version"))
+            match = _VERSION.match(version)
+            if match and (int(match[1]), int(match[2])) < _OLDEST_ZENOH:
+                old.append(f"{kind[0]} {zid}: Zenoh {version}")
+    if old:
+        oldest = ".".join(map(str, _OLDEST_ZENOH))
+        yield warning(
+            "old-zenoh",
+            f"parts of the network have a Zenoh before {oldest}",
+            sorted(old),
+            "update them: latched topics and the presence of nodes rely on what came since",
+        )
