@@ -7,11 +7,11 @@ import threading
 from queue import SimpleQueue
 
 import pytest
-from network import PATIENCE
+from network import PATIENCE, Network
 
 from rosz import worker
 from rosz.errors import ClosedError
-from rosz.worker import Worker
+from rosz.worker import Worker, start_thread
 
 
 def test_items_are_handled_in_order_on_one_thread() -> None:
@@ -187,3 +187,25 @@ def test_work_goes_on_where_the_system_has_no_more_threads(
     assert numbers.flush(PATIENCE)
     numbers.close(PATIENCE)
     assert not both.broken
+
+
+AT_THE_END = """
+import atexit
+import threading
+from rosz.worker import start_thread
+atexit.register(lambda: print(start_thread(threading.Thread(target=threading.get_ident))))
+"""
+
+
+def test_starting_a_thread_at_the_end_of_the_process(network: Network) -> None:
+    program = network.program(AT_THE_END)
+    assert program.exit_code() == 0
+    assert program.lines in (["True"], ["False"])
+
+
+def test_starting_a_thread_twice_is_an_error() -> None:
+    thread = threading.Thread(target=threading.get_ident)
+    assert start_thread(thread)
+    with pytest.raises(RuntimeError, match="once"):
+        start_thread(thread)
+    thread.join()

@@ -135,7 +135,7 @@ def _folder(given: str, command: str) -> Path:
 
 
 def _has_keys(folder: Path) -> bool:
-    from rosz.security.folder import CERTIFICATE
+    from rosz.security import CERTIFICATE
 
     return (folder / CERTIFICATE).is_file() or any(folder.glob(f"*/{CERTIFICATE}"))
 

@@ -25,7 +25,7 @@ from rosz.node.control import NodeInfo, Request, control_key
 from rosz.params.keys import Keys, Member
 from rosz.params.wire import Sync, SyncAnswer, decode, encode
 from rosz.session import Sample, Session
-from rosz.wire import Kind, Token, endpoint_key, unpack
+from rosz.wire import Kind, Token, entity_key, unpack_attachment
 
 __all__ = (
     "check_clocks",
@@ -283,7 +283,7 @@ def _listen(
     found: dict[str, tuple[Token, _First]] = {}
     arrived = threading.Condition()
     topics = {
-        endpoint_key(token.domain, token.name, token.type_name, token.type_hash): token
+        entity_key(token.domain, token.name, token.type_name, token.type_hash): token
         for token in publishers
     }
 
@@ -306,7 +306,7 @@ def _listen(
 def _look(sample: Sample) -> _First:
     now = time.time_ns()
     try:
-        return _First(age=now - unpack(sample.attachment).source_time)
+        return _First(age=now - unpack_attachment(sample.attachment).source_time)
     except DecodeError as fault:
         return _First(damage=fault.reason)
 

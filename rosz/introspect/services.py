@@ -10,7 +10,7 @@ import msgspec
 
 from rosz.errors import NotFoundError, near_miss
 from rosz.names import short_type
-from rosz.wire import Token, endpoint_key
+from rosz.wire import Token, entity_key
 
 if TYPE_CHECKING:
     from rosz.graph import View
@@ -70,7 +70,7 @@ def server(view: View, name: str) -> Token:
 
 def uri(token: Token) -> str:
     """Return where a service is called: its key expression on Zenoh."""
-    return endpoint_key(token.domain, token.name, token.type_name, token.type_hash)
+    return entity_key(token.domain, token.name, token.type_name, token.type_hash)
 
 
 def wait_for_server(context: Context, name: str, warn: Callable[[str], object]) -> Token:

@@ -11,7 +11,7 @@ from rosz.errors import DefinitionError, InvalidName, NotFoundError
 from rosz.introspect.fields import Target, find_target
 from rosz.node.entity import Entity
 from rosz.qos import DEFAULT
-from rosz.wire import NO_HASH, Kind, Token, endpoint_key
+from rosz.wire import NO_HASH, Kind, Token, entity_key
 
 if TYPE_CHECKING:
     from rosz.graph import View
@@ -132,7 +132,7 @@ def subscribe_samples(
     """
     entity = Entity(node, Kind.SUBSCRIPTION, topic, type_name, type_hash, DEFAULT)
     context = node.context
-    every_type = endpoint_key(context.domain, topic, "*", "*")
+    every_type = entity_key(context.domain, topic, "*", "*")
     entity.keep(context.session.subscriber(every_type, callback))
     entity.announce(watch=False)
     return node.keep(entity)

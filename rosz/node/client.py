@@ -20,7 +20,7 @@ from rosz.node.entity import Entity
 from rosz.node.incompatible import explain_incompatible
 from rosz.qos import QoS
 from rosz.session import Cancellation, clamp_timeout
-from rosz.wire import Kind, pack
+from rosz.wire import Kind, pack_attachment
 
 if TYPE_CHECKING:
     from rosz.graph import View
@@ -115,7 +115,7 @@ class Client(Entity):
         if left <= 0:
             raise self._late(limit)
         self.check_open("call")
-        attachment = pack(next(self._numbers), time.time_ns(), self.gid)
+        attachment = pack_attachment(next(self._numbers), time.time_ns(), self.gid)
         if abs(self._querier.timeout - left) < _SAME:
             replies = self._querier.query(payload, attachment, self._cancel)
         else:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.errors import DecodeError
-from rosz.wire import read
+from rosz.wire import read_attachment
 
 if TYPE_CHECKING:
     from rosz.message import Message
@@ -110,7 +110,7 @@ class Decoder:
         try:
             attachment = sample.attachment
             if attachment is not None:
-                sequence, source_time, gid = read(attachment)
+                sequence, source_time, gid = read_attachment(attachment)
                 if sequence > 0:
                     publisher = self._publishers.get(gid) or self._publisher(gid)
                     last = publisher.last

@@ -11,7 +11,7 @@ from rosz.errors import UsageError
 from rosz.lifecycle import Closable, Lifecycle
 from rosz.node.core import NodeCore
 from rosz.node.incompatible import COUNTERPARTS
-from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid
+from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -63,7 +63,7 @@ class Entity:
         self.qos = qos = _with_depth(qos)
         without_hash = context.environment.distro == "humble" and type_hash != ANY
         wire_hash = NO_HASH if without_hash else type_hash
-        self.key = endpoint_key(context.domain, names.check_resource(name), type_name, wire_hash)
+        self.key = entity_key(context.domain, names.check_resource(name), type_name, wire_hash)
         self.token = Token(
             domain=context.domain,
             zid=context.session.zid,

@@ -13,7 +13,7 @@ from rosz.node.core import NodeCore
 from rosz.node.direct_delivery import direct_key
 from rosz.node.entity import Entity
 from rosz.qos import QoS
-from rosz.wire import Kind, Token, pack
+from rosz.wire import Kind, Token, pack_attachment
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class Publisher(Entity, Generic[M]):
     def _send(self, payload: bytes) -> None:
         with self._ordered:
             self._sequence = sequence = self._sequence + 1
-            attachment = pack(sequence, time.time_ns(), self.gid)
+            attachment = pack_attachment(sequence, time.time_ns(), self.gid)
             if self._held is None:
                 self._put(payload, attachment)
                 return
@@ -142,7 +142,7 @@ class Publisher(Entity, Generic[M]):
         if key is None:
             self.publish(message)
             return
-        attachment = pack(_UNNUMBERED, time.time_ns(), self.gid)
+        attachment = pack_attachment(_UNNUMBERED, time.time_ns(), self.gid)
         context.session.put(key, self._encode(message), attachment=attachment, block=self._blocks)
 
     def _build(self, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:

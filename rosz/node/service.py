@@ -18,7 +18,7 @@ from rosz.node.core import NodeCore
 from rosz.node.entity import Entity
 from rosz.qos import QoS
 from rosz.session import Query
-from rosz.wire import Kind, pack, read
+from rosz.wire import Kind, pack_attachment, read_attachment
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
@@ -78,9 +78,11 @@ class Service(Entity):
             attachment = query.attachment
             sequence, gid = 0, _NO_GID
             if attachment is not None:
-                sequence, _, gid = read(attachment)
+                sequence, _, gid = read_attachment(attachment)
             payload = self._respond(query.payload or b"", gid)
-            query.reply(self.key, payload, attachment=pack(sequence, time.time_ns(), gid))
+            query.reply(
+                self.key, payload, attachment=pack_attachment(sequence, time.time_ns(), gid)
+            )
         except TransportError as error:
             self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
         except (ServiceError, DecodeError) as error:

@@ -25,7 +25,7 @@ from rosz.node.decoder import Decoder, Received
 from rosz.node.entity import ANY, Entity
 from rosz.qos import QoS
 from rosz.session import LONGEST_WAIT, clamp_timeout
-from rosz.wire import NO_HASH, Kind, Token, endpoint_key, format_token, gid, ros_type
+from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, ros_type
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
@@ -294,9 +294,7 @@ class Subscription(Entity, Generic[M]):
         self, publisher: Token, depth: int, receive: Callable[[Reply], None]
     ) -> None:
         """Request the newest samples in a latching publisher's cache."""
-        key = endpoint_key(
-            publisher.domain, publisher.name, publisher.type_name, publisher.type_hash
-        )
+        key = entity_key(publisher.domain, publisher.name, publisher.type_name, publisher.type_hash)
         context = self.node.context
         try:
             context.session.get_async(

@@ -9,7 +9,15 @@ Public modules beside the names exported here, because few programs need them:
 """
 
 from rosz.security.access import access_control
-from rosz.security.folder import KeyFolder, LocalPermissions
+from rosz.security.folder import CERTIFICATE, KeyFolder, LocalPermissions
 from rosz.security.rules import Permit, Rules, read_rules
 
-__all__ = ("KeyFolder", "LocalPermissions", "Permit", "Rules", "access_control", "read_rules")
+__all__ = (
+    "CERTIFICATE",
+    "KeyFolder",
+    "LocalPermissions",
+    "Permit",
+    "Rules",
+    "access_control",
+    "read_rules",
+)

@@ -1,12 +1,26 @@
-"""The text and bytes that rosz shares with ROS 2's rmw_zenoh; pure."""
+"""The keys, tokens and attachments of ROS 2's rmw_zenoh, and the endpoints of Zenoh; pure."""
 
-from rosz.wire.attachment import Attachment, pack, read, unpack
+from rosz.wire.attachment import (
+    Attachment,
+    pack_attachment,
+    read_attachment,
+    unpack_attachment,
+)
 from rosz.wire.endpoint import Endpoint
 from rosz.wire.gid import gid
-from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, endpoint_key, own_key, ros_type
-from rosz.wire.processes import ProcessToken, format_process, parse_process, processes_key
+from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, entity_key, own_key, ros_type
 from rosz.wire.qos import format_qos, parse_qos
-from rosz.wire.tokens import Kind, Token, format_token, parse_token, tokens_key
+from rosz.wire.tokens import (
+    Kind,
+    ProcessToken,
+    Token,
+    format_process,
+    format_token,
+    parse_process,
+    parse_token,
+    processes_key,
+    tokens_key,
+)
 
 __all__ = (
     "NO_HASH",
@@ -17,19 +31,19 @@ __all__ = (
     "ProcessToken",
     "Token",
     "dds_type",
-    "endpoint_key",
+    "entity_key",
     "format_process",
     "format_qos",
     "format_token",
     "gid",
     "own_key",
-    "pack",
+    "pack_attachment",
     "parse_process",
     "parse_qos",
     "parse_token",
     "processes_key",
-    "read",
+    "read_attachment",
     "ros_type",
     "tokens_key",
-    "unpack",
+    "unpack_attachment",
 )

@@ -1,6 +1,7 @@
 """The attachment that every publication, request and reply carries (rmw_zenoh).
 
-Sequence number and source time as little-endian 64-bit integers, then the GID behind its length.
+It consists of the sequence number and the source time as little-endian 64-bit integers, and of the
+GID after its length.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import msgspec
 
 from rosz.errors import DecodeError
 
-__all__ = ("Attachment", "pack", "read", "unpack")
+__all__ = ("Attachment", "pack_attachment", "read_attachment", "unpack_attachment")
 
 GID_SIZE = 16
 _LAYOUT = Struct("<qqB16s")
@@ -20,11 +21,11 @@ _pack = _LAYOUT.pack
 
 
 class Attachment(msgspec.Struct, frozen=True):
-    """Where a sample comes from.
+    """The origin of a sample.
 
     Attributes:
-        sequence: Number of the sample within its publisher or client, from 1.
-        source_time: Nanoseconds since the Unix epoch, by the sender's system clock.
+        sequence: The number of the sample within its publisher or client, from 1.
+        source_time: The sender's time of sending, in nanoseconds since the Unix epoch.
         gid: The 16 bytes that identify the publisher or client.
     """
 
@@ -33,27 +34,29 @@ class Attachment(msgspec.Struct, frozen=True):
     gid: bytes
 
 
-def pack(sequence: int, source_time: int, gid: bytes) -> bytes:
+def pack_attachment(sequence: int, source_time: int, gid: bytes) -> bytes:
     """Return the 33 bytes of an attachment."""
     return _pack(sequence, source_time, GID_SIZE, gid)
 
 
-def unpack(data: bytes | None) -> Attachment:
-    """Read an attachment.
+def unpack_attachment(data: bytes | None) -> Attachment:
+    """Parse an attachment.
 
     Raises:
-        DecodeError: It is missing, of an older release's layout, or damaged.
+        DecodeError: The attachment is missing, damaged, or in the layout of an older release.
     """
     if data is None:
         raise DecodeError("attachment", -1, "missing; the sender is no ROS 2 or rosz node")
-    return Attachment(*read(data))
+    return Attachment(*read_attachment(data))
 
 
-def read(data: bytes) -> tuple[int, int, bytes]:
-    """Read an attachment's sequence number, source time and GID, which every sample costs.
+def read_attachment(data: bytes) -> tuple[int, int, bytes]:
+    """Return the sequence number, source time and GID of an attachment.
+
+    Every sample received costs one call of this.
 
     Raises:
-        DecodeError: It is of an older release's layout, or damaged.
+        DecodeError: The attachment is damaged, or in the layout of an older release.
     """
     if len(data) != _LAYOUT.size:
         if len(data) == _OLD_SIZE:

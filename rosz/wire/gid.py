@@ -1,6 +1,6 @@
 """XXH3-128 of liveliness tokens, from which rmw_zenoh derives the GID of an entity.
 
-Only what tokens need: seed 0 and inputs of 17 bytes and more, which every token is. The algorithm
+This implements only what tokens need: seed 0, and inputs of 17 bytes or more. The algorithm
 is specified in the xxHash project's document "XXH3 algorithm overview".
 """
 
@@ -29,10 +29,13 @@ _STRIPES_PER_BLOCK = 16
 
 
 def gid(token: str) -> bytes:
-    """Return the 16-byte GID of the entity whose liveliness token this is.
+    """Return the GID of an entity, 16 bytes.
+
+    Args:
+        token: The liveliness token of the entity.
 
     Raises:
-        ValueError: The token is shorter than any can be.
+        ValueError: The token is shorter than any valid one.
     """
     data = token.encode()
     if len(data) < _SHORTEST:

@@ -24,7 +24,7 @@ _FIELDS_PER_PART = (1, 1, 2, 2, 2, 3)
 
 
 def format_qos(qos: QoS) -> str:
-    """Return the chunk, with every default left out."""
+    """Return the chunk of a QoS, without default values."""
     lease = _duration(qos.lease)
     return ":".join(
         (
@@ -41,10 +41,10 @@ def format_qos(qos: QoS) -> str:
 
 
 def parse_qos(chunk: str) -> QoS:
-    """Read the chunk; values that stand for "the system's choice" become the defaults.
+    """Parse a chunk; values that mean "the system's choice" become the defaults.
 
     Raises:
-        DecodeError: It has another form, or a number that means nothing.
+        DecodeError: The chunk has another form, or a number without a meaning.
     """
     parts = [part.split(",") for part in chunk.split(":")]
     if tuple(map(len, parts)) != _FIELDS_PER_PART:
@@ -69,7 +69,7 @@ def parse_qos(chunk: str) -> QoS:
         ) from error
 
 
-# 0 is the system's default, 3 unknown, 4 and 5 best available: who sends them means the default.
+# 0 is the system's default, 3 unknown, 4 and 5 best available: all of them mean the default.
 _RELIABILITY: dict[int, Literal["reliable", "best_effort"]] = {
     0: "reliable",
     _RELIABLE: "reliable",

@@ -16,7 +16,7 @@ from rosz.node.control import control_key
 from rosz.params.keys import Keys, Member
 from rosz.params.wire import SyncAnswer, encode
 from rosz.session import Query, Session, is_stopped
-from rosz.wire import endpoint_key, pack
+from rosz.wire import entity_key, pack_attachment
 
 from .conftest import Doctor
 from .test_tokens import stranger
@@ -176,7 +176,7 @@ def sample(network: Network) -> Callable[[bytes], None]:
 
     def send(attachment: bytes) -> None:
         session = stranger(network)
-        key = endpoint_key(network.domain, "/scan", "std_msgs/msg/String", String._type_hash)
+        key = entity_key(network.domain, "/scan", "std_msgs/msg/String", String._type_hash)
         stop = threading.Event()
 
         def run() -> None:
@@ -196,7 +196,7 @@ def sample(network: Network) -> Callable[[bytes], None]:
 
 
 def test_stamps_of_a_clock_that_is_off(doctor: Doctor, sample: Callable[[bytes], None]) -> None:
-    sample(pack(1, time.time_ns() - 60_000_000_000, bytes(16)))
+    sample(pack_attachment(1, time.time_ns() - 60_000_000_000, bytes(16)))
     finding = doctor(listen=15.0)["clock-offset"]
     (line,) = finding.evidence
     assert line.startswith("/stranger (")
@@ -210,7 +210,7 @@ def test_samples_of_an_older_release(doctor: Doctor, sample: Callable[[bytes], N
 
 
 def test_good_stamps(doctor: Doctor, sample: Callable[[bytes], None]) -> None:
-    sample(pack(1, time.time_ns(), bytes(16)))
+    sample(pack_attachment(1, time.time_ns(), bytes(16)))
     assert set(doctor(listen=0.5)) == {"no-subscriber"}
 
 

@@ -11,7 +11,7 @@ from rosz.wire import (
     ProcessToken,
     Token,
     dds_type,
-    endpoint_key,
+    entity_key,
     format_process,
     format_qos,
     format_token,
@@ -160,8 +160,8 @@ def test_type_names_both_ways(name: str) -> None:
 
 def test_keys() -> None:
     expected = f"0/robot1/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"
-    assert endpoint_key(0, "/robot1/chatter", "std_msgs/msg/String", STRING_HASH) == expected
-    assert endpoint_key(7, "/a", "*", "*") == "7/a/*/*"
+    assert entity_key(0, "/robot1/chatter", "std_msgs/msg/String", STRING_HASH) == expected
+    assert entity_key(7, "/a", "*", "*") == "7/a/*/*"
 
 
 def test_process_tokens() -> None:

@@ -11,7 +11,7 @@ from typing import Final
 from rosz.params.keys import Member
 from rosz.params.replica.mirror import Mirror
 from rosz.params.replica.sync import Synchroniser
-from rosz.session.starting import start
+from rosz.worker import start_thread
 
 __all__ = ("Keeper",)
 
@@ -73,7 +73,7 @@ class Keeper:
             self._reconcile_at = now + _RECONCILE_EVERY
             # It waits for answers, which the worker must not.
             target = self._mirror.reconcile
-            start(threading.Thread(target=target, name="rosz-params-mirror", daemon=True))
+            start_thread(threading.Thread(target=target, name="rosz-params-mirror", daemon=True))
 
     def _oldest(self) -> bool:
         return all(self._own < other for other in self._sync.members.all())
