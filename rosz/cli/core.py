@@ -14,7 +14,7 @@ from rosz.errors import UsageError
 
 if TYPE_CHECKING:
     from rosz.params.replica import Replica
-    from rosz.params.store import Store
+    from rosz.params.replica.storage import Storage
 
 __all__ = ("app",)
 
@@ -62,10 +62,10 @@ def core_command(
     file = Path(store).absolute() if store else None
     bounded = nullcontext() if environment.keys is None else zenoh_log_bounded()
     with bounded, until_stopped() as ready, ExitStack() as stack:
-        keep = None if file is None else _open_store(file, stack)
+        storage = None if file is None else _open_storage(file, stack)
         router = stack.enter_context(Router(environment, listen or (), connect or ()))
         domain = environment.domain
-        replica = stack.enter_context(closing(Replica(router.session, domain, keep=keep)))
+        replica = stack.enter_context(closing(Replica(router.session, domain, storage=storage)))
         _set_core_params(replica)
         lines = [f"listening on {endpoint}" for endpoint in router.endpoints]
         lines += [f"connecting to {endpoint}" for endpoint in router.connect]
@@ -76,10 +76,10 @@ def core_command(
         threading.Event().wait()
 
 
-def _open_store(file: Path, stack: ExitStack) -> Store:
-    from rosz.params.store import Store
+def _open_storage(file: Path, stack: ExitStack) -> Storage:
+    from rosz.params.replica.storage import Storage, StoreFile
 
-    return stack.enter_context(closing(Store(file)))
+    return stack.enter_context(closing(Storage(StoreFile(file))))
 
 
 def _set_core_params(replica: Replica) -> None:

@@ -187,7 +187,7 @@ def load_command(
         raise UsageError("--json is for --dry-run: loading prints nothing")
     from rosz.cli.param_files import read_text
     from rosz.params import condense, spread
-    from rosz.params.preview import preview
+    from rosz.params.tree import preview
     from rosz.params.yaml import load_documents
 
     text, source = read_text(file)

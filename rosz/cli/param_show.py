@@ -10,9 +10,9 @@ from rosz.cli.group import print_json, print_lines, warn
 if TYPE_CHECKING:
     from rosz.errors import ParamNotFound
     from rosz.params import Value
-    from rosz.params.preview import Difference
     from rosz.params.remote import ParamClient
     from rosz.params.replica import Changed, Outcome
+    from rosz.params.tree import Difference
 
 __all__ = (
     "as_yaml",

@@ -22,8 +22,7 @@ from rosz.doctor.machine import stopped_note
 from rosz.errors import DecodeError
 from rosz.introspect.survey import Survey, process_address, take_survey
 from rosz.node.control import NodeInfo, Request, control_key
-from rosz.params.keys import Keys, Member
-from rosz.params.wire import Sync, SyncAnswer, decode, encode
+from rosz.params.wire import Keys, Member, SyncReply, SyncRequest, decode, encode
 from rosz.session import Sample, Session
 from rosz.wire import Kind, Token, entity_key, unpack_attachment
 
@@ -363,7 +362,7 @@ def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
 
 def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, bytes]:
     """Query all replicas at once, and return their digests by session."""
-    request = encode(Sync())
+    request = encode(SyncRequest())
     asked = [
         (
             member.zid,
@@ -372,7 +371,7 @@ def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, b
         for member in members
     ]
     return {
-        zid: decode(reply.payload, SyncAnswer).digest
+        zid: decode(reply.payload, SyncReply).digest
         for zid, replies in asked
         for reply in replies
         if reply.ok

@@ -30,10 +30,9 @@ from rosz.msgs.rcl_interfaces.srv import (
 )
 from rosz.node.core import NodeCore
 from rosz.node.service import Service
-from rosz.params.merge import Change, condense
 from rosz.params.paths import Path, joined, split
 from rosz.params.values import Value, normalise, type_name
-from rosz.params.writes import DELETED, Deleted
+from rosz.params.writes import DELETED, Change, Deleted, condense
 from rosz.qos import PARAMETERS, SERVICES
 from rosz.session import Query
 from rosz.worker import Worker

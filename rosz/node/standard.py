@@ -32,7 +32,7 @@ def set_initial_params(node: NodeCore) -> None:
     """
     if not node.context.arguments.params:
         return
-    from rosz.params.nodes import read_plain
+    from rosz.params.yaml_nodes import read_plain
 
     for name, text in node.context.arguments.params.items():
         try:

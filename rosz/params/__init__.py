@@ -1,25 +1,30 @@
 """The parameter store.
 
-The pure half knows what parameters are and nothing of the network: values and names (`values`,
-`paths`), writes and their replay (`writes`, `tree`, `history`, `digest`, `merge`), YAML (`yaml`)
-and the messages between replicas (`keys`, `wire`). It imports nothing above the first floor.
+The modules exported here are pure. They know what parameters are, and nothing of the network:
+values (`values`), names (`paths`), writes and batches of them (`writes`), the tree that writes give
+(`tree`) and the set of writes behind it (`history`). They import nothing above the first floor.
 
-The other half lives on the fourth floor: `replica` and what serves it, `remote` for those who only
-ask, `api` for nodes. It is imported by module, so that the pure half stays light.
+These modules are public as well. They are not imported here, because start-up needs them alone:
+
+- `wire`: keys and messages of the store on the network (pure);
+- `yaml`: parameters as YAML text, and `yaml_nodes`: any YAML text, read safely (pure, need PyYAML);
+- `replica`: the replicated store of one process (fourth floor);
+- `remote`: the store as seen by a process that has no replica (fourth floor);
+- `api`: the store as seen by a node (fifth floor).
 """
 
 from rosz.params.history import History
-from rosz.params.merge import Change, condense, spread
 from rosz.params.paths import Path, climb, joined, resolve, split
-from rosz.params.tree import MISSING, Missing, leaves, lookup
-from rosz.params.values import Value, normalise
-from rosz.params.writes import DELETED, Deleted, Write
+from rosz.params.tree import MISSING, Difference, Missing, leaves, lookup, preview
+from rosz.params.values import Value, normalise, type_name
+from rosz.params.writes import DELETED, Change, Deleted, Write, condense, spread
 
 __all__ = (
     "DELETED",
     "MISSING",
     "Change",
     "Deleted",
+    "Difference",
     "History",
     "Missing",
     "Path",
@@ -31,7 +36,9 @@ __all__ = (
     "leaves",
     "lookup",
     "normalise",
+    "preview",
     "resolve",
     "split",
     "spread",
+    "type_name",
 )

@@ -1,4 +1,4 @@
-"""Parameters as a node sees them: by global, relative and private names, remapped."""
+"""Parameters as a node sees them: by global, relative and private names, with its remappings."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import datetime as dt
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final, TypeVar, overload
 
-from rosz.params.merge import Change, condense
 from rosz.params.paths import Path, climb, joined, resolve, split
-from rosz.params.replica import ACKNOWLEDGED_BY, Changed, Replica, Watch
-from rosz.params.replica.reading import not_found
+from rosz.params.replica import ACK_TIMEOUT, Changed, Replica, Watch
+from rosz.params.replica.state import not_found
 from rosz.params.tree import MISSING
-from rosz.params.values import convert, copy, normalise
+from rosz.params.values import convert, copy, normalise_at
+from rosz.params.writes import Change, condense
 
 __all__ = ("Params",)
 
@@ -19,20 +19,20 @@ T = TypeVar("T")
 D = TypeVar("D")
 
 _IMMUTABLE: Final = frozenset({bool, int, float, str, bytes, dt.datetime, dt.date})
-_REMEMBERED: Final = 10_000
-"""Names whose resolution is kept; a program that makes up more gets them resolved anew."""
+_MAX_CACHED: Final = 10_000
+"""Names whose paths are cached; when there are more, the cache is cleared."""
 
 
 class Params:
-    """The parameter store of a node; much like a dict of names to values, shared with all others.
+    """The parameter store as seen by a node, much like a dict that is shared with all other nodes.
 
-    Reading is a look-up in the memory of the process. Writing returns when all other processes
-    that hold the store have applied it. Safe for threads, and for any callback.
+    Reading is a look-up in the memory of the process. Writing returns when all other processes that
+    hold the store have applied the write. Safe for threads, and for use in any callback.
 
     Args:
         replica: The process's copy of the store.
         node: Full name of the node.
-        remaps: Resolved name to resolved name.
+        remaps: New name of each remapped name, both resolved.
     """
 
     def __init__(
@@ -45,10 +45,10 @@ class Params:
         self._paths: dict[str, Path] = {}
 
     def resolve(self, name: str) -> str:
-        """Return the global name that a name means here.
+        """Return the global name that a name means for this node.
 
         Raises:
-            InvalidName: The name holds a character that no text can.
+            InvalidName: The name holds half of a surrogate pair.
         """
         return resolve(name, self._node, self._remaps)
 
@@ -61,16 +61,16 @@ class Params:
     @overload
     def get(self, name: str, default: D, *, type: Callable[..., T]) -> T | D: ...
     def get(self, name: str, default: Any = MISSING, *, type: Any = None) -> Any:  # noqa: A002  # reads best
-        """Return a parameter's value, a copy that is the caller's own.
+        """Return a copy of the value of a parameter.
 
         Args:
-            name: Global, relative or private name; that of a namespace returns all below it.
-            default: What to return when it is not set.
-            type: The type that is expected, such as ``float``, which also takes an int.
+            name: Global, relative or private name; the name of a namespace returns all below it.
+            default: Value to return if the parameter is not set.
+            type: Type that is expected, such as ``float``, which also accepts an int.
 
         Raises:
-            ParamNotFound: It is not set, and there is no default; also a ``KeyError``.
-            ParamError: Its value has another type; the message says who set it.
+            ParamNotFound: The parameter is not set, and there is no default; also a ``KeyError``.
+            ParamError: The value has another type; the message names its writer.
         """
         path = self._path(name)
         value = self._replica.lookup(path)
@@ -79,8 +79,7 @@ class Params:
                 return default
             raise not_found(self._replica.root, path)
         if type is not None and value.__class__ is not type:
-            full = joined(path)
-            value = convert(value, type, full, self._replica.origin(full))
+            value = convert(value, type, joined(path), self._replica.origin(path))
         return copy(value)
 
     def __getitem__(self, name: str) -> Any:
@@ -93,67 +92,67 @@ class Params:
             raise not_found(self._replica.root, path) from None
         return node if type(node) in _IMMUTABLE else copy(node)
 
-    def set(self, name: str, value: object, *, timeout: float = ACKNOWLEDGED_BY) -> None:
-        """Set a parameter; a dict replaces all that was below the name.
+    def set(self, name: str, value: object, *, timeout: float = ACK_TIMEOUT) -> None:
+        """Set a parameter; a dict replaces everything below the name.
 
         Args:
             name: Global, relative or private name.
             value: bool, int, float, str, list, dict, bytes or a timestamp.
-            timeout: Seconds to wait for the other processes; those that are late are logged.
+            timeout: Time limit in seconds of the wait for the other processes; those that are late
+                are logged.
 
         Raises:
-            ParamError: The value is none that a parameter may have.
+            ParamError: A parameter cannot hold the value.
             ClosedError: The node is shut down.
         """
-        full = joined(self._path(name))
-        self._replica.set(full, value, origin=self._origin, timeout=timeout)
+        self._replica.set(self._path(name), value, origin=self._origin, timeout=timeout)
 
     def __setitem__(self, name: str, value: object) -> None:
         self.set(name, value)
 
-    def update(self, values: Mapping[str, object], *, timeout: float = ACKNOWLEDGED_BY) -> None:
-        """Set many parameters as one change: nobody ever sees some of them set and others not.
+    def update(self, values: Mapping[str, object], *, timeout: float = ACK_TIMEOUT) -> None:
+        """Set many parameters as one change: no reader sees only some of them set.
 
         Args:
-            values: Name to value, each set as `set` does, one after the other.
-            timeout: Seconds to wait for the other processes; those that are late are logged.
+            values: Values by name; they are set as `set` does, one after the other.
+            timeout: Time limit in seconds of the wait for the other processes; those that are late
+                are logged.
 
         Raises:
-            ParamError: A value is none that a parameter may have; nothing is set then.
+            ParamError: A parameter cannot hold one of the values; nothing is set then.
             ClosedError: The node is shut down.
         """
-        changes: list[Change] = [
-            (self._path(name), normalise(value, self.resolve(name)))
-            for name, value in values.items()
-        ]
+        changes: list[Change] = []
+        for name, value in values.items():
+            path = self._path(name)
+            changes.append((path, normalise_at(path, value)))
         self._replica.write(condense(changes), origin=self._origin, timeout=timeout)
 
-    def delete(self, name: str, *, timeout: float = ACKNOWLEDGED_BY) -> None:
-        """Delete a parameter and all below it; what is above it stays, even empty.
+    def delete(self, name: str, *, timeout: float = ACK_TIMEOUT) -> None:
+        """Delete a parameter and everything below it; its parent stays, even if empty.
 
         Raises:
-            ParamNotFound: It is not set; also a ``KeyError``.
-            ParamError: It is the root.
+            ParamNotFound: The parameter is not set; also a ``KeyError``.
+            ParamError: The parameter is the root.
             ClosedError: The node is shut down.
         """
-        full = joined(self._path(name))
-        self._replica.delete(full, origin=self._origin, timeout=timeout)
+        self._replica.delete(self._path(name), origin=self._origin, timeout=timeout)
 
     def __delitem__(self, name: str) -> None:
         self.delete(name)
 
     def has(self, name: str) -> bool:
         """Tell whether a parameter, or anything below the name, is set."""
-        return self._replica.lookup(self._path(name)) is not MISSING
+        return self._replica.has(self._path(name))
 
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and self.has(name)
 
     def search(self, name: str) -> str | None:
-        """Look for a parameter in the node's own namespace, then in each one above it.
+        """Search for a parameter from the node's own name upwards.
 
         Args:
-            name: Relative name, whose first part decides; a global one is only looked up.
+            name: Relative name, whose first part decides; a global name is only looked up.
 
         Returns:
             The global name found, or ``None``.
@@ -167,7 +166,7 @@ class Params:
         return climb(name, self._node, self._replica.has)
 
     def names(self) -> list[str]:
-        """Return the global names of all parameters of all nodes, sorted."""
+        """Return the sorted global names of all parameters of all nodes."""
         return self._replica.names()
 
     def __iter__(self) -> Iterator[str]:
@@ -177,22 +176,22 @@ class Params:
         return len(self.names())
 
     def watch(self, name: str, callback: Callable[[Changed], None]) -> Watch:
-        """Have a function called whenever a parameter, or one below or above it, changes.
+        """Call a function whenever a parameter, or one below or above it, changes.
 
         Args:
             name: Global, relative or private name; it need not be set.
-            callback: Gets the change, with its full name, the value before and the value now
-                (``None`` for not set) and who made it. It runs on one thread for all watches of
-                the process, where it may do anything, setting parameters included.
+            callback: Function called with the change: its full name, the value before and the value
+                now (``None`` if not set) and its writer. It is called on one thread for all watches
+                of the process, where it may do anything, including setting parameters.
 
         Returns:
-            What ends it when closed.
+            The watch, which its ``close`` ends.
         """
-        return self._replica.watch(joined(self._path(name)), callback)
+        return self._replica.watch(self._path(name), callback)
 
     def origin(self, name: str) -> str:
-        """Return who set a parameter; empty where nobody did."""
-        return self._replica.origin(joined(self._path(name)))
+        """Return the writer of a parameter, as shown to people; empty if nobody set it."""
+        return self._replica.origin(self._path(name))
 
     def __repr__(self) -> str:
         return f"<Params of {self._node}>"
@@ -201,7 +200,7 @@ class Params:
         path = self._paths.get(name)
         if path is None:
             path = split(self.resolve(name))
-            if len(self._paths) >= _REMEMBERED:
+            if len(self._paths) >= _MAX_CACHED:
                 self._paths.clear()
             self._paths[name] = path
         return path

@@ -1,36 +1,89 @@
-"""The store itself: the set of the newest writes, and the tree that replaying them gives.
+"""The set of the newest writes, the tree that replaying them gives, and its digest.
 
 The tree is the replay of all writes, oldest first, from an empty root:
 
-- a put at a path makes all above it dicts (a leaf there goes) and replaces what is at the path;
-- a deletion makes all above it dicts too, and removes what is at the path. Whoever deletes has seen
-  the parameter, so in ROS 1 all above it *is* dicts then; saying so again changes nothing, and it
-  keeps the empty parent that ROS 1 leaves when the puts before it are gone from the set.
+- a put at a path turns all above it into dicts (a leaf there is lost) and replaces what is there;
+- a deletion turns all above it into dicts too, and removes what is at the path. Whoever deletes a
+  parameter has seen it, so in ROS 1 all above it *are* dicts then. Repeating that changes nothing,
+  and it keeps the empty parent that ROS 1 leaves when the puts before it have left the set.
 
-Both only ever overwrite. So a write with a newer one at its own path or above leaves no trace in
-any replay, with whatever else may still arrive, and is dropped; what is kept does not depend on
-the order of arrival. That makes the store a join-semilattice: merging is commutative, associative
-and idempotent.
+Both only overwrite. So a write leaves no trace in any replay if a newer one at its own path or
+above is in the set, whatever else may still arrive. Such a write is dropped, and which writes
+remain does not depend on the order of arrival. That makes the store a join-semilattice: merging is
+commutative, associative and idempotent.
 
-Deletions are dropped too once they are old and removing them changes nothing (`History.forget`);
-an older put that arrives after that comes back to life, which bounds the memory.
+Deletions (tombstones) are dropped too once they are old and removing them changes nothing
+(`History.forget`), which bounds the memory. An older put that arrives after that takes effect
+again.
+
+A digest is `BUCKETS` numbers. Each write belongs to the bucket of its path and is folded into its
+number by exclusive or, so adding and removing cost the same, and equal sets have equal digests.
+Two replicas with different digests exchange the buckets that differ, and nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import struct
+import zlib
+from collections.abc import Iterable, Iterator
+from typing import Final
 
-from rosz.params.digest import Digest, bucket_of
+from rosz.errors import DecodeError
 from rosz.params.paths import Path
 from rosz.params.tree import MISSING, Draft, Missing, Tree, lookup, with_delete, with_put
 from rosz.params.values import Value
 from rosz.params.writes import DELETED, Write, check_write
 
-__all__ = ("History",)
+try:
+    # The module behind hashlib; hashlib itself would load OpenSSL in every node.
+    from _blake2 import blake2b
+except ImportError:
+    from hashlib import blake2b
+
+__all__ = ("BUCKETS", "EMPTY_DIGEST", "History")
+
+BUCKETS: Final = 64
+_MAX_PENDING: Final = 1000
+_DIGEST: Final = struct.Struct(f"<{BUCKETS}Q")
+EMPTY_DIGEST: Final = bytes(_DIGEST.size)
+"""The digest of the empty set."""
+
+
+def _bucket_of(path: str) -> int:
+    return zlib.crc32(path.encode()) % BUCKETS
+
+
+class _Digest:
+    """The digest of a set of writes.
+
+    Writes come and go far more often than the digest is read, so `toggle` only lists them. They are
+    folded in when the digest is read, or when the list is long.
+    """
+
+    __slots__ = ("_numbers", "_pending")
+
+    def __init__(self) -> None:
+        self._numbers = [0] * BUCKETS
+        self._pending: list[tuple[Path, int, str]] = []
+
+    def toggle(self, write: Write) -> None:
+        """Add a write, or remove it if it is in the set."""
+        self._pending.append((write.path, write.time, write.clock))
+        if len(self._pending) >= _MAX_PENDING:
+            self.numbers()
+
+    def numbers(self) -> list[int]:
+        """Return the number of each bucket."""
+        pending, self._pending = self._pending, []
+        for path, time, clock in pending:
+            text = "/".join(path)
+            mark = blake2b(f"{time} {clock} {text}".encode(), digest_size=8).digest()
+            self._numbers[_bucket_of(text)] ^= int.from_bytes(mark, "little")
+        return self._numbers
 
 
 class _Node:
-    """A path that is written, or that leads to one."""
+    """A path that is written, or that leads to one that is."""
 
     __slots__ = ("below", "write")
 
@@ -40,18 +93,18 @@ class _Node:
 
 
 class History:
-    """A set of newest writes and its tree; not safe for threads, but its `root` is.
+    """The set of the newest writes and its tree; not safe for threads, except for `root`.
 
     Attributes:
-        root: The tree: never changed in place, replaced by each `apply`.
-        latest: The newest time among all writes ever seen.
+        root: Tree; `apply` replaces it and never changes it in place.
+        latest: Newest time among all writes ever seen.
     """
 
     def __init__(self) -> None:
         self.root: Tree = {}
         self.latest = 0
         self._top = _Node()
-        self._digest = Digest()
+        self._digest = _Digest()
         self._deletions: dict[Path, Write] = {}
         self._count = 0
 
@@ -59,30 +112,30 @@ class History:
         return self._count
 
     def apply(self, writes: Iterable[Write]) -> list[Write]:
-        """Take in writes, in any order and any number of times, as one change of the tree.
+        """Add writes, in any order and any number of times, as one change of the tree.
 
         Returns:
-            Those that were news: not known and not hidden by a newer one.
+            The writes that are new: neither known nor hidden by a newer one.
 
         Raises:
-            ParamError: A write has no meaning in the tree; nothing has changed then.
+            ParamError: The tree cannot hold a write; nothing is changed then.
         """
         incoming = list(writes)
         for write in incoming:
             check_write(write.path, write.value)
-        news: list[Write] = []
+        new: list[Write] = []
         steps: list[Write] = []
         for write in incoming:
-            shown = self._take(write)
-            if shown is not None:
-                news.append(write)
-                steps += shown
+            replayed = self._add(write)
+            if replayed:
+                new.append(write)
+                steps += replayed
         if steps:
-            self.root = _replayed(self.root, steps)
-        return news
+            self.root = _replay(self.root, steps)
+        return new
 
     def writes(self) -> Iterator[Write]:
-        """Yield all writes of the set, those above before those below."""
+        """Yield all writes of the set; a write comes before those below its path."""
         stack = [self._top]
         while stack:
             node = stack.pop()
@@ -91,113 +144,117 @@ class History:
             stack.extend(node.below.values())
 
     def bucket(self, index: int) -> Iterator[Write]:
-        """Yield the writes of one bucket of the digest."""
-        return (write for write in self.writes() if bucket_of(write.path) == index)
+        """Yield the writes in one bucket of the digest."""
+        return (write for write in self.writes() if _bucket_of("/".join(write.path)) == index)
 
     def digest(self) -> bytes:
-        """Return the fingerprint of the set."""
-        return self._digest.to_bytes()
+        """Return the digest of the set, in the form that replicas exchange."""
+        return _DIGEST.pack(*self._digest.numbers())
 
     def differing(self, digest: bytes) -> list[int]:
-        """Return the buckets in which a replica with that digest holds another set.
+        """Return the buckets in which this set differs from the set of another digest.
 
         Raises:
-            DecodeError: The bytes are no digest.
+            DecodeError: The bytes are not a digest.
         """
-        return self._digest.differing(digest)
+        if len(digest) != _DIGEST.size:
+            raise DecodeError("digest", 0, f"{len(digest)} bytes, expected {_DIGEST.size}")
+        theirs = _DIGEST.unpack(digest)
+        return [index for index, ours in enumerate(self._digest.numbers()) if ours != theirs[index]]
 
     def find(self, path: Path) -> Write | None:
-        """Return the write at a path itself."""
+        """Return the write at exactly this path."""
         node: _Node | None = self._top
         for part in path:
             node = node.below.get(part) if node is not None else None
         return node.write if node is not None else None
 
     def hides(self, write: Write) -> bool:
-        """Tell whether a write is known, or has a newer one at its path or above."""
+        """Tell whether a write is known, or a newer one at its path or above is."""
         return any(above.order >= write.order for above in self._above(write.path))
 
     def source(self, path: Path) -> Write | None:
-        """Return the write that a parameter has its value from: the deepest at it or above."""
+        """Return the write that gives a path its value: the deepest one at the path or above."""
         found = None
-        for found in self._above(path):  # noqa: B007  # the last one is wanted
+        for found in self._above(path):  # noqa: B007  # the last one is returned
             pass
         return found
 
     def forget(self, before: int, keep: int) -> int:
-        """Drop old deletions that nothing depends on.
+        """Drop old deletions that the tree does not depend on.
+
+        Deletions that shape the tree stay: they remove a part of an older dict that was put as a
+        whole, or keep an empty dict. There are never more of them than there are dicts and parts of
+        dicts that were put.
 
         Args:
-            before: Deletions with an older time than this may go, in nanoseconds.
-            keep: So many of the newest may stay; of those above the number the oldest may go.
+            before: Time in nanoseconds; older deletions may be dropped.
+            keep: Number of deletions above which the oldest ones may be dropped.
 
         Returns:
-            How many went. Those that still shape the tree stay: they remove a part of an older
-            dict that was put whole, or keep an empty dict. There are never more of them than
-            there are dicts and parts of dicts that were put.
+            The number of deletions dropped.
         """
-        by_age: Callable[[Write], tuple[int, str, Path]] = lambda write: write.order  # noqa: E731
-        oldest_first = sorted(self._deletions.values(), key=by_age)
+        oldest_first = sorted(self._deletions.values(), key=lambda write: write.order)
         surplus = len(oldest_first) - keep
-        gone = 0
+        dropped = 0
         for index, write in enumerate(oldest_first):
             if write.time >= before and index >= surplus:
                 break
-            if not self._shapes(write):
+            if not self._shapes_tree(write):
                 self._drop(write.path)
-                gone += 1
-        return gone
+                dropped += 1
+        return dropped
 
-    def _take(self, write: Write) -> list[Write] | None:
-        """Put a write into the set; return what is to be replayed for it, or `None` if no news."""
+    def _add(self, write: Write) -> list[Write]:
+        """Add a write; return the writes to replay for it, which are none if it is not new."""
         self.latest = max(self.latest, write.time)
         node = self._top
         for part in write.path:
             if node.write is not None and not _comes_after(write, node.write):
-                return None
+                return []
             below = node.below.get(part)
             if below is None:
                 below = node.below[part] = _Node()
             node = below
         if node.write is not None and not _comes_after(write, node.write):
-            return None
+            return []
         later = self._prune(node, write) if node.below else []
-        self._hold(node, write)
+        self._put(node, write)
         return [write, *later]
 
     def _prune(self, top: _Node, write: Write) -> list[Write]:
         """Drop all older writes below a node; return the newer ones in the order of replay."""
         newer: list[Write] = []
         stack = [top]
-        met: list[_Node] = []
+        visited: list[_Node] = []
         while stack:
             node = stack.pop()
-            met.append(node)
+            visited.append(node)
             stack.extend(node.below.values())
             if node is top or node.write is None:
                 continue
             if _comes_after(node.write, write):
                 newer.append(node.write)
             else:
-                self._release(node)
-        for node in reversed(met):
+                self._remove(node)
+        for node in reversed(visited):
             node.below = {
                 part: below
                 for part, below in node.below.items()
                 if below.write is not None or below.below
             }
-        return sorted(newer, key=_order)
+        return sorted(newer, key=lambda write: write.order)
 
-    def _hold(self, node: _Node, write: Write) -> None:
+    def _put(self, node: _Node, write: Write) -> None:
         if node.write is not None:
-            self._release(node)
+            self._remove(node)
         node.write = write
         self._digest.toggle(write)
         self._count += 1
         if write.value is DELETED:
             self._deletions[write.path] = write
 
-    def _release(self, node: _Node) -> None:
+    def _remove(self, node: _Node) -> None:
         write = node.write
         if write is None:
             return
@@ -208,7 +265,7 @@ class History:
             del self._deletions[write.path]
 
     def _above(self, path: Path) -> Iterator[Write]:
-        """Yield the writes at a path and above, from the root down: each newer than the last."""
+        """Yield the writes at a path and above, from the root down; each is newer than the last."""
         node: _Node | None = self._top
         for part in (*path, None):
             if node is None:
@@ -217,11 +274,11 @@ class History:
                 yield node.write
             node = node.below.get(part) if part is not None else None
 
-    def _shapes(self, deletion: Write) -> bool:
-        """Tell whether the tree would be another without a deletion."""
+    def _shapes_tree(self, deletion: Write) -> bool:
+        """Tell whether the tree would differ without a deletion."""
         path = deletion.path
         cover = None
-        for cover in self._above(path[:-1]):  # noqa: B007  # the last one is wanted
+        for cover in self._above(path[:-1]):  # noqa: B007  # the last one is used
             pass
         beneath: Value | Missing = MISSING
         if cover is not None and cover.value is not DELETED:
@@ -231,20 +288,16 @@ class History:
             beneath = lookup(cover.value, path[depth:-1])
         if len(path) == 1 or type(beneath) is dict:
             return False
-        node = self._node(path[:-1])
-        return len(node.below) == 1 and not node.below[path[-1]].below
-
-    def _node(self, path: Path) -> _Node:
         node = self._top
-        for part in path:
+        for part in path[:-1]:
             node = node.below[part]
-        return node
+        return len(node.below) == 1 and not node.below[path[-1]].below
 
     def _drop(self, path: Path) -> None:
         way = [self._top]
         for part in path:
             way.append(way[-1].below[part])
-        self._release(way[-1])
+        self._remove(way[-1])
         for depth in range(len(path), 0, -1):
             if way[depth].write is not None or way[depth].below:
                 break
@@ -252,14 +305,14 @@ class History:
 
 
 def _comes_after(write: Write, other: Write) -> bool:
-    """Tell whether a write is replayed after another: what `Write.order` says, but faster."""
+    """Tell whether a write is replayed after another; faster than comparing `Write.order`."""
     if write.time != other.time:
         return write.time > other.time
     return write.order > other.order
 
 
-def _replayed(root: Tree, steps: list[Write]) -> Tree:
-    """Return the tree that replaying writes on another gives."""
+def _replay(root: Tree, steps: list[Write]) -> Tree:
+    """Return the tree after replaying writes on a tree."""
     if len(steps) == 1:
         step = steps[0]
         if step.value is DELETED:
@@ -272,7 +325,3 @@ def _replayed(root: Tree, steps: list[Write]) -> Tree:
         else:
             draft.put(step.path, step.value)
     return draft.root
-
-
-def _order(write: Write) -> tuple[int, str, Path]:
-    return write.order

@@ -1,9 +1,12 @@
-"""Names of parameters: as people write them, as paths in the tree, as Zenoh keys.
+"""Parameter names: as people write them, as paths in the tree, and as Zenoh keys.
 
-A path is the tuple of a global name's parts; the root is the empty one. Parts may hold whatever
-YAML keys may (spaces, ``*``, ``?``, ``#``, unicode), for ROS 1's parameter names are looser than
-its graph names. Zenoh's keys are not, so there a part's forbidden characters are written as the
-``%XX`` of their UTF-8 bytes.
+A path is the tuple of the parts of a global name; the root is the empty tuple. Parts may hold
+whatever YAML keys may hold (spaces, ``*``, ``?``, ``#``, unicode), because ROS 1's parameter names
+are looser than its graph names. Zenoh's keys are not: there, each forbidden character of a part is
+written as ``%XX`` for each of its UTF-8 bytes.
+
+Inside the store names are paths. Text becomes a path where it comes in (`split`), and a path
+becomes text where people or the network see it (`joined`, `rosz.params.wire.join_path`).
 """
 
 from __future__ import annotations
@@ -20,13 +23,13 @@ __all__ = (
     "ROOT",
     "Path",
     "climb",
-    "common",
+    "common_path",
     "from_key",
     "joined",
-    "parent",
     "resolve",
     "split",
     "to_key",
+    "to_path",
 )
 
 Path = tuple[str, ...]
@@ -37,10 +40,10 @@ _ESCAPED: Final = re.compile(rb"%([0-9A-F]{2})")
 
 
 def split(name: str) -> Path:
-    """Return the path of a global name; empty parts count for nothing.
+    """Return the path of a global name; empty parts are ignored.
 
     Raises:
-        InvalidName: The name holds a character that no text can, or is not global.
+        InvalidName: The name is not global, or holds half of a surrogate pair.
     """
     if not name.startswith("/"):
         raise InvalidName(name, "it is not global; expected it to start with '/'")
@@ -50,18 +53,22 @@ def split(name: str) -> Path:
     return tuple(part for part in name.split("/") if part)
 
 
+def to_path(name: str | Path) -> Path:
+    """Return the path of a name that is given as global name or as path.
+
+    Raises:
+        InvalidName: The name is not global, or holds half of a surrogate pair.
+    """
+    return split(name) if isinstance(name, str) else name
+
+
 def joined(path: Path) -> str:
-    """Return the global name of a path; the root's is ``/``."""
+    """Return the global name of a path; the name of the root is ``/``."""
     return "/" + "/".join(path)
 
 
-def parent(path: Path) -> Path:
-    """Return the path one level up; the root's is the root."""
-    return path[:-1]
-
-
-def common(paths: Iterable[Path]) -> Path:
-    """Return the longest path that all of some lie at or below; the root's, if there are none."""
+def common_path(paths: Iterable[Path]) -> Path:
+    """Return the longest path that all paths lie at or below; the root if there are no paths."""
     found = list(paths)
     if not found:
         return ROOT
@@ -75,15 +82,15 @@ def common(paths: Iterable[Path]) -> Path:
 def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> str:
     """Resolve a parameter name as a node sees it, then apply the node's remappings.
 
-    The rules are those of graph names, but any character may occur.
+    The rules are those of graph names, except that any character is allowed.
 
     Args:
-        name: Global, relative or private; the empty one means the node's namespace.
+        name: Global, relative or private name; the empty name means the node's namespace.
         node: Full name of the node.
-        remaps: Resolved name to resolved name.
+        remaps: New name of each remapped name, both resolved.
 
     Raises:
-        InvalidName: The name holds a character that no text can.
+        InvalidName: The name holds half of a surrogate pair.
     """
     reason = unsound_text(name)
     if reason:
@@ -102,24 +109,25 @@ def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> st
 def climb(name: str, node: str, exists: Callable[[str], bool]) -> str | None:
     """Search for a parameter from a node's own name upwards, as ROS 1's ``searchParam`` does.
 
-    Only the first part of the name has to exist: what follows it is taken to belong there.
+    Only the first part of the name has to exist; the other parts are taken to belong there.
 
     Args:
-        name: Relative name, or a global one, which is only looked up.
+        name: Relative name, or a global name, which is only looked up.
         node: Full name of the node to start at.
-        exists: Tells whether a global name is set.
+        exists: Function that tells whether a global name is set.
 
     Returns:
         The global name found, or ``None``.
 
     Raises:
         ParamError: The name is empty or private.
+        InvalidName: The name holds half of a surrogate pair.
     """
-    parts = [part for part in name.split("/") if part]
-    if not parts or name.startswith("~"):
+    parts = () if name.startswith("~") else split(f"/{name}")
+    if not parts:
         raise ParamError(f"cannot search for '{name}'; expected a relative or global name")
     if name.startswith("/"):
-        found = names.canonical(name)
+        found = joined(parts)
         return found if exists(found) else None
     spaces = [part for part in node.split("/") if part]
     for depth in range(len(spaces), -1, -1):
@@ -130,7 +138,7 @@ def climb(name: str, node: str, exists: Callable[[str], bool]) -> str | None:
 
 
 def to_key(path: Path) -> str:
-    """Return a path as chunks of a Zenoh key; the root's is empty."""
+    """Return a path as chunks of a Zenoh key; the root is the empty text."""
     return "/".join(_FORBIDDEN.sub(_escape, part) for part in path)
 
 
@@ -138,7 +146,7 @@ def from_key(key: str) -> Path:
     """Return the path that `to_key` wrote.
 
     Raises:
-        DecodeError: The key is not of that form; two keys must never mean one parameter.
+        DecodeError: `to_key` does not write this key; two keys must never mean one parameter.
     """
     if not key:
         return ROOT

@@ -1,6 +1,7 @@
-"""The parameter store for those who are no replicas: they ask one.
+"""The parameter store for a process without a replica, which asks the replicas of others.
 
-Who only reads loads nothing of a replica, which takes longer than to ask.
+A command that only reads does not load the modules of a replica, because that takes longer than its
+request.
 """
 
 from __future__ import annotations
@@ -10,38 +11,35 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
 from rosz.errors import DecodeError, NoReplica, ParamError, ParamNotFound, WaitTimeout
-from rosz.params.keys import Keys, Member
-from rosz.params.merge import Change, condense, spread
 from rosz.params.paths import joined, split
 from rosz.params.values import Value, normalise
-from rosz.params.wire import Answer, Batch, Question, decode, encode
-from rosz.params.writes import DELETED
+from rosz.params.wire import Batch, ClientReply, ClientRequest, Keys, Member, decode, encode
+from rosz.params.writes import DELETED, Change, condense, spread
 from rosz.session import Session, Stamp, clamp_timeout
 
 if TYPE_CHECKING:
-    from rosz.params.replica import Outcome
-    from rosz.params.replica.follower import Follower
+    from rosz.params.replica import Follower, Outcome
 
 __all__ = ("ParamClient",)
 
-_TOKENS_BY: Final = 2.0
-_PATIENCE: Final = 1.0
+_TOKENS_TIMEOUT: Final = 2.0
+_REPLY_TIMEOUT: Final = 1.0
 """Seconds after which the next replica is asked."""
 
-_JOINING_POLL: Final = 0.02
+_JOINING_PAUSE: Final = 0.02
 
 
 class ParamClient:
     """Reads and writes parameters through the replicas of others.
 
     Args:
-        session: The network; stays open.
-        domain: The ROS domain.
-        origin: Who writes, for people; this process when not given.
-        timeout: Seconds for each call.
+        session: Session of the client; it stays open.
+        domain: ROS domain.
+        origin: Writer, as shown to people; this process by default.
+        timeout: Time limit in seconds of each call.
 
     Raises:
-        UsageError: The timeout is no number.
+        UsageError: The timeout is not a number.
     """
 
     def __init__(
@@ -59,22 +57,22 @@ class ParamClient:
         """Return the value of a global name.
 
         Raises:
-            ParamNotFound: It is not set.
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            ParamNotFound: The parameter is not set.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
-        return normalise(self._ask(Question("get", joined(split(name)))).value)
+        return normalise(self._get(name).value)
 
     def origin(self, name: str) -> str:
-        """Return who set the value of a global name; the errors are those of `get`."""
-        return self._ask(Question("get", joined(split(name)))).origin
+        """Return the writer of the value of a global name; the errors are those of `get`."""
+        return self._get(name).origin
 
     def has(self, name: str) -> bool:
         """Tell whether a global name is set.
 
         Raises:
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
         try:
             self.get(name)
@@ -83,34 +81,34 @@ class ParamClient:
         return True
 
     def names(self) -> list[str]:
-        """Return the global names of all that is set and no dict, sorted.
+        """Return the sorted global names of all parameters that are not dicts.
 
         Raises:
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
-        return [str(name) for name in self._ask(Question("names")).value]
+        return [str(name) for name in self._request(ClientRequest("names")).value]
 
     def search(self, name: str, node: str = "/") -> str | None:
-        """Search for a name from a node's own upwards; return the global name found.
+        """Search for a name from a node's own name upwards; return the global name found.
 
         Raises:
             ParamError: The name is empty or private.
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
         try:
-            return str(self._ask(Question("search", name, node)).value)
+            return str(self._request(ClientRequest("search", name, node)).value)
         except ParamNotFound:
             return None
 
     def set(self, name: str, value: object) -> Outcome:
-        """Set a global name; a dict replaces all that was below it.
+        """Set a global name; a dict replaces everything below it.
 
         Raises:
-            ParamError: The value is none, or the root is to be no dict.
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            ParamError: A parameter cannot hold the value, or the root would not be a dict.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
         return self.write([(split(name), normalise(value, name))])
 
@@ -118,122 +116,129 @@ class ParamClient:
         """Set a global name as ROS 1's command line does: a dict leaf by leaf, as one change.
 
         Raises:
-            ParamError: The value is none, or the root is to be no dict.
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            ParamError: A parameter cannot hold the value, or the root would not be a dict.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
         return self.write(condense(spread(name, normalise(value, name))))
 
     def delete(self, name: str) -> Outcome:
-        """Delete a global name and all below it; the root is only emptied.
+        """Delete a global name and everything below it; the root is only emptied.
 
         Raises:
-            ParamNotFound: It is not set.
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            ParamNotFound: The parameter is not set.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
         path = split(name)
         if not path:
             return self.write([(path, {})])
-        self._ask(Question("get", joined(path)))
+        self._get(name)
         return self.write([(path, DELETED)])
 
     def write(self, changes: Iterable[Change]) -> Outcome:
-        """Make a batch of changes, which every replica applies as one.
+        """Write a batch, which every replica applies as one change.
 
         Args:
-            changes: Paths with values already normalised, or `DELETED`, as `condense` returns them.
+            changes: Paths with normalised values or `DELETED`, as `condense` returns them.
 
         Raises:
-            ParamError: A change has no meaning in the tree; nothing has changed then.
-            NoReplica: Nobody holds the store.
-            WaitTimeout: Those who hold it do not answer.
+            ParamError: The tree cannot hold a change; nothing is changed then.
+            NoReplica: There is no replica.
+            WaitTimeout: No replica answers.
         """
-        from rosz.params.replica import ACKNOWLEDGED_BY, Outcome, process_label
+        from rosz.params.replica import ACK_TIMEOUT, Outcome, process_label
 
         batch = list(changes)
         if not batch:
-            self._look()
+            self._find_members()
             return Outcome(0)
-        seen = self._ask(Question("stamp")).value
+        seen = self._request(ClientRequest("stamp")).value
         if type(seen) is not int:
             raise DecodeError("answer about parameters", -1, f"{seen!r}, expected a stamp")
         self._session.clock.observe(Stamp(seen, ""))
         stamp = self._session.stamp()
         message = Batch.of((stamp.time, stamp.id), self._origin or process_label(), batch)
-        patience = min(ACKNOWLEDGED_BY, self._timeout)
-        answer = self._ask(Question("write", batch=message, timeout=patience), batch)
-        return Outcome(stamp.time, tuple(answer.slow))
+        timeout = min(ACK_TIMEOUT, self._timeout)
+        reply = self._request(ClientRequest("write", batch=message, timeout=timeout), batch)
+        return Outcome(stamp.time, tuple(reply.slow))
 
     def follow(self) -> Follower:
-        """Return a copy of the store that stays up to date, for reading and watching; close it.
+        """Return a copy of the store that stays up to date, for reading and watching.
+
+        Close it after use.
 
         Raises:
-            NoReplica: Nobody holds the store.
+            NoReplica: There is no replica.
         """
-        from rosz.params.replica.follower import Follower
+        from rosz.params.replica import Follower
 
-        return Follower(self._session, self._domain, _TOKENS_BY)
+        return Follower(self._session, self._domain, _TOKENS_TIMEOUT)
 
     @property
     def silent(self) -> list[str]:
-        """What people call the replicas that were asked and did not answer in time."""
+        """The replicas that were asked and did not answer in time, as shown to people."""
         return sorted(member.label for member in self._silent.values())
 
-    def _look(self) -> list[Member]:
-        tokens = self._session.live_tokens(self._keys.tokens, _TOKENS_BY)
+    def _get(self, name: str) -> ClientReply:
+        return self._request(ClientRequest("get", joined(split(name))))
+
+    def _find_members(self) -> list[Member]:
+        tokens = self._session.live_tokens(self._keys.tokens, _TOKENS_TIMEOUT)
         self._members = sorted(self._keys.member(token) for token in tokens)
         if not self._members:
-            from rosz.params.replica.follower import NOBODY
+            from rosz.params.replica import NO_REPLICA
 
-            raise NoReplica(NOBODY)
+            raise NoReplica(NO_REPLICA)
         return self._members
 
-    def _ask(self, question: Question, batch: Sequence[Change] = ()) -> Answer:
-        """Ask the replicas one after the other, those last that were asked in vain before.
+    def _request(self, request: ClientRequest, batch: Sequence[Change] = ()) -> ClientReply:
+        """Ask the replicas one after the other, last those that did not answer before.
 
         Args:
-            question: What to ask.
-            batch: What it writes, if it does.
+            request: Request to send.
+            batch: Batch in the request, if it writes.
         """
         deadline = time.monotonic() + self._timeout
-        data = encode(question)
-        patience = question.timeout + _PATIENCE
+        payload = encode(request)
+        timeout = request.timeout + _REPLY_TIMEOUT
         while True:
             stopped = self._session.out_of_reach()
             for member in sorted(
-                self._members or self._look(),
+                self._members or self._find_members(),
                 key=lambda one: (one.zid in stopped, one.zid in self._silent),
             ):
-                answer = self._ask_one(self._key(member, batch), member, data, patience)
-                if answer is not None and answer.status != "joining":
-                    return _checked(question, answer)
+                reply = self._request_from(member, self._key(member, batch), payload, timeout)
+                if reply is not None and reply.status != "joining":
+                    return _checked(request, reply)
                 if time.monotonic() >= deadline:
                     who = ", ".join(self.silent) or "those there are have not joined yet"
                     if self._session.secured:
                         who += "; or the rules beside their keys do not allow it"
                     raise WaitTimeout("answer about parameters", self._timeout, f"asked: {who}")
             self._members = []
-            time.sleep(_JOINING_POLL)
+            time.sleep(_JOINING_PAUSE)
 
     def _key(self, member: Member, batch: Sequence[Change]) -> str:
         if not batch:
             return self._keys.ask(member.zid)
-        return self._keys.reaching(self._keys.set(member.zid), (path for path, _ in batch))
+        return self._keys.scope(self._keys.set(member.zid), (path for path, _ in batch))
 
-    def _ask_one(self, key: str, member: Member, data: bytes, patience: float) -> Answer | None:
-        replies = self._session.get(key, payload=data, timeout=patience)
+    def _request_from(
+        self, member: Member, key: str, payload: bytes, timeout: float
+    ) -> ClientReply | None:
+        replies = self._session.get(key, payload=payload, timeout=timeout)
         for reply in replies:
             if reply.ok:
-                return decode(reply.payload, Answer)
-        if replies:  # an error in place of an answer: the time is over; nothing at all: it is gone
+                return decode(reply.payload, ClientReply)
+        if replies:  # an error reply means that the time is over; no reply, that it is gone
             self._silent[member.zid] = member
         return None
 
 
-def _checked(question: Question, answer: Answer) -> Answer:
-    if answer.status == "missing":
-        raise ParamNotFound(question.name, answer.value if isinstance(answer.value, list) else ())
-    if answer.status != "ok":
-        raise ParamError(answer.text)
-    return answer
+def _checked(request: ClientRequest, reply: ClientReply) -> ClientReply:
+    if reply.status == "missing":
+        raise ParamNotFound(request.name, reply.value if isinstance(reply.value, list) else ())
+    if reply.status != "ok":
+        raise ParamError(reply.text)
+    return reply

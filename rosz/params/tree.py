@@ -1,25 +1,31 @@
-"""The tree of parameters, by ROS 1's rules, as dicts that never change once seen.
+"""The tree of parameters, by ROS 1's rules, as dicts that do not change once they are visible.
 
-A root handed out is never written to: a `Draft` copies each dict on its way down the first time it
-changes it. So readers need no lock, and a batch becomes visible as one change when its root does.
+A root that was handed out is never written to: a `Draft` copies each dict on the way down the first
+time that it changes it. So readers need no lock, and a batch becomes visible as one change, when
+its root does.
 """
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final, Literal
 
-from rosz.params.paths import Path
+import msgspec
+
+from rosz.params.paths import Path, joined
 from rosz.params.values import Value
+from rosz.params.writes import DELETED, Change, check_write
 
 __all__ = (
     "MISSING",
+    "Difference",
     "Draft",
     "Missing",
     "Tree",
     "leaves",
     "lookup",
+    "preview",
     "with_delete",
     "with_put",
 )
@@ -28,7 +34,7 @@ Tree = dict[str, Value]
 
 
 class Missing(enum.Enum):
-    """What `lookup` returns where nothing is set."""
+    """The type of `MISSING`."""
 
     MISSING = "missing"
 
@@ -37,10 +43,14 @@ class Missing(enum.Enum):
 
 
 MISSING: Final[Literal[Missing.MISSING]] = Missing.MISSING
+"""The value that `lookup` returns where nothing is set."""
 
 
 def lookup(root: Value, path: Path) -> Value | Missing:
-    """Return the value at a path, or `MISSING`; it belongs to the tree, so do not change it."""
+    """Return the value at a path, or `MISSING`.
+
+    The value belongs to the tree and must not be changed.
+    """
     node = root
     try:
         for part in path:
@@ -51,7 +61,7 @@ def lookup(root: Value, path: Path) -> Value | Missing:
 
 
 def leaves(value: Value, path: Path = ()) -> Iterator[tuple[Path, Value]]:
-    """Yield what is set below a value: all that is no dict; an empty dict has nothing."""
+    """Yield the path and value of everything below a value that is not a dict."""
     if type(value) is not dict:
         yield path, value
         return
@@ -60,7 +70,7 @@ def leaves(value: Value, path: Path = ()) -> Iterator[tuple[Path, Value]]:
 
 
 def with_put(root: Tree, path: Path, value: Value) -> Tree:
-    """Return a tree with a value set: what is there goes, and all above becomes dicts."""
+    """Return a tree with a value set: it replaces what is there, and all above become dicts."""
     if not path:
         return dict(value)
     changed, parent = _opened(root, path)
@@ -69,14 +79,14 @@ def with_put(root: Tree, path: Path, value: Value) -> Tree:
 
 
 def with_delete(root: Tree, path: Path) -> Tree:
-    """Return a tree without what is at a path; all above becomes dicts, and stays when empty."""
+    """Return a tree without a path: all above become dicts, and stay even if empty."""
     changed, parent = _opened(root, path)
     parent.pop(path[-1], None)
     return changed
 
 
 def _opened(root: Tree, path: Path) -> tuple[Tree, Tree]:
-    """Return a copy of a tree that may be changed at a path, and the dict to change there."""
+    """Return a copy of a tree that may be changed at a path, and the dict to change."""
     changed = node = root.copy()
     for part in path[:-1]:
         below = node.get(part)
@@ -86,13 +96,13 @@ def _opened(root: Tree, path: Path) -> tuple[Tree, Tree]:
 
 
 class Draft:
-    """Many changes of a tree in the making, which copy each dict but once.
+    """A tree that is being changed many times; each dict is copied only once.
 
     Args:
-        root: The tree to start from; it stays as it is.
+        root: Tree to start from; it is not changed.
 
     Attributes:
-        root: The tree as changed so far.
+        root: Tree with the changes made so far.
     """
 
     def __init__(self, root: Tree) -> None:
@@ -100,14 +110,14 @@ class Draft:
         self._own: dict[int, Tree] = {}
 
     def put(self, path: Path, value: Value) -> None:
-        """Set a value: what is there goes, and all above becomes dicts."""
+        """Set a value: it replaces what is there, and all above become dicts."""
         if path:
             self._parent(path)[path[-1]] = value
         else:
             self.root = value
 
     def delete(self, path: Path) -> None:
-        """Delete what is at a path; all above becomes dicts, and stays when empty."""
+        """Delete a path: all above become dicts, and stay even if empty."""
         self._parent(path).pop(path[-1], None)
 
     def _parent(self, path: Path) -> Tree:
@@ -125,3 +135,43 @@ class Draft:
     def _new(self, node: Tree) -> Tree:
         self._own[id(node)] = node
         return node
+
+
+class Difference(msgspec.Struct, frozen=True):
+    """One parameter that a batch would change.
+
+    Attributes:
+        name: Global name.
+        old: Value now; ``None`` if it is not set.
+        new: Value after the batch; ``None`` if it would be deleted.
+    """
+
+    name: str
+    old: Value | None
+    new: Value | None
+
+
+def preview(root: Tree, changes: Iterable[Change]) -> list[Difference]:
+    """Return what a batch would change, sorted by name.
+
+    Args:
+        root: Tree before the batch; it is not changed.
+        changes: Batch, as `condense` returns it.
+
+    Raises:
+        ParamError: The tree cannot hold a change.
+    """
+    draft = Draft(root)
+    for path, value in changes:
+        check_write(path, value)
+        if value is DELETED:
+            draft.delete(path)
+        else:
+            draft.put(path, value)
+    old = {joined(path): value for path, value in leaves(root) if path}
+    new = {joined(path): value for path, value in leaves(draft.root) if path}
+    return [
+        Difference(name, old.get(name), new.get(name))
+        for name in sorted(old.keys() | new.keys())
+        if repr(old.get(name)) != repr(new.get(name))
+    ]

@@ -1,8 +1,8 @@
-"""What a parameter may hold, and what it may not.
+"""The values that a parameter can hold.
 
-ROS 1's values, without XML-RPC's limits: bool, int (64 bit), float, str, list (mixed, nested),
-dict with str keys, bytes, and timestamps (``datetime.datetime``, ``datetime.date``). ``None`` is no
-value, as in ROS 1: a parameter that is not to be set is deleted.
+They are ROS 1's values without the limits of XML-RPC: bool, int (64 bit), float, str, list (mixed,
+nested), dict with str keys, bytes, and timestamps (``datetime.datetime``, ``datetime.date``).
+``None`` is not a value, as in ROS 1: delete a parameter that shall not be set.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ __all__ = (
     "convert",
     "copy",
     "normalise",
+    "normalise_at",
     "type_name",
     "unsound_text",
 )
 
 Value = Any
-"""A parameter's value: one of the types above, nested at most `MAX_DEPTH` deep."""
+"""The value of a parameter: one of the types above, nested at most `MAX_DEPTH` deep."""
 
 MAX_DEPTH: Final = 100
-"""Levels of lists and dicts in one value; also what stops a value that contains itself."""
+"""Levels of lists and dicts in one value; the limit also stops a value that contains itself."""
 
 _LOWEST: Final = -(1 << 63)
 _HIGHEST: Final = (1 << 63) - 1
@@ -47,21 +48,27 @@ _EXPECTED: Final = "expected bool, int, float, str, list, dict, bytes or a times
 
 
 class _RefusedError(Exception):
-    """A part of a value that cannot be kept; the way to it grows as the error climbs."""
+    """A part of a value is refused; the trail to it grows while the exception propagates."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
         self.trail: list[str] = []
         super().__init__(reason)
 
+    def error(self, name: str) -> ParamError:
+        """Return the error for a parameter of this name."""
+        start = f"'{name}' cannot be set: " if name else ""
+        inside = f"at {''.join(reversed(self.trail))}: " if self.trail else ""
+        return ParamError(f"{start}{inside}{self.reason}")
+
 
 def type_name(value: object) -> str:
-    """Return what a value's type is called in messages: ``int``, ``timestamp``, ``null`` …."""
+    """Return the name of a value's type in messages, such as ``int``, ``timestamp`` or ``null``."""
     return _NAMES.get(type(value), type(value).__name__)
 
 
 def unsound_text(text: str) -> str:
-    """Say which character keeps a text from being written as UTF-8; empty where none does."""
+    """Return why a text cannot be written as UTF-8, or an empty text if it can."""
     if text.isascii():
         return ""
     try:
@@ -75,26 +82,32 @@ def unsound_text(text: str) -> str:
 def normalise(value: object, name: str = "") -> Value:
     """Return a private copy of a value in the store's own types.
 
-    Tuples become lists, subclasses their base, and whatever has ``tolist`` (numpy scalars and
-    arrays, ``array.array``) what that returns.
+    Tuples become lists, and instances of subclasses become instances of the base class. Objects
+    with a ``tolist`` method (numpy scalars and arrays, ``array.array``) become what it returns.
 
     Args:
-        value: What somebody wants to set.
-        name: The parameter's name, for the message.
+        value: Value to set.
+        name: Name of the parameter, for the error message.
 
     Raises:
-        ParamError: It, or something in it, is no parameter value; the message names the place.
+        ParamError: A parameter cannot hold the value, or a part of it; the message names the place.
     """
     try:
         return _normalise(value, 0)
     except _RefusedError as refused:
-        start = f"'{name}' cannot be set: " if name else ""
-        inside = f"at {''.join(reversed(refused.trail))}: " if refused.trail else ""
-        raise ParamError(f"{start}{inside}{refused.reason}") from None
+        raise refused.error(name) from None
+
+
+def normalise_at(path: tuple[str, ...], value: object) -> Value:
+    """Return a value for a path, as `normalise` does for a name."""
+    try:
+        return _normalise(value, 0)
+    except _RefusedError as refused:
+        raise refused.error(f"/{'/'.join(path)}") from None
 
 
 def copy(value: Value) -> Value:
-    """Return a value that shares nothing mutable with the one given."""
+    """Return a deep copy of a value."""
     kind = type(value)
     if kind is dict:
         return {key: copy(item) for key, item in value.items()}
@@ -104,18 +117,18 @@ def copy(value: Value) -> Value:
 
 
 def convert(value: Value, wanted: type, name: str, origin: str) -> Value:
-    """Return a value as the type that its reader asked for.
+    """Return a value as the type that its reader expects.
 
-    An int is a float where a float is asked for, as in ROS 1; nothing else is converted.
+    An int becomes a float where a float is expected, as in ROS 1; nothing else is converted.
 
     Args:
-        value: What is set.
-        wanted: One of the store's types.
-        name: The parameter's name, for the message.
-        origin: Who set it, for the message.
+        value: Value that is set.
+        wanted: Type of the store's own types.
+        name: Name of the parameter, for the error message.
+        origin: Writer of the value, for the error message.
 
     Raises:
-        ParamError: It has another type, or ``wanted`` is no type of parameters.
+        ParamError: The value has another type, or no parameter has the wanted type.
     """
     kind = type(value)
     if kind is wanted:
@@ -193,10 +206,10 @@ def _sequence(value: list[Any] | tuple[Any, ...], depth: int) -> list[Value]:
 
 
 def _unusual(value: Any, depth: int) -> Value:
-    """Take what is no plain value of the store but can be made one without loss."""
+    """Convert an object that is not one of the store's types but becomes one without loss."""
     if value is None:
         raise _RefusedError(
-            "null is no parameter value; delete the parameter, or set '' or {} instead"
+            "null is not a parameter value; delete the parameter, or set '' or {} instead"
         )
     for base, convert_from in _BASES:
         if isinstance(value, base):
@@ -204,11 +217,11 @@ def _unusual(value: Any, depth: int) -> Value:
     to_list = getattr(value, "tolist", None)
     if callable(to_list):
         return _normalise(to_list(), depth + 1)
-    raise _RefusedError(f"a {type(value).__name__} is no parameter value; {_EXPECTED}")
+    raise _RefusedError(f"a {type(value).__name__} is not a parameter value; {_EXPECTED}")
 
 
 def _moment(value: dt.datetime) -> dt.datetime:
-    # A zone by name would not survive the way to another process; its offset does.
+    # The name of a time zone is lost on the way to another process; its offset is not.
     return dt.datetime.fromisoformat(value.isoformat())
 
 

@@ -1,7 +1,41 @@
-"""What replicas say to each other, in msgpack.
+"""Keys and messages of the parameter store on the network.
 
-Whatever bytes arrive become a message or a `DecodeError`; values in them have been through the same
-rules as values that a program sets.
+The protocol between replicas, and between a replica and its clients:
+
+- **Write.** The writer applies a batch itself, then publishes it on ``change``, behind a header
+  with its session and a number. Every replica that has applied it (and stored it, if it has
+  storage) publishes an **acknowledgement**, that number and its own session, on ``ack`` of the
+  writer. A replica that does not acknowledge in time is sent the batch once more as a query on its
+  ``write`` key (the barrier query), whose reply is the acknowledgement.
+- **Exchange of differences.** A replica sends another its **digest** on the ``sync`` key of the
+  other. If the digests differ, it sends the index (path and stamp) of its writes in the buckets
+  that differ. The reply holds the writes that it lacks, and the paths of the writes that the other
+  lacks, which it then sends on the ``tell`` key. A replica that joins has the empty digest, and
+  gets all writes in the first reply. Deletions are writes as well (**tombstones**).
+- **Clients.** A process that has no replica reads on the ``ask`` key of a replica, and writes on
+  its ``set`` key, with a stamp of its own.
+
+Under ``@rosz/<domain>/``::
+
+    param/<path>                 one key for each parameter: msgpack of the value, or deleted
+    change[/<path>]              batches that replicas publish to each other
+    ack/<zid>                    acknowledgements to the writer of that session
+    store/<zid>/write[/<path>]   query to one replica: a batch that it has not acknowledged
+    store/<zid>/sync             query to one replica: a digest, or the index of some buckets
+    store/<zid>/tell[/<path>]    query to one replica: writes that it lacks
+    store/<zid>/ask              query to one replica: read for a client
+    store/<zid>/set[/<path>]     query to one replica: write for a client
+    replica/<zid>/<start>/<who>  liveliness token of a replica
+
+Where links need keys, the key of a write names a path that all of the write lies at or below, so
+that rules can tell who may write what. A replica accepts no write that reaches further than its
+key.
+
+The keys under ``param`` are for other Zenoh programs, such as storages. Replicas write them only
+while somebody subscribes to them.
+
+Messages are msgpack. Bytes that arrive become a message or a `DecodeError`, and values in a message
+have passed the same checks as values that a program sets.
 """
 
 from __future__ import annotations
@@ -14,47 +48,185 @@ from typing import Any, Final, TypeVar
 import msgspec
 
 from rosz.errors import DecodeError, ParamError
-from rosz.params.merge import Change
-from rosz.params.paths import Path, joined
-from rosz.params.tree import MISSING
+from rosz.params.paths import Path, common_path, from_key, joined, to_key
 from rosz.params.values import Value, normalise
-from rosz.params.writes import DELETED, Write, delete, put
+from rosz.params.writes import DELETED, Change, Write, delete, put
+from rosz.wire import own_key
 
 __all__ = (
-    "Answer",
     "Batch",
+    "ClientReply",
+    "ClientRequest",
     "Index",
-    "Question",
+    "Keys",
+    "Member",
     "Record",
-    "Sync",
-    "SyncAnswer",
+    "SyncReply",
+    "SyncRequest",
+    "add_header",
+    "check_reach",
     "decode",
     "decode_value",
     "encode",
     "encode_value",
     "join_path",
-    "packed",
-    "seal",
+    "pack_value",
+    "read_header",
     "split_path",
-    "unseal",
 )
 
 _MOMENT: Final = 1
 _DATE: Final = 2
 _PLAIN: Final = frozenset({bool, int, float, str, bytes})
-
-_HEAD: Final = struct.Struct("<QB")
+_HEADER: Final = struct.Struct("<QB")
 
 _Message = TypeVar("_Message", bound=msgspec.Struct)
+
+
+class Member(msgspec.Struct, frozen=True, order=True):
+    """A replica, as described by its liveliness token; a younger replica is greater.
+
+    Attributes:
+        start: Time when it started, by its own clock, in nanoseconds.
+        zid: Zenoh id of its session.
+        label: Process, as shown to people.
+    """
+
+    start: int
+    zid: str
+    label: str
+
+
+class Keys:
+    """The keys of one domain.
+
+    Args:
+        domain: ROS domain.
+        scoped: Whether the key of a write names the path that the write lies at or below.
+
+    Attributes:
+        scoped: The argument.
+        params: Key of the root parameter.
+        all_params: Key expression of all parameters, including the root.
+        change: Key of batches, without a path.
+        tokens: Key expression of the liveliness tokens of all replicas.
+    """
+
+    def __init__(self, domain: int, *, scoped: bool = False) -> None:
+        self.scoped = scoped
+        self.params = own_key(domain, "param")
+        self.all_params = f"{self.params}/**"
+        self.change = own_key(domain, "change")
+        self.tokens = own_key(domain, "replica", "**")
+        self._domain = domain
+
+    def param(self, path: Path) -> str:
+        """Return the key of a parameter."""
+        return f"{self.params}/{to_key(path)}" if path else self.params
+
+    def path(self, key: str) -> Path:
+        """Return the path of the parameter with a key.
+
+        Raises:
+            DecodeError: The key is not the key of a parameter.
+        """
+        return _path_below(key, self.params, self.all_params)
+
+    def ack(self, zid: str) -> str:
+        """Return the key of the acknowledgements to one writer."""
+        return own_key(self._domain, "ack", zid)
+
+    def write(self, zid: str) -> str:
+        """Return the key of batches that one replica has not acknowledged."""
+        return own_key(self._domain, "store", zid, "write")
+
+    def sync(self, zid: str) -> str:
+        """Return the key on which one replica compares itself with others."""
+        return own_key(self._domain, "store", zid, "sync")
+
+    def tell(self, zid: str) -> str:
+        """Return the key on which one replica receives writes that it lacks."""
+        return own_key(self._domain, "store", zid, "tell")
+
+    def ask(self, zid: str) -> str:
+        """Return the key on which one replica reads for clients."""
+        return own_key(self._domain, "store", zid, "ask")
+
+    def set(self, zid: str) -> str:
+        """Return the key on which one replica writes for clients."""
+        return own_key(self._domain, "store", zid, "set")
+
+    def scope(self, key: str, paths: Iterable[Path]) -> str:
+        """Return the key for a write of some paths: with their common path if keys are scoped."""
+        if not self.scoped:
+            return key
+        reach = to_key(common_path(paths))
+        return f"{key}/{reach}" if reach else key
+
+    def reach(self, key: str, base: str) -> Path:
+        """Return the path that the key of a write names.
+
+        Args:
+            key: Key that the write arrived on.
+            base: Start of the key.
+
+        Raises:
+            DecodeError: The key does not start with ``base``, or names no path.
+        """
+        return _path_below(key, base, f"{base}/**")
+
+    def token(self, member: Member) -> str:
+        """Return the liveliness token of a replica."""
+        label = to_key((member.label or "-",))
+        return own_key(self._domain, "replica", member.zid, str(member.start), label)
+
+    def member(self, token: str) -> Member:
+        """Return the replica that a liveliness token describes.
+
+        Raises:
+            DecodeError: The text is not the token of a replica.
+        """
+        head = own_key(self._domain, "replica") + "/"
+        chunks = token.removeprefix(head).split("/")
+        if not token.startswith(head) or len(chunks) != 3 or not chunks[1].isdecimal():  # noqa: PLR2004  # zid, start, label
+            raise DecodeError(
+                "replica token", 0, f"'{token}', expected '{head}<zid>/<start>/<who>'"
+            )
+        return Member(int(chunks[1]), chunks[0], joined(from_key(chunks[2]))[1:])
+
+
+def _path_below(key: str, base: str, expected: str) -> Path:
+    if key != base and not key.startswith(f"{base}/"):
+        raise DecodeError("parameter key", 0, f"'{key}', expected '{expected}'")
+    return from_key(key[len(base) + 1 :])
+
+
+def check_reach(paths: Iterable[Path], reach: Path) -> None:
+    """Refuse a write that reaches further than its key.
+
+    Args:
+        paths: Paths that are written.
+        reach: Path that the key names.
+
+    Raises:
+        DecodeError: A path does not lie at or below ``reach``.
+    """
+    if not reach:
+        return
+    for path in paths:
+        if path[: len(reach)] != reach:
+            raise DecodeError(
+                "parameter batch", -1, f"'{joined(path)}' on the key for '{joined(reach)}'"
+            )
 
 
 class Batch(msgspec.Struct, array_like=True):
     """Writes under one stamp.
 
     Attributes:
-        time: Nanoseconds.
-        clock: The clock that the time is of.
-        origin: Who made them, for people.
+        time: Time of the stamp in nanoseconds.
+        clock: Clock that gave the time.
+        origin: Writer, as shown to people.
         puts: Path and value of each put.
         deletions: Path of each deletion.
     """
@@ -73,14 +245,14 @@ class Batch(msgspec.Struct, array_like=True):
             if value is DELETED:
                 batch.deletions.append(join_path(path))
             else:
-                batch.puts.append((join_path(path), packed(value)))
+                batch.puts.append((join_path(path), pack_value(value)))
         return batch
 
     def writes(self) -> list[Write]:
         """Return the writes.
 
         Raises:
-            DecodeError: A value or path in it is none.
+            DecodeError: The store cannot hold a value or path in the message.
         """
         stamp = _stamp(self.time, self.clock)
         origin = self.origin
@@ -96,7 +268,15 @@ class Batch(msgspec.Struct, array_like=True):
 
 
 class Record(msgspec.Struct, array_like=True):
-    """One write as it is kept; the value is left out of a deletion."""
+    """One write.
+
+    Attributes:
+        path: Path that is written.
+        time: Time of the stamp in nanoseconds.
+        clock: Clock that gave the time.
+        origin: Writer, as shown to people.
+        value: One value, or nothing for a deletion.
+    """
 
     path: str
     time: int
@@ -107,14 +287,14 @@ class Record(msgspec.Struct, array_like=True):
     @classmethod
     def of(cls, write: Write) -> Record:
         """Return the record of a write."""
-        value = [] if write.value is DELETED else [packed(write.value)]
+        value = [] if write.value is DELETED else [pack_value(write.value)]
         return cls(join_path(write.path), write.time, write.clock, write.origin, value)
 
     def write(self) -> Write:
         """Return the write.
 
         Raises:
-            DecodeError: The value or path is none.
+            DecodeError: The store cannot hold the value or path.
         """
         stamp = _stamp(self.time, self.clock)
         path = split_path(self.path)
@@ -127,19 +307,19 @@ class Record(msgspec.Struct, array_like=True):
 
 
 class Index(msgspec.Struct, array_like=True):
-    """The writes of some buckets of a digest, without their values."""
+    """Path, time and clock of the writes in some buckets of a digest."""
 
     buckets: list[int]
     entries: list[tuple[str, int, str]]
 
 
-class Sync(msgspec.Struct, omit_defaults=True):
-    """What one replica tells another to find out, or settle, what differs between them.
+class SyncRequest(msgspec.Struct, omit_defaults=True):
+    """What one replica sends another to find their differences, or to settle them.
 
     Attributes:
-        digest: Of the asker's set of writes.
-        index: Of the asker's writes in the buckets that differ.
-        records: Writes that the other was found to lack.
+        digest: Digest of the sender's writes.
+        index: Index of the sender's writes in the buckets that differ.
+        records: Writes that the receiver lacks.
     """
 
     digest: bytes | None = None
@@ -147,14 +327,14 @@ class Sync(msgspec.Struct, omit_defaults=True):
     records: list[Record] = []
 
 
-class SyncAnswer(msgspec.Struct, omit_defaults=True):
-    """What it hears back.
+class SyncReply(msgspec.Struct, omit_defaults=True):
+    """The reply to a `SyncRequest`.
 
     Attributes:
-        digest: Of the other's set of writes.
-        ready: Whether the other has joined, or is itself still asking around.
-        records: Writes that the asker lacks.
-        wanted: Paths of writes that the other lacks.
+        digest: Digest of the responder's writes.
+        ready: Whether the responder has joined; if not, it is still asking others itself.
+        records: Writes that the sender of the request lacks.
+        wanted: Paths of writes that the responder lacks.
     """
 
     digest: bytes = b""
@@ -163,16 +343,16 @@ class SyncAnswer(msgspec.Struct, omit_defaults=True):
     wanted: list[str] = []
 
 
-class Question(msgspec.Struct, omit_defaults=True):
-    """What somebody who is no replica asks of one.
+class ClientRequest(msgspec.Struct, omit_defaults=True):
+    """What a process without a replica asks of one.
 
     Attributes:
         verb: ``get``, ``names``, ``search``, ``stamp`` or ``write``.
-        name: Global name, or the one searched for.
-        node: Where a search starts.
-        batch: What a write writes. Its stamp is the asker's own, so that it does no harm when two
-            replicas, or one of them much later, do it again.
-        timeout: Seconds to wait for the other replicas, for a write.
+        name: Global name, or the name to search for.
+        node: Name where a search starts.
+        batch: Batch to write. Its stamp is the client's own, so that it does no harm if two
+            replicas make the write, or one of them makes it much later.
+        timeout: Time in seconds that a write waits for the other replicas.
     """
 
     verb: str
@@ -182,14 +362,15 @@ class Question(msgspec.Struct, omit_defaults=True):
     timeout: float = 0.0
 
 
-class Answer(msgspec.Struct, omit_defaults=True):
-    """What it hears back.
+class ClientReply(msgspec.Struct, omit_defaults=True):
+    """The reply to a `ClientRequest`.
 
     Attributes:
-        status: ``ok``, ``missing`` (no such parameter), ``joining`` (ask another), ``refused``.
-        value: What was asked for.
-        text: Why not.
-        origin: Who set the value.
+        status: ``ok``, ``missing`` (no such parameter), ``joining`` (ask another replica) or
+            ``refused``.
+        value: Result; if the parameter is missing, the names in its namespace.
+        text: Reason if it is refused.
+        origin: Writer of the value, as shown to people.
         slow: Replicas that did not acknowledge a write in time.
     """
 
@@ -209,52 +390,54 @@ def decode(data: bytes | memoryview, kind: type[_Message]) -> _Message:
     """Return the message that bytes hold.
 
     Raises:
-        DecodeError: They hold none of that kind.
+        DecodeError: The bytes hold no message of this kind.
     """
     try:
         message: _Message = _DECODERS[kind].decode(data)
     except (msgspec.MsgspecError, RecursionError, ValueError) as error:
-        raise DecodeError(f"{kind.__name__.lower()} of parameters", -1, str(error)) from error
+        raise DecodeError(f"{kind.__name__} of parameters", -1, str(error)) from error
     return message
 
 
-def seal(sender: str, number: int, message: bytes) -> bytes:
-    """Put in front of a message who is to hear that it has arrived.
+def add_header(sender: str, number: int, message: bytes) -> bytes:
+    """Return a message behind the header that tells where to acknowledge it.
 
     Args:
-        sender: The session that sends it.
-        number: Which of its messages it is.
-        message: It.
+        sender: Zenoh id of the session that sends it.
+        number: Number of the message.
+        message: Encoded message.
     """
-    return _HEAD.pack(number, len(sender)) + sender.encode() + message
+    return _HEADER.pack(number, len(sender)) + sender.encode() + message
 
 
-def unseal(data: bytes) -> tuple[str, int, int]:
-    """Return sender and number of a message, and where it begins.
+def read_header(data: bytes) -> tuple[str, int, int]:
+    """Return the sender and the number of a message, and the offset where it begins.
 
     Raises:
-        DecodeError: The bytes are none.
+        DecodeError: The bytes do not start with a header.
     """
-    if len(data) < _HEAD.size or len(data) < _HEAD.size + data[_HEAD.size - 1]:
+    if len(data) < _HEADER.size or len(data) < _HEADER.size + data[_HEADER.size - 1]:
         raise DecodeError("message about parameters", 0, f"{len(data)} bytes, expected more")
-    number, length = _HEAD.unpack_from(data)
-    start = _HEAD.size + length
-    sender = data[_HEAD.size : start]
+    number, length = _HEADER.unpack_from(data)
+    start = _HEADER.size + length
+    sender = data[_HEADER.size : start]
     if not sender.isalnum():
-        raise DecodeError("message about parameters", _HEAD.size, f"{sender!r}, expected a session")
+        raise DecodeError(
+            "message about parameters", _HEADER.size, f"{sender!r}, expected a session"
+        )
     return sender.decode(), number, start
 
 
 def encode_value(value: Value) -> bytes:
-    """Return a value as the bytes under its key."""
-    return _ENCODER.encode(packed(value))
+    """Return the payload of a parameter's own key."""
+    return _ENCODER.encode(pack_value(value))
 
 
 def decode_value(data: bytes) -> Value:
-    """Return the value that the bytes under a key hold.
+    """Return the value that the payload of a parameter's own key holds.
 
     Raises:
-        DecodeError: They hold none.
+        DecodeError: The bytes hold no value.
     """
     try:
         return normalise(_ANY.decode(data))
@@ -263,15 +446,15 @@ def decode_value(data: bytes) -> Value:
 
 
 def join_path(path: Path) -> str:
-    """Return a path as it is sent."""
+    """Return a path as it is sent and stored."""
     return "/".join(path)
 
 
 def split_path(text: str) -> Path:
-    """Return the path that was sent.
+    """Return the path that `join_path` wrote.
 
     Raises:
-        DecodeError: It has an empty part.
+        DecodeError: The path has an empty part.
     """
     path = tuple(text.split("/")) if text else ()
     if "" in path:
@@ -279,15 +462,15 @@ def split_path(text: str) -> Path:
     return path
 
 
+def pack_value(value: Value) -> Any:
+    """Return a value in msgpack's types, which have no timestamps with a time zone."""
+    return _replace_moments(value) if _has_moments(value) else value
+
+
 def _stamp(time: int, clock: str) -> tuple[int, str]:
     if time <= 0:
         raise DecodeError("parameter stamp", -1, f"the time {time}, expected one after the epoch")
     return time, clock
-
-
-def packed(value: Value) -> Any:
-    """Return a value in types that msgpack has: moments with their zone are not among them."""
-    return _replaced(value) if _has_moments(value) else value
 
 
 def _has_moments(value: Value) -> bool:
@@ -298,14 +481,14 @@ def _has_moments(value: Value) -> bool:
         return any(_has_moments(item) for item in value.values())
     if kind is list:
         return any(_has_moments(item) for item in value)
-    return kind is not type(MISSING)
+    return kind is dt.datetime or kind is dt.date
 
 
-def _replaced(value: Value) -> Any:
+def _replace_moments(value: Value) -> Any:
     if type(value) is dict:
-        return {key: _replaced(item) for key, item in value.items()}
+        return {key: _replace_moments(item) for key, item in value.items()}
     if type(value) is list:
-        return [_replaced(item) for item in value]
+        return [_replace_moments(item) for item in value]
     if type(value) is dt.datetime:
         return msgspec.msgpack.Ext(_MOMENT, value.isoformat().encode())
     if type(value) is dt.date:
@@ -313,7 +496,7 @@ def _replaced(value: Value) -> Any:
     return value
 
 
-def _extended(code: int, data: memoryview) -> Any:
+def _read_extension(code: int, data: memoryview) -> Any:
     text = bytes(data).decode()
     if code == _MOMENT:
         return dt.datetime.fromisoformat(text)
@@ -323,8 +506,8 @@ def _extended(code: int, data: memoryview) -> Any:
 
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
-_ANY: Final = msgspec.msgpack.Decoder(ext_hook=_extended)
+_ANY: Final = msgspec.msgpack.Decoder(ext_hook=_read_extension)
 _DECODERS: Final[dict[type, Any]] = {
-    kind: msgspec.msgpack.Decoder(kind, ext_hook=_extended)
-    for kind in (Batch, Sync, SyncAnswer, Question, Answer)
+    kind: msgspec.msgpack.Decoder(kind, ext_hook=_read_extension)
+    for kind in (Batch, SyncRequest, SyncReply, ClientRequest, ClientReply)
 }

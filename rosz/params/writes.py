@@ -1,29 +1,45 @@
-"""A write: what the store is a set of.
+"""Writes, which the store is a set of, and batches of writes.
 
-Writes are ordered by stamp, then by path, so that one stamp may cover a batch: in a batch what lies
-deeper comes later. Nothing else decides anything, so every replica orders all writes alike.
+Writes are ordered by stamp, then by path, so that one stamp may cover a batch: within a batch, what
+lies deeper comes later. Nothing else decides the order, so every replica orders all writes alike.
+
+A batch is what one call writes. ROS 1's command line does not replace a dict but sets its leaves
+one by one, so that parameters beside them stay. Here those leaves become one batch (`spread`),
+which is checked as a whole before anything is written.
 """
 
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable, Iterator
 from typing import Final, Literal
 
 import msgspec
 
 from rosz.errors import DecodeError, ParamError
-from rosz.params.paths import ROOT, Path, joined
+from rosz.params.paths import ROOT, Path, joined, split
 from rosz.params.values import MAX_DEPTH, Value, type_name
 
-__all__ = ("DELETED", "Deleted", "Write", "check_time", "check_write", "delete", "put")
+__all__ = (
+    "DELETED",
+    "Change",
+    "Deleted",
+    "Write",
+    "check_time",
+    "check_write",
+    "condense",
+    "delete",
+    "put",
+    "spread",
+)
 
-_KNOWN: Final = 1_767_225_600 * 10**9
-"""A moment that is over, the year 2026: clocks without a battery begin anew, years behind."""
+_PAST: Final = 1_767_225_600 * 10**9
+"""The start of 2026: a clock without a battery starts years behind, and shows an earlier time."""
 
 _YEAR: Final = 365 * 86_400 * 10**9
-_AHEAD: Final = 10
-"""Years that a clock may be ahead. Were later stamps believed, all that is written after one of
-them would have to be stamped still later, on every machine and for ever."""
+_MAX_YEARS_AHEAD: Final = 10
+"""Years that a stamp may be ahead. If a later stamp were accepted, all writes after it would need
+still later stamps, on every machine and for ever."""
 
 
 class Deleted(enum.Enum):
@@ -37,16 +53,19 @@ class Deleted(enum.Enum):
 
 DELETED: Final[Literal[Deleted.DELETED]] = Deleted.DELETED
 
+Change = tuple[Path, "Value | Deleted"]
+"""One part of a batch: a path, and its new value or `DELETED`."""
+
 
 class Write(msgspec.Struct, frozen=True):
     """One put or deletion.
 
     Attributes:
-        path: Where.
-        time: Nanoseconds of the hybrid logical clock.
-        clock: The clock that gave the time, which no other clock shares.
-        value: What, or `DELETED`. Belongs to the store: never change it.
-        origin: Who wrote it, for people.
+        path: Path that is written.
+        time: Time of the hybrid logical clock, in nanoseconds since the epoch.
+        clock: Clock that gave the time; no two clocks have the same name.
+        value: New value, or `DELETED`. It belongs to the store and must not be changed.
+        origin: Writer, as shown to people.
     """
 
     path: Path
@@ -57,27 +76,27 @@ class Write(msgspec.Struct, frozen=True):
 
     @property
     def order(self) -> tuple[int, str, Path]:
-        """What sorts writes into the order of their replay."""
+        """The sort key that puts writes into the order of their replay."""
         return self.time, self.clock, self.path
 
     @property
     def deleted(self) -> bool:
-        """Whether it deletes."""
+        """Whether the write deletes."""
         return self.value is DELETED
 
 
 def put(path: Path, stamp: tuple[int, str], value: Value, origin: str = "") -> Write:
-    """Return the write that sets a value already normalised.
+    """Return the write that sets a normalised value.
 
     Raises:
-        ParamError: The root is to be no dict, or the path is too deep.
+        ParamError: The root would not be a dict, or the path is too deep.
     """
     check_write(path, value)
     return Write(path, stamp[0], stamp[1], value, origin)
 
 
 def delete(path: Path, stamp: tuple[int, str], origin: str = "") -> Write:
-    """Return the write that deletes; at the root, one that leaves it empty.
+    """Return the write that deletes a path; at the root, the write that leaves it empty.
 
     Raises:
         ParamError: The path is too deep.
@@ -86,30 +105,31 @@ def delete(path: Path, stamp: tuple[int, str], origin: str = "") -> Write:
 
 
 def check_time(write: Write, now: int) -> None:
-    """Refuse a write that is stamped so late that no clock can have been meant.
+    """Refuse a write whose stamp lies years ahead.
 
     Args:
-        write: It.
-        now: What the clock here says, in nanoseconds since the epoch.
+        write: Write to check.
+        now: Time of the local clock, in nanoseconds since the epoch.
 
     Raises:
-        DecodeError: It is.
+        DecodeError: The stamp lies years ahead.
     """
-    ahead = write.time - max(now, _KNOWN)
-    if ahead > _AHEAD * _YEAR:
+    ahead = write.time - max(now, _PAST)
+    if ahead > _MAX_YEARS_AHEAD * _YEAR:
         raise DecodeError(
             "parameter stamp",
             -1,
-            f"'{joined(write.path)}' of {write.origin!r} is stamped {ahead // _YEAR} years ahead,"
-            f" expected at most {_AHEAD}: set the clock of the machine that wrote it",
+            f"'{joined(write.path)}' of {write.origin!r} is stamped {ahead // _YEAR} years"
+            f" ahead, expected at most {_MAX_YEARS_AHEAD}: set the clock of the machine that wrote"
+            " it",
         )
 
 
 def check_write(path: Path, value: Value | Deleted) -> None:
-    """Refuse a write that has no meaning in the tree.
+    """Refuse a write that the tree cannot hold.
 
     Raises:
-        ParamError: The root is to be no dict, or the path is too deep.
+        ParamError: The root would not be a dict, or the path is too deep.
     """
     if path == ROOT and type(value) is not dict:
         raise ParamError(
@@ -119,3 +139,67 @@ def check_write(path: Path, value: Value | Deleted) -> None:
         raise ParamError(
             f"'{joined(path[:3])}/…' has {len(path)} parts; expected at most {MAX_DEPTH}"
         )
+
+
+def spread(name: str, value: Value) -> Iterator[Change]:
+    """Yield the leaves that the command line sets for a value.
+
+    A key may lead several levels down (``a/b``), or start at the root (``/a``) whatever name it
+    stands under. An empty dict sets nothing.
+
+    Args:
+        name: Global name.
+        value: Normalised value.
+
+    Raises:
+        ParamError: A key is private, or the root would not be a dict.
+        InvalidName: A key holds half of a surrogate pair.
+    """
+    if type(value) is not dict:
+        path = split(name)
+        if not path:
+            raise ParamError(
+                f"'/' can only be set to a dict, not to the {type_name(value)} {value!r}"
+            )
+        check_write(path, value)
+        yield path, value
+        return
+    for key, item in value.items():
+        if key.startswith("~"):
+            raise ParamError(
+                f"the key '{key}' in '{name}' is private, but a command has no node of its own; "
+                "write the node's name instead of '~'"
+            )
+        yield from spread(key if key.startswith("/") else f"{name.rstrip('/')}/{key}", item)
+
+
+def condense(changes: Iterable[Change]) -> list[Change]:
+    """Return a batch with the same effect as changes made one after the other.
+
+    A change that a later one at the same path or above undoes is left out. So of any two changes
+    left, the deeper one is the later one, which is the order in which a batch is replayed.
+    """
+    top = _Place()
+    for change in changes:
+        place = top
+        for part in change[0]:
+            place = place.below.setdefault(part, _Place())
+        place.change = change
+        place.below = {}
+    return list(top.changes())
+
+
+class _Place:
+    """The last change at a path, and the later changes below it."""
+
+    __slots__ = ("below", "change")
+
+    def __init__(self) -> None:
+        self.below: dict[str, _Place] = {}
+        self.change: Change | None = None
+
+    def changes(self) -> Iterator[Change]:
+        if self.change is not None:
+            yield self.change
+        for place in self.below.values():
+            yield from place.changes()

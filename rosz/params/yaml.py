@@ -1,26 +1,41 @@
 """Parameters as YAML, read and written as ROS 1's rosparam does.
 
-YAML 1.1 by PyYAML's safe rules, with angles (`rosz.params.angles`), ``!!binary``, timestamps,
-several documents, and ``_ns`` naming the namespace of a document. What rosparam only notices when
-the parameter server refuses it (null, keys that are no text, numbers that do not fit) is an error
-here, with its place, and so is a document whose aliases unfold to a size out of all proportion.
+The text is YAML 1.1 by PyYAML's safe rules, with angles, ``!!binary``, timestamps, several
+documents, and ``_ns`` as the namespace of a document. Values that rosparam leaves to the parameter
+server to refuse (null, keys that are not text, numbers that do not fit) are an error here that
+names their position, and so is a document whose aliases repeat too much.
+
+Angles are written ``deg(90)``, ``rad(pi/2)``, ``!degrees 90`` or ``!radians 2*pi``. rosparam
+evaluates the text of a radian as Python. Here it may hold only numbers, ``pi``, the operators
+``+ - * / // % **``, parentheses, and functions and constants of ``math``.
 """
 
 from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterator
+import operator
+import re
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import yaml
 
 from rosz.errors import ParamError, YamlError
-from rosz.params import angles
-from rosz.params.nodes import SCALAR_FAULTS, fault, read_nodes, shown_tag
 from rosz.params.values import Value, normalise, type_name
+from rosz.params.yaml_nodes import SCALAR_FAULTS, fault, read_nodes, shown_tag
 
-__all__ = ("dump", "format_get", "inline", "load", "load_all", "load_documents", "pretty")
+__all__ = (
+    "degrees",
+    "dump",
+    "format_get",
+    "inline",
+    "load",
+    "load_all",
+    "load_documents",
+    "pretty",
+    "radians",
+)
 
 _NAMESPACE_KEY: Final = "_ns"
 _MAP: Final = "tag:yaml.org,2002:map"
@@ -31,20 +46,37 @@ _MERGE: Final = "tag:yaml.org,2002:merge"
 _VALUE: Final = "tag:yaml.org,2002:value"
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
+_MAX_ANGLE: Final = 200
+"""Characters of the text of an angle; a longer one could overflow Python's parser."""
+
+_BINARY_OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
+    "Add": operator.add,
+    "Sub": operator.sub,
+    "Mult": operator.mul,
+    "Div": operator.truediv,
+    "FloorDiv": operator.floordiv,
+    "Mod": operator.mod,
+    "Pow": operator.pow,
+}
+_UNARY_OPERATORS: Final[dict[str, Callable[[Any], Any]]] = {
+    "UAdd": operator.pos,
+    "USub": operator.neg,
+}
+
 
 class _Loader(_Base):  # type: ignore[misc]  # either of two base classes
     """PyYAML's safe loader with rosparam's tags."""
 
 
 class _Dumper(yaml.SafeDumper):
-    """PyYAML's safe dumper, which never refers to a value by an anchor."""
+    """PyYAML's safe dumper without anchors."""
 
     def ignore_aliases(self, _data: Any) -> bool:
         return True
 
 
 class _LineDumper(_Dumper):
-    """Keeps what has several lines on one."""
+    """A dumper that writes texts of several lines on one line."""
 
     def represent_text(self, data: str) -> Any:
         return self.represent_scalar(_STR, data, style='"' if "\n" in data else None)
@@ -58,23 +90,24 @@ _LineDumper.add_representer(bytes, _LineDumper.represent_bytes)
 
 
 def load_all(text: str, path: str = "<string>") -> list[Value]:
-    """Read all documents of a text.
+    """Return the values of all documents of a text.
 
     Args:
-        text: YAML.
-        path: Where it is from, for messages.
+        text: YAML text.
+        path: File that the text is from, for error messages.
 
     Raises:
-        YamlError: It is no YAML, or holds what no parameter can.
+        YamlError: The text is not YAML, or holds a value that a parameter cannot hold.
     """
     return [value for value, _ in _read(text, path)]
 
 
 def load(text: str, path: str = "<string>") -> Value:
-    """Read a text of one document; the empty text is the empty string, as for rosparam.
+    """Return the value of a text of one document; empty text is the empty string, as in rosparam.
 
     Raises:
-        YamlError: It is no YAML, holds what no parameter can, or has not one document.
+        YamlError: The text is not YAML, holds a value that a parameter cannot hold, or does not
+            have exactly one document.
     """
     if not text:
         return ""
@@ -89,18 +122,19 @@ def load(text: str, path: str = "<string>") -> Value:
 def load_documents(
     text: str, namespace: str = "/", path: str = "<string>"
 ) -> list[tuple[str, Value]]:
-    """Read the documents of a parameter file, each with the namespace it belongs to.
+    """Return the documents of a parameter file, each with its namespace.
 
     Args:
-        text: YAML.
-        namespace: Global namespace; a document's ``_ns`` goes below it, or replaces it if global.
-        path: Where it is from, for messages.
+        text: YAML text.
+        namespace: Global namespace. The ``_ns`` of a document is appended, or replaces it if
+            global.
+        path: File that the text is from, for error messages.
 
     Returns:
-        Namespace and value of each document, ``_ns`` taken out; a value need not be a dict.
+        Namespace and value of each document, without ``_ns``; a value may be other than a dict.
 
     Raises:
-        YamlError: It is no YAML, or holds what no parameter can.
+        YamlError: The text is not YAML, or holds a value that a parameter cannot hold.
     """
     found: list[tuple[str, Value]] = []
     for value, line in _read(text, path):
@@ -117,23 +151,23 @@ def load_documents(
 
 
 def dump(value: Value) -> str:
-    """Write a value as a YAML document, keys sorted, as rosparam does."""
+    """Return a value as a YAML document with sorted keys, as rosparam writes it."""
     return str(yaml.dump(value, Dumper=_Dumper, default_flow_style=False))
 
 
 def format_get(value: Value) -> str:
-    """Write a value as ``rosparam get`` prints it: without the mark that ends a lone scalar."""
+    """Return a value as ``rosparam get`` prints it: without the mark at the end of a scalar."""
     return dump(value).removesuffix("\n...\n") + "\n"
 
 
 def inline(value: Value) -> str:
-    """Write a value as YAML on one line."""
+    """Return a value as YAML on one line."""
     text = yaml.dump(value, Dumper=_LineDumper, default_flow_style=True, width=math.inf)
     return str(text).removesuffix("\n").removesuffix("\n...")
 
 
 def pretty(value: Value) -> str:
-    """Write a value as ``rosparam get -p`` prints it: for reading, not for loading."""
+    """Return a value as ``rosparam get -p`` prints it: for people, not for loading."""
     if type(value) is str:
         return value + "\n"
     if type(value) is dict:
@@ -157,13 +191,13 @@ def _pretty_lines(tree: dict[str, Value], indent: str) -> Iterator[str]:
 
 
 def _read(text: str, path: str) -> Iterator[tuple[Value, int]]:
-    """Yield the value of each document and the line, from 0, that it starts on."""
+    """Yield the value of each document and the line that it starts on, counted from 0."""
     for loader, node in read_nodes(_Loader, text, path):
         yield _Builder(loader, path).build(node), node.start_mark.line
 
 
 class _Builder:
-    """Makes the value of one document from its nodes, which know their places."""
+    """Builder of the value of one document from its nodes."""
 
     def __init__(self, loader: Any, path: str) -> None:
         self._loader = loader
@@ -197,7 +231,7 @@ class _Builder:
         except ParamError as error:
             raise self._error(node, str(error)) from error
         except SCALAR_FAULTS as error:
-            reason = f"'{node.value}' is no {shown_tag(node)}: {error}"
+            reason = f"'{node.value}' is not a {shown_tag(node)}: {error}"
             raise self._error(node, reason) from error
 
     def _mapping(self, node: Any) -> dict[str, Value]:
@@ -233,21 +267,76 @@ class _Builder:
         return fault(node, reason, self._path)
 
 
-def _degrees(loader: Any, node: Any) -> float:
-    return angles.degrees(loader.construct_scalar(node))
+def degrees(text: str) -> float:
+    """Return an angle in degrees, such as ``90`` or ``deg(90)``, in radians.
+
+    Raises:
+        ValueError: The text is not a number.
+    """
+    inner = text.strip()[4:-1] if text.startswith("deg(") else text
+    try:
+        return float(inner) * math.pi / 180.0
+    except ValueError:
+        raise ValueError(f"'{text}' is not an angle in degrees; expected a number") from None
 
 
-def _radians(loader: Any, node: Any) -> float:
-    return angles.radians(loader.construct_scalar(node))
+def radians(text: str) -> float:
+    """Return an angle in radians, such as ``pi/2`` or ``rad(pi/2)``.
+
+    Raises:
+        ValueError: The text is not arithmetic, or has no finite real value.
+    """
+    stripped = text.strip()
+    inner = stripped[4:-1].strip() if stripped.startswith("rad(") else stripped
+    try:
+        return float(_evaluate(_parse(inner)))
+    except (ArithmeticError, SyntaxError, TypeError, ValueError):
+        raise ValueError(
+            f"'{text}' is not an angle in radians; expected arithmetic with numbers and pi"
+        ) from None
 
 
-def _register() -> None:
-    import re
+def _parse(text: str) -> Any:
+    """Return the node of Python's syntax tree for an expression."""
+    import ast
 
-    _Loader.add_constructor("!degrees", _degrees)
-    _Loader.add_constructor("!radians", _radians)
-    _Loader.add_implicit_resolver("!degrees", re.compile(r"^deg\([^\)]*\)$"), ["d"])
-    _Loader.add_implicit_resolver("!radians", re.compile(r"^rad\([^\)]*\)$"), ["r"])
+    if len(text) > _MAX_ANGLE:
+        raise ValueError
+    return ast.parse(text, mode="eval").body
 
 
-_register()
+def _evaluate(node: Any) -> float:
+    """Return the value of a node of Python's syntax tree."""
+    match type(node).__name__:
+        case "Constant" if isinstance(node.value, (int, float)):
+            return float(node.value)
+        case "Name" if node.id == "pi":
+            return math.pi
+        case "UnaryOp" if unary := _UNARY_OPERATORS.get(type(node.op).__name__):
+            return float(unary(_evaluate(node.operand)))
+        case "BinOp" if binary := _BINARY_OPERATORS.get(type(node.op).__name__):
+            return float(binary(_evaluate(node.left), _evaluate(node.right)))
+        case "Call" if not node.keywords:
+            return float(_of_math(node.func)(*map(_evaluate, node.args)))
+    return float(_of_math(node))
+
+
+def _of_math(node: Any) -> Any:
+    """Return the function or constant that ``math.<name>`` means.
+
+    Raises:
+        ValueError: The node is something else.
+    """
+    attribute = getattr(node, "attr", "_")
+    if getattr(getattr(node, "value", None), "id", "") != "math" or attribute.startswith("_"):
+        raise ValueError
+    found = getattr(math, attribute, None)
+    if found is None:
+        raise ValueError
+    return found
+
+
+_Loader.add_constructor("!degrees", lambda loader, node: degrees(loader.construct_scalar(node)))
+_Loader.add_constructor("!radians", lambda loader, node: radians(loader.construct_scalar(node)))
+_Loader.add_implicit_resolver("!degrees", re.compile(r"^deg\([^\)]*\)$"), ["d"])
+_Loader.add_implicit_resolver("!radians", re.compile(r"^rad\([^\)]*\)$"), ["r"])

@@ -40,7 +40,6 @@ FLOORS = {
     "rosz.session": 3,
     "rosz.graph": 4,
     "rosz.params.replica": 4,
-    "rosz.params.store": 4,
     "rosz.params.remote": 4,
     "rosz.params.api": 5,
     "rosz.node": 5,

@@ -311,7 +311,7 @@ def test_loading_is_all_or_nothing(replica: Replica, param: Command, tmp_path: P
     assert param("load", "bad.yaml") == (
         1,
         "",
-        "rosz: bad.yaml:4:5: null is no parameter value; "
+        "rosz: bad.yaml:4:5: null is not a parameter value; "
         "delete the parameter, or set '' or {} instead\n",
     )
     (tmp_path / "bad.yaml").write_bytes(b"a: 2\nb: \xff\n")
@@ -434,7 +434,7 @@ def test_a_writer_is_told_who_did_not_hear(
 
     from rosz.params import replica as package
 
-    monkeypatch.setattr(package, "ACKNOWLEDGED_BY", 0.3)
+    monkeypatch.setattr(package, "ACK_TIMEOUT", 0.3)
     replica = network.replica()
     Mute(network)
     until(lambda: len(replica.members()) == 1)

@@ -13,8 +13,7 @@ from network import Network, Program, eventually
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.node.control import control_key
-from rosz.params.keys import Keys, Member
-from rosz.params.wire import SyncAnswer, encode
+from rosz.params.wire import Keys, Member, SyncReply, encode
 from rosz.session import Query, Session, is_stopped
 from rosz.wire import entity_key, pack_attachment
 
@@ -218,7 +217,7 @@ def test_a_replica_out_of_step(doctor: Doctor, network: Network) -> None:
     for name in ("one", "two"):
         network.node(name).params["/speed"] = 3
     session, keys = network.session(), Keys(network.domain)
-    odd = SyncAnswer(digest=b"\1" * 512)
+    odd = SyncReply(digest=b"\1" * 512)
     answering(network, session, keys.sync(session.zid), encode(odd))
     network._keep(session.token(keys.token(Member(1, session.zid, "odd one"))))
     eventually(lambda: len(session.peers()) == 2, "links to both")

@@ -17,10 +17,10 @@ SPIRAL = "d0: &d0 [1]\n" + "".join(
     f"d{i}: &d{i} {'[' * 50}*d{i - 1}{']' * 50}\n" for i in range(1, 30)
 )
 REFUSED = {
-    "2020-13-45": "'2020-13-45' is no !!timestamp: month must be in 1..12",
-    "!!int x": "'x' is no !!int",
-    "!!timestamp x": "'x' is no !!timestamp",
-    "9" * 5000: "is no !!int: Exceeds the limit",
+    "2020-13-45": "'2020-13-45' is not a !!timestamp: month must be in 1..12",
+    "!!int x": "'x' is not a !!int",
+    "!!timestamp x": "'x' is not a !!timestamp",
+    "9" * 5000: "is not a !!int: Exceeds the limit",
     "[" * 20_000: "it is nested more than 100 deep",
     BOMB: "this looks like a YAML bomb",
     SPIRAL: "it is nested more than 100 deep",

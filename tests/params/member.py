@@ -17,7 +17,7 @@ from typing import Any
 
 from rosz.params.api import Params
 from rosz.params.replica import Changed, Replica
-from rosz.params.store import Store
+from rosz.params.replica.storage import Storage, StoreFile
 from rosz.session import (
     HybridClock,
     MeshReadiness,
@@ -71,9 +71,9 @@ class Member:
         if mode == "peer":
             serve_links(self._session)
             settled = MeshReadiness(self._session, 0.5, threading.Event()).ready
-        keep = Store(Path(file)) if file else None
+        storage = Storage(StoreFile(Path(file))) if file else None
         self.replica = Replica(
-            self._session, label=f"member {os.getpid()}", settled=settled, keep=keep
+            self._session, label=f"member {os.getpid()}", settled=settled, storage=storage
         )
         self.joined = time.perf_counter() - begun
         self._crowd = [
@@ -159,7 +159,7 @@ class Member:
             self._delays.append((time.monotonic_ns() - change.new) / 1e9)
 
     def do_echo(self, key: str) -> Any:
-        """Answer puts as a replica does, and do nothing else."""
+        """ClientReply puts as a replica does, and do nothing else."""
         back = self._session.publisher(f"{key}/back")
         self._bare += [back, self._session.subscriber(key, lambda _sample: back.put(b"0"))]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import threading
 from queue import SimpleQueue
 
-from rosz.params.keys import Keys, matches
+from rosz.params.replica.serve import is_key_in
+from rosz.params.wire import Keys
 from rosz.session import Query, Sample, Session, Stamp
 
 
@@ -16,7 +17,7 @@ class Storage:
         self.held: dict[str, tuple[Stamp, bytes]] = {}
         self.tombs: dict[str, Stamp] = {}
         self._queries: SimpleQueue[Query | None] = SimpleQueue()
-        key = Keys(domain).below
+        key = Keys(domain).all_params
         self._thread = threading.Thread(target=self._answer)
         self._thread.start()
         self._declared = [
@@ -47,5 +48,5 @@ class Storage:
         while (query := self._queries.get()) is not None:
             with query:
                 for key, (stamp, payload) in self.held.copy().items():
-                    if matches(query.key, key):
+                    if is_key_in(query.key, key):
                         query.reply(key, payload, stamp=stamp)

@@ -139,7 +139,7 @@ def test_what_is_read_is_the_readers_own(params: Params) -> None:
 def test_bad_names_and_values_are_named(params: Params) -> None:
     with pytest.raises(InvalidName, match="half of a surrogate pair"):
         params["a\udc80"] = 1
-    with pytest.raises(ParamError, match="'/ns/node/x' cannot be set: a set is no parameter value"):
+    with pytest.raises(ParamError, match="'/ns/node/x' cannot be set: a set is not a"):
         params["~x"] = {1}
     with pytest.raises(ParamError, match="the root of all parameters is a dict"):
         params["/"] = 1

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from rosz.errors import ParamError
 from rosz.params.history import History
-from rosz.params.merge import condense
 from rosz.params.tree import MISSING, leaves, lookup
 from rosz.params.values import MAX_DEPTH
-from rosz.params.writes import DELETED, Write, check_write, delete, put
+from rosz.params.writes import DELETED, Write, check_write, condense, delete, put
 
 from .oracle import replay
 from .strategies import DICTS, PATHS, VALUES, shared, writes
@@ -29,7 +28,7 @@ def kept(history: History) -> set[tuple[Any, ...]]:
     return {(write.path, write.time, write.clock) for write in history.writes()}
 
 
-def same(left: History, right: History) -> bool:
+def is_same(left: History, right: History) -> bool:
     return (
         left.root == right.root
         and kept(left) == kept(right)
@@ -45,13 +44,13 @@ def test_the_tree_is_the_replay_whatever_the_order(
     shuffled = chance.sample(batch, len(batch))
     one_by_one = of(*([write] for write in shuffled))
     assert one_by_one.root == replay(batch)
-    assert same(one_by_one, of(batch))
+    assert is_same(one_by_one, of(batch))
 
 
 @given(shared(2))
 def test_merging_commutes(seen: list[list[Write]]) -> None:
     left, right = seen
-    assert same(of(left, right), of(right, left))
+    assert is_same(of(left, right), of(right, left))
 
 
 @given(shared(3))
@@ -59,7 +58,7 @@ def test_merging_is_associative(seen: list[list[Write]]) -> None:
     one, two, three = seen
     left = of(list(of(one, two).writes()), three)
     right = of(one, list(of(two, three).writes()))
-    assert same(left, right)
+    assert is_same(left, right)
 
 
 @given(writes())
@@ -122,7 +121,7 @@ def test_forgetting_changes_nothing_now(batch: list[Write], before: int, keep: i
     assert history.root == replay(batch)
     assert history.root == replay(history.writes())
     assert len(history) == len(of(batch)) - gone
-    assert same(history, of(list(history.writes())))
+    assert is_same(history, of(list(history.writes())))
 
 
 @given(shared(2), st.integers(0, 21))

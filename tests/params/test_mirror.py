@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rosz.params.keys import Keys
+from rosz.params.replica import Replica
 from rosz.params.tree import MISSING, leaves
-from rosz.params.wire import decode_value
+from rosz.params.wire import Keys, decode_value
+from rosz.params.writes import Write
 from rosz.session import Reply, Session
 
 from .network import Network, until
@@ -83,6 +84,12 @@ def test_a_storage_holds_what_the_store_holds(network: Network) -> None:
     until(lambda: held(storage) == shown(one.root))
 
 
+def source(replica: Replica) -> Write | None:
+    """Return the write that /a/b has its value from."""
+    with replica._state.locked as history:
+        return history.source(("a", "b"))
+
+
 def test_a_storage_brings_the_store_back(network: Network) -> None:
     storage = Storage(network.session())
     network.keep(storage)
@@ -91,11 +98,11 @@ def test_a_storage_brings_the_store_back(network: Network) -> None:
     first.set("/old", 1)
     first.delete("/old")
     until(lambda: held(storage) == shown(first.root))
-    stamp = first._state.source(("a", "b"))
+    stamp = source(first)
     first.close()
     again = network.replica()
     assert again.root == {"a": {"b": 1, "c": [2, b"x"]}}
-    restored = again._state.source(("a", "b"))
+    restored = source(again)
     assert stamp is not None
     assert restored is not None
     assert (restored.time, restored.clock) == (stamp.time, stamp.clock)
@@ -113,7 +120,7 @@ def test_a_storage_that_comes_late_or_is_wrong_is_put_right(network: Network) ->
     stranger.put("@rosz/0/param/a//b".replace("//", "/%41"), b"\x01", stamp=stranger.stamp())
     stranger.put("@rosz/0/param/a/b", b"\x09", stamp=stranger.stamp())
     until(lambda: len(storage.held) == 4)
-    replica._mirror.reconcile()
+    replica._parameter_keys.reconcile()
     until(lambda: held(storage) == {"@rosz/0/param/a/b": 1, "@rosz/0/param/a/c": 2})
 
 
@@ -152,18 +159,18 @@ def test_damaged_storages_are_survived(network: Network, caplog: pytest.LogCaptu
     until(lambda: len(storage.held) == 3)
     replica = network.replica()
     assert replica.root == {"b": 1}
-    assert caplog.text.count("a storage holds what is no parameter") == 2
+    assert caplog.text.count("a storage holds something that is not a parameter") == 2
 
 
 def test_a_storage_gives_back_names_that_are_no_parts_of_keys(network: Network) -> None:
     storage = Storage(network.session())
     network.keep(storage)
     one = network.replica()
-    until(lambda: one._mirror.wanted)
+    until(lambda: one._parameter_keys.subscribed)
     value = {"a": {"": 1, "b": 2}, "c": {"d/e": 3, "f": 4}, "g": 5}
     one.set("/v", value)
     until(lambda: len(storage.held) == 3)
-    one._mirror.reconcile()
+    one._parameter_keys.reconcile()
     assert len(storage.held) == 3
     one.close()
     assert network.replica().get("/v") == value

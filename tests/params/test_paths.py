@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rosz import names
 from rosz.errors import DecodeError, InvalidName, ParamError
-from rosz.params.paths import Path, climb, from_key, joined, parent, resolve, split, to_key
+from rosz.params.paths import Path, climb, from_key, joined, resolve, split, to_key
 
 ANY_PART = st.text(
     st.characters(exclude_categories=["Cs"], exclude_characters="/"), min_size=1, max_size=10
@@ -56,11 +56,6 @@ def test_a_key_that_no_path_has_is_refused(key: str) -> None:
 )
 def test_empty_parts_count_for_nothing(name: str, path: Path) -> None:
     assert split(name) == path
-
-
-def test_parents_end_at_the_root() -> None:
-    assert parent(("a", "b")) == ("a",)
-    assert parent(()) == ()
 
 
 @pytest.mark.parametrize("name", ["a", "~a", ""])

@@ -8,10 +8,9 @@ from queue import SimpleQueue
 import pytest
 
 from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
-from rosz.params.merge import condense
 from rosz.params.remote import ParamClient
 from rosz.params.replica import Changed
-from rosz.params.writes import DELETED
+from rosz.params.writes import DELETED, condense
 from rosz.session import HybridClock
 
 from .network import Network, until
@@ -66,7 +65,7 @@ def test_errors_are_the_same_as_near(client: ParamClient) -> None:
         client.delete("/robot/sped")
     with pytest.raises(ParamError, match="the root of all parameters is a dict"):
         client.set("/", 1)
-    with pytest.raises(ParamError, match="null is no parameter value"):
+    with pytest.raises(ParamError, match="null is not a parameter value"):
         client.set("/a", None)
     with pytest.raises(ParamError, match="cannot search for '~a'"):
         client.search("~a")
@@ -110,14 +109,13 @@ def test_a_writer_whose_clock_is_behind_still_writes_last(network: Network) -> N
 
 
 def test_doing_a_write_again_much_later_changes_nothing(network: Network) -> None:
-    from rosz.params.keys import Keys
-    from rosz.params.wire import Batch, Question, encode
+    from rosz.params.wire import Batch, ClientRequest, Keys, encode
 
     replica = network.replica()
     session = network.session()
     stamp = replica._session.stamp()
     batch = Batch.of((stamp.time, session.zid), "x", [(("a",), "old")])
-    question = encode(Question("write", batch=batch, timeout=1))
+    question = encode(ClientRequest("write", batch=batch, timeout=1))
     key = Keys(0).set(replica.zid)
     assert session.get(key, payload=question, timeout=5)[0].ok
     replica.set("/a", "new")

@@ -9,10 +9,18 @@ from collections.abc import Collection
 import pytest
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
-from rosz.params.keys import Keys, Member
 from rosz.params.replica import Replica
-from rosz.params.replica.acks import Pending
-from rosz.params.wire import Batch, Question, Record, Sync, encode, seal
+from rosz.params.replica.broadcast import PendingWrite
+from rosz.params.wire import (
+    Batch,
+    ClientRequest,
+    Keys,
+    Member,
+    Record,
+    SyncRequest,
+    add_header,
+    encode,
+)
 from rosz.session import HybridClock, Stamp
 
 from .network import PATIENCE, Network, until
@@ -50,19 +58,19 @@ def test_nobody_waits_for_one_that_ends_as_it_is_counted(
     network: Network, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = network.replicas(2)
-    count = first._line.acks.open
+    count = first._broadcaster.pending.open
 
-    def too_late(zids: Collection[str]) -> Pending:
+    def too_late(zids: Collection[str]) -> PendingWrite:
         second.close()
         until(lambda: first.members() == [] and not first._members.zids)
-        first._line.gone(second.zid)
+        first._broadcaster.drop_peer(second.zid)
         return count(zids)
 
-    monkeypatch.setattr(first._line.acks, "open", too_late)
+    monkeypatch.setattr(first._broadcaster.pending, "open", too_late)
     begun = time.monotonic()
     assert first.set("/a", 1, timeout=10).slow == ()
     assert time.monotonic() - begun < 5
-    assert not first._line.acks._lagging
+    assert not first._broadcaster.pending._lagging
 
 
 def test_a_newcomer_has_everything(network: Network) -> None:
@@ -99,11 +107,11 @@ def test_a_stamp_years_ahead_stops_no_later_write(
     records.append(Record("b", 5, "f0", "forger", ["fair"]))
     keys = Keys(0)
     with caplog.at_level(logging.WARNING, "rosz.params"):
-        stranger.put(keys.change, seal(stranger.zid, 1, encode(batch)))
+        stranger.put(keys.change, add_header(stranger.zid, 1, encode(batch)))
         asked = {
-            keys.write(one.zid): seal(stranger.zid, 2, encode(batch)),
-            keys.tell(one.zid): encode(Sync(records=records)),
-            keys.set(one.zid): encode(Question("write", batch=batch)),
+            keys.write(one.zid): add_header(stranger.zid, 2, encode(batch)),
+            keys.tell(one.zid): encode(SyncRequest(records=records)),
+            keys.set(one.zid): encode(ClientRequest("write", batch=batch)),
         }
         for key, payload in asked.items():
             (reply,) = stranger.get(key, payload=payload, timeout=PATIENCE)
@@ -122,14 +130,14 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
         session.secured = True
     one, other = (network.join(session) for session in sessions)
     until(lambda: len(one.members()) == len(other.members()) == 1)
-    monkeypatch.setattr(one._line, "tell", lambda *_: ())
+    monkeypatch.setattr(one._broadcaster, "send", lambda *_: ())
     other._declared[1].close()  # where it is told: rules leave such questions without an answer
     one.merge("/", {"a": {"b": 1, "c": 2}, "d": 3})
     with caplog.at_level(logging.WARNING, "rosz.params"):
         assert one.compare(PATIENCE)
         assert one.compare(PATIENCE)
         key = f"{Keys(0).tell(other.zid)}/**"
-        network.keep(sessions[1].queryable(key, other._sync.serve_told, complete=True))
+        network.keep(sessions[1].queryable(key, other._sync.on_tell, complete=True))
         assert one.compare(PATIENCE)
     assert other.root == {}
     assert caplog.text.count("and 2 more, which differs there from now on") == 1
@@ -181,7 +189,7 @@ def test_a_missing_name_is_a_key_error_with_its_near_miss(network: Network) -> N
 
 def test_what_is_refused_is_written_nowhere(network: Network) -> None:
     one, other = network.replicas(2)
-    with pytest.raises(ParamError, match="null is no parameter value"):
+    with pytest.raises(ParamError, match="null is not a parameter value"):
         one.set("/a", None)
     with pytest.raises(ParamError, match="the root of all parameters is a dict"):
         one.set("/", 5)
@@ -350,7 +358,7 @@ def test_joining_does_not_hang_on_a_replica_that_is_mute(network: Network) -> No
 
 def test_a_write_that_got_lost_is_told_once_more(network: Network) -> None:
     one, deaf = network.replicas(2)
-    deaf._line._declared[0].close()
+    deaf._broadcaster._declared[0].close()
     assert one.set("/a", 1, timeout=5).slow == ()
     assert deaf.get("/a") == 1
 
@@ -358,7 +366,7 @@ def test_a_write_that_got_lost_is_told_once_more(network: Network) -> None:
 def test_what_was_missed_is_found_by_comparing(network: Network) -> None:
     one, deaf = network.replicas(2)
     one.set("/old", 1)
-    for declared in (deaf._line._declared[0], deaf._line._declared[2]):
+    for declared in (deaf._broadcaster._declared[0], deaf._broadcaster._declared[2]):
         declared.close()
     for number in range(300):
         one.set(f"/n/{number}", number, timeout=0)
@@ -373,19 +381,19 @@ def test_what_was_missed_is_found_by_comparing(network: Network) -> None:
 
 def test_those_that_meet_again_compare_unasked(network: Network) -> None:
     one, deaf = network.replicas(2)
-    for declared in (deaf._line._declared[0], deaf._line._declared[2]):
+    for declared in (deaf._broadcaster._declared[0], deaf._broadcaster._declared[2]):
         declared.close()
     one.set("/a", 1, timeout=0)
-    deaf._members._on_watched(Keys(0).token(one._own), False)
+    deaf._members._on_token(Keys(0).token(one._own), False)
     assert deaf.members() == []
-    deaf._members._on_watched(Keys(0).token(one._own), True)
+    deaf._members._on_token(Keys(0).token(one._own), True)
     until(lambda: deaf.has("/a"))
 
 
 def test_one_that_went_before_it_could_be_watched_is_forgotten(network: Network) -> None:
     replica = network.replica()
     ghost = Member(1, "f0f0", "ghost")
-    replica._members._take(ghost, True)
+    replica._members._update(ghost, True)
     assert replica.members() == [ghost]
     until(lambda: replica.members() == [])
     assert replica.set("/a", 1).slow == ()
@@ -419,7 +427,9 @@ def test_what_nobody_wrote_is_survived(network: Network, caplog: pytest.LogCaptu
     stranger.token(f"{keys.tokens[:-3]}/nonsense").close()
     assert replica.set("/a", 1).slow == ()
     assert replica.root == {"a": 1}
-    assert any("wrote what is no parameter" in record.message for record in caplog.records)
+    assert any(
+        "wrote something that is not a parameter" in record.message for record in caplog.records
+    )
     assert not [record for record in caplog.records if record.levelno >= logging.ERROR]
 
 

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from rosz.errors import ParamError
 from rosz.params.history import History
-from rosz.params.merge import Change, condense, spread
 from rosz.params.paths import climb, joined, split
 from rosz.params.tree import MISSING, leaves, lookup
-from rosz.params.writes import delete, put
+from rosz.params.writes import Change, condense, delete, put, spread
 from rosz.params.yaml import dump, load_documents
 
 from .ros1 import Ros1

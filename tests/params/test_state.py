@@ -11,7 +11,7 @@ import pytest
 
 from rosz.errors import DecodeError, ParamError
 from rosz.params.replica.state import State
-from rosz.params.wire import Batch, encode, seal
+from rosz.params.wire import Batch, add_header, encode
 from rosz.params.writes import Write, delete, put
 from rosz.session import HybridClock, Stamp
 
@@ -32,9 +32,14 @@ def state() -> State:
     return State(HybridClock("aa"))
 
 
+def stored(shared: State) -> list[Write]:
+    with shared.locked as history:
+        return list(history.writes())
+
+
 def message(path: str, value: Any, time: int) -> bytes:
     batch = Batch.of((time, "bb"), "other", [(tuple(path.split("/")), value)])
-    return seal("bb", time, encode(batch))
+    return add_header("bb", time, encode(batch))
 
 
 @pytest.mark.usefixtures("hasty")
@@ -46,8 +51,8 @@ def test_what_was_noted_is_in_every_tree_read_afterwards() -> None:
     def note(name: str) -> None:
         for number in range(1, 1500):
             data = message(name, number, number)
-            if not shared.note(data):
-                shared.take(data)
+            if not shared.defer(data):
+                shared.receive(data)
             seen = shared.root.get(name)
             if seen != number:
                 wrong.append((name, number, seen))
@@ -55,7 +60,8 @@ def test_what_was_noted_is_in_every_tree_read_afterwards() -> None:
     def look() -> None:
         while not stop.is_set():
             shared.root  # noqa: B018  # reading is what is tried
-            shared.digest()
+            with shared.locked as history:
+                history.digest()
 
     lookers = [threading.Thread(target=look) for _ in range(2)]
     noters = [threading.Thread(target=note, args=(name,)) for name in ("a", "b")]
@@ -81,8 +87,8 @@ def test_a_read_waits_for_the_one_that_is_under_way(monkeypatch: pytest.MonkeyPa
         return apply(writes)
 
     monkeypatch.setattr(shared._history, "apply", slowly)
-    shared.note(message("a", 1, 1))
-    first = threading.Thread(target=shared.read)
+    shared.defer(message("a", 1, 1))
+    first = threading.Thread(target=shared.apply_deferred)
     first.start()
     assert entered.wait(10)
     seen: list[dict[str, Any]] = []
@@ -97,21 +103,21 @@ def test_a_read_waits_for_the_one_that_is_under_way(monkeypatch: pytest.MonkeyPa
 
 def test_noting_has_an_end() -> None:
     shared = state()
-    taken = [shared.note(message(f"n{number}", number, number + 1)) for number in range(100)]
+    taken = [shared.defer(message(f"n{number}", number, number + 1)) for number in range(100)]
     assert taken == [True] * 64 + [False] * 36
     assert len(shared.root) == 64
 
 
 def test_who_follows_is_served_at_once() -> None:
     shared = state()
-    assert shared.note(message("a", 1, 1))
+    assert shared.defer(message("a", 1, 1))
     heard: list[object] = []
     watch = shared.watch(("a",), heard.append)
-    assert not shared.note(message("a", 2, 2))
+    assert not shared.defer(message("a", 2, 2))
     watch.close()
-    assert shared.note(message("a", 3, 3))
-    shared.feed(heard.append)
-    assert not shared.note(message("a", 4, 4))
+    assert shared.defer(message("a", 3, 3))
+    shared.on_new(heard.append)
+    assert not shared.defer(message("a", 4, 4))
     assert shared.root == {"a": 3}
 
 
@@ -120,28 +126,28 @@ def test_taking_does_not_wait_for_others() -> None:
     entered, release = threading.Event(), threading.Event()
 
     def work() -> None:
-        shared.enter()
+        shared.acquire()
         entered.set()
         assert release.wait(10)
-        shared.leave()
+        shared.release()
 
     other = threading.Thread(target=work)
     other.start()
     assert entered.wait(10)
-    assert not shared.take_soon(message("a", 1, 1))
+    assert not shared.try_receive(message("a", 1, 1))
     release.set()
     other.join()
-    assert shared.take_soon(message("a", 1, 1))
+    assert shared.try_receive(message("a", 1, 1))
     assert shared.root == {"a": 1}
 
 
 def test_own_stamps_are_later_than_all_that_was_noted() -> None:
     shared = state()
     far = time.time_ns() + 9 * YEAR
-    shared.note(message("a", 1, far))
-    stamp, (_, new, _) = shared.write([(("a",), 2)], "me")
+    shared.defer(message("a", 1, far))
+    stamp, change = shared.write([(("a",), 2)], "me")
     assert stamp > Stamp(far, "bb")
-    assert new == {"a": 2}
+    assert change.new == {"a": 2}
     assert shared.stamp() > stamp
 
 
@@ -156,14 +162,14 @@ def test_stamps_years_ahead_are_not_taken_in(
     late = [LATE, (1 << 64) - 1, now + 11 * YEAR]
     with caplog.at_level(logging.WARNING, "rosz.params"):
         for at in late:
-            shared.note(message("a", "noted", at))
-            shared.take(message("a", "taken", at))
-            assert shared.take_soon(message("a", "soon", at))
+            shared.defer(message("a", "noted", at))
+            shared.receive(message("a", "taken", at))
+            assert shared.try_receive(message("a", "soon", at))
             shared.apply([put(("a",), (at, "bb"), "applied")])
             with pytest.raises(DecodeError, match=r"'/a' of 'me' is stamped .* years ahead"):
                 shared.write([(("a",), "written")], "me", Stamp(at, "bb"))
         assert shared.root == {}
-        shared.take(message("b", 1, now))
+        shared.receive(message("b", 1, now))
     assert shared.root == {"b": 1}
     assert shared.stamp().time == max(clock, now) + 1
     assert caplog.text.count("years ahead") == 1
@@ -183,33 +189,38 @@ def test_what_was_saved_years_ahead_counts_as_new(caplog: pytest.LogCaptureFixtu
         assert shared.restore(saved)
     assert caplog.text.count("counts as written just now") == 1
     assert shared.root == {"a": {"x": "newest", "y": 1}}
-    assert all(begun < write.time <= shared.stamp().time for write in shared.writes())
+    assert all(begun < write.time <= shared.stamp().time for write in stored(shared))
     assert shared.stamp().time < time.time_ns() + YEAR
-    assert not shared.restore(shared.writes())
+    assert not shared.restore(stored(shared))
 
 
 def test_damaged_messages_change_nothing(caplog: pytest.LogCaptureFixture) -> None:
     shared = state()
     with caplog.at_level(logging.WARNING, "rosz.params"):
-        for data in (b"", seal("bb", 1, b""), seal("bb", 1, b"\xc1"), message("a//b", 1, 1)):
-            shared.note(data)
+        for data in (
+            b"",
+            add_header("bb", 1, b""),
+            add_header("bb", 1, b"\xc1"),
+            message("a//b", 1, 1),
+        ):
+            shared.defer(data)
         assert shared.root == {}
-    assert caplog.text.count("wrote what is no parameter") == 3  # kinds of damage
+    assert caplog.text.count("wrote something that is not a parameter") == 3  # kinds of damage
 
 
 def test_ctrl_c_while_messages_are_read_locks_nobody_out(monkeypatch: pytest.MonkeyPatch) -> None:
     shared = state()
-    assert shared.note(message("a", 1, 1))
+    assert shared.defer(message("a", 1, 1))
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(shared, "_take", interrupt)
+        patched.setattr(shared, "_receive", interrupt)
         with pytest.raises(KeyboardInterrupt):
             _ = shared.root
-    assert shared.enter(0)
-    shared.leave()
+    assert shared.acquire(0)
+    shared.release()
     assert shared.root == {}
 
 
@@ -222,9 +233,9 @@ def test_a_signal_handler_in_the_midst_of_work_reads_what_was_and_is_refused_the
     seen: list[Any] = []
 
     def interrupted(writes: list[Write]) -> list[Write]:
-        shared.note(message("b", 1, 1))
+        shared.defer(message("b", 1, 1))
         seen.append(shared.root)
-        for refused in (shared.digest, lambda: shared.write([(("a",), 3)], "handler")):
+        for refused in (lambda: stored(shared), lambda: shared.write([(("a",), 3)], "handler")):
             with pytest.raises(ParamError, match="have it start a thread"):
                 refused()
         return apply(writes)

@@ -16,8 +16,7 @@ from hypothesis import given
 
 from rosz.errors import StoreError
 from rosz.params.history import History
-from rosz.params.replica.saver import Saver
-from rosz.params.store import Store
+from rosz.params.replica.storage import Storage, StoreFile
 from rosz.params.writes import Write, delete, put
 
 from .network import Network, until
@@ -26,9 +25,9 @@ from .strategies import writes
 WRITER = """
 import sys
 from pathlib import Path
-from rosz.params.store import Store
+from rosz.params.replica.storage import StoreFile
 from rosz.params.writes import put
-store = Store(Path(sys.argv[1]))
+store = StoreFile(Path(sys.argv[1]))
 for number in range(1, 1_000_000):
     store.save([put(("n", str(number % 50)), (number, "c"), number)])
     print(number, flush=True)
@@ -36,7 +35,7 @@ for number in range(1, 1_000_000):
 
 
 def saved(path: Path, *batches: list[Write]) -> History:
-    store = Store(path)
+    store = StoreFile(path)
     for batch in batches:
         store.save(batch)
     store.close()
@@ -45,7 +44,7 @@ def saved(path: Path, *batches: list[Write]) -> History:
 
 def loaded(path: Path) -> History:
     history = History()
-    with closing(Store(path)) as store:
+    with closing(StoreFile(path)) as store:
         history.apply(store.load())
     return history
 
@@ -84,7 +83,7 @@ def test_what_is_hidden_leaves_the_file(tmp_path: Path) -> None:
 
 
 def test_replacing_drops_all_else(tmp_path: Path) -> None:
-    store = Store(tmp_path / "params")
+    store = StoreFile(tmp_path / "params")
     store.save([put(("a",), (1, "c"), 1), delete(("b",), (2, "c"))])
     moment = dt.datetime(2024, 1, 2, tzinfo=dt.UTC)
     store.replace([put(("c",), (3, "c"), {"when": moment, "raw": b"\x00"})])
@@ -97,11 +96,11 @@ def test_replacing_drops_all_else(tmp_path: Path) -> None:
 
 def test_a_file_in_use_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "params"
-    store = Store(path)
+    store = StoreFile(path)
     with pytest.raises(StoreError, match=f"'{path}' is in use by another process"):
-        Store(path)
+        StoreFile(path)
     store.close()
-    Store(path).close()
+    StoreFile(path).close()
 
 
 def test_another_programs_database_is_refused_and_left(tmp_path: Path) -> None:
@@ -111,8 +110,8 @@ def test_another_programs_database_is_refused_and_left(tmp_path: Path) -> None:
     base.commit()
     base.close()
     before = path.read_bytes()
-    with pytest.raises(StoreError, match=f"'{path}' is a database, but not one of parameters"):
-        Store(path)
+    with pytest.raises(StoreError, match=f"'{path}' is a database, but not of parameters"):
+        StoreFile(path)
     assert path.read_bytes() == before
 
 
@@ -123,7 +122,7 @@ def test_another_version_is_refused(tmp_path: Path) -> None:
     base.execute("PRAGMA user_version = 7")
     base.close()
     with pytest.raises(StoreError, match="is of version 7, expected 1"):
-        Store(path)
+        StoreFile(path)
 
 
 @pytest.mark.parametrize("offset", [0, 20, 40, 4096, 4100, 8192])
@@ -135,7 +134,7 @@ def test_a_damaged_file_is_refused_by_name_and_left(tmp_path: Path, offset: int)
     content[offset : offset + 64] = b"\xa5" * 64
     path.write_bytes(content)
     with pytest.raises(StoreError, match=str(path)):
-        Store(path)
+        StoreFile(path)
     assert path.read_bytes() == content
 
 
@@ -147,7 +146,7 @@ def test_one_wrong_byte_in_a_value_is_noticed(tmp_path: Path, place: float) -> N
     at = content.index(b"x" * 50, int(len(content) * place)) + 25
     content[at] = ord("y")
     path.write_bytes(content)
-    with pytest.raises(StoreError, match=f"'{path}' is damaged .*the sum of '/n/"):
+    with pytest.raises(StoreError, match=f"'{path}' is damaged .*the checksum of '/n/"):
         loaded(path)
     assert path.read_bytes() == content
 
@@ -159,7 +158,7 @@ def test_a_damaged_value_is_refused_by_name(tmp_path: Path) -> None:
     base.execute("UPDATE writes SET value = x'c1'")
     base.commit()
     base.close()
-    store = Store(path)
+    store = StoreFile(path)
     with pytest.raises(StoreError, match=f"'{path}' is damaged"):
         store.load()
     store.close()
@@ -170,14 +169,14 @@ def test_a_file_that_is_no_database_is_refused(tmp_path: Path, content: bytes) -
     path = tmp_path / "params"
     path.write_bytes(content)
     with pytest.raises(StoreError, match=f"'{path}' is damaged"):
-        Store(path)
+        StoreFile(path)
     assert path.read_bytes() == content
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     path = tmp_path / "none" / "params"
     with pytest.raises(StoreError, match=f"cannot open '{path}': unable to open database file"):
-        Store(path)
+        StoreFile(path)
 
 
 def test_a_kill_loses_nothing_that_was_saved(tmp_path: Path) -> None:
@@ -201,7 +200,7 @@ def test_a_kill_loses_nothing_that_was_saved(tmp_path: Path) -> None:
 
 def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) -> None:
     path = tmp_path / "params"
-    keeper = network.replica(keep=Store(path))
+    keeper = network.replica(storage=Storage(StoreFile(path)))
     other = network.replica()
     until(lambda: len(keeper.members()) == 1)
     other.set("/a", {"b": 1, "c": 2})
@@ -210,7 +209,7 @@ def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) ->
     assert loaded_while_open(path) == {"a": {"c": 2}, "late": 5}
     keeper.close()
     other.close()
-    again = network.replica(keep=Store(path))
+    again = network.replica(storage=Storage(StoreFile(path)))
     assert again.root == {"a": {"c": 2}, "late": 5}
     newer = again.set("/a", 1)
     assert newer.time > 0
@@ -218,7 +217,7 @@ def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) ->
     assert loaded(path).root == {"a": 1, "late": 5}
 
 
-class Disk:
+class Disk(StoreFile):
     """Keeps writes, unless it is full."""
 
     def __init__(self, *, full: bool = False) -> None:
@@ -240,14 +239,14 @@ class Disk:
         self.full = True
 
 
-def held(saver: Saver) -> threading.Event:
-    """Have a saver wait, so that what comes is there at once when it goes on."""
+def held(storage: Storage) -> threading.Event:
+    """Have a storage wait, so that what comes is there at once when it goes on."""
     go_on = threading.Event()
 
     def wait() -> None:
         assert go_on.wait(10)
 
-    saver._worker.submit(wait)
+    storage._worker.submit(wait)
     return go_on
 
 
@@ -255,16 +254,16 @@ def test_a_file_with_stamps_years_ahead_is_read_and_mended(
     network: Network, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "params"
-    with closing(Store(path)) as store:
+    with closing(StoreFile(path)) as store:
         store.save([put(("a",), (time, "f0"), "kept") for time in ((1 << 62) - 1, (1 << 62) + 1)])
         store.save([put(("b",), (5, "f0"), 1)])
     for _ in range(2):
-        replica = network.replica(keep=Store(path))
+        replica = network.replica(storage=Storage(StoreFile(path)))
         assert replica.root["a"] in {"kept", "new"}
         assert replica.set("/a", "new").slow == ()
         replica.close()
     assert caplog.text.count("years ahead") == 1
-    with closing(Store(path)) as store:
+    with closing(StoreFile(path)) as store:
         found = {write.path: write for write in store.load()}
     assert found[("a",)].value == "new"
     assert found[("a",)].time < time.time_ns() + 10**9
@@ -273,12 +272,12 @@ def test_a_file_with_stamps_years_ahead_is_read_and_mended(
 
 def test_what_comes_right_before_the_end_is_saved() -> None:
     disk = Disk()
-    saver = Saver(disk)
-    go_on = held(saver)
-    saver.take([put(("n",), (1, "c"), 1)])
-    end = threading.Thread(target=saver.close)
+    storage = Storage(disk)
+    go_on = held(storage)
+    storage.save([put(("n",), (1, "c"), 1)])
+    end = threading.Thread(target=storage.close)
     end.start()
-    until(lambda: saver._worker._closed)
+    until(lambda: storage._worker.closed)
     go_on.set()
     end.join()
     assert [write.path for write in disk.kept] == [("n",)]
@@ -286,25 +285,25 @@ def test_what_comes_right_before_the_end_is_saved() -> None:
 
 def test_tidying_up_makes_nobody_wait() -> None:
     disk = Disk()
-    saver = Saver(disk)
-    go_on, safe = held(saver), threading.Event()
-    saver.when_safe(safe.set)
-    saver.trim(list)
+    storage = Storage(disk)
+    go_on, safe = held(storage), threading.Event()
+    storage.when_stored(safe.set)
+    storage.compact(list)
     go_on.set()
     assert safe.wait(10)
-    saver.close()
+    storage.close()
 
 
 def test_a_disk_that_is_full_for_long_costs_no_memory() -> None:
     disk = Disk(full=True)
-    saver = Saver(disk)
+    storage = Storage(disk)
     for number in range(1, 101):
-        saver.take([put(("n",), (number, "c"), number), put(("m",), (number, "c"), 0)])
-    until(lambda: not saver._worker.pending and bool(saver._unsaved))
-    until(lambda: len(saver._unsaved) == 2)
+        storage.save([put(("n",), (number, "c"), number), put(("m",), (number, "c"), 0)])
+    until(lambda: not storage._worker.waiting and bool(storage._unsaved))
+    until(lambda: len(storage._unsaved) == 2)
     disk.full = False
-    saver.take([put(("late",), (101, "c"), 1)])
-    saver.close()
+    storage.save([put(("late",), (101, "c"), 1)])
+    storage.close()
     assert [(write.path, write.time) for write in disk.kept] == [
         (("n",), 100),
         (("m",), 100),

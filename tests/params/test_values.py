@@ -85,7 +85,7 @@ def test_a_zone_becomes_its_offset() -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        (None, "'/p' cannot be set: null is no parameter value; delete the parameter"),
+        (None, "'/p' cannot be set: null is not a parameter value; delete the parameter"),
         ({"a": [1, {"b": None}]}, "'/p' cannot be set: at /a[1]/b: null"),
         (1 << 63, "'/p' cannot be set: the int 0x8000000000000000 does not fit 64 bits"),
         (
@@ -93,8 +93,8 @@ def test_a_zone_becomes_its_offset() -> None:
             "does not fit 64 bits; expected -9223372036854775808 to 9223",
         ),
         ({1: 2}, "'/p' cannot be set: the key 1 is a int; expected a str"),
-        ({"a", "b"}, "'/p' cannot be set: a set is no parameter value; expected bool, int"),
-        (1j, "a complex is no parameter value"),
+        ({"a", "b"}, "'/p' cannot be set: a set is not a parameter value; expected bool, int"),
+        (1j, "a complex is not a parameter value"),
         ("a\ud800b", r"character '\\ud800' at position 2 is half of a surrogate pair"),
         ({"\udfff": 1}, r"character '\\udfff' at position 1"),
         (LOOP, "nested more than 100 deep, or contains itself"),

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rosz.params.replica import Changed
-from rosz.params.replica.watch import Watchers, same
+from rosz.params.replica.watch import TreeChange, Watchers, is_same
 from rosz.params.writes import Write, put
 
 from .network import Network
@@ -174,7 +174,7 @@ def test_a_slow_callback_gets_the_newest_of_each_name() -> None:
     for number in range(5000):
         write: Write = put(("a",), (number + 1, "c"), number)
         changed = {"a": number}
-        watchers.tell(root, changed, [write])
+        watchers.notify(TreeChange(root, changed, [write]))
         root = changed
         if number == 0:
             assert entered.wait(PATIENCE)
@@ -189,6 +189,6 @@ def test_a_slow_callback_gets_the_newest_of_each_name() -> None:
 
 def test_values_are_the_same_only_with_their_types() -> None:
     nan = float("nan")
-    assert same({"a": [1, nan]}, {"a": [1, nan]})
+    assert is_same({"a": [1, nan]}, {"a": [1, nan]})
     for left, right in [(1, True), (1, 1.0), ([1], [1, 2]), ({"a": 1}, {"b": 1}), ("1", 1)]:
-        assert not same(left, right)
+        assert not is_same(left, right)

@@ -8,28 +8,30 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rosz.errors import DecodeError
-from rosz.params.keys import Keys, Member, matches
+from rosz.params.replica.serve import is_key_in
 from rosz.params.values import normalise
 from rosz.params.wire import (
-    Answer,
     Batch,
+    ClientReply,
+    ClientRequest,
     Index,
-    Question,
+    Keys,
+    Member,
     Record,
-    Sync,
-    SyncAnswer,
+    SyncReply,
+    SyncRequest,
+    add_header,
     decode,
     decode_value,
     encode,
     encode_value,
-    seal,
-    unseal,
+    read_header,
 )
 from rosz.params.writes import DELETED, Write
 
 from .strategies import PATHS, VALUES, writes
 
-KINDS: list[type[Any]] = [Batch, Sync, SyncAnswer, Question, Answer]
+KINDS: list[type[Any]] = [Batch, SyncRequest, SyncReply, ClientRequest, ClientReply]
 KEYS = Keys(7)
 
 
@@ -42,8 +44,8 @@ def test_values_survive_the_way(value: Any) -> None:
 
 @given(writes())
 def test_records_survive_the_way(batch: list[Write]) -> None:
-    message = encode(Sync(records=[Record.of(write) for write in batch]))
-    assert [record.write() for record in decode(message, Sync).records] == batch
+    message = encode(SyncRequest(records=[Record.of(write) for write in batch]))
+    assert [record.write() for record in decode(message, SyncRequest).records] == batch
 
 
 @given(st.dictionaries(PATHS.filter(bool), st.one_of(st.just(DELETED), VALUES), max_size=5))
@@ -97,7 +99,7 @@ def test_any_msgpack_is_a_message_or_the_named_error(kind: type[Any], value: Any
         (Batch(0, "a", ""), "the time 0, expected one after"),
         (Batch(5, "a", "", [("a//b", 1)]), "'a//b', expected 'a//b'|expected"),
         (Batch(5, "a", "", [("", 1)]), "the root of all parameters is a dict"),
-        (Batch(5, "a", "", [("a", None)]), "null is no parameter value"),
+        (Batch(5, "a", "", [("a", None)]), "null is not a parameter value"),
         (Batch(5, "a", "", [("/".join("a" * 101), 1)]), "has 101 parts"),
     ],
 )
@@ -108,15 +110,15 @@ def test_writes_that_mean_nothing_are_refused(message: Batch, reason: str) -> No
 
 @given(st.integers(0, (1 << 64) - 1), st.from_regex(r"[0-9a-f]{1,32}", fullmatch=True))
 def test_seals_survive_the_way(number: int, sender: str) -> None:
-    data = seal(sender, number, b"rest")
-    found, again, start = unseal(data)
+    data = add_header(sender, number, b"rest")
+    found, again, start = read_header(data)
     assert (found, again, data[start:]) == (sender, number, b"rest")
 
 
 @given(st.binary(max_size=30))
 def test_any_bytes_are_sealed_or_the_named_error(data: bytes) -> None:
     try:
-        sender, _, start = unseal(data)
+        sender, _, start = read_header(data)
     except DecodeError:
         return
     assert sender.isalnum()
@@ -134,12 +136,12 @@ def test_values_nested_without_end_are_refused() -> None:
 
 def test_an_index_is_small() -> None:
     index = Index([1], [("a/b", 1_700_000_000_000_000_000, "0123456789abcdef0123456789abcdef")])
-    assert len(encode(Sync(index=index))) < 70
+    assert len(encode(SyncRequest(index=index))) < 70
 
 
 def test_keys_of_a_domain() -> None:
     assert KEYS.change == "@rosz/7/change"
-    assert KEYS.below == "@rosz/7/param/**"
+    assert KEYS.all_params == "@rosz/7/param/**"
     assert KEYS.param(()) == "@rosz/7/param"
     assert KEYS.param(("a", "*")) == "@rosz/7/param/a/%2A"
     assert KEYS.ask("f0") == "@rosz/7/store/f0/ask"
@@ -183,4 +185,4 @@ def test_tokens_carry_the_replica() -> None:
     ],
 )
 def test_key_expressions(expression: str, key: str, expected: bool) -> None:
-    assert matches(expression, key) is expected
+    assert is_key_in(expression, key) is expected

@@ -15,7 +15,8 @@ FORGER = """
     import zenoh
     from rosz.msgs.std_msgs.msg import String
     from rosz.msgs.std_srvs.srv import Trigger
-    from rosz.params.wire import Batch, Question, Record, Sync, SyncAnswer, encode, seal
+    from rosz.params.wire import (
+        Batch, ClientRequest, Record, SyncReply, SyncRequest, add_header, encode)
     from rosz.wire import dds_type
 
     keys = sys.argv[1]
@@ -61,7 +62,7 @@ FORGER = """
         return [Record("secrets/pin", time.time_ns(), "f0", "forger", [0])]
 
     def confused(query):
-        query.reply(query.key_expr, encode(SyncAnswer(records=records())))
+        query.reply(query.key_expr, encode(SyncReply(records=records())))
 
     print("up", flush=True)
     for line in sys.stdin:
@@ -74,16 +75,16 @@ FORGER = """
         for key in (f"0/format/{trigger}", "0/**", "**/format/**", "**", "@rosz/**", "@/**"):
             ask(key, b"")
         write = encode(batch("secrets/pin", 0))
-        put = encode(Question("write", batch=batch("secrets/pin", 0), timeout=1.0))
+        put = encode(ClientRequest("write", batch=batch("secrets/pin", 0), timeout=1.0))
         for reach in ("", "/gains", "/gains/p", "/*", "/**", "/secrets", "/gains/../secrets"):
             for key in ("change", "param", "store/*/write", "store/*/set", "store/*/sync"):
-                session.put(f"@rosz/0/{key}{reach}", seal(str(zid), 1, write))
+                session.put(f"@rosz/0/{key}{reach}", add_header(str(zid), 1, write))
                 ask(f"@rosz/0/{key}{reach}", put)
-                ask(f"@rosz/0/{key}{reach}", encode(Sync(digest=b"", records=records())))
-                ask(f"@rosz/0/{key}{reach}", seal(str(zid), 1, write))
+                ask(f"@rosz/0/{key}{reach}", encode(SyncRequest(digest=b"", records=records())))
+                ask(f"@rosz/0/{key}{reach}", add_header(str(zid), 1, write))
         session.put("@rosz/0/param/secrets/pin", b"\\x00")
         session.delete("@rosz/0/param/secrets")
-        fair = seal(str(zid), 2, encode(batch("gains/p", 77)))
+        fair = add_header(str(zid), 2, encode(batch("gains/p", 77)))
         session.put("@rosz/0/change/gains", fair)
         print("done", flush=True)
 """

@@ -15,7 +15,7 @@ from network import Network, Program, eventually
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import SetBool
-from rosz.params.wire import Batch, Question, encode, seal
+from rosz.params.wire import Batch, ClientRequest, add_header, encode
 from rosz.wire import dds_type
 
 VICTIM = """
@@ -104,12 +104,12 @@ class Attacker:
         return Batch.of((self._random.getrandbits(62), "ab"), "x", [(("n", "m"), 1)])
 
     def _write(self) -> None:
-        sealed = seal("abcdef", self._random.randrange(1 << 60), encode(self._batch()))
+        sealed = add_header("abcdef", self._random.randrange(1 << 60), encode(self._batch()))
         self._put("@rosz/42/change", self._damaged(sealed), None)
 
     def _store(self) -> None:
         verb = self._random.choice(["get", "names", "search", "stamp", "write", "dance"])
-        question = encode(Question(verb, "/a", batch=self._batch()))
+        question = encode(ClientRequest(verb, "/a", batch=self._batch()))
         where = self._random.choice(["ask", "set", "sync", "write"])
         self._ask(f"@rosz/42/store/{self._zid}/{where}", self._damaged(question))
 

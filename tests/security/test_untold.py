@@ -11,20 +11,20 @@ from rosz.security.authority import Authority
 WRITER = """
     import logging, sys
     import rosz
-    from rosz.params.replica import keeper, sync
+    from rosz.params.replica import sync
     logging.basicConfig()
-    keeper._COMPARE_EVERY = (0.2, 0.2)
-    keeper._TICK = 0.2
-    tell = sync._Comparison._tell
+    sync._COMPARE_EVERY = (0.2, 0.2)
+    sync._TICK = 0.2
+    send = sync._Comparison._send
 
-    def told(self, writes):
-        print("told", len(writes), min(write.path for write in writes), flush=True)
-        tell(self, writes)
+    def sent(self, writes):
+        print("sent", len(writes), min(write.path for write in writes), flush=True)
+        send(self, writes)
 
-    sync._Comparison._tell = told
+    sync._Comparison._send = sent
     with rosz.Node("writer") as node:
         store = node.context.params
-        store._line.tell = lambda *_: ()  # as if the link were cut
+        store._broadcaster.send = lambda *_: ()  # as if the link were cut
         store.merge("/", {
             "gains": {f"g{n}": n for n in range(2000)},
             "secrets": {"pin": 1, "word": "x"},
@@ -52,10 +52,10 @@ def test_what_rules_forbid_holds_up_nothing_and_is_told_once(
     writer.say("5")
     eventually(lambda: writer.output.count("compared") == 5, "5 comparisons", 60)
     assert "compared True" in writer.output  # those that the keeper is at already say False
-    assert [line for line in writer.lines[begun:] if line.startswith("told")] == []
+    assert [line for line in writer.lines[begun:] if line.startswith("sent")] == []
     assert writer.output.count("differs there from now on") == 1
     held = robot.ask("param", "list").split()
     assert ("/gains/g1999" in held) == permitted
     assert not {"/secrets/pin", "/secrets/word", "/gains_too"} & {*held}
     # Those that pass do so together.
-    assert len([line for line in writer.lines if line.startswith("told")]) < 10 or not permitted
+    assert len([line for line in writer.lines if line.startswith("sent")]) < 10 or not permitted

@@ -1,19 +1,28 @@
-"""The replicated store, on the network: a process's own copy, kept the same as all others.
+"""The replicated store on the network: one copy in each process, kept the same as all others.
 
-`replica` is the whole; `reading` its tree and `state` its history behind a lock; `line`, `acks` and
-`members` bring writes to everybody; `sync` and `keeper` settle what went wrong meanwhile; `serve`
-and `mirror` answer those who are no replicas; `watch` tells programs what changes; `saver` keeps it
-on disk.
+`replica` holds the copies themselves, `state` the history and tree of a copy, `broadcast` writes
+and their acknowledgements, `sync` joining, comparing and anti-entropy, `members` the replicas that
+are alive, `serve` what a replica does for programs that have none, and `watch` the notification of
+changes. The keys and messages are those of `rosz.params.wire`.
+
+`storage` is public as well, but not imported here, because only a replica with a file needs SQLite.
 """
 
-from rosz.params.replica.replica import ACKNOWLEDGED_BY, Outcome, Replica, process_label
-from rosz.params.replica.saver import Keep
+from rosz.params.replica.replica import (
+    ACK_TIMEOUT,
+    NO_REPLICA,
+    Follower,
+    Outcome,
+    Replica,
+    process_label,
+)
 from rosz.params.replica.watch import Changed, Watch
 
 __all__ = (
-    "ACKNOWLEDGED_BY",
+    "ACK_TIMEOUT",
+    "NO_REPLICA",
     "Changed",
-    "Keep",
+    "Follower",
     "Outcome",
     "Replica",
     "Watch",

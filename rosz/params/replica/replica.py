@@ -1,60 +1,70 @@
-"""A process's own copy of the parameter store.
+"""Copies of the parameter store: the replica of a process, and followers.
 
-It begins by listening, then asks the others for all they have, and serves once it has that. Reads
-are look-ups in its own tree. A write is applied here, told to all others in one message, and done
-when each of them has acknowledged it. Who does not answer is told once more, directly, and then
-named in a warning: the write stands, and that replica gets it when it answers again.
+A replica first subscribes to the writes of others, then asks one of them for everything it has, and
+serves others once it has that. Reads are look-ups in its own tree. A write is applied here,
+broadcast to all others in one message, and done when each of them has acknowledged it. A replica
+that does not answer is sent the write once more, directly, and then named in a warning: the write
+stands, and that replica gets it when it answers again.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import socket
 import sys
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import PurePath
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import msgspec
 
-from rosz.errors import ClosedError, ParamError
+from rosz.errors import ClosedError, DecodeError, NoReplica, ParamError
 from rosz.lifecycle import Closable
-from rosz.params.keys import Keys, Member
-from rosz.params.merge import Change, condense, spread
-from rosz.params.paths import split
-from rosz.params.replica.keeper import Keeper
-from rosz.params.replica.line import Line
+from rosz.params.paths import Path, to_path
+from rosz.params.replica.broadcast import WriteBroadcaster
 from rosz.params.replica.members import Members
-from rosz.params.replica.mirror import Mirror
-from rosz.params.replica.reading import Reading, not_found
-from rosz.params.replica.saver import Keep, Saver
-from rosz.params.replica.serve import Server
-from rosz.params.replica.state import State
-from rosz.params.replica.sync import Synchroniser
-from rosz.params.replica.worker import Worker
-from rosz.params.tree import MISSING, lookup
-from rosz.params.values import normalise
-from rosz.params.writes import DELETED
-from rosz.session import Session, Stamp, clamp_timeout
+from rosz.params.replica.serve import ClientServer, ParameterKeys
+from rosz.params.replica.state import NOT_A_PARAMETER, State, TreeReader, not_found
+from rosz.params.replica.sync import AntiEntropy, Synchroniser
+from rosz.params.tree import MISSING
+from rosz.params.values import normalise, normalise_at
+from rosz.params.wire import Keys, Member
+from rosz.params.writes import DELETED, Change, Write, condense, spread
+from rosz.session import Sample, Session, Stamp, clamp_timeout
+from rosz.worker import Worker
 
-__all__ = ("ACKNOWLEDGED_BY", "Outcome", "Replica", "process_label")
+if TYPE_CHECKING:
+    from rosz.params.replica.storage import Storage
 
-ACKNOWLEDGED_BY: Final = 2.0
-"""Seconds that a write waits for the other replicas when not told otherwise."""
+__all__ = ("ACK_TIMEOUT", "NO_REPLICA", "Follower", "Outcome", "Replica", "process_label")
 
-_SETTLED_BY: Final = 2.0
-_TOKENS_BY: Final = 0.5
+_log = logging.getLogger("rosz.params")
+
+ACK_TIMEOUT: Final = 2.0
+"""Time in seconds that a write waits for the other replicas by default."""
+
+NO_REPLICA: Final = (
+    "no process on this network holds the parameter store; start one that does, such as "
+    "'rosz core', 'rosz launch …' or any node that uses parameters"
+)
+
+_MESH_TIMEOUT: Final = 2.0
+_TOKENS_TIMEOUT: Final = 0.5
+_COMPARE_EVERY: Final = 5.0
+_MAX_WAITING: Final = 2000
+"""Tasks of a worker above which requests from the network are refused."""
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """What became of a write, which stands in any case.
+    """The result of a write, which stands in any case.
 
     Attributes:
-        time: Its time, in nanoseconds since the epoch.
-        slow: Replicas that did not acknowledge it in time, for people.
+        time: Time of the write, in nanoseconds since the epoch.
+        slow: Replicas that did not acknowledge it in time, as shown to people.
     """
 
     time: int
@@ -62,205 +72,43 @@ class Outcome(msgspec.Struct, frozen=True):
 
 
 def process_label() -> str:
-    """Return what people call this process: its program, number and host."""
+    """Return this process as shown to people: its program, process id and host."""
     program = PurePath(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
-    # The name of a file may be no UTF-8, but others are told of it.
+    # A file name may be other than UTF-8, but the label is sent to others.
     program = program.encode(errors="surrogateescape").decode(errors="replace")
     return f"{program} (pid {os.getpid()} on {socket.gethostname()})"
 
 
-class Replica(Reading):
-    """The parameter store, as one process holds it. Safe for threads.
+def _run(task: Callable[[], object]) -> None:
+    try:
+        task()
+    except ClosedError as error:
+        _log.debug("a task of the parameter store came too late: %s", error)
 
-    Opening it joins the others, which takes a few milliseconds, or up to seconds where those that
-    should answer do not.
+
+class _Copy(TreeReader):
+    """What every copy of the store has: its state, the replicas, and synchronisation with them.
 
     Args:
-        session: The network; stays open when the replica closes.
-        domain: The ROS domain.
-        label: What people call this process, in warnings and as the origin of its writes.
-        settled: Set when the session is linked to all its neighbours; not waited for when missing.
-        keep: Where writes outlive the process.
-
-    Attributes:
-        label: What people call this process.
-        zid: Its session.
-
-    Raises:
-        ClosedError: The session is closed.
-        TransportError: The session cannot declare what it takes.
+        session: Session of the copy; `close` leaves it open.
+        domain: ROS domain.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        domain: int = 0,
-        *,
-        label: str = "",
-        settled: threading.Event | None = None,
-        keep: Keep | None = None,
-    ) -> None:
+    def __init__(self, session: Session, domain: int) -> None:
         super().__init__(State(session.clock))
-        self.label = label or process_label()
-        self.zid = session.zid
         self._session = session
-        self._own = Member(session.stamp().time, session.zid, self.label)
-        self._closed = False
-        self._saver = self._load(keep)
-        self._worker = Worker("rosz-params")
-        keys = Keys(domain, scoped=session.secured)
-        kept = self._saver.when_safe if self._saver is not None else None
-        self._line = Line(session, keys, self._state, self._worker, kept)
-        self._mirror = Mirror(session, keys, self._state, self._worker)
-        self._members = Members(session, keys)
-        self._sync = Synchroniser(session, keys, self._state, self._members, self._worker)
-        server = Server(self, keys, self._state.stamp, self._worker, lambda: self._sync.ready)
-        self._declared: list[Closable] = [
-            session.queryable(keys.sync(session.zid), self._sync.serve, complete=True),
-            session.queryable(f"{keys.tell(session.zid)}/**", self._sync.serve_told, complete=True),
-            session.queryable(keys.ask(session.zid), server.serve, complete=True),
-            session.queryable(f"{keys.set(session.zid)}/**", server.serve_writes, complete=True),
-        ]
-        if settled is not None:
-            settled.wait(_SETTLED_BY)
-        self._members.follow(self._on_member, _TOKENS_BY)
-        self._token = session.token(keys.token(self._own))
-        self._join()
-        Keeper(self._own, self._sync, self._mirror, self._trim)
-
-    def set(
-        self, name: str, value: object, *, origin: str = "", timeout: float = ACKNOWLEDGED_BY
-    ) -> Outcome:
-        """Set a global name; a dict replaces all that was below it.
-
-        Args:
-            name: Global name.
-            value: What a parameter may hold.
-            origin: Who sets it; this process when not given.
-            timeout: Seconds to wait for the other replicas.
-
-        Raises:
-            ParamError: The value is none, or the root is to be no dict.
-            InvalidName: It is no global name.
-            ClosedError: The replica or the session is closed.
-        """
-        changes: list[Change] = [(split(name), normalise(value, name))]
-        return self.write(changes, origin=origin, timeout=timeout)
-
-    def merge(
-        self, name: str, value: object, *, origin: str = "", timeout: float = ACKNOWLEDGED_BY
-    ) -> Outcome:
-        """Set a global name as ROS 1's command line does: a dict leaf by leaf, as one change.
-
-        Raises:
-            ParamError: The value is none, or the root is to be no dict.
-            InvalidName: It, or a key, is no name.
-            ClosedError: The replica or the session is closed.
-        """
-        changes = condense(spread(name, normalise(value, name)))
-        return self.write(changes, origin=origin, timeout=timeout)
-
-    def delete(self, name: str, *, origin: str = "", timeout: float = ACKNOWLEDGED_BY) -> Outcome:
-        """Delete a global name and all below it; its parent stays, even empty.
-
-        Raises:
-            ParamNotFound: It is not set.
-            ParamError: It is the root.
-            InvalidName: It is no global name.
-            ClosedError: The replica or the session is closed.
-        """
-        path = split(name)
-        if not path:
-            raise ParamError("'/' cannot be deleted; set it to {} to delete all parameters")
-        if lookup(self._state.root, path) is MISSING:
-            raise not_found(self._state.root, path)
-        return self.write([(path, DELETED)], origin=origin, timeout=timeout)
-
-    def write(
-        self,
-        changes: Iterable[Change],
-        *,
-        origin: str = "",
-        stamp: Stamp | None = None,
-        timeout: float = ACKNOWLEDGED_BY,
-    ) -> Outcome:
-        """Make a batch of changes, which every replica applies as one.
-
-        Args:
-            changes: Paths with values already normalised, or `DELETED`; of two of which one lies
-                below the other, the upper one comes first (`rosz.params.condense`).
-            origin: Who makes them; this process when not given.
-            stamp: When they were made, if not now.
-            timeout: Seconds to wait for the other replicas.
-
-        Raises:
-            ParamError: A change has no meaning in the tree; nothing has changed then.
-            DecodeError: The stamp given lies years ahead; nothing has changed then.
-            ClosedError: The replica or the session is closed.
-            UsageError: The timeout is no number; nothing has changed then.
-        """
-        timeout = clamp_timeout(timeout)
-        if self._closed:
-            raise ClosedError("the parameter store of this process is closed")
-        batch = list(changes)
-        if not batch:
-            return Outcome(0)
-        origin = origin or self.label
-        stamp, step = self._state.write(batch, origin, stamp)
-        slow = self._line.tell(batch, stamp, origin, self._members, timeout)
-        self._mirror.show(step)
-        self._wait_until_kept(timeout)
-        return Outcome(stamp.time, slow)
-
-    def members(self) -> list[Member]:
-        """Return the other replicas that are alive, the oldest first."""
-        return self._members.all()
-
-    def compare(self, timeout: float) -> bool:
-        """Compare with all other replicas and settle what differs.
-
-        Args:
-            timeout: Seconds.
-
-        Returns:
-            Whether all of them answered in time.
-        """
-        timeout = clamp_timeout(timeout)
-        answers: SimpleQueue[bool] = SimpleQueue()
-        expected = self._sync.compare_with_all(answers.put)
-        try:
-            return all(answers.get(timeout=timeout) for _ in range(expected))
-        except Empty:
-            return False
-
-    def digest(self) -> bytes:
-        """Return the fingerprint of all writes: replicas that hold the same have the same."""
-        return self._state.digest()
-
-    @property
-    def closed(self) -> bool:
-        """Whether it is closed."""
-        return self._closed
-
-    def disown(self) -> None:
-        """Refuse every write from now on, touching neither threads nor links: after a fork."""
-        self._closed = True
+        self._keys = Keys(domain, scoped=session.secured)
+        self._worker: Worker[Callable[[], object]] = Worker(
+            "rosz-params", _run, capacity=_MAX_WAITING, logger=_log
+        )
+        self._members = Members(session, self._keys)
+        self._sync = Synchroniser(session, self._keys, self._state, self._members, self._worker)
 
     def close(self) -> None:
-        """Leave the others; again is no error."""
-        if self._closed:
-            return
-        self._closed = True
-        self._token.close()
-        for declared in self._declared:
-            declared.close()
-        self._line.close()
+        """Leave the other copies; a second call has no effect."""
         self._members.close()
         self._worker.close()
-        self._mirror.close()
         self._state.watchers.close()
-        if self._saver is not None:
-            self._saver.close()
 
     def __enter__(self) -> Self:
         return self
@@ -273,29 +121,209 @@ class Replica(Reading):
     ) -> None:
         self.close()
 
+
+class Replica(_Copy):
+    """The parameter store of one process. Safe for threads.
+
+    The constructor joins the other replicas, which takes a few milliseconds, or up to seconds if
+    those that should reply do not.
+
+    Args:
+        session: Session of the replica; `close` leaves it open.
+        domain: ROS domain.
+        label: Process as shown to people, in warnings and as the origin of its writes.
+        settled: Event that is set when the session is linked to all its neighbours; without it, the
+            constructor does not wait for that.
+        storage: Storage that holds the parameters when the process has ended.
+
+    Attributes:
+        label: Process as shown to people.
+        zid: Zenoh id of the session.
+
+    Raises:
+        ClosedError: The session is closed.
+        TransportError: The session cannot declare the keys.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        domain: int = 0,
+        *,
+        label: str = "",
+        settled: threading.Event | None = None,
+        storage: Storage | None = None,
+    ) -> None:
+        super().__init__(session, domain)
+        self.label = label or process_label()
+        self.zid = session.zid
+        self._own = Member(session.stamp().time, session.zid, self.label)
+        self._closed = False
+        self._storage = storage
+        if storage is not None:
+            if self._state.restore(storage.load()):
+                storage.compact(self._writes)
+            self._state.on_new(storage.save)
+        keys, state, sync, worker = self._keys, self._state, self._sync, self._worker
+        self._broadcaster = WriteBroadcaster(session, keys, state, self._members, worker, storage)
+        self._parameter_keys = ParameterKeys(session, keys, state, worker)
+        self._declared: list[Closable] = [
+            session.queryable(keys.sync(session.zid), sync.on_sync, complete=True),
+            session.queryable(f"{keys.tell(session.zid)}/**", sync.on_tell, complete=True),
+            ClientServer(session, keys, state, self._write_for_client, worker, lambda: sync.ready),
+        ]
+        if settled is not None:
+            settled.wait(_MESH_TIMEOUT)
+        self._members.follow(self._on_member, _TOKENS_TIMEOUT)
+        self._token = session.token(keys.token(self._own))
+        self._join()
+        AntiEntropy(self._own, sync, self._parameter_keys, self._compact)
+
+    def set(
+        self, name: str | Path, value: object, *, origin: str = "", timeout: float = ACK_TIMEOUT
+    ) -> Outcome:
+        """Set a parameter; a dict replaces everything below the name.
+
+        Args:
+            name: Global name or its path.
+            value: New value.
+            origin: Writer, as shown to people; this process by default.
+            timeout: Time limit in seconds of the wait for the other replicas.
+
+        Raises:
+            ParamError: A parameter cannot hold the value, or the root would not be a dict.
+            InvalidName: The name is not a global name.
+            ClosedError: The replica or the session is closed.
+        """
+        path = to_path(name)
+        return self.write([(path, normalise_at(path, value))], origin=origin, timeout=timeout)
+
+    def merge(
+        self, name: str, value: object, *, origin: str = "", timeout: float = ACK_TIMEOUT
+    ) -> Outcome:
+        """Set a global name as ROS 1's command line does: a dict leaf by leaf, as one change.
+
+        Raises:
+            ParamError: A parameter cannot hold the value, or the root would not be a dict.
+            InvalidName: The name, or a key, is not a name.
+            ClosedError: The replica or the session is closed.
+        """
+        changes = condense(spread(name, normalise(value, name)))
+        return self.write(changes, origin=origin, timeout=timeout)
+
+    def delete(
+        self, name: str | Path, *, origin: str = "", timeout: float = ACK_TIMEOUT
+    ) -> Outcome:
+        """Delete a parameter and everything below it; its parent stays, even if empty.
+
+        Raises:
+            ParamNotFound: The parameter is not set.
+            ParamError: The parameter is the root.
+            InvalidName: The name is not a global name.
+            ClosedError: The replica or the session is closed.
+        """
+        path = to_path(name)
+        if not path:
+            raise ParamError("'/' cannot be deleted; set it to {} to delete all parameters")
+        if self.lookup(path) is MISSING:
+            raise not_found(self.root, path)
+        return self.write([(path, DELETED)], origin=origin, timeout=timeout)
+
+    def write(
+        self,
+        changes: Iterable[Change],
+        *,
+        origin: str = "",
+        stamp: Stamp | None = None,
+        timeout: float = ACK_TIMEOUT,
+    ) -> Outcome:
+        """Write a batch, which every replica applies as one change.
+
+        Args:
+            changes: Paths with normalised values or `DELETED`. If one path lies below another, the
+                upper one comes first (`rosz.params.condense`).
+            origin: Writer, as shown to people; this process by default.
+            stamp: Stamp of the batch; a new one by default.
+            timeout: Time limit in seconds of the wait for the other replicas.
+
+        Raises:
+            ParamError: The tree cannot hold a change; nothing is changed then.
+            DecodeError: The given stamp lies years ahead; nothing is changed then.
+            ClosedError: The replica or the session is closed.
+            UsageError: The timeout is not a number; nothing is changed then.
+        """
+        timeout = clamp_timeout(timeout)
+        if self._closed:
+            raise ClosedError("the parameter store of this process is closed")
+        batch = list(changes)
+        if not batch:
+            return Outcome(0)
+        origin = origin or self.label
+        stamp, change = self._state.write(batch, origin, stamp)
+        slow = self._broadcaster.send(batch, stamp, origin, timeout)
+        self._parameter_keys.publish(change)
+        self._wait_until_stored(timeout)
+        return Outcome(stamp.time, slow)
+
+    def members(self) -> list[Member]:
+        """Return the other replicas that are alive, oldest first."""
+        return self._members.all()
+
+    def compare(self, timeout: float) -> bool:
+        """Compare with all other replicas and settle the differences.
+
+        Args:
+            timeout: Time limit in seconds.
+
+        Returns:
+            Whether all of them replied in time.
+        """
+        timeout = clamp_timeout(timeout)
+        results: SimpleQueue[bool] = SimpleQueue()
+        expected = self._sync.compare_with_all(results.put)
+        try:
+            return all(results.get(timeout=timeout) for _ in range(expected))
+        except Empty:
+            return False
+
+    def digest(self) -> bytes:
+        """Return the digest of all writes; replicas with the same writes have the same digest."""
+        with self._state.locked as history:
+            return history.digest()
+
+    @property
+    def closed(self) -> bool:
+        """Whether the replica is closed."""
+        return self._closed
+
+    def disown(self) -> None:
+        """Refuse all writes from now on, without touching threads and links; for a forked child."""
+        self._closed = True
+
+    def close(self) -> None:
+        """Leave the other replicas; a second call has no effect."""
+        if self._closed:
+            return
+        self._closed = True
+        self._token.close()
+        for declared in self._declared:
+            declared.close()
+        self._broadcaster.close()
+        super().close()
+        self._parameter_keys.close()
+        if self._storage is not None:
+            self._storage.close()
+
     def __repr__(self) -> str:
         state = "closed" if self._closed else f"{len(self._members.zids)} others"
         return f"<Replica of {len(self._state)} writes, {state}>"
-
-    def _load(self, keep: Keep | None) -> Saver | None:
-        if keep is None:
-            return None
-        saver = Saver(keep)
-        if self._state.restore(saver.load()):
-            saver.trim(self._state.writes)
-        self._state.feed(saver.take)
-        return saver
-
-    def _trim(self) -> None:
-        if self._saver is not None:
-            self._saver.trim(self._state.writes)
 
     def _join(self) -> None:
         known = self._members.zids
         if known:
             self._sync.join()
         else:
-            self._state.restore(self._mirror.restore())
+            self._state.restore(self._parameter_keys.load())
             self._sync.ready = True
         for member in self._members.all():
             if member.zid not in known:
@@ -303,13 +331,80 @@ class Replica(Reading):
 
     def _on_member(self, member: Member, alive: bool) -> None:
         if not alive:
-            self._line.gone(member.zid)
-            self._sync.gone(member.zid)
+            self._broadcaster.drop_peer(member.zid)
+            self._sync.drop_peer(member.zid)
         elif self._sync.ready and member < self._own:
-            self._sync.meet(member)
+            self._sync.compare_soon(member)
 
-    def _wait_until_kept(self, timeout: float) -> None:
-        if self._saver is not None and timeout > 0:
-            safe = threading.Event()
-            self._saver.when_safe(safe.set)
-            safe.wait(timeout)
+    def _write_for_client(
+        self, changes: list[Change], origin: str, stamp: Stamp, timeout: float
+    ) -> tuple[str, ...]:
+        return self.write(changes, origin=origin, stamp=stamp, timeout=timeout).slow
+
+    def _writes(self) -> list[Write]:
+        with self._state.locked as history:
+            return list(history.writes())
+
+    def _compact(self) -> None:
+        if self._storage is not None:
+            self._storage.compact(self._writes)
+
+    def _wait_until_stored(self, timeout: float) -> None:
+        if self._storage is not None and timeout > 0:
+            stored = threading.Event()
+            self._storage.when_stored(stored.set)
+            stored.wait(timeout)
+
+
+class Follower(_Copy):
+    """A copy of the store that only listens, for reading and watching; no write waits for it.
+
+    Args:
+        session: Session of the follower; `close` leaves it open.
+        domain: ROS domain.
+        timeout: Time limit in seconds of the search for replicas.
+
+    Raises:
+        NoReplica: There is no replica.
+        ClosedError: The session is closed.
+    """
+
+    def __init__(self, session: Session, domain: int, timeout: float) -> None:
+        super().__init__(session, domain)
+        self._subscriber = session.subscriber(f"{self._keys.change}/**", self._on_change)
+        try:
+            self._members.follow(self._on_member, timeout)
+            self._join()
+        except BaseException:
+            self.close()
+            raise
+        self._worker.later(_COMPARE_EVERY, self._compare)
+
+    def close(self) -> None:
+        """Stop following; a second call has no effect."""
+        self._subscriber.close()
+        super().close()
+
+    def _join(self) -> None:
+        if not self._members.zids:
+            raise NoReplica(NO_REPLICA)
+        self._sync.join()
+
+    def _on_member(self, member: Member, alive: bool) -> None:
+        if not alive:
+            self._sync.drop_peer(member.zid)
+
+    def _on_change(self, sample: Sample) -> None:
+        payload, key = sample.payload, sample.key
+        # If the worker is busy, comparing finds the write.
+        self._worker.offer(lambda: self._receive(payload, key))
+
+    def _receive(self, payload: bytes, key: str) -> None:
+        try:
+            self._state.receive(payload, self._keys.reach(key, self._keys.change))
+        except DecodeError as error:
+            self._state.damage.report(NOT_A_PARAMETER, error)
+
+    def _compare(self) -> None:
+        self._sync.compare_with_one()
+        self._worker.later(_COMPARE_EVERY, self._compare)

@@ -1,151 +1,373 @@
-"""Reading and writing on behalf of those who are no replicas: commands, mostly."""
+"""What a replica does for programs that have none.
+
+`ClientServer` reads and writes for `rosz.params.remote.ParamClient`, mostly commands.
+
+`ParameterKeys` keeps one key for each parameter, for any Zenoh program and Zenoh's own storages.
+Every parameter that is not a dict has a key. Whoever sets the parameter writes the key while
+anybody subscribes to it, and each replica answers queries on the keys. So a storage on the keys
+holds the whole store, and the first replica that starts asks whether there is one. A storage may
+hold wrong values if writers did not know of each other, and old ones if it was away, so the oldest
+replica compares it with the tree from time to time.
+"""
 
 from __future__ import annotations
 
 import logging
+import re
 import threading
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterator
+from typing import Any, Final
 
 from rosz.errors import DecodeError, ParamNotFound, RoszError
-from rosz.params.keys import Keys, check_reach
-from rosz.params.merge import Change
 from rosz.params.paths import Path, split
-from rosz.params.replica.reading import names_beside
-from rosz.params.replica.worker import Worker
-from rosz.params.wire import Answer, Question, decode, encode, packed
-from rosz.session import Query, Stamp
+from rosz.params.replica.state import State, TreeReader, names_beside
+from rosz.params.replica.watch import TreeChange
+from rosz.params.tree import MISSING, lookup
+from rosz.params.values import Value
+from rosz.params.wire import (
+    ClientReply,
+    ClientRequest,
+    Keys,
+    check_reach,
+    decode,
+    decode_value,
+    encode,
+    encode_value,
+    pack_value,
+)
+from rosz.params.writes import Change, Write, put
+from rosz.session import Query, Reply, Session, Stamp
+from rosz.worker import Worker
 
-if TYPE_CHECKING:
-    from rosz.params.replica.replica import Replica
-
-__all__ = ("Server",)
+__all__ = ("ClientServer", "ParameterKeys", "is_key_in")
 
 _log = logging.getLogger("rosz.params")
 
-_LONGEST: Final = 60.0
-"""Seconds that a write for somebody else may wait at most."""
+_MAX_TIMEOUT: Final = 60.0
+"""Longest time in seconds that a write for a client waits for the other replicas."""
 
-_AT_ONCE: Final = 16
-"""Writes for others that may wait for acknowledgements at a time; further ones are put off."""
+_MAX_WRITES: Final = 16
+"""Writes for clients that wait for acknowledgements at a time; further clients try again."""
+
+_STORAGE_TIMEOUT: Final = 1.0
+_STORAGES_ONLY: Final = "_by=replica"
+"""Parameter of a query that storages answer and replicas do not."""
+
+WriteFunction = Callable[[list[Change], str, Stamp, float], tuple[str, ...]]
+"""Function that writes a batch: changes, origin, stamp and timeout, to the slow replicas."""
 
 
-class Server:
-    """Answers questions, each on the replica's worker, or if it has to wait on its own thread.
+class ClientServer:
+    """Reads on the replica's worker, and writes on a thread for each write, for clients.
 
     Args:
-        replica: Whom to read and write.
-        keys: Where it is asked.
-        stamp: Gives stamps to those who are to write.
-        worker: Where the reading is done.
-        ready: Tells whether the replica has joined.
+        session: Session of the replica.
+        keys: Keys of the domain.
+        state: State of the replica.
+        write: Function that writes a batch.
+        worker: Worker of the replica.
+        is_ready: Function that tells whether the replica has joined.
     """
 
     def __init__(
         self,
-        replica: Replica,
+        session: Session,
         keys: Keys,
-        stamp: Callable[[], Stamp],
-        worker: Worker,
-        ready: Callable[[], bool],
+        state: State,
+        write: WriteFunction,
+        worker: Worker[Any],
+        is_ready: Callable[[], bool],
     ) -> None:
-        self._replica = replica
-        self._keys = keys
-        self._stamp_now = stamp
+        self._state = state
+        self._reader = TreeReader(state)
+        self._write_batch = write
         self._worker = worker
-        self._ready = ready
-        self._places = threading.BoundedSemaphore(_AT_ONCE)
-        self._verbs: dict[str, Callable[[Question], Answer]] = {
+        self._is_ready = is_ready
+        self._slots = threading.BoundedSemaphore(_MAX_WRITES)
+        self._keys = keys
+        self._set_key = keys.set(session.zid)
+        self._verbs: dict[str, Callable[[ClientRequest], ClientReply]] = {
             "get": self._get,
             "names": self._names,
             "search": self._search,
             "stamp": self._stamp,
         }
+        self._declared = [
+            session.queryable(keys.ask(session.zid), self._on_read, complete=True),
+            session.queryable(f"{self._set_key}/**", self._on_write, complete=True),
+        ]
 
-    def serve(self, query: Query) -> None:
-        """Take in a question."""
+    def close(self) -> None:
+        """Stop serving; a second call has no effect."""
+        for declared in self._declared:
+            declared.close()
+
+    def _on_read(self, query: Query) -> None:
         payload = query.payload or b""
         if not self._worker.offer(lambda: self._read(query, payload)):
-            self._reply(query, Answer("joining"))
+            _reply(query, ClientReply("joining"))
 
-    def serve_writes(self, query: Query) -> None:
-        """Take in a write."""
+    def _on_write(self, query: Query) -> None:
         payload = query.payload or b""
-        if not self._worker.offer(lambda: self._begin_write(query, payload)):
-            self._reply(query, Answer("joining"))
+        if not self._worker.offer(lambda: self._start_write(query, payload)):
+            _reply(query, ClientReply("joining"))
 
     def _read(self, query: Query, payload: bytes) -> None:
         try:
-            question = decode(payload, Question)
+            request = decode(payload, ClientRequest)
         except DecodeError as error:
-            self._reply(query, Answer("refused", text=str(error)))
+            _reply(query, ClientReply("refused", text=str(error)))
             return
-        verb = self._verbs.get(question.verb)
+        verb = self._verbs.get(request.verb)
         if verb is None:
-            self._reply(query, Answer("refused", text=f"'{question.verb}' is nothing to ask for"))
-        elif self._ready():
-            self._reply(query, self._outcome(lambda: verb(question), question))
+            _reply(query, ClientReply("refused", text=f"'{request.verb}' is not a known verb"))
+        elif self._is_ready():
+            _reply(query, self._reply_to(request, verb))
         else:
-            self._reply(query, Answer("joining"))
+            _reply(query, ClientReply("joining"))
 
-    def _begin_write(self, query: Query, payload: bytes) -> None:
+    def _start_write(self, query: Query, payload: bytes) -> None:
         try:
-            order = decode(payload, Question)
-            reach = self._keys.reach(query.key, self._keys.set(self._replica.zid))
+            request = decode(payload, ClientRequest)
+            reach = self._keys.reach(query.key, self._set_key)
         except DecodeError as error:
-            self._reply(query, Answer("refused", text=str(error)))
+            _reply(query, ClientReply("refused", text=str(error)))
             return
-        if not self._ready() or not self._places.acquire(blocking=False):
-            self._reply(query, Answer("joining"))
+        if not self._is_ready() or not self._slots.acquire(blocking=False):
+            _reply(query, ClientReply("joining"))
             return
         threading.Thread(
-            target=self._end_write, args=(query, order, reach), name="rosz-params-ask", daemon=True
+            target=self._finish_write,
+            args=(query, request, reach),
+            name="rosz-params-ask",
+            daemon=True,
         ).start()
 
-    def _end_write(self, query: Query, order: Question, reach: Path) -> None:
+    def _finish_write(self, query: Query, request: ClientRequest, reach: Path) -> None:
         try:
-            self._reply(query, self._outcome(lambda: self._write(order, reach), order))
+            _reply(query, self._reply_to(request, lambda one: self._write(one, reach)))
         finally:
-            self._places.release()
+            self._slots.release()
 
-    def _outcome(self, act: Callable[[], Answer], question: Question) -> Answer:
+    def _reply_to(
+        self, request: ClientRequest, verb: Callable[[ClientRequest], ClientReply]
+    ) -> ClientReply:
         try:
-            return act()
+            return verb(request)
         except ParamNotFound as error:
-            beside = names_beside(self._replica.root, split(question.name))
-            return Answer("missing", text=str(error), value=beside)
+            beside = names_beside(self._state.root, split(request.name))
+            return ClientReply("missing", text=str(error), value=beside)
         except RoszError as error:
-            return Answer("refused", text=str(error))
+            return ClientReply("refused", text=str(error))
 
-    def _reply(self, query: Query, answer: Answer) -> None:
-        with query:
-            try:
-                query.reply(query.key, encode(answer))
-            except RoszError as error:
-                _log.debug("an answer came too late: %s", error)
+    def _get(self, request: ClientRequest) -> ClientReply:
+        path = split(request.name)
+        value = pack_value(self._reader.peek(path))
+        return ClientReply(value=value, origin=self._reader.origin(path))
 
-    def _get(self, question: Question) -> Answer:
-        value = packed(self._replica.peek(question.name))
-        return Answer(value=value, origin=self._replica.origin(question.name))
+    def _names(self, _: ClientRequest) -> ClientReply:
+        return ClientReply(value=self._reader.names())
 
-    def _names(self, _: Question) -> Answer:
-        return Answer(value=self._replica.names())
+    def _search(self, request: ClientRequest) -> ClientReply:
+        found = self._reader.search(request.name, request.node)
+        return ClientReply("missing" if found is None else "ok", value=found)
 
-    def _search(self, question: Question) -> Answer:
-        found = self._replica.search(question.name, question.node)
-        return Answer("missing" if found is None else "ok", value=found)
+    def _stamp(self, _: ClientRequest) -> ClientReply:
+        return ClientReply(value=self._state.stamp().time)
 
-    def _stamp(self, _: Question) -> Answer:
-        return Answer(value=self._stamp_now().time)
-
-    def _write(self, order: Question, reach: Path) -> Answer:
-        batch = order.batch
+    def _write(self, request: ClientRequest, reach: Path) -> ClientReply:
+        batch = request.batch
         if batch is None:
-            return Answer("refused", text="a write that writes nothing")
+            return ClientReply("refused", text="a write without a batch")
         changes: list[Change] = [(write.path, write.value) for write in batch.writes()]
         check_reach((path for path, _ in changes), reach)
         stamp = Stamp(batch.time, batch.clock)
-        outcome = self._replica.write(
-            changes, origin=batch.origin, stamp=stamp, timeout=min(order.timeout, _LONGEST)
-        )
-        return Answer(slow=list(outcome.slow))
+        timeout = min(request.timeout, _MAX_TIMEOUT)
+        return ClientReply(slow=list(self._write_batch(changes, batch.origin, stamp, timeout)))
+
+
+def _reply(query: Query, reply: ClientReply) -> None:
+    with query:
+        try:
+            query.reply(query.key, encode(reply))
+        except RoszError as error:
+            _log.debug("a reply came too late: %s", error)
+
+
+class ParameterKeys:
+    """Writes one key for each parameter, and answers queries on the keys.
+
+    Args:
+        session: Session of the replica.
+        keys: Keys of the domain.
+        state: State of the replica.
+        worker: Worker of the replica.
+    """
+
+    def __init__(self, session: Session, keys: Keys, state: State, worker: Worker[Any]) -> None:
+        self._session = session
+        self._keys = keys
+        self._state = state
+        self._worker = worker
+        self._publisher = session.publisher(keys.all_params)
+        self._queryable = session.queryable(keys.all_params, self._on_query, complete=True)
+
+    @property
+    def subscribed(self) -> bool:
+        """Whether anybody subscribes to single parameters."""
+        return self._publisher.matched
+
+    def publish(self, change: TreeChange) -> None:
+        """Write the keys that a change concerns, in the background."""
+        if self.subscribed:
+            self._worker.submit(lambda: self._publish(change))
+
+    def load(self) -> list[Write]:
+        """Return the content of storages as writes."""
+        found = []
+        for reply in self._query_storages():
+            try:
+                found.append(self._read(reply))
+            except DecodeError as error:
+                _log.warning("a storage holds something that is not a parameter: %s", error)
+        return found
+
+    def reconcile(self) -> None:
+        """Make storages hold what the tree holds, and nothing else."""
+        missing = dict(_keyed(self._state.root, ()))
+        for reply in self._query_storages():
+            try:
+                path = self._keys.path(reply.key)
+                value = decode_value(reply.payload)
+            except DecodeError:
+                self._session.delete(reply.key, stamp=self._state.stamp())
+                continue
+            if path not in missing:
+                self._session.delete(reply.key, stamp=self._state.stamp())
+            elif encode_value(missing[path]) == encode_value(value):
+                del missing[path]
+        for path, value in missing.items():
+            self._put(path, value, self._state.stamp())
+
+    def close(self) -> None:
+        """Undeclare the keys; a second call has no effect."""
+        self._publisher.close()
+        self._queryable.close()
+
+    def _query_storages(self) -> list[Reply]:
+        try:
+            replies = self._session.get(
+                self._keys.all_params, parameters=_STORAGES_ONLY, timeout=_STORAGE_TIMEOUT
+            )
+        except RoszError as error:
+            _log.warning("cannot ask for storages of parameters: %s", error)
+            return []
+        return [reply for reply in replies if reply.ok and not reply.deleted]
+
+    def _read(self, reply: Reply) -> Write:
+        path = self._keys.path(reply.key)
+        stamp = reply.stamp
+        if stamp is None:
+            raise DecodeError("parameter", -1, f"'{reply.key}' has no timestamp")
+        return put(path, (stamp.time, stamp.id), decode_value(reply.payload), "a storage")
+
+    def _publish(self, change: TreeChange) -> None:
+        for write in change.writes:
+            before, after = lookup(change.old, write.path), lookup(change.new, write.path)
+            kept = dict(_keyed(after, write.path)) if after is not MISSING else {}
+            gone = dict(_keyed(before, write.path)) if before is not MISSING else {}
+            stamp = Stamp(write.time, write.clock)
+            for path in gone.keys() - kept.keys():
+                self._session.delete(self._keys.param(path), stamp=stamp)
+            for path in _leaves_above(change.old, write.path):
+                self._session.delete(self._keys.param(path), stamp=stamp)
+            for path, value in kept.items():
+                self._put(path, value, stamp)
+
+    def _put(self, path: Path, value: Value, stamp: Stamp) -> None:
+        self._session.put(self._keys.param(path), encode_value(value), stamp=stamp)
+
+    def _on_query(self, query: Query) -> None:
+        if _STORAGES_ONLY in query.parameters:
+            query.close()
+            return
+        if not self._worker.offer(lambda: self._answer(query)):
+            with query:
+                query.reply_error("this replica has too many queries; ask again later")
+
+    def _answer(self, query: Query) -> None:
+        with query:
+            try:
+                selected = list(self._select(query.key))
+            except DecodeError as error:
+                query.reply_error(str(error))
+                return
+            for path, value in selected:
+                with self._state.locked as history:
+                    source = history.source(path)
+                stamp = None if source is None else Stamp(source.time, source.clock)
+                query.reply(self._keys.param(path), encode_value(value), stamp=stamp)
+
+    def _select(self, key: str) -> Iterator[tuple[Path, Value]]:
+        root = self._state.root
+        if "*" not in key:
+            path = self._keys.path(key)
+            value = lookup(root, path)
+            if value is not MISSING:
+                yield path, value
+            return
+        for path, value in _keyed(root, ()):
+            if is_key_in(key, self._keys.param(path)):
+                yield path, value
+
+
+def _keyed(value: Value, path: Path) -> Iterator[tuple[Path, Value]]:
+    """Yield the path and value of everything with a key of its own: leaves and empty dicts.
+
+    A dict has a key of its own as well if a name in it is empty or holds a slash, because the keys
+    of its items would mean other parameters.
+    """
+    if type(value) is not dict or (not value and path) or not all(map(_is_part, value)):
+        yield path, value
+        return
+    for key, item in value.items():
+        yield from _keyed(item, (*path, key))
+
+
+def _is_part(name: str) -> bool:
+    return bool(name) and "/" not in name
+
+
+def _leaves_above(root: Value, path: Path) -> Iterator[Path]:
+    """Yield the path of the leaf above a path, if there is one."""
+    for depth in range(1, len(path)):
+        value = lookup(root, path[:depth])
+        if value is not MISSING and type(value) is not dict:
+            yield path[:depth]
+
+
+def is_key_in(expression: str, key: str) -> bool:
+    """Tell whether a Zenoh key expression includes a key."""
+    chunks = key.split("/")
+    reached = {0}
+    for part in expression.split("/"):
+        if not reached:
+            return False
+        if part == "**":
+            reached = set(range(min(reached), len(chunks) + 1))
+        else:
+            reached = {
+                place + 1
+                for place in reached
+                if place < len(chunks) and _is_chunk_in(part, chunks[place])
+            }
+    return len(chunks) in reached
+
+
+def _is_chunk_in(part: str, chunk: str) -> bool:
+    if part == "*":
+        return True
+    if "$*" not in part:
+        return part == chunk
+    pattern = ".*".join(re.escape(piece) for piece in part.split("$*"))
+    return re.fullmatch(pattern, chunk, re.DOTALL) is not None

@@ -1,7 +1,8 @@
-"""The history of a replica, shared between its threads."""
+"""The state of one copy of the store: its history behind a lock, and its tree for readers."""
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections import deque
@@ -11,26 +12,30 @@ from typing import Final
 
 from msgspec import structs
 
-from rosz.errors import DecodeError, ParamError
+from rosz.errors import DecodeError, ParamError, ParamNotFound
 from rosz.params.history import History
-from rosz.params.keys import check_reach
-from rosz.params.merge import Change
-from rosz.params.paths import ROOT, Path
-from rosz.params.replica.complaints import AHEAD, NO_PARAMETER, SAVED_AHEAD, Complaints
-from rosz.params.replica.watch import Callback, Watch, Watchers
-from rosz.params.tree import Tree
-from rosz.params.wire import Batch, decode, unseal
-from rosz.params.writes import DELETED, Write, check_time, delete, put
+from rosz.params.paths import ROOT, Path, climb, joined, to_path
+from rosz.params.replica.watch import Callback, TreeChange, Watch, Watchers
+from rosz.params.tree import MISSING, Missing, Tree, leaves, lookup
+from rosz.params.values import Value, copy
+from rosz.params.wire import Batch, check_reach, decode, read_header
+from rosz.params.writes import DELETED, Change, Write, check_time, delete, put
 from rosz.session import HybridClock, Stamp
 
-__all__ = ("State", "Step")
+__all__ = ("NOT_A_PARAMETER", "DamageLog", "State", "TreeReader", "names_beside", "not_found")
 
-Step = tuple[Tree, Tree, list[Write]]
-"""A change of the tree: before, after, and the writes that made it."""
+_log = logging.getLogger("rosz.params")
 
-_PATIENCE: Final = 0.002
-_MOST_UNREAD: Final = 64
-"""Messages that may wait to be read: what a read has to do at most before it returns."""
+NOT_A_PARAMETER: Final = "a replica wrote something that is not a parameter"
+_REFUSED: Final = "a write of a replica is refused"
+_STORED_AHEAD: Final = "a stored write counts as written just now"
+
+_LOCK_TIMEOUT: Final = 0.002
+_MAX_DEFERRED: Final = 64
+"""Messages that may be deferred, which bounds the work that a read has to do before it returns."""
+
+_MAX_SUGGESTIONS: Final = 200
+"""Names beside a missing one that are compared with it."""
 
 _INTERRUPTED: Final = (
     "a signal handler interrupted its thread at work on the parameters, and cannot work on them"
@@ -38,85 +43,133 @@ _INTERRUPTED: Final = (
 )
 
 
+def not_found(root: Tree, path: Path) -> ParamNotFound:
+    """Return the error for a path that is not set, with a similar name if there is one."""
+    return ParamNotFound(joined(path), names_beside(root, path))
+
+
+def names_beside(root: Tree, path: Path) -> list[str]:
+    """Return the names in the namespace of a path, or some of them if there are many."""
+    beside = lookup(root, path[:-1])
+    names = list(beside)[:_MAX_SUGGESTIONS] if type(beside) is dict else []
+    return [joined((*path[:-1], name)) for name in names]
+
+
+class DamageLog:
+    """Log of damaged messages, with one line for each kind of damage: senders may repeat it."""
+
+    def __init__(self) -> None:
+        self._kinds: set[tuple[str, str]] = set()
+
+    def report(self, what: str, error: DecodeError) -> None:
+        """Log a warning, unless the same kind of damage was logged before.
+
+        Args:
+            what: What is wrong, such as `NOT_A_PARAMETER`.
+            error: Reason.
+        """
+        kind = (what, error.type_name)
+        if kind not in self._kinds:
+            self._kinds.add(kind)
+            _log.warning("%s (reported once): %.300s", what, error)
+
+
 class State:
-    """A history behind a lock; its tree is read without.
+    """A history behind a lock. Its tree is read without the lock.
 
-    Messages of others are only noted as they arrive, and read when somebody looks at the tree: a
-    process that nobody asks costs the writers next to nothing, and who asks gets what is newest.
+    Messages of other replicas are deferred: they are applied when somebody reads the tree. So a
+    process whose parameters nobody reads costs the writers almost nothing, and a reader always sees
+    the newest state.
 
-    A signal handler may interrupt its own thread at work on the history, half of which is changed
-    then. It sees the tree as it was before, and is refused all else.
+    A signal handler may interrupt its own thread while that thread changes the history. It then
+    reads the tree as it was before, and everything else raises `ParamError`.
 
     Args:
-        clock: The session's, which is kept ahead of all writes seen whenever it is asked.
+        clock: Clock of the session; it is kept ahead of all writes seen.
 
     Attributes:
-        watchers: Who is told of changes.
-        complaints: What was said of damage.
+        locked: Context manager that locks the history, applies deferred messages and returns it.
+        watchers: Callbacks that are notified of changes.
+        damage: Log of damaged messages.
     """
 
     def __init__(self, clock: HybridClock) -> None:
         self.watchers = Watchers()
-        self.complaints = Complaints()
+        self.damage = DamageLog()
         self._root: Tree = {}
         self._clock = clock
         self._history = History()
+        self.locked = _Locked(self, self._history)
         self._lock = threading.RLock()
         self._holder = 0
-        self._current = _Current(self)
-        self._sinks: tuple[Callable[[list[Write]], None], ...] = ()
-        self._unread: deque[tuple[bytes, Path]] = deque()
-        self._reading = False
+        self._on_new: Callable[[list[Write]], None] | None = None
+        self._deferred: deque[tuple[bytes, Path]] = deque()
+        self._applying = False
 
     def __len__(self) -> int:
-        with self._current:
-            return len(self._history)
+        with self.locked as history:
+            return len(history)
 
     @property
     def root(self) -> Tree:
         """The tree now; never changed in place."""
-        # Set before the last message is taken from the queue, so that one of the two always tells.
-        if self._unread or self._reading:
-            self.read()
+        # One of the two is always true until the last deferred message has been applied.
+        if self._deferred or self._applying:
+            self.apply_deferred()
         return self._root
 
-    def read(self) -> None:
-        """Apply what was noted, unless the same thread is at work on the history already."""
+    def apply_deferred(self) -> None:
+        """Apply deferred messages, unless this thread is at work on the history already."""
         if self._holder != threading.get_ident():
-            with self._current:
+            with self.locked:
                 pass
 
-    def note(self, message: bytes, reach: Path = ROOT) -> bool:
-        """Take in a message of another replica, sealed, in next to no time.
+    def defer(self, message: bytes, reach: Path = ROOT) -> bool:
+        """Queue a message of another replica, to be applied by the next read.
 
         Args:
-            message: It.
-            reach: The path that all that it writes has to lie at or below.
+            message: Message with its header.
+            reach: Path that all writes in the message must lie at or below.
 
         Returns:
-            Whether that is all; if not, somebody waits for it and it has to be applied at once.
+            Whether that is enough; if not, the message must be applied now, because somebody is to
+            be notified of it or too many messages are deferred.
         """
-        if self._is_followed() or len(self._unread) >= _MOST_UNREAD:
+        if self._is_followed() or len(self._deferred) >= _MAX_DEFERRED:
             return False
-        self._unread.append((message, reach))
-        # Whoever began to follow meanwhile may have read what was there before this.
+        self._deferred.append((message, reach))
+        # Somebody may have begun to follow after the first check, and seen the queue without this.
         return not self._is_followed()
 
-    def feed(self, sink: Callable[[list[Write]], None]) -> None:
-        """Have a function given all that is news, in order; it must be quick."""
-        with self._current:
-            self._sinks = (*self._sinks, sink)
+    def receive(self, message: bytes, reach: Path = ROOT) -> None:
+        """Apply a message of another replica; the arguments are those of `defer`."""
+        with self.locked:
+            self._receive(message, reach)
+
+    def try_receive(self, message: bytes, reach: Path = ROOT) -> bool:
+        """Apply a message of another replica, unless another thread holds the history.
+
+        Returns:
+            Whether it was applied; if not, call `receive` on a thread that may wait.
+        """
+        if not self.acquire(_LOCK_TIMEOUT):
+            return False
+        try:
+            self._receive(message, reach)
+        finally:
+            self.release()
+        return True
 
     def write(
         self, changes: Iterable[Change], origin: str, stamp: Stamp | None = None
-    ) -> tuple[Stamp, Step]:
-        """Make writes, under a given stamp, or one that is later than all that was seen.
+    ) -> tuple[Stamp, TreeChange]:
+        """Write a batch, under a given stamp or one that is later than all writes seen.
 
         Raises:
-            ParamError: A change has no meaning in the tree; nothing has changed then.
-            DecodeError: The stamp given lies years ahead; nothing has changed then.
+            ParamError: The tree cannot hold a change; nothing is changed then.
+            DecodeError: The given stamp lies years ahead; nothing is changed then.
         """
-        with self._current:
+        with self.locked:
             given, stamp = stamp, stamp or self._now()
             at = (stamp.time, stamp.id)
             writes = [
@@ -129,116 +182,71 @@ class State:
                     check_time(write, now)
             return stamp, self._apply(writes)
 
-    def apply(self, writes: Iterable[Write]) -> Step:
-        """Take in writes of others, except for those stamped years ahead.
+    def apply(self, writes: Iterable[Write]) -> None:
+        """Add writes of other replicas, except for those stamped years ahead.
 
         Raises:
-            ParamError: A write has no meaning in the tree; nothing has changed then.
+            ParamError: The tree cannot hold a write; nothing is changed then.
         """
-        with self._current:
-            return self._apply(self._parted(writes, AHEAD)[0])
+        with self.locked:
+            self._apply(self._check_times(writes, _REFUSED)[0])
 
     def restore(self, writes: Iterable[Write]) -> bool:
-        """Take in writes that were saved; those stamped years ahead as if they were made now.
+        """Add stored writes; those stamped years ahead get a new stamp.
 
         Returns:
-            Whether there were such.
+            Whether any got a new stamp.
 
         Raises:
-            ParamError: A write has no meaning in the tree.
+            ParamError: The tree cannot hold a write.
         """
-        with self._current:
-            sound, ahead = self._parted(writes, SAVED_AHEAD)
+        with self.locked:
+            sound, ahead = self._check_times(writes, _STORED_AHEAD)
             self._apply(sound)
             for write in sorted(ahead, key=lambda write: write.order):
                 now = self._now()
                 self._apply([structs.replace(write, time=now.time, clock=now.id)])
             return bool(ahead)
 
-    def take(self, message: bytes, reach: Path = ROOT) -> None:
-        """Apply a message of another replica, sealed; the arguments are those of `note`."""
-        with self._current:
-            self._take(message, reach)
-
-    def take_soon(self, message: bytes, reach: Path = ROOT) -> bool:
-        """Apply a message of another replica, unless somebody is at work on the history just now.
-
-        Returns:
-            Whether it is done; if not, use `take` where waiting does no harm.
-        """
-        if not self.enter(_PATIENCE):
-            return False
-        try:
-            self._take(message, reach)
-        finally:
-            self.leave()
-        return True
+    def on_new(self, callback: Callable[[list[Write]], None]) -> None:
+        """Call a function with all new writes from now on, in order; it must return quickly."""
+        with self.locked:
+            self._on_new = callback
 
     def stamp(self) -> Stamp:
-        """Return a stamp that is later than all that was seen."""
-        with self._current:
+        """Return a stamp that is later than all writes seen."""
+        with self.locked:
             return self._now()
 
-    def writes(self) -> list[Write]:
-        """Return all writes that are kept."""
-        with self._current:
-            return list(self._history.writes())
-
-    def bucket(self, indices: Iterable[int]) -> list[Write]:
-        """Return the writes in some buckets of the digest."""
-        with self._current:
-            return [write for index in indices for write in self._history.bucket(index)]
-
-    def find(self, path: Path) -> Write | None:
-        """Return the write at a path itself."""
-        with self._current:
-            return self._history.find(path)
-
-    def hides(self, write: Write) -> bool:
-        """Tell whether a write is known, or has a newer one at its path or above."""
-        with self._current:
-            return self._history.hides(write)
-
-    def source(self, path: Path) -> Write | None:
-        """Return the write that a parameter has its value from."""
-        with self._current:
-            return self._history.source(path)
-
-    def digest(self) -> bytes:
-        """Return the fingerprint of the history."""
-        with self._current:
-            return self._history.digest()
-
-    def differing(self, digest: bytes) -> list[int]:
-        """Return the buckets in which a replica with that digest differs.
-
-        Raises:
-            DecodeError: The bytes are no digest.
-        """
-        with self._current:
-            return self._history.differing(digest)
-
     def forget(self, age: int, keep: int) -> int:
-        """Drop deletions older than an age in nanoseconds, or above a number, if not needed."""
-        with self._current:
-            return self._history.forget(self._now().time - age, keep)
-
-    def watch(self, path: Path, callback: Callback) -> Watch:
-        """Start a watch, which hears of all that comes from now on."""
-        with self._current:
-            return self.watchers.add(path, callback)
-
-    def enter(self, timeout: float = -1) -> bool:
-        """Begin to work on the history; nobody else does until `leave`.
+        """Drop deletions that the tree does not depend on.
 
         Args:
-            timeout: Seconds to wait for others to leave; for ever if negative.
+            age: Age in nanoseconds above which deletions are dropped.
+            keep: Number of deletions above which the oldest ones are dropped.
 
         Returns:
-            Whether it is so; false when the time was over.
+            The number of deletions dropped.
+        """
+        with self.locked as history:
+            return history.forget(self._now().time - age, keep)
+
+    def watch(self, path: Path, callback: Callback) -> Watch:
+        """Call a function on all changes of a path from now on."""
+        with self.locked:
+            return self.watchers.add(path, callback)
+
+    def acquire(self, timeout: float = -1) -> bool:
+        """Lock the history and apply deferred messages; see `locked`.
+
+        Args:
+            timeout: Time limit in seconds; none if negative.
+
+        Returns:
+            Whether the history is locked; false if the time was over.
 
         Raises:
-            ParamError: The same thread is at work on it already, below a signal handler.
+            ParamError: This thread holds the history already, below a signal handler.
         """
         if not self._lock.acquire(timeout=timeout):
             return False
@@ -247,40 +255,40 @@ class State:
             raise ParamError(_INTERRUPTED)
         self._holder = threading.get_ident()
         try:
-            if self._unread:
-                self._reading = True
-                while self._unread:
-                    self._take(*self._unread.popleft())
-                self._reading = False
-        except BaseException:  # Ctrl-C comes anywhere
-            self._reading = False
-            self.leave()
+            if self._deferred:
+                self._applying = True
+                while self._deferred:
+                    self._receive(*self._deferred.popleft())
+                self._applying = False
+        except BaseException:  # KeyboardInterrupt may be raised anywhere
+            self._applying = False
+            self.release()
             raise
         return True
 
-    def leave(self) -> None:
-        """End what `enter` began."""
+    def release(self) -> None:
+        """Unlock the history."""
         self._holder = 0
         self._lock.release()
 
     def _is_followed(self) -> bool:
-        return bool(self._sinks) or self.watchers.active
+        return self._on_new is not None or self.watchers.active
 
-    def _take(self, message: bytes, reach: Path) -> None:
+    def _receive(self, message: bytes, reach: Path) -> None:
         try:
-            start = unseal(message)[2]
+            start = read_header(message)[2]
             writes = decode(memoryview(message)[start:], Batch).writes()
             check_reach((write.path for write in writes), reach)
-            self._apply(self._parted(writes, AHEAD)[0])
+            self._apply(self._check_times(writes, _REFUSED)[0])
         except DecodeError as error:
-            self.complaints.tell(NO_PARAMETER, error)
+            self.damage.report(NOT_A_PARAMETER, error)
 
-    def _parted(self, writes: Iterable[Write], what: str) -> tuple[list[Write], list[Write]]:
-        """Return the writes that clocks can have stamped, and those that lie years ahead.
+    def _check_times(self, writes: Iterable[Write], what: str) -> tuple[list[Write], list[Write]]:
+        """Return the writes with a plausible stamp, and those stamped years ahead.
 
         Args:
-            writes: All.
-            what: What to say of the latter.
+            writes: All writes.
+            what: What to report of the latter.
         """
         now = time.time_ns()
         sound: list[Write] = []
@@ -290,7 +298,7 @@ class State:
                 check_time(write, now)
                 sound.append(write)
             except DecodeError as error:
-                self.complaints.tell(what, error)
+                self.damage.report(what, error)
                 ahead.append(write)
         return sound, ahead
 
@@ -298,27 +306,30 @@ class State:
         self._clock.observe(Stamp(self._history.latest, ""))
         return self._clock.now()
 
-    def _apply(self, writes: Iterable[Write]) -> Step:
+    def _apply(self, writes: Iterable[Write]) -> TreeChange:
         old = self._root
-        news = self._history.apply(writes)
-        new = self._root = self._history.root
-        if news:
-            self.watchers.tell(old, new, news)
-            for sink in self._sinks:
-                sink(news)
-        return old, new, news
+        new_writes = self._history.apply(writes)
+        self._root = self._history.root
+        change = TreeChange(old, self._root, new_writes)
+        if new_writes:
+            self.watchers.notify(change)
+            if self._on_new is not None:
+                self._on_new(new_writes)
+        return change
 
 
-class _Current:
-    """The history of a state with all that was noted applied, and nobody else at work on it."""
+class _Locked:
+    """Context manager of a state: its history, locked, with all deferred messages applied."""
 
-    __slots__ = ("_state",)
+    __slots__ = ("_history", "_state")
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: State, history: History) -> None:
         self._state = state
+        self._history = history
 
-    def __enter__(self) -> None:
-        self._state.enter()
+    def __enter__(self) -> History:
+        self._state.acquire()
+        return self._history
 
     def __exit__(
         self,
@@ -326,4 +337,82 @@ class _Current:
         value: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._state.leave()
+        self._state.release()
+
+
+class TreeReader:
+    """Reading access to a copy of the store. Safe for threads.
+
+    Names are global names or their paths.
+
+    Args:
+        state: State of the copy.
+    """
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+
+    @property
+    def root(self) -> Tree:
+        """The tree now; it must not be changed, and is replaced when a parameter changes."""
+        return self._state.root
+
+    def lookup(self, path: Path) -> Value | Missing:
+        """Return the value at a path, or `MISSING`; it must not be changed."""
+        return lookup(self._state.root, path)
+
+    def peek(self, name: str | Path) -> Value:
+        """Return the value of a name; it must not be changed.
+
+        Raises:
+            ParamNotFound: The parameter is not set.
+            InvalidName: The name is not a global name.
+        """
+        root, path = self._state.root, to_path(name)
+        found = lookup(root, path)
+        if found is MISSING:
+            raise not_found(root, path)
+        return found
+
+    def get(self, name: str | Path) -> Value:
+        """Return a copy of the value of a name; the errors are those of `peek`."""
+        return copy(self.peek(name))
+
+    def has(self, name: str | Path) -> bool:
+        """Tell whether a name is set.
+
+        Raises:
+            InvalidName: The name is not a global name.
+        """
+        return lookup(self._state.root, to_path(name)) is not MISSING
+
+    def names(self) -> list[str]:
+        """Return the sorted global names of all parameters that are not dicts."""
+        return sorted(joined(path) for path, _ in leaves(self._state.root) if path)
+
+    def search(self, name: str, node: str) -> str | None:
+        """Search for a name from a node's own name upwards; return the global name found.
+
+        Raises:
+            ParamError: The name is empty or private.
+        """
+        return climb(name, node, self.has)
+
+    def origin(self, name: str | Path) -> str:
+        """Return the writer of a value, as shown to people; empty if nobody wrote it."""
+        with self._state.locked as history:
+            write = history.source(to_path(name))
+        return write.origin if write is not None else ""
+
+    def watch(self, name: str | Path, callback: Callback) -> Watch:
+        """Call a function on every change at a name, above it and below it.
+
+        Args:
+            name: Name to watch; it need not be set.
+            callback: Function called with each change, in order, on a thread of the store, where it
+                may do anything. If it is too slow, it gets only the newest change of each name.
+
+        Raises:
+            InvalidName: The name is not a global name.
+        """
+        return self._state.watch(to_path(name), callback)

@@ -1,36 +1,38 @@
-"""Two replicas finding out what differs between them, and settling it.
+"""Keeping replicas the same: joining, comparing with others, and anti-entropy.
 
-The asker sends its digest. Where the other's is the same, that is all. Otherwise the asker sends
-the index of the buckets that differ; the other answers with the writes that the asker lacks and the
-paths of those that it lacks itself, and the asker sends these. A replica that joins has nothing
-yet, and gets everything with the first answer.
+The side that asks sends its digest. If the other's digest is the same, that is all. Otherwise it
+sends the index of the buckets that differ. The other replies with the writes that the asker lacks
+and the paths of those that it lacks itself, and the asker sends these. A replica that joins has
+nothing yet, and gets everything with the first reply.
 
-All of it is done on the replica's worker; what Zenoh calls only hands over to it.
+All of this runs on the replica's worker; Zenoh's threads only hand over to it.
 """
 
 from __future__ import annotations
 
 import logging
 import random
+import threading
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from queue import Empty, SimpleQueue
-from typing import Final
+from typing import Any, Final
 
 from rosz.errors import DecodeError, RoszError
-from rosz.params.digest import Digest
-from rosz.params.keys import Keys, Member, check_reach
-from rosz.params.paths import Path, common
+from rosz.params.history import EMPTY_DIGEST
+from rosz.params.paths import Path, common_path, joined
 from rosz.params.replica.members import Members
-from rosz.params.replica.refusals import Refusals
+from rosz.params.replica.serve import ParameterKeys
 from rosz.params.replica.state import State
-from rosz.params.replica.worker import Worker
 from rosz.params.wire import (
     Index,
+    Keys,
+    Member,
     Record,
-    Sync,
-    SyncAnswer,
+    SyncReply,
+    SyncRequest,
+    check_reach,
     decode,
     encode,
     join_path,
@@ -38,44 +40,58 @@ from rosz.params.wire import (
 )
 from rosz.params.writes import DELETED, Write
 from rosz.session import Query, Session
+from rosz.worker import Worker, start_thread
 
-__all__ = ("Synchroniser",)
+__all__ = ("AntiEntropy", "Synchroniser")
 
 _log = logging.getLogger("rosz.params")
 
-_NOTHING: Final = Digest().to_bytes()
 _TIMEOUT: Final = 5.0
-_PATIENCE: Final = 0.3
-"""Seconds that a joining replica gives one other before it asks the next as well."""
+_NEXT_AFTER: Final = 0.3
+"""Seconds after which a joining replica asks the next replica as well."""
 
-_JOINED_BY: Final = 30.0
-_TOLD_AFTER: Final = 5.0
-"""Seconds after which who joins in vain says so: a hundred that start at once take their time."""
+_JOIN_TIMEOUT: Final = 30.0
+_WARN_AFTER: Final = 5.0
+"""Seconds after which a replica that cannot join warns; 100 that start at once need their time."""
+
 _SPREAD: Final = 0.05
-"""Seconds over which replicas that find each other spread their questions, for each ten of them."""
+"""Seconds for each ten replicas over which those that find each other spread their requests."""
 
-_MOST_MET: Final = 8
-"""Replicas to compare with of those that appear together, else many that start ask for ever."""
+_MAX_COMPARED: Final = 8
+"""Replicas to compare with of those that appear together; with more, many that start never end."""
+
+_RETRY_REFUSED_AFTER: Final = 3600.0
+"""Seconds before a refused write is sent again: the rules on the way may have changed."""
+
+_TICK: Final = 1.0
+_STOPPED: Final = 3.0
+"""Delay of a tick in seconds that means that the process was stopped, and is not merely slow."""
+
+_COMPARE_EVERY: Final = (10.0, 30.0)
+_FORGET_EVERY: Final = 60.0
+_RECONCILE_EVERY: Final = 30.0
+_TOMBSTONE_AGE: Final = 24 * 3600 * 1_000_000_000
+_MAX_TOMBSTONES: Final = 10_000
 
 
 class Synchroniser:
     """Keeps one replica the same as the others.
 
     Args:
-        session: The network.
-        keys: Where to ask.
-        state: What is kept the same.
-        members: Whom to ask.
-        worker: Where it is done.
+        session: Session of the replica.
+        keys: Keys of the domain.
+        state: State of the replica.
+        members: Other replicas.
+        worker: Worker of the replica.
 
     Attributes:
-        ready: Whether this replica has what the others had when it came.
-        busy: Those that it is comparing itself with.
-        refusals: What others do not take.
+        ready: Whether the replica has everything that the others had when it started.
+        busy: Replicas that it is comparing itself with.
+        refused: Writes that others refuse.
     """
 
     def __init__(
-        self, session: Session, keys: Keys, state: State, members: Members, worker: Worker
+        self, session: Session, keys: Keys, state: State, members: Members, worker: Worker[Any]
     ) -> None:
         self.ready = False
         self.session = session
@@ -84,94 +100,101 @@ class Synchroniser:
         self.members = members
         self.worker = worker
         self.busy: set[str] = set()
-        self.refusals = Refusals()
-        self._met: set[str] = set()
+        self.refused = _RefusedWrites()
+        self._appeared: set[str] = set()
 
     def join(self) -> None:
-        """Get what the others have, from the first that has it and answers."""
-        answers: SimpleQueue[bool] = SimpleQueue()
+        """Get what the others have, from the first one that has joined and replies."""
+        results: SimpleQueue[bool] = SimpleQueue()
         asked: list[str] = []
-        open_questions = 0
+        open_requests = 0
         began = time.monotonic()
-        told = False
-        while (passed := time.monotonic() - began) < _JOINED_BY:
+        warned = False
+        while (passed := time.monotonic() - began) < _JOIN_TIMEOUT:
             for member in self.members.all():
                 if member.zid not in asked:
                     asked.append(member.zid)
-                    self.worker.submit(partial(self._compare, member.zid, answers.put))
-                    open_questions += 1
+                    self.worker.submit(partial(self._compare, member.zid, results.put))
+                    open_requests += 1
                     break
-            if not open_questions:
+            if not open_requests:
                 break
             try:
-                if answers.get(timeout=_PATIENCE):
+                if results.get(timeout=_NEXT_AFTER):
                     break
-                open_questions -= 1
+                open_requests -= 1
             except Empty:
-                stopped = self.session.out_of_reach() >= self.members.zids
-                if stopped or (passed > _TOLD_AFTER and not told):
-                    told = True
-                    self._complain(asked, passed)
-                if stopped:
+                all_stopped = self.session.out_of_reach() >= self.members.zids
+                if all_stopped or (passed > _WARN_AFTER and not warned):
+                    warned = True
+                    self._warn(asked, passed)
+                if all_stopped:
                     break
         else:
-            self._complain(asked, _JOINED_BY)
+            self._warn(asked, _JOIN_TIMEOUT)
         self.ready = True
 
-    def _complain(self, asked: Iterable[str], seconds: float) -> None:
-        labels = ", ".join(self.members.label(zid) for zid in asked)
-        _log.warning("no replica of the parameters answered in %.2g s: %s", seconds, labels)
-
-    def serve(self, query: Query) -> None:
-        """Answer another replica."""
+    def on_sync(self, query: Query) -> None:
+        """Handle a request of another replica on the ``sync`` key."""
         payload = query.payload or b""
         if not self.worker.offer(lambda: self._answer(query, payload)):
             query.close()
 
-    def serve_told(self, query: Query) -> None:
-        """Take in what another replica has found this one to lack."""
+    def on_tell(self, query: Query) -> None:
+        """Handle writes of another replica on the ``tell`` key."""
         payload = query.payload or b""
-        if not self.worker.offer(lambda: self._take(query, payload)):
+        if not self.worker.offer(lambda: self._receive(query, payload)):
             with query:
-                query.reply_error("too much is told to this replica; tell it again later")
+                query.reply_error("this replica has too many queries; send the writes again later")
 
-    def meet(self, member: Member) -> None:
-        """Compare with a replica that has appeared, at a moment that not all choose alike.
+    def compare_soon(self, member: Member) -> None:
+        """Compare with a replica that has appeared, after a random delay.
 
-        Of many that appear together, as behind a link that is back, some are enough: they have told
-        each other what they know. What is missing even so is found by comparing now and then.
+        Of many that appear together, such as those behind a link that is back, a few are enough:
+        they have told each other what they know. Anti-entropy finds what is missing even so.
         """
-        self.worker.submit(lambda: self._meet(member.zid))
+        self.worker.submit(lambda: self._add_appeared(member.zid))
 
-    def gone(self, zid: str) -> None:
-        """Begin anew with a replica if it comes back: it may have been out of reach."""
-        self.worker.submit(lambda: self.refusals.forget(zid))
+    def drop_peer(self, zid: str) -> None:
+        """Forget what a replica refused: it may return, and was perhaps only out of reach."""
+        self.worker.submit(lambda: self.refused.drop_peer(zid))
 
     def compare_with_one(self) -> None:
-        """Compare with a replica chosen by chance."""
+        """Compare with a random replica."""
         zids = sorted(self.members.zids)
-        self.worker.submit(lambda: self.refusals.trim(self.state))
+        self.worker.submit(lambda: self.refused.trim(self.state))
         if zids:
-            zid = random.choice(zids)  # noqa: S311  # nothing secret
+            zid = random.choice(zids)  # noqa: S311  # not for security
             self.worker.submit(lambda: self._compare(zid))
 
     def compare_with_all(self, done: Callable[[bool], object]) -> int:
-        """Compare with every replica; return how many times ``done`` will be called."""
+        """Compare with every replica.
+
+        Args:
+            done: Function called once for each replica, with whether it replied.
+
+        Returns:
+            The number of replicas.
+        """
         zids = sorted(self.members.zids)
         for zid in zids:
             self.worker.submit(partial(self._compare, zid, done))
         return len(zids)
 
-    def _meet(self, zid: str) -> None:
-        if not self._met:
-            spread = _SPREAD * (1 + len(self.members.zids) / 10)
-            delay = random.uniform(0, spread)  # noqa: S311  # nothing secret
-            self.worker.later(delay, self._compare_with_met)
-        self._met.add(zid)
+    def _warn(self, asked: Iterable[str], seconds: float) -> None:
+        labels = ", ".join(self.members.label(zid) for zid in asked)
+        _log.warning("no replica of the parameters answered in %.2g s: %s", seconds, labels)
 
-    def _compare_with_met(self) -> None:
-        met, self._met = sorted(self._met), set()
-        for zid in random.sample(met, min(len(met), _MOST_MET)):
+    def _add_appeared(self, zid: str) -> None:
+        if not self._appeared:
+            spread = _SPREAD * (1 + len(self.members.zids) / 10)
+            delay = random.uniform(0, spread)  # noqa: S311  # not for security
+            self.worker.later(delay, self._compare_with_appeared)
+        self._appeared.add(zid)
+
+    def _compare_with_appeared(self) -> None:
+        zids, self._appeared = sorted(self._appeared), set()
+        for zid in random.sample(zids, min(len(zids), _MAX_COMPARED)):
             self._compare(zid)
 
     def _compare(self, zid: str, done: Callable[[bool], object] = bool) -> None:
@@ -184,145 +207,156 @@ class Synchroniser:
     def _answer(self, query: Query, payload: bytes) -> None:
         with query:
             try:
-                sync = decode(payload, Sync)
-                answer = SyncAnswer(digest=self.state.digest(), ready=self.ready)
-                if sync.digest == _NOTHING:
-                    answer.records = [Record.of(write) for write in self.state.writes()]
-                if sync.index is not None:
-                    self._settle(sync.index, answer)
+                request = decode(payload, SyncRequest)
+                with self.state.locked as history:
+                    digest = history.digest()
+                    writes = list(history.writes()) if request.digest == EMPTY_DIGEST else []
+                reply = SyncReply(digest, self.ready, [Record.of(write) for write in writes])
+                if request.index is not None:
+                    self._fill_differences(request.index, reply)
             except DecodeError as error:
-                self.state.complaints.tell("a replica sent what is no comparison", error)
+                self.state.damage.report("a replica sent a damaged comparison", error)
                 query.reply_error(str(error))
                 return
-            query.reply(query.key, encode(answer))
+            query.reply(query.key, encode(reply))
 
-    def _take(self, query: Query, payload: bytes) -> None:
+    def _fill_differences(self, index: Index, reply: SyncReply) -> None:
+        theirs = {path: (time_, clock) for path, time_, clock in index.entries}
+        with self.state.locked as history:
+            ours = [write for bucket in index.buckets for write in history.bucket(bucket)]
+        for write in ours:
+            known = theirs.get(join_path(write.path))
+            if known is None or known < (write.time, write.clock):
+                reply.records.append(Record.of(write))
+        for path, (time_, clock) in theirs.items():
+            write = Write(split_path(path), time_, clock, DELETED)
+            with self.state.locked as history:
+                hidden = history.hides(write)
+            if not hidden:
+                reply.wanted.append(path)
+
+    def _receive(self, query: Query, payload: bytes) -> None:
         with query:
             try:
                 reach = self.keys.reach(query.key, self.keys.tell(self.session.zid))
-                writes = [record.write() for record in decode(payload, Sync).records]
+                writes = [record.write() for record in decode(payload, SyncRequest).records]
                 check_reach((write.path for write in writes), reach)
                 self.state.apply(writes)
             except DecodeError as error:
-                self.state.complaints.tell("a replica told what is no write", error)
+                self.state.damage.report("a replica sent damaged writes", error)
                 query.reply_error(str(error))
                 return
-            query.reply(query.key, encode(SyncAnswer(digest=self.state.digest())))
-
-    def _settle(self, index: Index, answer: SyncAnswer) -> None:
-        theirs = {path: (time_, clock) for path, time_, clock in index.entries}
-        for write in self.state.bucket(index.buckets):
-            known = theirs.get(join_path(write.path))
-            if known is None or known < (write.time, write.clock):
-                answer.records.append(Record.of(write))
-        for path, (time_, clock) in theirs.items():
-            if not self.state.hides(Write(split_path(path), time_, clock, DELETED)):
-                answer.wanted.append(path)
+            with self.state.locked as history:
+                reply = SyncReply(digest=history.digest())
+            query.reply(query.key, encode(reply))
 
 
 class _Comparison:
-    """One talk with one other replica, from its digest to the last write that was missing."""
+    """One exchange of differences with one replica, from the digest to the last missing write."""
 
     def __init__(self, owner: Synchroniser, zid: str, done: Callable[[bool], object]) -> None:
         self._owner = owner
+        self._state = owner.state
         self._zid = zid
         self._done = done
         self._ready = False
         self._parts: list[list[Write]] = []
 
     def start(self) -> None:
-        self._ask(Sync(digest=self._state.digest()), self._on_digest)
+        with self._state.locked as history:
+            digest = history.digest()
+        self._request(SyncRequest(digest=digest), self._on_digest)
 
-    @property
-    def _state(self) -> State:
-        return self._owner.state
-
-    def _on_digest(self, answer: SyncAnswer) -> None:
-        self._ready = answer.ready
-        buckets = self._state.differing(answer.digest)
+    def _on_digest(self, reply: SyncReply) -> None:
+        self._ready = reply.ready
+        with self._state.locked as history:
+            buckets = history.differing(reply.digest)
+            writes = [write for bucket in buckets for write in history.bucket(bucket)]
         if not buckets:
             self._end()
             return
-        entries = [
-            (join_path(write.path), write.time, write.clock)
-            for write in self._state.bucket(buckets)
-        ]
-        self._ask(Sync(index=Index(buckets, entries)), self._on_index)
+        entries = [(join_path(write.path), write.time, write.clock) for write in writes]
+        self._request(SyncRequest(index=Index(buckets, entries)), self._on_differences)
 
-    def _on_index(self, answer: SyncAnswer) -> None:
-        owner = self._owner
-        found = [self._state.find(split_path(path)) for path in answer.wanted]
-        lacking = [
+    def _on_differences(self, reply: SyncReply) -> None:
+        with self._state.locked as history:
+            found = [history.find(split_path(path)) for path in reply.wanted]
+        refused = self._owner.refused
+        wanted = [
             write
             for write in found
-            if write is not None and not owner.refusals.rests(self._zid, write)
+            if write is not None and not refused.was_refused(self._zid, write)
         ]
-        if lacking:
-            self._parts.append(lacking)
-        self._tell_next()
+        if wanted:
+            self._parts.append(wanted)
+        self._send_next()
 
-    def _tell_next(self) -> None:
+    def _send_next(self) -> None:
         if self._parts:
-            self._tell(self._parts.pop())
+            self._send(self._parts.pop())
         else:
-            self._owner.refusals.report(self._zid, self._owner.members.label(self._zid))
+            self._owner.refused.report(self._zid, self._owner.members.label(self._zid))
             self._end()
 
-    def _tell(self, writes: list[Write]) -> None:
+    def _send(self, writes: list[Write]) -> None:
         keys, worker = self._owner.keys, self._owner.worker
-        taken: list[bool] = []
-        try:
-            self._owner.session.get_async(
-                keys.reaching(keys.tell(self._zid), (write.path for write in writes)),
-                lambda reply: taken.append(reply.ok),
-                lambda: worker.submit(lambda: self._on_told(writes, taken)),
-                payload=encode(Sync(records=[Record.of(write) for write in writes])),
-                timeout=_TIMEOUT,
-            )
-        except RoszError:
-            self._end(failed=True)
-            raise
+        accepted: list[bool] = []
+        self._query(
+            keys.scope(keys.tell(self._zid), (write.path for write in writes)),
+            SyncRequest(records=[Record.of(write) for write in writes]),
+            lambda reply: accepted.append(reply.ok),
+            lambda: worker.submit(lambda: self._on_sent(writes, accepted)),
+        )
 
-    def _on_told(self, writes: list[Write], taken: list[bool]) -> None:
-        # Links that go leave questions without answers just as rules do.
-        if False in taken or self._zid not in self._owner.members.zids:
+    def _on_sent(self, writes: list[Write], accepted: list[bool]) -> None:
+        # A query stays without a reply if rules forbid it, or if the link is gone.
+        if False in accepted or self._zid not in self._owner.members.zids:
             self._end(failed=True)
             return
-        if not taken and self._owner.keys.scoped:
-            # Rules judge by the path that all of a message lies below: parts of it may pass.
+        if not accepted and self._owner.keys.scoped:
+            # Rules judge by the common path of all writes in a message: parts of it may pass.
             if len(writes) > 1:
-                self._parts += _parted(writes)
+                self._parts += _split(writes)
             else:
-                self._owner.refusals.add(self._zid, writes[0])
-        self._tell_next()
+                self._owner.refused.add(self._zid, writes[0])
+        self._send_next()
 
-    def _ask(self, sync: Sync, then: Callable[[SyncAnswer], None]) -> None:
-        answers: list[bytes] = []
-        key = self._owner.keys.sync(self._zid)
+    def _request(self, request: SyncRequest, then: Callable[[SyncReply], None]) -> None:
+        payloads: list[bytes] = []
         worker = self._owner.worker
+        self._query(
+            self._owner.keys.sync(self._zid),
+            request,
+            lambda reply: payloads.append(reply.payload) if reply.ok else None,
+            lambda: worker.submit(lambda: self._on_reply(payloads, then)),
+        )
+
+    def _query(
+        self,
+        key: str,
+        request: SyncRequest,
+        on_reply: Callable[[Any], None],
+        on_done: Callable[[], None],
+    ) -> None:
         try:
             self._owner.session.get_async(
-                key,
-                lambda reply: answers.append(reply.payload) if reply.ok else None,
-                lambda: worker.submit(lambda: self._on_answer(answers, then)),
-                payload=encode(sync),
-                timeout=_TIMEOUT,
+                key, on_reply, on_done, payload=encode(request), timeout=_TIMEOUT
             )
         except RoszError:
             self._end(failed=True)
             raise
 
-    def _on_answer(self, answers: list[bytes], then: Callable[[SyncAnswer], None]) -> None:
-        if not answers:
+    def _on_reply(self, payloads: list[bytes], then: Callable[[SyncReply], None]) -> None:
+        if not payloads:
             self._end(failed=True)
             return
         try:
-            answer = decode(answers[0], SyncAnswer)
-            self._state.apply([record.write() for record in answer.records])
-            then(answer)
+            reply = decode(payloads[0], SyncReply)
+            self._state.apply([record.write() for record in reply.records])
+            then(reply)
         except DecodeError as error:
             label = self._owner.members.label(self._zid)
-            self._state.complaints.tell(f"the replica in {label} answered nonsense", error)
+            self._state.damage.report(f"the replica in {label} sent a damaged reply", error)
             self._end(failed=True)
 
     def _end(self, *, failed: bool = False) -> None:
@@ -330,10 +364,125 @@ class _Comparison:
         self._done(self._ready and not failed)
 
 
-def _parted(writes: list[Write]) -> list[list[Write]]:
-    """Return writes by the part of their paths in which they begin to differ."""
-    depth = len(common(write.path for write in writes)) + 1
+def _split(writes: list[Write]) -> list[list[Write]]:
+    """Return writes grouped by the first part of their paths that differs."""
+    depth = len(common_path(write.path for write in writes)) + 1
     parts: dict[Path, list[Write]] = {}
     for write in writes:
         parts.setdefault(write.path[:depth], []).append(write)
     return list(parts.values())
+
+
+class _RefusedWrites:
+    """Writes that other replicas refuse, such as by the rules beside their keys.
+
+    They are not sent again with every comparison. Not safe for threads.
+    """
+
+    def __init__(self) -> None:
+        self._sent: dict[tuple[str, Path, int, str], float] = {}
+        self._unreported: dict[str, list[Path]] = {}
+
+    def was_refused(self, zid: str, write: Write) -> bool:
+        """Tell whether a replica refused a write not long ago."""
+        sent = self._sent.get((zid, write.path, write.time, write.clock))
+        return sent is not None and time.monotonic() - sent < _RETRY_REFUSED_AFTER
+
+    def add(self, zid: str, write: Write) -> None:
+        """Remember that a replica refused a write."""
+        key = (zid, write.path, write.time, write.clock)
+        if key not in self._sent:
+            self._unreported.setdefault(zid, []).append(write.path)
+        self._sent[key] = time.monotonic()
+
+    def report(self, zid: str, label: str) -> None:
+        """Log what a replica refused for the first time.
+
+        Args:
+            zid: Session of the replica.
+            label: Process of the replica, as shown to people.
+        """
+        paths = self._unreported.pop(zid, [])
+        if paths:
+            more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+            _log.warning(
+                "%s does not take '%s'%s, which differs there from now on: the rules beside its"
+                " keys may not allow it",
+                label,
+                joined(paths[0]),
+                more,
+            )
+
+    def drop_peer(self, zid: str) -> None:
+        """Forget what a replica refused."""
+        self._unreported.pop(zid, None)
+        for key in [key for key in self._sent if key[0] == zid]:
+            del self._sent[key]
+
+    def trim(self, state: State) -> None:
+        """Forget writes that have left the history."""
+        with state.locked as history:
+            for key in list(self._sent):
+                _, path, time_, clock = key
+                write = history.find(path)
+                if write is None or (write.time, write.clock) != (time_, clock):
+                    del self._sent[key]
+
+
+class AntiEntropy:
+    """Compares with a random replica from time to time, and drops old tombstones.
+
+    It also compares storages with the tree, in the oldest replica.
+
+    Args:
+        own: This replica.
+        sync: Synchroniser of the replica.
+        parameter_keys: Keys that storages hold.
+        on_forgotten: Function called when tombstones were dropped.
+    """
+
+    def __init__(
+        self,
+        own: Member,
+        sync: Synchroniser,
+        parameter_keys: ParameterKeys,
+        on_forgotten: Callable[[], None],
+    ) -> None:
+        self._own = own
+        self._sync = sync
+        self._parameter_keys = parameter_keys
+        self._on_forgotten = on_forgotten
+        now = time.monotonic()
+        self._last = now
+        self._compare_at = now + random.uniform(*_COMPARE_EVERY)  # noqa: S311  # not for security
+        self._forget_at = now + _FORGET_EVERY
+        self._reconcile_at = now
+        sync.worker.later(_TICK, self._tick)
+
+    def _tick(self) -> None:
+        self._sync.worker.later(_TICK, self._tick)
+        now = time.monotonic()
+        late = now - self._last - _TICK
+        self._last = now
+        self._sync.members.drop_ghosts()
+        self._sync.state.apply_deferred()
+        if late > _STOPPED or now >= self._compare_at:
+            self._compare_at = now + random.uniform(*_COMPARE_EVERY)  # noqa: S311  # see above
+            self._sync.compare_with_one()
+        if now >= self._forget_at:
+            self._forget_at = now + _FORGET_EVERY
+            if self._sync.state.forget(_TOMBSTONE_AGE, _MAX_TOMBSTONES):
+                self._on_forgotten()
+        self._reconcile_storages(now)
+
+    def _reconcile_storages(self, now: float) -> None:
+        if not self._parameter_keys.subscribed:
+            self._reconcile_at = now
+        elif now >= self._reconcile_at and self._is_oldest():
+            self._reconcile_at = now + _RECONCILE_EVERY
+            # This waits for replies, which the worker must not.
+            target = self._parameter_keys.reconcile
+            start_thread(threading.Thread(target=target, name="rosz-params-mirror", daemon=True))
+
+    def _is_oldest(self) -> bool:
+        return all(self._own < other for other in self._sync.members.all())

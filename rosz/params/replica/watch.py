@@ -1,39 +1,53 @@
-"""Telling a program what changed, on a thread that belongs to the replica."""
+"""Watching parameters: changes of the tree, and the callbacks that are notified of them."""
 
 from __future__ import annotations
 
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Final, Self
 
 import msgspec
 
 from rosz.params.paths import Path, joined
-from rosz.params.replica.worker import Worker
 from rosz.params.tree import MISSING, Missing, Tree, lookup
 from rosz.params.values import Value, copy
 from rosz.params.writes import Write
+from rosz.worker import Worker
 
-__all__ = ("Changed", "Watch", "Watchers", "same")
+__all__ = ("Callback", "Changed", "TreeChange", "Watch", "Watchers", "is_same")
 
 _log = logging.getLogger("rosz.params")
-_BACKLOG: Final = 1000
-"""Changes that may wait for a slow callback; beyond it, only the newest of each path is told."""
+_MAX_BACKLOG: Final = 1000
+"""Changes that wait for a slow callback; of more, only the newest of each path is kept."""
+
+
+class TreeChange(msgspec.Struct, frozen=True):
+    """A change of the tree.
+
+    Attributes:
+        old: Tree before.
+        new: Tree after.
+        writes: New writes that made the change.
+    """
+
+    old: Tree
+    new: Tree
+    writes: list[Write]
 
 
 class Changed(msgspec.Struct, frozen=True):
-    """One change of a parameter, seen from what is watched.
+    """One change of a parameter that is watched.
 
     Attributes:
-        name: What changed: the name watched if something at it or above it was written, else the
-            name below it that was.
-        old: Its value before; ``None`` where it was not set.
-        new: Its value now; ``None`` where it is not set any more.
-        origin: Who wrote it.
-        time: When, in nanoseconds since the epoch, by the writer's clock.
+        name: Name that changed: the name watched if it or a name above it was written, else the
+            name below it that was written.
+        old: Value before; ``None`` if it was not set.
+        new: Value now; ``None`` if it is not set any more.
+        origin: Writer, as shown to people.
+        time: Time of the write by the writer's clock, in nanoseconds since the epoch.
     """
 
     name: str
@@ -44,7 +58,7 @@ class Changed(msgspec.Struct, frozen=True):
 
     @property
     def deleted(self) -> bool:
-        """Whether it is not set any more."""
+        """Whether the parameter is not set any more."""
         return self.new is None
 
 
@@ -52,10 +66,12 @@ Callback = Callable[[Changed], None]
 
 
 class Watch:
-    """A callback on a name; ends when closed.
+    """A callback on changes of a name; `close` ends it.
 
     Attributes:
-        name: What is watched, with all below it.
+        name: Global name that is watched, with all names below it.
+        path: Path of the name.
+        callback: Function called with each change.
     """
 
     def __init__(self, owner: Watchers, path: Path, callback: Callback) -> None:
@@ -65,7 +81,7 @@ class Watch:
         self._owner = owner
 
     def close(self) -> None:
-        """Call back no more; again is no error."""
+        """End the watch; a second call has no effect."""
         self._owner.remove(self)
 
     def __enter__(self) -> Self:
@@ -80,34 +96,26 @@ class Watch:
         self.close()
 
 
-class _Step(msgspec.Struct, frozen=True):
-    """A change of the tree."""
-
-    old: Tree
-    new: Tree
-    writes: tuple[Write, ...]
-
-
 class Watchers:
-    """All watches of one replica, and the thread that calls them back.
+    """All watches of one copy of the store, and the thread that calls their callbacks.
 
     Safe for threads, and for a signal handler that ends a watch.
     """
 
     def __init__(self) -> None:
         self._watches: tuple[Watch, ...] = ()
-        self._steps: deque[_Step] = deque()
+        self._backlog: deque[TreeChange] = deque()
         self._lock = threading.RLock()
-        self._worker: Worker | None = None
+        self._worker: Worker[Callable[[], object]] | None = None
         self._closed = False
 
     @property
     def active(self) -> bool:
-        """Whether there are any."""
+        """Whether there are watches."""
         return bool(self._watches)
 
     def add(self, path: Path, callback: Callback) -> Watch:
-        """Call a function back on changes at a path, above it and below it."""
+        """Call a function on changes at a path, above it and below it."""
         watch = Watch(self, path, callback)
         with self._lock:
             self._watches = (*self._watches, watch)
@@ -116,24 +124,24 @@ class Watchers:
         return watch
 
     def remove(self, watch: Watch) -> None:
-        """End a watch."""
+        """End a watch; a second call has no effect."""
         with self._lock:
             self._watches = tuple(other for other in self._watches if other is not watch)
 
-    def tell(self, old: Tree, new: Tree, writes: Iterable[Write]) -> None:
-        """Take note of a change; call it in the order of the changes."""
+    def notify(self, change: TreeChange) -> None:
+        """Queue a change for the callbacks; must be called in the order of the changes."""
         if not self._watches:
             return
         with self._lock:
-            idle = not self._steps
-            self._steps.append(_Step(old, new, tuple(writes)))
-            if len(self._steps) > _BACKLOG:
-                self._steps = deque([_condensed(self._steps)])
+            idle = not self._backlog
+            self._backlog.append(change)
+            if len(self._backlog) > _MAX_BACKLOG:
+                self._backlog = deque([_condense(self._backlog)])
             if idle and self._worker is not None:
-                self._worker.submit(self._call)
+                self._worker.submit(self._call_next)
 
     def close(self) -> None:
-        """End all watches; again is no error."""
+        """End all watches; a second call has no effect."""
         with self._lock:
             self._closed = True
             self._watches = ()
@@ -141,58 +149,63 @@ class Watchers:
         if worker is not None:
             worker.close()
 
-    def _call(self) -> None:
+    def _call_next(self) -> None:
+        """Call the callbacks for the oldest change."""
         with self._lock:
-            if not self._steps:
+            if not self._backlog:
                 return
-            step = self._steps.popleft()
+            tree_change = self._backlog.popleft()
             watches = self._watches
-            if self._steps and self._worker is not None:
-                self._worker.submit(self._call)
+            if self._backlog and self._worker is not None:
+                self._worker.submit(self._call_next)
         for watch in watches:
-            for change in _seen_from(watch.path, step):
+            for change in _changes_seen(watch.path, tree_change):
                 if watch in self._watches:
-                    self._deliver(watch, change)
+                    self._call(watch, change)
 
-    def _deliver(self, watch: Watch, change: Changed) -> None:
+    def _call(self, watch: Watch, change: Changed) -> None:
         try:
             watch.callback(change)
-        except BaseException:  # noqa: BLE001  # a program's own code: it must not end the others' calls
+        except BaseException:  # noqa: BLE001  # callback boundary: the other callbacks go on
             _log.exception("the callback that watches '%s' failed on '%s'", watch.name, change.name)
 
 
-def same(left: Value | Missing, right: Value | Missing) -> bool:
-    """Tell whether two values are the same to the last type: 1, 1.0 and True are three."""
+def is_same(left: Value | Missing, right: Value | Missing) -> bool:
+    """Tell whether two values and all their types are equal: 1, 1.0 and True differ."""
     if left is right:
         return True
     if type(left) is not type(right):
         return False
     if isinstance(left, dict) and isinstance(right, dict):
-        return left.keys() == right.keys() and all(same(left[key], right[key]) for key in left)
+        return left.keys() == right.keys() and all(is_same(left[key], right[key]) for key in left)
     if isinstance(left, list) and isinstance(right, list):
-        return len(left) == len(right) and all(map(same, left, right))
+        return len(left) == len(right) and all(map(is_same, left, right))
     return bool(left == right) or (left != left and right != right)  # noqa: PLR0124  # nan
 
 
-def _condensed(steps: deque[_Step]) -> _Step:
-    newest = {write.path: write for step in steps for write in step.writes}
-    return _Step(steps[0].old, steps[-1].new, tuple(newest.values()))
+def _condense(changes: deque[TreeChange]) -> TreeChange:
+    """Return one change with the effect of several: the newest write of each path."""
+    newest = {write.path: write for change in changes for write in change.writes}
+    return TreeChange(changes[0].old, changes[-1].new, list(newest.values()))
 
 
-def _seen_from(path: Path, step: _Step) -> Iterator[Changed]:
+def _changes_seen(path: Path, change: TreeChange) -> Iterator[Changed]:
+    """Yield what a watch of a path is notified of for a change of the tree."""
     depth = len(path)
-    told: set[Path] = set()
-    for write in step.writes:
+    seen: set[Path] = set()
+    for write in change.writes:
         place = write.path if write.path[:depth] == path else path
         if place is path and path[: len(write.path)] != write.path:
             continue
-        if place in told:
+        if place in seen:
             continue
-        told.add(place)
-        old, new = lookup(step.old, place), lookup(step.new, place)
-        if not same(old, new):
-            yield Changed(joined(place), _shown(old), _shown(new), write.origin, write.time)
+        seen.add(place)
+        old, new = lookup(change.old, place), lookup(change.new, place)
+        if not is_same(old, new):
+            yield Changed(
+                joined(place), _copy_or_none(old), _copy_or_none(new), write.origin, write.time
+            )
 
 
-def _shown(value: Value | Missing) -> Value | None:
+def _copy_or_none(value: Value | Missing) -> Value | None:
     return None if value is MISSING else copy(value)

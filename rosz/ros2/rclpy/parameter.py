@@ -10,7 +10,7 @@ from typing import Any
 from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
 from rosz.msgs.rcl_interfaces.msg import ParameterValue
-from rosz.params.nodes import read_plain
+from rosz.params.yaml_nodes import read_plain
 
 __all__ = ("PARAMETER_SEPARATOR_STRING", "Parameter", "get_parameter_value")
 

@@ -126,7 +126,7 @@ def test_classic_parameters_count_too() -> None:
         ("--ros-args -p a", "expected name:=value"),
         ("--ros-args -p", "is the last word"),
         ("--ros-args -p a:=[", "no YAML value"),
-        ("--ros-args -p a:=2020-13-45", "no YAML value: '2020-13-45' is no !!timestamp"),
+        ("--ros-args -p a:=2020-13-45", "no YAML value: '2020-13-45' is not a !!timestamp"),
         (f"--ros-args -p a:={'[' * 20_000}", "nested more than 100 deep"),
     ],
 )

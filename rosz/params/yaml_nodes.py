@@ -1,8 +1,8 @@
-"""YAML text as nodes that know their place, composed without trusting its depth.
+"""YAML text as nodes that know their position, composed safely whatever the text holds.
 
-PyYAML's own composer recurses in C over whatever is nested, so that a few thousand brackets end the
-process. This one takes the parser's events, which are flat, and refuses to go deep, and to let
-aliases unfold to a size out of all proportion.
+PyYAML's own composer recurses in C over nested text, so a few thousand brackets crash the process.
+This composer reads the parser's events, which are flat. It limits the depth, and the number of
+values that aliases repeat.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from rosz.params.values import MAX_DEPTH, unsound_text
 __all__ = ("SCALAR_FAULTS", "fault", "read_nodes", "read_plain", "shown_tag")
 
 SCALAR_FAULTS: Final = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
-"""What PyYAML lets through when a tag is put on a scalar that does not fit it."""
+"""Exceptions that PyYAML raises when a scalar does not fit its tag."""
 
 _MOST_REPEATED: Final = 100_000
-"""Values that aliases may add to a document; beyond it, the document is taken for an attack."""
+"""Values that aliases may add to a document; a document that adds more is refused as an attack."""
 
 _SafeLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _PlainLoader(_SafeLoader):  # type: ignore[misc]  # either of two base classes
-    """PyYAML's safe loader, which says of every scalar that does not fit its tag where it is."""
+    """PyYAML's safe loader that names the position of a scalar that does not fit its tag."""
 
     def construct_object(self, node: Any, deep: bool = False) -> Any:
         try:
@@ -35,14 +35,14 @@ class _PlainLoader(_SafeLoader):  # type: ignore[misc]  # either of two base cla
         except SCALAR_FAULTS as error:
             if not isinstance(node, yaml.ScalarNode):
                 raise
-            reason = f"'{node.value}' is no {shown_tag(node)}: {error}"
+            reason = f"'{node.value}' is not a {shown_tag(node)}: {error}"
             raise yaml.constructor.ConstructorError(
                 problem=reason, problem_mark=node.start_mark
             ) from error
 
 
 def fault(node: Any, reason: str, path: str) -> YamlError:
-    """Return the error that names where a node, event or mark of PyYAML's stands."""
+    """Return the error that names the position of a node, event or mark of PyYAML."""
     mark = getattr(node, "start_mark", node)
     return YamlError(reason, path, mark.line + 1, mark.column + 1)
 
@@ -53,14 +53,14 @@ def shown_tag(node: Any) -> str:
 
 
 def read_plain(text: str, path: str) -> Iterator[Any]:
-    """Yield what each document of a text holds, by PyYAML's safe rules.
+    """Yield the content of each document of a text, by PyYAML's safe rules.
 
     Args:
-        text: YAML.
-        path: Where it is from, for messages.
+        text: YAML text.
+        path: File that the text is from, for error messages.
 
     Raises:
-        YamlError: It is no YAML, is nested too deep, or a value does not fit its tag.
+        YamlError: The text is not YAML or is nested too deep, or a value does not fit its tag.
     """
     for loader, node in read_nodes(_PlainLoader, text, path):
         try:
@@ -71,15 +71,15 @@ def read_plain(text: str, path: str) -> Iterator[Any]:
 
 
 def read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, Any]]:
-    """Yield each document's loader, which constructs its scalars, and top node.
+    """Yield for each document its loader, which constructs the scalars, and its top node.
 
     Args:
-        loader_class: A PyYAML loader with its constructors and resolvers.
-        text: YAML.
-        path: Where it is from, for messages.
+        loader_class: PyYAML loader with constructors and resolvers.
+        text: YAML text.
+        path: File that the text is from, for error messages.
 
     Raises:
-        YamlError: It is no YAML, is nested too deep, or repeats too much by aliases.
+        YamlError: The text is not YAML, is nested too deep, or repeats too much by aliases.
     """
     reason = unsound_text(text)
     if reason:
@@ -95,7 +95,7 @@ def read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, A
         raise YamlError(reason, path, line, column) from error
     except yaml.MarkedYAMLError as error:
         parts = [part for part in (error.context, error.problem) if part]
-        reason = ", ".join(parts) or "it is no YAML"
+        reason = ", ".join(parts) or "it is not YAML"
         mark = error.problem_mark or error.context_mark
         raise (YamlError(reason, path) if mark is None else fault(mark, reason, path)) from error
     finally:
@@ -103,15 +103,15 @@ def read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, A
 
 
 class _Anchored:
-    """A node that aliases may repeat, with what each of them adds to the document."""
+    """A node that aliases may repeat, with the number of values that each of them adds."""
 
     def __init__(self, node: Any) -> None:
         self.node = node
-        self.size = self.height = 0  # until it is whole
+        self.size = self.height = 0  # until it is complete
 
 
 class _Composer:
-    """Makes the nodes of one document."""
+    """Composer of the nodes of one document."""
 
     def __init__(self, loader: Any, path: str) -> None:
         self._loader = loader

@@ -1,0 +1,350 @@
+"""Broadcasting writes to all replicas, and the acknowledgements that tell when they have them.
+
+A write is acknowledged, and `WriteBroadcaster.send` returns, when every live replica has applied
+it. A replica that has not acknowledged it after a moment is sent it once more, as a query to it
+alone. One that still does not answer in time is lagging: no write waits for it until it is heard of
+again.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import struct
+import threading
+import time
+from collections.abc import Callable, Collection
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from rosz.errors import DecodeError, RoszError
+from rosz.lifecycle import Closable
+from rosz.params.paths import ROOT, Path, joined
+from rosz.params.replica.members import Members
+from rosz.params.replica.state import NOT_A_PARAMETER, State
+from rosz.params.wire import Batch, Keys, add_header, encode, read_header
+from rosz.params.writes import Change
+from rosz.session import Query, RawPublisher, Reply, Sample, Session, Stamp
+from rosz.worker import Worker
+
+if TYPE_CHECKING:
+    from rosz.params.replica.storage import Storage
+
+__all__ = ("PendingWrite", "PendingWrites", "WriteBroadcaster")
+
+_log = logging.getLogger("rosz.params")
+
+_LARGE: Final = 16_384
+"""Bytes of a message above which it is not applied on Zenoh's thread."""
+
+_ACK: Final = struct.Struct("<Q")
+_MAX_PEERS: Final = 1000
+"""Writers with a publisher of their own for the acknowledgements to them."""
+
+_RESEND_AFTER: Final = 0.25
+"""Seconds after which a write is sent once more to those that have not acknowledged it."""
+
+
+class PendingWrite:
+    """One write that is not yet acknowledged by all.
+
+    Attributes:
+        number: Number of the write of this replica.
+        waiting: Sessions that have not acknowledged it.
+    """
+
+    __slots__ = ("_done", "number", "waiting")
+
+    def __init__(self, number: int, waiting: set[str]) -> None:
+        self.number = number
+        self.waiting = waiting
+        # A bare lock is the fastest thing to wait on: it is acquired here and released at the end.
+        self._done = threading.Lock()
+        if waiting:
+            self._done.acquire()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until all have acknowledged the write; return whether they have."""
+        return self._done.acquire(timeout=max(0.0, seconds)) if self.waiting else True
+
+    def remove(self, zid: str) -> None:
+        """Stop waiting for a session."""
+        if zid in self.waiting:
+            self.waiting.discard(zid)
+            if not self.waiting:
+                self._done.release()
+
+
+class PendingWrites:
+    """All writes of this replica that are not yet acknowledged by all.
+
+    Safe for threads, and for a signal handler that writes.
+    """
+
+    def __init__(self) -> None:
+        self._numbers = itertools.count(1)
+        self._pending: dict[int, PendingWrite] = {}
+        self._lagging: set[str] = set()
+        self._lock = threading.RLock()
+
+    def open(self, zids: Collection[str]) -> PendingWrite:
+        """Start waiting for sessions, except for lagging ones."""
+        with self._lock:
+            waiting = {zid for zid in zids if zid not in self._lagging}
+            pending = PendingWrite(next(self._numbers), waiting)
+            if waiting:
+                self._pending[pending.number] = pending
+            return pending
+
+    def close(self, pending: PendingWrite) -> frozenset[str]:
+        """Stop waiting; return the sessions that did not acknowledge, which are lagging now."""
+        with self._lock:
+            self._pending.pop(pending.number, None)
+            late = frozenset(pending.waiting)
+            self._lagging |= late
+            return late
+
+    def acknowledge(self, zid: str, number: int) -> None:
+        """Handle an acknowledgement."""
+        with self._lock:
+            self._lagging.discard(zid)
+            pending = self._pending.get(number)
+            if pending is not None:
+                pending.remove(zid)
+
+    def drop_peer(self, zid: str) -> None:
+        """Stop waiting for a session that is gone."""
+        with self._lock:
+            self._lagging.discard(zid)
+            for pending in self._pending.values():
+                pending.remove(zid)
+
+    def abandon(self) -> None:
+        """Stop waiting for all sessions."""
+        with self._lock:
+            for pending in self._pending.values():
+                for zid in tuple(pending.waiting):
+                    pending.remove(zid)
+
+
+class WriteBroadcaster:
+    """Sends the writes of one replica, and receives and acknowledges those of others.
+
+    Args:
+        session: Session of the replica.
+        keys: Keys of the domain.
+        state: State that the writes of others are applied to.
+        members: Replicas that acknowledge writes.
+        worker: Worker that applies large messages.
+        storage: Storage; with it, a write is acknowledged when it is stored.
+
+    Attributes:
+        pending: Writes that are not yet acknowledged by all.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        keys: Keys,
+        state: State,
+        members: Members,
+        worker: Worker[Any],
+        storage: Storage | None,
+    ) -> None:
+        self.pending = PendingWrites()
+        self._session = session
+        self._keys = keys
+        self._state = state
+        self._members = members
+        self._worker = worker
+        self._storage = storage
+        self._own = session.zid.encode()
+        self._ack_publishers: dict[str, RawPublisher] = {}
+        self._publisher = session.publisher(keys.change, block=True)
+        self._declared: list[Closable] = [
+            session.subscriber(keys.change, self._on_change, remote_only=True),
+            session.subscriber(f"{keys.change}/*/**", self._on_scoped_change, remote_only=True),
+            session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
+            session.queryable(f"{keys.write(session.zid)}/**", self._on_resent, complete=True),
+        ]
+
+    def send(
+        self, changes: list[Change], stamp: Stamp, origin: str, timeout: float
+    ) -> tuple[str, ...]:
+        """Send a batch to all replicas, and wait until they have acknowledged it.
+
+        Args:
+            changes: Batch; of two changes, the deeper one comes later.
+            stamp: Stamp of the batch.
+            origin: Writer, as shown to people.
+            timeout: Time limit in seconds; 0 does not wait.
+
+        Returns:
+            The replicas that did not acknowledge it in time, as shown to people.
+
+        Raises:
+            ClosedError: The session is closed.
+            TransportError: The session cannot send.
+        """
+        began = time.monotonic()
+        deadline = began + timeout
+        pending = self.pending.open(self._members.zids if timeout > 0 else ())
+        for zid in pending.waiting - self._members.zids:  # gone since the set was read
+            self.pending.drop_peer(zid)
+        try:
+            batch = Batch.of((stamp.time, stamp.id), origin, changes)
+            message = add_header(self._session.zid, pending.number, encode(batch))
+            self._publish(changes, message)
+            if not pending.wait(min(_RESEND_AFTER, timeout)) and not self._all_stopped(pending):
+                self._resend(pending, changes, message, deadline - time.monotonic())
+                pending.wait(deadline - time.monotonic())
+        finally:
+            late = self._labels(self.pending.close(pending))
+        if late:
+            _warn(changes, late, time.monotonic() - began)
+        return tuple(late)
+
+    def drop_peer(self, zid: str) -> None:
+        """Stop waiting for a replica that is gone, and stop acknowledging its writes."""
+        self.pending.drop_peer(zid)
+        self._worker.submit(lambda: self._close_ack_publisher(zid))
+
+    def close(self) -> None:
+        """Undeclare everything, and stop waiting for all replicas."""
+        for declared in self._declared:
+            declared.close()
+        self.pending.abandon()
+        for zid in tuple(self._ack_publishers):
+            self._close_ack_publisher(zid)
+        self._publisher.close()
+
+    def _publish(self, changes: list[Change], message: bytes) -> None:
+        if self._keys.scoped:
+            key = self._keys.scope(self._keys.change, (path for path, _ in changes))
+            self._session.put(key, message)
+        else:
+            self._publisher.put(message)
+
+    def _all_stopped(self, pending: PendingWrite) -> bool:
+        """Tell whether all sessions waited for are stopped; they get the write when they go on."""
+        return self._session.out_of_reach().issuperset(pending.waiting.copy())
+
+    def _labels(self, late: Collection[str]) -> list[str]:
+        stopped = self._session.out_of_reach() if late else ()
+        return sorted(self._members.label(zid) + " (stopped)" * (zid in stopped) for zid in late)
+
+    def _resend(
+        self, pending: PendingWrite, changes: list[Change], message: bytes, timeout: float
+    ) -> None:
+        if timeout <= 0:
+            return
+        for zid in sorted(pending.waiting.copy()):
+            self._session.get_async(
+                self._keys.scope(self._keys.write(zid), (path for path, _ in changes)),
+                partial(self._on_resend_reply, zid, pending.number),
+                lambda: None,
+                payload=message,
+                timeout=timeout,
+            )
+
+    def _on_resend_reply(self, zid: str, number: int, reply: Reply) -> None:
+        if reply.ok:
+            self.pending.acknowledge(zid, number)
+
+    def _on_change(self, sample: Sample) -> None:
+        self._receive(sample.payload, ROOT)
+
+    def _on_scoped_change(self, sample: Sample) -> None:
+        try:
+            reach = self._keys.reach(sample.key, self._keys.change)
+        except DecodeError as error:
+            self._state.damage.report(NOT_A_PARAMETER, error)
+            return
+        self._receive(sample.payload, reach)
+
+    def _receive(self, message: bytes, reach: Path) -> None:
+        """Apply a message on Zenoh's thread if that is quick, else on the worker."""
+        try:
+            sender, number, _ = read_header(message)
+        except DecodeError as error:
+            self._state.damage.report(NOT_A_PARAMETER, error)
+            return
+        acknowledge = partial(self._acknowledge, sender, number)
+        if len(message) > _LARGE:
+            self._worker.offer(lambda: self._apply(message, reach, acknowledge))
+        elif self._state.defer(message, reach):
+            acknowledge()
+        elif self._state.try_receive(message, reach):
+            self._when_stored(acknowledge)
+        else:
+            # If the worker is busy, the write is not acknowledged, and so sent once more.
+            self._worker.offer(lambda: self._apply(message, reach, acknowledge))
+
+    def _apply(self, message: bytes, reach: Path, then: Callable[[], None]) -> None:
+        self._state.receive(message, reach)
+        self._when_stored(then)
+
+    def _when_stored(self, then: Callable[[], None]) -> None:
+        """Call a function when everything applied so far is stored."""
+        if self._storage is None:
+            then()
+        else:
+            self._storage.when_stored(then)
+
+    def _acknowledge(self, sender: str, number: int) -> None:
+        ack = _ACK.pack(number) + self._own
+        publisher = self._ack_publishers.get(sender)
+        try:
+            # On Zenoh's thread: an acknowledgement that waits for a full link would hold up all
+            # that arrives, and one that is lost is asked for again.
+            if publisher is not None:
+                publisher.put(ack)
+            else:
+                self._session.put(self._keys.ack(sender), ack, block=False)
+                self._worker.submit(lambda: self._open_ack_publisher(sender))
+        except RoszError as error:
+            _log.debug("a write is not acknowledged: %s", error)
+
+    def _open_ack_publisher(self, sender: str) -> None:
+        """Declare the key of acknowledgements to a writer, which makes each put faster."""
+        if sender not in self._ack_publishers and len(self._ack_publishers) < _MAX_PEERS:
+            self._ack_publishers[sender] = self._session.publisher(self._keys.ack(sender))
+
+    def _close_ack_publisher(self, zid: str) -> None:
+        publisher = self._ack_publishers.pop(zid, None)
+        if publisher is not None:
+            publisher.close()
+
+    def _on_ack(self, sample: Sample) -> None:
+        payload = sample.payload
+        zid = payload[_ACK.size :]
+        if zid.isalnum():
+            self.pending.acknowledge(zid.decode(), _ACK.unpack_from(payload)[0])
+
+    def _on_resent(self, query: Query) -> None:
+        message = query.payload or b""
+        try:
+            reach = self._keys.reach(query.key, self._keys.write(self._session.zid))
+        except DecodeError as error:
+            with query:
+                query.reply_error(str(error))
+            return
+        confirm = partial(_confirm, query)
+        if not self._worker.offer(lambda: self._apply(message, reach, confirm)):
+            query.close()
+
+
+def _confirm(query: Query) -> None:
+    with query:
+        query.reply(query.key, b"")
+
+
+def _warn(changes: list[Change], late: list[str], seconds: float) -> None:
+    more = f" and {len(changes) - 1} more" if len(changes) > 1 else ""
+    _log.warning(
+        "'%s'%s is written, but not yet known to %s, which did not answer within %.2g s",
+        joined(changes[0][0]) if changes else "/",
+        more,
+        ", ".join(late),
+        seconds,
+    )
