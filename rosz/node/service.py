@@ -25,13 +25,9 @@ if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.message import Service as ServiceType
 
-__all__ = ("Refusal", "Service", "to_response")
+__all__ = ("Service", "to_response")
 
 _NO_GID = bytes(16)
-
-
-class Refusal(ServiceError):
-    """Raised by a handler to respond with an error that it has logged itself."""
 
 
 class Service(Entity):
@@ -79,7 +75,8 @@ class Service(Entity):
             sequence, gid = 0, _NO_GID
             if attachment is not None:
                 sequence, _, gid = read_attachment(attachment)
-            payload = self._respond(query.payload or b"", gid)
+            request = self.service_type.Request._decode(query.payload or b"")
+            payload = self.respond(request, gid)
             query.reply(
                 self.key, payload, attachment=pack_attachment(sequence, time.time_ns(), gid)
             )
@@ -90,37 +87,27 @@ class Service(Entity):
         finally:
             query.close()
 
-    def handle(self, request: Any, caller: bytes) -> Any:
-        """Return the handler's result for a request.
+    def respond(self, request: Any, caller: bytes) -> bytes:
+        """Return the encoded response to a request.
 
         Args:
             request: The request.
-            caller: Gid of the client that sent it; zeros if the client does not tell.
-        """
-        del caller
-        return self._handler(request)
-
-    def _respond(self, request: bytes, caller: bytes) -> bytes:
-        """Return the encoded response.
+            caller: GID of the client that sent it; zeros if the client does not tell.
 
         Raises:
-            DecodeError: The request is damaged.
-            Refusal: The handler raised it.
-            ServiceError: The handler raised something else, or did not return a response.
+            ServiceError: The handler failed, or did not return a response.
         """
-        types = self.service_type
-        message = types.Request._decode(request)
+        del caller
         try:
-            result = self.handle(message, caller)
-        except Refusal:
-            raise
+            result = self._handler(request)
         except ServiceError as error:  # a refusal on purpose
             raise ServiceError(f"service cannot process request: {error}") from error
         except BaseException as error:  # it must not end the thread
             self.node.log.exception("handler of service '%s' failed", self.name)
             raise ServiceError(f"error processing request: {error}") from error
         try:
-            return types.Response._encode(to_response(types.Response, result))
+            response = to_response(self.service_type.Response, result)
+            return response._encode(response)
         except EncodeError as error:
             self.node.log.exception("handler of service '%s' returned no response", self.name)
             raise ServiceError(f"handler returned invalid value: {error}") from error

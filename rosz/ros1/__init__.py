@@ -1,7 +1,11 @@
-"""ROS 1's names over rosz; importing this package makes them importable in this process.
+"""ROS 1's Python modules over rosz; importing this package makes them importable.
 
-``import rosz.ros1`` and then ``import rospy``, ``from std_msgs.msg import String``, and so on. May
-import everything below the command line.
+After ``import rosz.ros1`` programs can ``import rospy``, ``from std_msgs.msg import String`` and so
+on. The modules are adapters over the packages below, and may import everything below the commands.
+
+``state``, ``exceptions`` and ``modules`` serve the others: the state of the process, rospy's
+exceptions, and the table of modules for ``importer``. ``script`` and ``python2`` run scripts. Each
+is imported on its own, since start-up needs few of them.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ def main(argv: Sequence[str], begin: Callable[[], object] | None = None) -> None
 
     Args:
         argv: Arguments without the program name.
-        begin: Called right before the script runs.
+        begin: Function to call right before the script runs.
     """
     from rosz.ros1.importer import install
     from rosz.ros1.script import Script

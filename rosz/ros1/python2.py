@@ -1,4 +1,4 @@
-"""Scripts from the days of Python 2: what to say when one does not run under Python 3."""
+"""Explains the errors of Python 2 scripts under Python 3."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ __all__ = ("explain", "hint")
 
 _CONVERT = "convert the file with: 2to3 -w {path} (or futurize -w {path})"
 
-# What the parser of Python 3 says about Python 2, and what it is. Where it says no more than
-# "invalid syntax", the line itself is looked at.
+# Errors of Python 3's parser and the Python 2 syntax that causes them. For "invalid syntax" the
+# line itself is matched.
 _MESSAGES = (
     (re.compile(r"Missing parentheses in call to 'print'"), "print without parentheses"),
     (re.compile(r"Missing parentheses in call to 'exec'"), "exec without parentheses"),
@@ -65,14 +65,14 @@ _METHODS = {
 
 
 def explain(error: SyntaxError, path: str) -> SourceError | None:
-    """Return a syntax error as one line, if it is Python 2 that causes it.
+    """Return an error that explains Python 2 syntax.
 
     Args:
-        error: What compiling the script raised.
-        path: The script.
+        error: Error of compiling the script.
+        path: Path of the script.
 
     Returns:
-        None where it is an error in Python 3 as well.
+        The error, or None if Python 2 is not the cause.
     """
     line, column = error.lineno or 0, error.offset or 0
     if isinstance(error, TabError):
@@ -100,7 +100,7 @@ def _match(error: SyntaxError) -> str | None:
 
 
 def hint(error: BaseException) -> str:
-    """Return what to write instead of a name that only Python 2 has; empty for other errors."""
+    """Return the replacement of a name that only Python 2 has; empty for other errors."""
     name = getattr(error, "name", None) or ""
     if isinstance(error, ModuleNotFoundError) and name in _MODULES:
         return f"module '{name}' is Python 2; Python 3 has '{_MODULES[name]}'"

@@ -1,7 +1,7 @@
-"""Running a Python script as the interpreter itself would, in a process that knows ROS 1's names.
+"""Runs a Python script as the interpreter does, with ROS 1's names importable.
 
-The script is ``__main__``: its arguments, its folder in front of the module path, its tracebacks
-without a trace of rosz, its exit code.
+The script is ``__main__``, has its own ``sys.argv`` and exit code, and its folder is first on
+``sys.path``. Its tracebacks do not show rosz.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ _Hook = Callable[[type[BaseException], BaseException, TracebackType | None], obj
 
 
 class Script:
-    """A script, read and compiled.
+    """A compiled script.
 
     Args:
-        path: The script.
+        path: Path of the script.
 
     Raises:
-        NotFoundError: It cannot be read.
-        SourceError: It is written in Python 2.
-        SyntaxError: It is not Python.
+        NotFoundError: The file cannot be read.
+        SourceError: The script is Python 2.
+        SyntaxError: The script is not valid Python.
     """
 
     def __init__(self, path: str) -> None:
@@ -46,14 +46,14 @@ class Script:
         )
         if "__annotations__" in vars(sys.modules["__main__"]):  # up to Python 3.13
             self._main.__annotations__ = {}
-        with _shown_without_rosz(self._main):
+        with _trimmed_tracebacks(self._main):
             self._code = _compile(self._file)
 
     def run(self, arguments: Sequence[str]) -> None:
-        """Run it as the main module of this process; it may raise or exit as it likes.
+        """Run the script as the main module of this process; whatever it raises is passed on.
 
         Args:
-            arguments: What it finds behind its name in ``sys.argv``.
+            arguments: Arguments of the script, without its name.
         """
         sys.argv[:] = [self._path, *arguments]
         folder = str(self._file.resolve().parent)
@@ -62,7 +62,7 @@ class Script:
         else:
             sys.path[0] = folder
         sys.modules["__main__"] = self._main
-        with _shown_without_rosz(self._main):
+        with _trimmed_tracebacks(self._main):
             exec(self._code, self._main.__dict__)  # noqa: S102  # the user's own program
 
 
@@ -81,25 +81,25 @@ def _compile(file: Path) -> CodeType:
 
 
 @contextmanager
-def _shown_without_rosz(main: ModuleType) -> Iterator[None]:
-    """Have an exception that nobody catches shown from the script's first line on."""
+def _trimmed_tracebacks(main: ModuleType) -> Iterator[None]:
+    """Show an uncaught exception without the frames before the script."""
     try:
         yield
     except BaseException:
-        sys.excepthook = _trimming(sys.excepthook, main)
+        sys.excepthook = _excepthook(sys.excepthook, main)
         raise
 
 
-def _trimming(show: _Hook, main: ModuleType) -> _Hook:
-    """Return a hook that shows an uncaught exception from the script's first line on."""
+def _excepthook(show: _Hook, main: ModuleType) -> _Hook:
+    """Return an ``excepthook`` that removes the frames before the script."""
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         while trace is not None and trace.tb_frame.f_globals is not main.__dict__:
             trace = trace.tb_next
         if isinstance(error, KeyboardInterrupt) and _is_importing(trace, main):
-            return  # Ctrl-C while modules load: where it hit tells nobody anything
+            return  # Ctrl-C during an import, where a traceback does not help
         if isinstance(error, RoszError):
-            # It says all there is to say but where the script stood.
+            # Its text needs no traceback, only the place in the script.
             sys.stderr.write(f"rosz: {_place(trace, main)}{error}\n")
             return
         show(kind, error.with_traceback(trace), trace)
@@ -111,7 +111,7 @@ def _trimming(show: _Hook, main: ModuleType) -> _Hook:
 
 
 def _is_importing(trace: TracebackType | None, main: ModuleType) -> bool:
-    """Tell whether a module was being looked for, or begun, other than the script."""
+    """Return whether another module than the script was being imported."""
     while trace is not None:
         code = trace.tb_frame.f_code
         if code.co_filename.startswith("<frozen importlib"):
@@ -123,7 +123,7 @@ def _is_importing(trace: TracebackType | None, main: ModuleType) -> bool:
 
 
 def _place(trace: TracebackType | None, main: ModuleType) -> str:
-    """Return ``file:line: `` of the innermost frame that is of the script itself."""
+    """Return ``file:line: `` of the innermost frame of the script."""
     place = ""
     while trace is not None:
         if trace.tb_frame.f_globals is main.__dict__:

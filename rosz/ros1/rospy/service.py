@@ -11,7 +11,6 @@ from typing import Any
 from rosz.errors import ClosedError, EncodeError, ServiceError, ServiceNotFound, WaitTimeout
 from rosz.node import Client, Node
 from rosz.node import Service as NodeService
-from rosz.node.service import Refusal
 from rosz.qos import SERVICES
 from rosz.ros1.exceptions import ROSException, ROSInterruptException
 from rosz.ros1.rospy.core import NO_LIMIT, SHUT_DOWN, SLICE, check_running, deadline_of, is_shutdown
@@ -33,6 +32,7 @@ _REFUSED = "responded with an error: "
 _MISMATCH = "is not available: "
 
 ErrorHandler = Callable[[BaseException, Any, Any, Any], object]
+_Responder = Callable[[Any, bytes], bytes]
 
 
 class ServiceException(Exception):
@@ -74,16 +74,16 @@ class _ServiceBase:
 
 
 class _Server(NodeService):
-    """A server of the node whose handler also receives the GID of the client."""
+    """A server of the node that responds as rospy does."""
 
-    def __init__(self, node: Node, service: Service, handler: Callable[[Any, bytes], Any]) -> None:
-        self._handle = handler
+    def __init__(self, node: Node, service: Service, respond: _Responder) -> None:
+        self._respond = respond
         name, kind = service.resolved_name, service.service_class
         super().__init__(node, name, kind, service.handler, SERVICES, _THREADS)
 
-    def handle(self, request: Any, caller: bytes) -> Any:
-        """Return the response to a request."""
-        return self._handle(request, caller)
+    def respond(self, request: Any, caller: bytes) -> bytes:
+        """Return the encoded response to a request."""
+        return self._respond(request, caller)
 
 
 class Service(_ServiceBase):
@@ -152,26 +152,24 @@ class Service(_ServiceBase):
         names = (token.node_name for token in known if gid(format_token(token)) == caller)
         return next(names, "")
 
-    def _respond(self, request: Any, caller: bytes) -> Any:
-        """Return the response to a request.
+    def _respond(self, request: Any, caller: bytes) -> bytes:
+        """Return the encoded response to a request.
 
         Args:
             request: The request.
             caller: GID of the client.
 
         Raises:
-            Refusal: The handler failed; the text is sent to the caller.
+            ServiceError: The handler failed; the text is sent to the caller.
         """
         state.local.delivery = (request, self, caller)
         try:
-            response = self._response(self.handler(request))
-            encode(response)
+            return encode(self._response(self.handler(request)))
         except ServiceException as error:
-            raise Refusal(f"service cannot process request: {error}") from error
-        except Exception as error:
+            raise ServiceError(f"service cannot process request: {error}") from error
+        except BaseException as error:  # it must not end the thread
             self._report(error)
-            raise Refusal(f"error processing request: {error}") from error
-        return response
+            raise ServiceError(f"error processing request: {error}") from error
 
     def _response(self, value: Any) -> Any:
         kind = self.response_class
@@ -190,7 +188,7 @@ class Service(_ServiceBase):
         except (AttributeError, TypeError) as error:
             raise ServiceException(f"handler {fault}: {error}") from error
 
-    def _report(self, error: Exception) -> None:
+    def _report(self, error: BaseException) -> None:
         if self.error_handler is not None:
             self.error_handler(error, type(error), error, error.__traceback__)
         elif state.node is not None:

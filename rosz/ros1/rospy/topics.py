@@ -228,36 +228,45 @@ class Subscriber(Topic):
         self.impl.add(self, callback, callback_args)
 
 
-class _SharedPublisher:
-    """The publisher of the node that all publishers of a topic share.
+class _Shared:
+    """Base class of what the publishers, or the subscribers, of a topic and type share.
 
     Args:
         name: Full name of the topic.
         data_class: Message class.
-        queue_size: Queue size of the first publisher.
+        queue_size: Queue size of the first publisher or subscriber.
 
     Attributes:
-        seq: Number of messages published.
-        latch: The latched message.
-        is_latch: Whether it latches.
-        closed: Whether all its publishers are unregistered.
+        closed: Whether all publishers or subscribers are unregistered.
     """
 
     def __init__(self, name: str, data_class: type[Any], queue_size: int | None) -> None:
         self.name = self.resolved_name = name
         self.data_class = data_class
         self.type: str = data_class._type
+        self.closed = False
+        self._depth = queue_size if isinstance(queue_size, int) else 0
+        self._lock = threading.RLock()
+
+
+class _SharedPublisher(_Shared):
+    """The publisher of the node that all publishers of a topic share.
+
+    Attributes:
+        seq: Number of messages published.
+        latch: The latched message.
+        is_latch: Whether it latches.
+    """
+
+    def __init__(self, name: str, data_class: type[Any], queue_size: int | None) -> None:
+        super().__init__(name, data_class, queue_size)
         self.seq = 0
         self.latch: Any = None
         self.is_latch = False
-        self.closed = False
         self._warned = False
         self._has_header = bool(data_class._has_header)
-        self._queue_size = queue_size if isinstance(queue_size, int) else 0
-        self._lock = threading.RLock()
         self._members: list[object] = []
         self._listeners: list[SubscribeListener] = []
-        self._peers: dict[SubscribeListener, int] = {}
         self._publisher: NodePublisher[Any] | None = None
 
     @property
@@ -271,11 +280,10 @@ class _SharedPublisher:
             if self.closed or self.data_class is AnyMsg:
                 return
             before = self._publisher
-            depth = self._queue_size
             if self.is_latch:
                 qos = QoS(depth=1, durability="transient_local")
             else:
-                qos = QoS(depth=depth) if depth > 0 else QoS(history="keep_all")
+                qos = QoS(depth=self._depth) if self._depth > 0 else QoS(history="keep_all")
             self._publisher = NodePublisher(node, self.name, self.data_class, qos)
             node.keep(self._publisher)
             for listener in self._listeners:
@@ -418,25 +426,12 @@ def _shared_publisher(
     return known
 
 
-class _SharedSubscription:
-    """The subscription of the node that all subscribers of a topic and type share.
-
-    Args:
-        name: Full name of the topic.
-        data_class: Message class.
-        queue_size: Queue size of the first subscriber.
-
-    Attributes:
-        closed: Whether all its subscribers are unregistered.
-    """
+class _SharedSubscription(_Shared):
+    """The subscription of the node that all subscribers of a topic and type share."""
 
     def __init__(self, name: str, data_class: type[Any], queue_size: int | None) -> None:
-        self.name = self.resolved_name = name
-        self.data_class = data_class
-        self.type: str = data_class._type
+        super().__init__(name, data_class, queue_size)
         self.queue_size = queue_size
-        self.closed = False
-        self._lock = threading.RLock()
         self._members: tuple[_Member, ...] = ()
         self._subscription: Subscription[Any] | GenericSubscription | None = None
         self._origins: dict[bytes, Token] = {}
@@ -447,8 +442,7 @@ class _SharedSubscription:
         with self._lock:
             if self.closed:
                 return
-            depth = self.queue_size or 0
-            qos = QoS(depth=depth if depth > 0 else _NO_LIMIT)
+            qos = QoS(depth=self._depth if self._depth > 0 else _NO_LIMIT)
             if self.data_class is AnyMsg:
                 self._subscription = GenericSubscription(
                     node, self.name, self._receive_any, qos, raw=True, with_info=True

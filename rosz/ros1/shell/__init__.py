@@ -1,3 +1,3 @@
-"""What ``rosz env`` puts on the PYTHONPATH, as ROS 1's setup.bash puts rospy there."""
+"""The folder that ``rosz env`` adds to PYTHONPATH, as ROS 1's setup.bash adds rospy's."""
 
 __all__ = ()

@@ -1,8 +1,8 @@
 """Makes ROS 1's names importable in scripts that are run directly: ``./talker.py``.
 
-Python imports a module of this name by itself when it starts. All it does then is to stand last in
-the line of finders: only a module that nobody else has makes it load anything of rosz. Where the
-interpreter has no rosz, the module stays unknown.
+Python imports a module of this name when it starts. It only adds a finder at the end: rosz is
+loaded when a module is imported that no other finder has. If the interpreter does not have rosz,
+such a module stays unknown.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from types import FrameType, ModuleType
 __all__ = ()
 
 _NEEDED = sys.stdlib_module_names | {"msgspec", "rosz", "yaml", "zenoh"}
-"""What rosz is made of."""
+"""Modules that rosz itself needs."""
 
 
 class _Last(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Have rosz look for a module, and for all others from now on.
+        """Install rosz's finders, and find the module with them.
 
-        Not for what rosz is made of: that tries modules of other systems as it loads (``_wmi``,
-        ``msvcrt``), and rosz cannot load with one of its parts half there.
+        Do nothing while a module that rosz needs is being loaded: such a module tries to import
+        modules of other systems (``_wmi``, ``msvcrt``), and rosz cannot load before it is complete.
         """
         if path is not None or not _NEEDED.isdisjoint(_loading()):
             return None
@@ -45,7 +45,7 @@ class _Last(MetaPathFinder):
 
 
 def _loading() -> Iterator[str]:
-    """Yield the packages that this thread is in the middle of loading."""
+    """Yield the packages that this thread is loading."""
     frame: FrameType | None = sys._getframe()  # noqa: SLF001  # the public ways load modules
     while frame is not None:
         if frame.f_code.co_name == "<module>":
@@ -54,7 +54,7 @@ def _loading() -> Iterator[str]:
 
 
 def _run_next() -> None:
-    """Run the module of this name that Python would have found without this one."""
+    """Run the ``sitecustomize`` that Python would find without this one."""
     here = Path(__file__).resolve().parent
     others = [folder for folder in sys.path if Path(folder).resolve() != here]
     spec = PathFinder.find_spec("sitecustomize", others)
