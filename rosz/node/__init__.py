@@ -11,10 +11,9 @@ from rosz.node.control import NodeInfo
 from rosz.node.decoder import MessageInfo
 from rosz.node.node import Node
 from rosz.node.publisher import Publisher, SubscriberLink
-from rosz.node.rate import Rate
 from rosz.node.service import Service
 from rosz.node.subscription import GenericSubscription, Subscription
-from rosz.node.timer import Timer, TimerEvent
+from rosz.node.timer import Rate, Timer, TimerEvent
 
 __all__ = (
     "Client",

@@ -28,8 +28,6 @@ from rosz.session import (
 )
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rosz.params.replica import Replica
     from rosz.security import LocalPermissions
     from rosz.typestore import TypeStore
@@ -257,12 +255,7 @@ class Context:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exc: object) -> None:
         self.close()
 
 

@@ -22,8 +22,6 @@ from rosz.node.log import DEFAULT_FORMAT, NodeLog
 from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rosz.params.api import Params
 
 __all__ = ("NodeCore",)
@@ -213,12 +211,7 @@ class NodeCore:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exc: object) -> None:
         self.close()
 
     def __repr__(self) -> str:

@@ -14,8 +14,6 @@ from rosz.node.incompatible import COUNTERPARTS
 from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rosz.qos import QoS
 
 __all__ = ("ANY", "Entity")
@@ -154,12 +152,7 @@ class Entity:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exc: object) -> None:
         self.close()
 
     def __repr__(self) -> str:

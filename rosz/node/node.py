@@ -12,11 +12,10 @@ from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
 from rosz.node.core import NodeCore
 from rosz.node.publisher import Publisher
-from rosz.node.rate import Rate
 from rosz.node.ros2_detector import Ros2PeerDetector
 from rosz.node.service import Service
 from rosz.node.subscription import GenericSubscription, Subscription
-from rosz.node.timer import Timer, TimerEvent
+from rosz.node.timer import Rate, Timer, TimerEvent
 from rosz.qos import SERVICES, QoS, for_queue
 
 if TYPE_CHECKING:

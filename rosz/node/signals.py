@@ -1,13 +1,13 @@
-"""Ctrl-C and SIGTERM: the first asks politely, the second leaves.
+"""Ctrl-C and SIGTERM: the first shuts contexts down, the second ends the process at once.
 
-A program that asks whether it is shut down, or waits through rosz, is told in that way and ends by
-itself. One that never does, such as a loop around ``time.sleep``, is interrupted by an exception.
+A program that asks whether it is shut down, or waits in a function of rosz, ends by itself. One
+that never does, such as a loop around ``time.sleep``, is interrupted by an exception.
 
-Python runs a signal's handler in the main thread between two steps, and one that comes right before
-that thread begins to wait is not seen until the wait ends. So a thread of its own is told as well,
-through a pipe that the interpreter writes to from the signal itself. It acts, and where the handler
-does not run soon it sends the main thread the signal once more. Where the pipe belongs to somebody
-else, such as an event loop, the handler has to act.
+Python runs a signal handler in the main thread between two bytecodes. A signal that comes right
+before that thread begins to wait is not handled until the wait ends. So a thread is notified too,
+by a pipe that the interpreter writes to when the signal comes. It shuts the contexts down, and
+sends the main thread the signal once more if the handler does not run soon. If the pipe belongs to
+other code, such as an event loop, the handler shuts the contexts down.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ __all__ = ("install", "of_program")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_FD = -1
 _SOON = 0.05
-_ONE_STROKE = 0.1
-"""Seconds in which a second signal is an echo of the first: timeout(1) signals the group, too."""
+_SAME_SIGNAL = 0.1
+"""Seconds in which a second signal counts as the first: timeout(1) signals the group as well."""
 _REMINDERS = 20
 
 
 def install(context: Context) -> None:
-    """Have signals shut a context down, where the program has not taken them itself.
+    """Make signals shut a context down, unless the program handles them itself.
 
-    Nothing happens outside the main thread, or for a signal that has another handler already. One
-    that is ignored has none: shells start what a script puts in the background so, and it is to end
-    by ``kill -INT`` nevertheless, as rospy's nodes do. A signal that finds all contexts shut down
-    does what it would do without rosz.
+    Nothing happens outside the main thread, or for a signal that has another handler already. A
+    signal that is ignored is taken too: shells start background jobs of a script like that, and
+    ``kill -INT`` must end them nevertheless, as it ends nodes of rospy. A signal that finds all
+    contexts shut down does what it would do without rosz.
     """
     if threading.current_thread() is not threading.main_thread():
         return
@@ -68,7 +68,7 @@ def of_program(number: signal.Signals) -> Callable[[int, FrameType | None], obje
 
 
 class _Handler:
-    """Who is told of the signals of a process."""
+    """The handler of the signals of a process, and the contexts that they shut down."""
 
     def __init__(self, numbers: list[signal.Signals]) -> None:
         self._numbers = numbers
@@ -82,7 +82,7 @@ class _Handler:
         self._writer.setblocking(False)
         previous = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
         if previous != _NO_FD:
-            signal.set_wakeup_fd(previous)  # an event loop of the program has it; leave it there
+            signal.set_wakeup_fd(previous)  # an event loop of the program has it
         threading.Thread(target=self._watch, name="rosz-signal-watch", daemon=True).start()
 
     def add(self, context: Context) -> None:
@@ -91,25 +91,25 @@ class _Handler:
         self._asked = False
 
     def __call__(self, number: int, _frame: FrameType | None) -> None:
-        """Run in the main thread, between two of its steps."""
+        """Handle a signal; in the main thread, between two bytecodes."""
         self._ran.set()
         contexts = self._contexts
         if not self._asked and all(context.is_shutdown for context in contexts):
-            self.let_go(number)
+            self.restore(number)
             signal.raise_signal(number)
             return
         for context in contexts:
-            # The main thread may get to the end before the thread that shuts down.
+            # The main thread may end before the thread that shuts down.
             context.reason = context.reason or signal.Signals(number).name
         if not self._is_watching():
-            self._hear(number)
+            self._react(number)
         if not any(context.cooperative for context in contexts):
             if number == signal.SIGINT:
                 raise KeyboardInterrupt
             raise SystemExit(128 + number)
 
-    def let_go(self, number: int) -> None:
-        """Have a signal do what it would do without rosz."""
+    def restore(self, number: int) -> None:
+        """Restore what a signal does without rosz."""
         if self._is_watching():
             signal.set_wakeup_fd(_NO_FD)
         default = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
@@ -118,8 +118,8 @@ class _Handler:
     def _forked(self) -> None:
         """Give the signals back in a forked child, whose pipe is still that of its parent."""
         for number in self._numbers:
-            if self._hears(number):
-                self.let_go(number)
+            if self._handles(number):
+                self.restore(number)
 
     def _is_watching(self) -> bool:
         own = self._writer.fileno()
@@ -131,19 +131,19 @@ class _Handler:
     def _watch(self) -> None:
         while data := self._reader.recv(64):
             for number in data:
-                if number not in self._numbers or not self._hears(number):
-                    continue  # the program's own business, perhaps since a moment ago
+                if number not in self._numbers or not self._handles(number):
+                    continue  # the program handles it, perhaps since a moment ago
                 if self._echoes:
                     self._echoes -= 1
                     continue
-                self._hear(number)
+                self._react(number)
                 self._remind(number)
 
-    def _hears(self, number: int) -> bool:
+    def _handles(self, number: int) -> bool:
         return signal.getsignal(number) is self
 
     def _remind(self, number: int) -> None:
-        """See to it that the main thread takes note."""
+        """Send the main thread the signal until its handler runs."""
         main = threading.main_thread().ident
         for _ in range(_REMINDERS):
             if self._ran.wait(_SOON) or main is None:
@@ -152,19 +152,19 @@ class _Handler:
             signal.pthread_kill(main, number)
         self._ran.clear()
 
-    def _hear(self, number: int) -> None:
+    def _react(self, number: int) -> None:
         if self._asked:
             ending = not all(context.closed for context in self._contexts)
-            if ending and time.monotonic() - self._asked_at < _ONE_STROKE:
+            if ending and time.monotonic() - self._asked_at < _SAME_SIGNAL:
                 return
-            # End the process at once, telling where every thread stood.
+            # End the process at once, and show where every thread is.
             faulthandler.dump_traceback()
             os._exit(128 + number)
         live = [context for context in self._contexts if not context.is_shutdown]
         self._asked, self._asked_at = bool(live), time.monotonic()
         reason = signal.Signals(number).name
         for context in live:
-            # On another thread: this one may hold a lock that is needed, or has to hear of more.
+            # On another thread: this one may hold a lock that is needed, and must stay ready.
             name = "rosz-signal"
             start_thread(
                 threading.Thread(target=context.shutdown, args=(reason,), name=name, daemon=True)

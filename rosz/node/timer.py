@@ -1,34 +1,148 @@
-"""Timers: a callback at each period, on a thread of its own."""
+"""Work at a steady rate: loops with a `Rate`, and callbacks with a `Timer`, by ROS 1's rules."""
 
 from __future__ import annotations
 
+import itertools
+import math
 import threading
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Self
+from collections.abc import Callable, Iterator
+from typing import Self
 
 import msgspec
 
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock
-from rosz.node.rate import Pace
 from rosz.session import clamp_timeout
 
-if TYPE_CHECKING:
-    from types import TracebackType
+__all__ = ("Rate", "Timer", "TimerEvent")
 
-__all__ = ("Timer", "TimerEvent")
+_HIGHEST_HZ = 1_000_000_000
+_MISSED_PERIODS = 2
+
+
+class _Pace:
+    """The time at which the next turn of a loop is due; it does not read a clock.
+
+    A turn that starts late shortens the wait for the next, so that the mean rate holds. A loop that
+    is more than two periods late skips the turns that it missed.
+
+    Args:
+        period_ns: Period in nanoseconds.
+        now: Time at the start, in nanoseconds.
+
+    Attributes:
+        period_ns: As given.
+        last: Start of the current period, in nanoseconds.
+    """
+
+    __slots__ = ("last", "period_ns")
+
+    def __init__(self, period_ns: int, now: int) -> None:
+        self.period_ns = period_ns
+        self.last = now
+
+    def remaining(self, now: int) -> int:
+        """Return the nanoseconds until the next turn; 0 or less if it is due."""
+        self.last = min(self.last, now)
+        return self.period_ns - (now - self.last)
+
+    def step(self, now: int) -> None:
+        """Begin the next period.
+
+        Args:
+            now: Time before the wait for the turn.
+        """
+        self.last += self.period_ns
+        if now - self.last > _MISSED_PERIODS * self.period_ns:
+            self.last = now
+
+    def restart(self, now: int) -> None:
+        """Begin a period now."""
+        self.last = now
+
+
+class Rate:
+    """Run a loop at a rate.
+
+    Call `sleep` at the end of each turn, or iterate::
+
+        for tick in node.rate(10):
+            ...
+
+    which yields 0 at once, then 1, 2, … at the rate, until the node shuts down.
+
+    Args:
+        hz: Turns per second.
+        clock: Clock to use; the loop ends when it is closed.
+        reset: Whether `sleep` begins a new period when ROS time moves back, instead of raising.
+
+    Raises:
+        UsageError: `hz` is not above 0, or a period is less than a nanosecond.
+    """
+
+    def __init__(self, hz: float, clock: Clock, *, reset: bool = False) -> None:
+        if not 0 < hz <= _HIGHEST_HZ or math.isinf(1e9 / hz):
+            raise UsageError(f"rate is '{hz}' Hz: expected above 0 and at most {_HIGHEST_HZ}")
+        self._clock = clock
+        self._reset = reset
+        self._pace = _Pace(int(1e9 / hz), clock.steady())
+
+    @property
+    def period_ns(self) -> int:
+        """Period in nanoseconds."""
+        return self._pace.period_ns
+
+    def remaining(self) -> int:
+        """Return the nanoseconds until the next turn; 0 or less if it is due."""
+        return self._pace.remaining(self._clock.steady())
+
+    def restart(self) -> None:
+        """Begin a period now."""
+        self._pace.restart(self._clock.steady())
+
+    def sleep(self) -> None:
+        """Sleep until the next turn is due.
+
+        Raises:
+            ClosedError: The node or context of the clock was shut down before or during the sleep.
+            TimeMovedBackwards: ROS time moved back during the sleep, and `reset` is off.
+        """
+        if not self._pause(reset=self._reset):
+            raise ClosedError("shut down during the sleep of a rate")
+
+    def __iter__(self) -> Iterator[int]:
+        """Yield 0, 1, 2, … at the rate, until shutdown; also when ROS time moves back."""
+        self.restart()
+        for tick in itertools.count():
+            if self._clock.closed:
+                return
+            yield tick
+            if not self._pause(reset=True):
+                return
+
+    def _pause(self, *, reset: bool) -> bool:
+        now = self._clock.steady()
+        try:
+            ended = self._clock.sleep(self._pace.remaining(now))
+        except TimeMovedBackwards:
+            if not reset:
+                raise
+            self.restart()
+            return not self._clock.closed
+        self._pace.step(now)
+        return ended
 
 
 class TimerEvent(msgspec.Struct, frozen=True):
-    """When a timer was due and when it came; the fields of ROS 1, in nanoseconds.
+    """When a call of a timer was due and when it was made; ROS 1's fields, in nanoseconds.
 
     Attributes:
-        last_expected: When the previous call was due; None at the first.
-        last_real: When it was made; None at the first.
-        current_expected: When this call was due.
-        current_real: When it was made.
-        last_duration: How long the previous call took, in wall time; None at the first.
+        last_expected: Time at which the previous call was due; None at the first.
+        last_real: Time at which it was made; None at the first.
+        current_expected: Time at which this call was due.
+        current_real: Time at which it was made.
+        last_duration: Duration of the previous call in wall time; None at the first.
     """
 
     last_expected: int | None
@@ -41,19 +155,20 @@ class TimerEvent(msgspec.Struct, frozen=True):
 class Timer:
     """Call a function at each period until closed, or once.
 
-    Calls never overlap. Like a `Rate`, the timer makes up for a late call, and gives up what it
-    missed when more than two periods late. In simulated time it starts with the first ``/clock``.
+    Calls never overlap. Like a `Rate`, the timer makes up for a late call, and skips the calls that
+    it missed when it is more than two periods late. In simulated time it starts with the first
+    ``/clock``.
 
     Args:
-        period_ns: Nanoseconds between calls, and before the first.
-        callback: What to call with a `TimerEvent`.
-        clock: Whose time to go by; the timer ends when it is closed.
-        on_error: Told, with a text, of what the callback raises; the timer goes on.
-        oneshot: Whether to call once only.
-        reset: What to do when ROS time moves back: call now and count on from there, or, as in
-            ROS 1, tell `on_error` and stop.
-        name: What to call the timer in such texts and in the list of threads.
-        on_end: Called with the timer, on its thread, when it has ended.
+        period_ns: Period in nanoseconds; the first call is due after one period.
+        callback: Function that gets a `TimerEvent`.
+        clock: Clock to use; the timer ends when it is closed.
+        on_error: Function that gets a text and what the callback raised; the timer goes on.
+        oneshot: Whether to call only once.
+        reset: Whether to call at once and begin anew when ROS time moves back; otherwise, as in
+            ROS 1, the timer calls `on_error` and ends.
+        name: Name of the timer in such texts and of its thread.
+        on_end: Function that gets the timer, on its thread, when it has ended.
 
     Raises:
         UsageError: The period is not above 0.
@@ -88,13 +203,13 @@ class Timer:
 
     @property
     def alive(self) -> bool:
-        """Whether the timer has calls to make, or is making its last."""
+        """Whether the timer has calls to make, or is making its last one."""
         return self._thread.is_alive()
 
     def close(self) -> None:
-        """Make no more calls; from anywhere, its own callback too, and again is no error.
+        """Make no more calls; the callback may do this, too, and a second call has no effect.
 
-        A call under way is not waited for: see `join`.
+        It does not wait for a call in progress; see `join`.
         """
         self._clock.close()
 
@@ -104,13 +219,13 @@ class Timer:
         """Wait until the timer has ended.
 
         Args:
-            timeout: Seconds; forever when not given.
+            timeout: Time limit in seconds; none when not given.
 
         Returns:
-            Whether it has; False at once in its own callback.
+            Whether it has ended; False, at once, in its own callback.
 
         Raises:
-            UsageError: The timeout is no number.
+            UsageError: The timeout is not a number.
         """
         if threading.current_thread() is self._thread:
             return False
@@ -120,12 +235,7 @@ class Timer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exc: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -143,7 +253,7 @@ class Timer:
         clock = self._clock
         if not clock.wait_started():
             return
-        pace = Pace(self.period_ns, clock.steady())
+        pace = _Pace(self.period_ns, clock.steady())
         expected = clock.now() + self.period_ns
         last_expected: int | None = None
         last_real: int | None = None
@@ -173,6 +283,6 @@ class Timer:
         try:
             self._callback(event)
         except BaseException as error:  # noqa: BLE001  # the timer outlives what it raises
-            # What a callback tries on a node that is just shutting down is no fault of its.
+            # What a callback tries while its node is being shut down is not its fault.
             if not (isinstance(error, ClosedError) and self._clock.closed):
                 self._on_error(f"callback of timer '{self.name}' failed", error)

@@ -11,7 +11,7 @@ from simulation import SECOND, START, SimulatedClock, Task
 
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock
-from rosz.node.rate import Rate
+from rosz.node.timer import Rate
 
 # Each turn of each loop: do some work, ask what remains, sleep; time moves back in some sleeps.
 _ROSPY_LOOPS = """

@@ -102,7 +102,7 @@ def leave_at_second_signal(program: Program, number: signal.Signals) -> None:
     program.wait_for("ready")
     program.send(number)
     program.wait_for("hook")
-    time.sleep(2 * signals._ONE_STROKE)  # as a person does who means it
+    time.sleep(2 * signals._SAME_SIGNAL)  # as a person does who means it
     program.send(number)
     assert program.exit_code() == 128 + number, program.output
 

@@ -75,7 +75,7 @@ class Rate:
     """
 
     def __init__(self, period_ns: int, source: _RosClock) -> None:
-        from rosz.node.rate import Rate as _Rate
+        from rosz.node import Rate as _Rate
 
         self._rate = _Rate(1e9 / period_ns, source, reset=True)
 
