@@ -80,19 +80,19 @@ def log_command(
 def _set_level(call: Call, words: Sequence[str]) -> None:
     if len(words) != _LEVEL_WORDS:
         raise UsageError("expected: rosz log level NODE LOGGER LEVEL")
-    from rosz.introspect.nodes import members, set_level
+    from rosz.introspect.nodes import find_nodes, set_level
     from rosz.introspect.survey import take_survey
     from rosz.node.logger import parse_severity
 
     _, node, logger, level = words
     parse_severity(level)
     with call.session() as session:
-        for token in members(take_survey(session, call.domain), call.resolve(node, _TOOL)):
+        for token in find_nodes(take_survey(session, call.domain), call.resolve(node, _TOOL)):
             set_level(session, token, logger, level)
 
 
 def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
-    from rosz.introspect.nodes import get_levels, members
+    from rosz.introspect.nodes import find_nodes, get_levels
     from rosz.introspect.survey import take_survey
 
     if not nodes:
@@ -101,7 +101,7 @@ def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
     with call.session() as session:
         survey = take_survey(session, call.domain)
         for node in nodes:
-            for token in members(survey, call.resolve(node, _TOOL)):
+            for token in find_nodes(survey, call.resolve(node, _TOOL)):
                 found[token.node_name] = get_levels(session, token)
     if as_json:
         print_json(found)

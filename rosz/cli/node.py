@@ -67,10 +67,10 @@ def machine_command(
     json: _Json = False,
 ) -> None:
     """List the machines that nodes run on, or the nodes on one of them."""
-    from rosz.introspect.nodes import list_nodes, machines, on_machine
+    from rosz.introspect.nodes import list_nodes, machines, nodes_on_machine
 
     nodes = list_nodes(call_of(context).survey(processes=True))
-    found = on_machine(nodes, machine) if machine else machines(nodes)
+    found = nodes_on_machine(nodes, machine) if machine else machines(nodes)
     if json:
         print_json(found)
     else:

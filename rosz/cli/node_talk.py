@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from rosz.cli.group import Call, print_json, print_lines
 from rosz.errors import NotFoundError, RoszError, near_miss
 from rosz.introspect import nodes as library
-from rosz.introspect.nodes import PING_TIMEOUT, connections, describe, members
+from rosz.introspect.nodes import PING_TIMEOUT, find_nodes, format_connections, format_node
 from rosz.introspect.survey import Survey, take_survey
 from rosz.names import short_type
 from rosz.wire import Kind
@@ -38,15 +38,15 @@ def info(call: Call, names: Sequence[str], *, quiet: bool, as_json: bool) -> Non
     rows: list[dict[str, Any]] = []
     with call.session() as session:
         survey = take_survey(session, call.domain, processes=True)
-        chosen = [node for name in names for node in members(survey, call.resolve(name, _TOOL))]
+        chosen = [node for name in names for node in find_nodes(survey, call.resolve(name, _TOOL))]
         for node in chosen:
             if as_json:
                 rows.append(_row(session, survey, node, quiet=quiet))
                 continue
-            print_lines([describe(survey, node)])
+            print_lines([format_node(survey, node)])
             if not quiet:
                 print_lines([f"\ncontacting node {survey.address(node)} ..."])
-                print_lines([_answers(session, node) + connections(survey, node)])
+                print_lines([_answers(session, node) + format_connections(survey, node)])
     if as_json:
         print_json(rows)
 
@@ -95,7 +95,7 @@ def ping(call: Call, name: str, count: int | None) -> int:
     times: list[float] = []
     with call.session() as session:
         survey = take_survey(session, call.domain, processes=True)
-        node = members(survey, full)[-1]
+        node = find_nodes(survey, full)[-1]
         print_lines([f"pinging {full} with a timeout of {PING_TIMEOUT}s"])
         try:
             while True:
@@ -125,7 +125,7 @@ def ping_all(call: Call) -> int:
         code = 0
         for name in names:
             print_lines([f"pinging {name} with a timeout of {PING_TIMEOUT}s"])
-            for node in survey.members(name):
+            for node in survey.nodes_named(name):
                 try:
                     _ping(session, survey, node)
                 except RoszError as error:

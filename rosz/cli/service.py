@@ -53,17 +53,17 @@ def info_command(context: Context, service: _ServiceName, *, json: _Json = False
     from rosz.names import short_type
 
     call = call_of(context)
-    token = library.server(call.survey().view, call.resolve(service, _TOOL))
+    token = library.find_server(call.survey().view, call.resolve(service, _TOOL))
     arguments = list_arguments(call.types.service(token.type_name).Request)
     type_name = short_type(token.type_name)
     if json:
-        row = {"name": token.name, "node": token.node_name, "uri": library.uri(token)}
+        row = {"name": token.name, "node": token.node_name, "uri": library.service_key(token)}
         print_json(row | {"type": type_name, "args": arguments.split()})
         return
     print_lines(
         [
             f"Node: {token.node_name}",
-            f"URI: {library.uri(token)}",
+            f"URI: {library.service_key(token)}",
             f"Type: {type_name}",
             f"Args: {arguments}",
         ]
@@ -73,11 +73,11 @@ def info_command(context: Context, service: _ServiceName, *, json: _Json = False
 @app.command("type")
 def type_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the type of a service."""
-    from rosz.introspect.services import server
+    from rosz.introspect.services import find_server
     from rosz.names import short_type
 
     call = call_of(context)
-    name = short_type(server(call.survey().view, call.resolve(service, _TOOL)).type_name)
+    name = short_type(find_server(call.survey().view, call.resolve(service, _TOOL)).type_name)
     _print_one("type", name, as_json=json)
 
 
@@ -96,9 +96,9 @@ def find_command(
     json: _Json = False,
 ) -> None:
     """List the services of a type."""
-    from rosz.introspect.services import find
+    from rosz.introspect.services import services_of_type
 
-    found = find(call_of(context).survey().view, type_name)
+    found = services_of_type(call_of(context).survey().view, type_name)
     if json:
         print_json(found)
     else:
@@ -109,10 +109,10 @@ def find_command(
 def args_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the arguments that a service takes."""
     from rosz.introspect.arguments import list_arguments
-    from rosz.introspect.services import server
+    from rosz.introspect.services import find_server
 
     call = call_of(context)
-    token = server(call.survey().view, call.resolve(service, _TOOL))
+    token = find_server(call.survey().view, call.resolve(service, _TOOL))
     names = list_arguments(call.types.service(token.type_name).Request)
     if json:
         print_json({"args": names.split()})
@@ -123,21 +123,21 @@ def args_command(context: Context, service: _ServiceName, *, json: _Json = False
 @app.command("node")
 def node_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the node that serves a service."""
-    from rosz.introspect.services import server
+    from rosz.introspect.services import find_server
 
     call = call_of(context)
-    token = server(call.survey().view, call.resolve(service, _TOOL))
+    token = find_server(call.survey().view, call.resolve(service, _TOOL))
     _print_one("node", token.node_name, as_json=json)
 
 
 @app.command("uri")
 def uri_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the key that a service is called by on Zenoh."""
-    from rosz.introspect.services import server, uri
+    from rosz.introspect.services import find_server, service_key
 
     call = call_of(context)
-    token = server(call.survey().view, call.resolve(service, _TOOL))
-    _print_one("uri", uri(token), as_json=json)
+    token = find_server(call.survey().view, call.resolve(service, _TOOL))
+    _print_one("uri", service_key(token), as_json=json)
 
 
 @app.command("call", arrange=values_last(frozenset({"--timeout"})))

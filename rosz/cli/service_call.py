@@ -12,8 +12,8 @@ import msgspec
 from rosz.cli.group import Call, print_json, print_lines, until_stopped, warn
 from rosz.errors import EncodeError, UsageError
 from rosz.introspect.arguments import list_arguments, read_arguments, read_stream, with_arguments
-from rosz.introspect.services import call as send_call
-from rosz.introspect.services import server, wait_for_server
+from rosz.introspect.services import call_service as send_call
+from rosz.introspect.services import find_server, wait_for_server
 from rosz.message.convert import to_jsonable
 from rosz.node import Client, Node
 
@@ -55,7 +55,7 @@ def call_service(call: Call, name: str, words: Sequence[str], options: CallOptio
         if options.wait:
             token = wait_for_server(context, full, warn)
         else:
-            token = server(context.graph.refresh(), full)
+            token = find_server(context.graph.refresh(), full)
         stopped = context.session.why_silent(token.zid)
         if stopped:
             warn(f"service [{token.name}] does not answer as long as {stopped}")

@@ -68,7 +68,7 @@ def list_command(
             print_lines([f"Host [{name}]:"])
         if verbose:
             print_lines(
-                library.describe_list(
+                library.format_topics(
                     topics,
                     publishers=not subscribers,
                     subscribers=not publishers,
@@ -90,15 +90,15 @@ def info_command(context: Context, topic: _TopicName, *, json: _Json = False) ->
     name = call.resolve(topic, "rostopic")
     survey = call.survey(processes=True)
     if not json:
-        print_lines([library.describe(survey, name)])
+        print_lines([library.format_topic(survey, name)])
         return
-    entry, publishers, subscriptions = library.info(survey, name)
+    entry, publishers, subscriptions = library.find_topic(survey, name)
     print_json(
         {
             "name": entry.name,
             "types": entry.types,
-            "publishers": [library.end_row(survey, token) for token in publishers],
-            "subscribers": [library.end_row(survey, token) for token in subscriptions],
+            "publishers": [library.entity_row(survey, token) for token in publishers],
+            "subscribers": [library.entity_row(survey, token) for token in subscriptions],
         }
     )
 
@@ -135,7 +135,9 @@ def find_command(
     """List the topics of a type."""
     from rosz.introspect import topics as library
 
-    found = library.find(library.list_topics(call_of(context).survey().view.tokens), type_name)
+    found = library.topics_of_type(
+        library.list_topics(call_of(context).survey().view.tokens), type_name
+    )
     if json:
         print_json(found)
     else:

@@ -1,17 +1,17 @@
-"""How a command gets into the network.
+"""The session of a command.
 
-A short one is a client of whoever holds the rendezvous: one link, and it sees everything at once.
-When nobody holds it, because the process that did has ended, those that are left look for a new
-meeting point all the time; then the command becomes that point and waits for them. One that stays
-for long is a peer from the start, so that it lives on when the process at the rendezvous ends.
+A short command is a client of the process at the rendezvous: it has one link and sees everything at
+once. If no process listens there, since the one that did has ended, the command listens there
+itself and waits for the others, which keep trying to connect. A command that runs for long is a
+peer from the start, so that it does not depend on the process at the rendezvous.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
@@ -22,31 +22,32 @@ if TYPE_CHECKING:
 
 __all__ = ("command_config", "open_context", "open_session")
 
-_MEET_SECONDS = 0.5
-"""Somewhat more than the pause in which a lone peer tries the rendezvous again."""
-_SETTLE_SECONDS = 1.0
+T = TypeVar("T")
+
+_PEER_TIMEOUT = 0.5
+"""Time limit for a first peer: more than the pause between its attempts to connect."""
+_READY_TIMEOUT = 1.0
 _LOOK_SECONDS = 0.002
-_ANSWER_SECONDS = 1.0
-_BUSY_SECONDS = 10.0
-"""How long one that is known to be awake may take to answer, as where many start at once."""
+_REPLY_TIMEOUT = 1.0
+_BUSY_TIMEOUT = 10.0
+"""Time limit for a process that runs but is busy, as where many start at once."""
 
 
 def open_session(environment: Environment) -> Session:
-    """Open the session of a command that asks and ends.
+    """Open the session of a short command.
+
+    Args:
+        environment: Settings of this machine.
 
     Raises:
-        TransportError: Nobody answers; the text says what to start.
+        TransportError: No process answers; the text says what to start.
     """
-    peers = LocalPeers.read(environment.rendezvous)
-    _check_awake(environment, peers)
-    if _may_answer(environment, peers):
-        try:
-            return Session.open(command_config(environment, peers), peers)
-        except TransportError as error:
-            _check_free(environment, error)
+    client = _open_client(environment, Session.open)
+    if client is not None:
+        return client
     session = Session.open(SessionConfig.node(environment))
     try:
-        _meet(session, environment)
+        _wait_for_peers(session, environment)
     except BaseException:
         session.close()
         raise
@@ -59,26 +60,24 @@ def open_context(
     """Open the context of a command that publishes, subscribes or calls.
 
     Args:
-        environment: Settings.
-        argv: Remappings and the like of its node.
-        lasting: Whether it stays until it is told to end.
+        environment: Settings of this machine.
+        argv: Command line of its node, such as remappings.
+        lasting: Whether the command runs until it is stopped.
 
     Raises:
-        TransportError: Nobody answers; the text says what to start.
+        TransportError: No process answers; the text says what to start.
     """
     from rosz.node import Context
 
-    peers = LocalPeers.read(environment.rendezvous)
-    _check_awake(environment, peers)
-    if not lasting and _may_answer(environment, peers):
-        try:
-            return Context(environment, argv, command_config(environment, peers))
-        except TransportError as error:
-            _check_free(environment, error)
+    client = _open_client(
+        environment, lambda config, _: Context(environment, argv, config), allowed=not lasting
+    )
+    if client is not None:
+        return client
     context = Context(environment, argv)
     try:
-        _meet(context.session, environment)
-        context.settled.wait(_SETTLE_SECONDS)
+        _wait_for_peers(context.session, environment)
+        context.settled.wait(_READY_TIMEOUT)
     except BaseException:
         context.close()
         raise
@@ -86,31 +85,47 @@ def open_context(
 
 
 def command_config(environment: Environment, peers: LocalPeers | None = None) -> SessionConfig:
-    """Return what the session of a command that asks and ends is to be.
+    """Return the configuration of the session of a short command.
 
-    It waits longer where a session of rosz is awake: whatever listens there will answer.
+    Its time limit is longer if a process of rosz runs here, which will answer.
+
+    Args:
+        environment: Settings of this machine.
+        peers: Processes of rosz on this machine; looked up when not given.
     """
     peers = peers or LocalPeers.read(environment.rendezvous)
     awake = not _reaches_beyond(environment) and peers.is_any_running
-    return SessionConfig.command(environment, _BUSY_SECONDS if awake else _ANSWER_SECONDS)
+    return SessionConfig.command(environment, _BUSY_TIMEOUT if awake else _REPLY_TIMEOUT)
 
 
 def _reaches_beyond(environment: Environment) -> bool:
     return bool(environment.connect or environment.multicast or environment.zenoh_config)
 
 
-def _check_awake(environment: Environment, peers: LocalPeers) -> None:
-    """See that not all who are there are stopped.
+def _open_client(
+    environment: Environment,
+    open_client: Callable[[SessionConfig, LocalPeers], T],
+    *,
+    allowed: bool = True,
+) -> T | None:
+    """Open a client of the process at the rendezvous; return None where a peer is needed.
 
     Raises:
-        TransportError: They are.
+        TransportError: All processes are stopped, or the one at the rendezvous does not answer.
     """
+    peers = LocalPeers.read(environment.rendezvous)
     if not _reaches_beyond(environment) and not peers.is_anybody_there and peers.why_unanswered:
         raise TransportError(peers.why_unanswered)
+    if allowed and _may_answer(environment, peers):
+        try:
+            return open_client(command_config(environment, peers), peers)
+        except TransportError as error:
+            _check_free(environment, error)
+    return None
 
 
 def _may_answer(environment: Environment, peers: LocalPeers) -> bool:
-    """Tell whether it is worth the wait to try as a client."""
+    """Return whether a client may get an answer."""
     return bool(
         _reaches_beyond(environment)
         or environment.mode == "client"
@@ -119,10 +134,10 @@ def _may_answer(environment: Environment, peers: LocalPeers) -> bool:
 
 
 def _check_free(environment: Environment, error: TransportError) -> None:
-    """See that a failure to connect is not one of something that holds the rendezvous.
+    """Check that a client failed to connect because the rendezvous is free.
 
     Raises:
-        TransportError: Somebody listens there, and does not speak; or a setting is refused.
+        TransportError: A process listens there and does not answer, or a setting is not valid.
     """
     places_of(SessionConfig.command(environment))
     stopped = LocalPeers.read(environment.rendezvous).why_unanswered
@@ -130,19 +145,19 @@ def _check_free(environment: Environment, error: TransportError) -> None:
         raise TransportError(stopped) from error
     if is_listening(environment.rendezvous):
         raise TransportError(
-            f"what listens at {environment.rendezvous} does not answer: it is stopped, or it is no"
+            f"what listens at {environment.rendezvous} does not answer: it is stopped, or it is not"
             " Zenoh; end it, or set ROSZ_RENDEZVOUS to another endpoint for all"
         ) from error
 
 
-def _meet(session: Session, environment: Environment) -> None:
-    """Wait until a peer is linked to all that are there."""
-    deadline = time.monotonic() + _MEET_SECONDS
+def _wait_for_peers(session: Session, environment: Environment) -> None:
+    """Wait until a peer is connected to all others."""
+    deadline = time.monotonic() + _PEER_TIMEOUT
     while not session.peers():
         if time.monotonic() > deadline:
             raise _nobody(environment)
         time.sleep(_LOOK_SECONDS)
-    MeshReadiness(session, _SETTLE_SECONDS, threading.Event()).ready.wait(_SETTLE_SECONDS)
+    MeshReadiness(session, _READY_TIMEOUT, threading.Event()).ready.wait(_READY_TIMEOUT)
 
 
 def _nobody(environment: Environment) -> TransportError:

@@ -1,4 +1,4 @@
-"""Definitions of messages and services as rosmsg and rossrv show them."""
+"""Definitions of messages and services, as rosmsg and rossrv show them."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _HEADER = "std_msgs/msg/Header"
 
 
 class TypeSummary(msgspec.Struct, frozen=True):
-    """What there is to say about a type.
+    """A type with its hashes and fields.
 
     Attributes:
-        name: As ROS 1 spells it.
+        name: Name as ROS 1 spells it.
         type_name: Full name.
         md5: Hash of ROS 1.
-        hash: Hash of ROS 2, part of the key that the type is sent under.
-        parts: A message's fields, or those of a request and of a response, name to type.
-        constants: Likewise.
-        text: The definition.
+        hash: Hash of ROS 2, which is part of the keys of topics of the type.
+        parts: Types by field name, of the message or of request and response.
+        constants: Values by constant name, of the same parts.
+        text: Text of the definition.
     """
 
     name: str
@@ -44,11 +44,11 @@ class TypeSummary(msgspec.Struct, frozen=True):
 
 
 class Definitions:
-    """All definitions of one kind that can be found.
+    """The definitions of one kind.
 
     Args:
-        store: Where types are.
-        kind: Messages or services.
+        store: Types by name.
+        kind: ``msg`` or ``srv``.
     """
 
     def __init__(self, store: TypeStore, kind: Kind) -> None:
@@ -57,18 +57,18 @@ class Definitions:
         self._catalog = Catalog(store.definition)
 
     def find(self, name: str) -> list[str]:
-        """Return the full names that a name means: one, or all of that base name.
+        """Return the full names that a name stands for: one, or all of that base name.
 
         Args:
             name: ``pkg/Name``, ``pkg/msg/Name``, or ``Name`` alone; a suffix ``.msg`` is ignored.
 
         Raises:
-            TypeNotFound: There is none.
-            UsageError: It is no name of a type.
+            TypeNotFound: There is no such type.
+            UsageError: The name is not valid for a type.
         """
         name = name.removesuffix(f".{self._kind}")
         if "::" in name or "." in name:
-            raise UsageError(f"'{name}' is no type; expected a form such as 'std_msgs/String'")
+            raise UsageError(f"'{name}' is not a type; expected a form such as 'std_msgs/String'")
         if "/" not in name:
             known = self._store.names(self._kind)
             found = [one for one in known if one.rpartition("/")[2] == name]
@@ -81,7 +81,7 @@ class Definitions:
         try:
             self._store.definition(full)
         except (TypeNotFound, ValueError):  # the latter for too many slashes
-            # The store knows best why not.
+            # The store raises an error that says why.
             look = self._store.message if self._kind == "msg" else self._store.service
             look(name)
         return [full]
@@ -102,7 +102,7 @@ class Definitions:
         return [service.request, service.response]
 
     def show(self, name: str) -> str:
-        """Return a definition, the types in it unfolded, as ``rosmsg show`` prints it."""
+        """Return a definition with the fields of the types in it, as ``rosmsg show`` prints it."""
         return "---\n".join(
             "".join(f"{line}\n" for line in self._lines(part, "")) for part in self.parts(name)
         )
@@ -111,34 +111,34 @@ class Definitions:
         for constant in spec.constants:
             yield f"{indent}{constant.type} {constant.name}={constant.text}"
         if spec.name == _HEADER and all(field.name != "seq" for field in spec.fields):
-            yield f"{indent}uint32 seq"  # not on the wire; receivers fill it in
+            yield f"{indent}uint32 seq"  # not on the wire; receivers set it
         for field in spec.fields:
             yield f"{indent}{_written(field.type)} {field.name}"
             if not field.type.primitive and field.type.base not in _PRIMITIVE_IN_ROS1:
                 yield from self._lines(self._catalog.message(field.type.base), f"{indent}  ")
 
     def text(self, name: str) -> str:
-        """Return a definition as it is written.
+        """Return the text of a definition.
 
         Raises:
-            RoszError: It cannot be read.
+            RoszError: The definition cannot be read.
         """
         return self._store.definition(name).text
 
     def md5(self, name: str) -> str:
-        """Return the hash that ROS 1 knows a type by."""
+        """Return the hash of a type in ROS 1."""
         if self._kind == "msg":
             return message_md5(self._catalog.message(name), self._catalog)
         return service_md5(self._catalog.service(name), self._catalog)
 
     def hash(self, name: str) -> str:
-        """Return the hash that ROS 2 knows a type by."""
+        """Return the hash of a type in ROS 2."""
         if self._kind == "msg":
             return message_hash(self._catalog.message(name), self._catalog)
         return service_hash(self._catalog.service(name), self._catalog)
 
     def summary(self, name: str) -> TypeSummary:
-        """Return all about a type.
+        """Return a type with its hashes and fields.
 
         Raises:
             RoszError: The definition, or one that it refers to, is missing or not well-formed.
@@ -156,7 +156,7 @@ class Definitions:
 
 
 def _written(kind: Any) -> str:
-    """Spell the type of a field as ROS 1 does."""
+    """Return the type of a field as ROS 1 spells it."""
     if kind.primitive:
         base = kind.base + (f"<={kind.bound}" if kind.bound else "")
     else:

@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 __all__ = (
     "PING_TIMEOUT",
     "NodeEntry",
-    "connections",
-    "describe",
+    "find_nodes",
+    "format_connections",
+    "format_node",
     "get_info",
     "get_levels",
     "kill",
     "kill_nodes",
     "list_nodes",
     "machines",
-    "members",
-    "on_machine",
+    "nodes_on_machine",
     "ping",
     "query_node",
     "set_level",
@@ -54,9 +54,9 @@ class NodeEntry(msgspec.Struct, frozen=True, omit_defaults=True):
     Attributes:
         name: Full name.
         session: Id of its session.
-        host: Host name; empty where it does not tell, as ROS 2 nodes.
-        pid: Process id; 0 where it does not tell.
-        started: Nanoseconds since the Unix epoch; 0 where it does not tell.
+        host: Host name; empty if unknown, as for ROS 2 nodes.
+        pid: Process id; 0 if unknown.
+        started: Start time in nanoseconds since the Unix epoch; 0 if unknown.
     """
 
     name: str
@@ -67,12 +67,12 @@ class NodeEntry(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def address(self) -> str:
-        """Where it is, as far as it tells."""
+        """Host and process id if known, or else the session."""
         return f"{self.host}, pid {self.pid}" if self.host else f"session {self.session}"
 
 
 def list_nodes(survey: Survey) -> list[NodeEntry]:
-    """Return all nodes, sorted by name; several of one name are several entries."""
+    """Return an entry for each node, sorted by name."""
     found: dict[tuple[str, int], NodeEntry] = {}
     for token in survey.view.tokens:
         process = survey.process(token)
@@ -89,35 +89,35 @@ def machines(nodes: Iterable[NodeEntry]) -> list[str]:
     return sorted({node.host for node in nodes if node.host})
 
 
-def members(survey: Survey, name: str) -> list[Token]:
-    """Return one token for every node of a full name.
+def find_nodes(survey: Survey, name: str) -> list[Token]:
+    """Return one token for each node of a full name.
 
     Raises:
-        NotFoundError: There is none.
+        NotFoundError: There is no such node.
     """
-    found = survey.members(name)
+    found = survey.nodes_named(name)
     if not found:
         raise NotFoundError(f"unknown node '{name}'{near_miss(name, survey.view.nodes())}")
     return found
 
 
-def describe(survey: Survey, node: Token) -> str:
-    """Return what ``rosnode info`` prints about a node before it asks it.
+def format_node(survey: Survey, node: Token) -> str:
+    """Return what ``rosnode info`` prints about a node from its tokens.
 
     Args:
-        survey: Who is there.
+        survey: The running nodes.
         node: One of the node's tokens.
     """
     lines = [_RULE, f"Node [{node.node_name}]"]
     for title, kind in (("Publications", Kind.PUBLISHER), ("Subscriptions", Kind.SUBSCRIPTION)):
-        found = {(t.name, short_type(t.type_name)) for t in _endpoints(survey, node, kind)}
+        found = {(t.name, short_type(t.type_name)) for t in _entities(survey, node, kind)}
         lines += _section(title, [f"{name} [{type_name}]" for name, type_name in sorted(found)])
-    served = {t.name for t in _endpoints(survey, node, Kind.SERVICE)}
+    served = {t.name for t in _entities(survey, node, Kind.SERVICE)}
     lines += _section("Services", sorted(served))
     return "\n".join(lines)
 
 
-def _endpoints(survey: Survey, node: Token, *kinds: Kind) -> list[Token]:
+def _entities(survey: Survey, node: Token, *kinds: Kind) -> list[Token]:
     return [
         token
         for token in survey.view.entities(*kinds)
@@ -131,15 +131,15 @@ def _section(title: str, items: list[str]) -> list[str]:
     )
 
 
-def connections(survey: Survey, node: Token) -> str:
-    """Return what ``rosnode info`` prints about whom a node exchanges messages with.
+def format_connections(survey: Survey, node: Token) -> str:
+    """Return what ``rosnode info`` prints about the connections of a node.
 
     Args:
-        survey: Who is there.
+        survey: The running nodes.
         node: One of the node's tokens.
     """
     lines: list[str] = []
-    for ours in _endpoints(survey, node, Kind.PUBLISHER, Kind.SUBSCRIPTION):
+    for ours in _entities(survey, node, Kind.PUBLISHER, Kind.SUBSCRIPTION):
         outbound = ours.kind is Kind.PUBLISHER
         others = survey.view.subscriptions if outbound else survey.view.publishers
         for other in others(ours.name):
@@ -154,11 +154,11 @@ def connections(survey: Survey, node: Token) -> str:
     return "\n".join(["Connections:", *lines, ""]) if lines else ""
 
 
-def on_machine(nodes: Iterable[NodeEntry], machine: str) -> list[str]:
+def nodes_on_machine(nodes: Iterable[NodeEntry], machine: str) -> list[str]:
     """Return the names of the nodes on a machine, sorted.
 
     Raises:
-        NotFoundError: None runs there.
+        NotFoundError: No node runs there.
     """
     known = list(nodes)
     found = sorted(node.name for node in known if node.host == machine)
@@ -236,7 +236,7 @@ def ping(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> float:
     try:
         get_info(session, node, timeout)
     except NotFoundError as error:
-        if take_survey(session, node.domain).members(node.node_name):
+        if take_survey(session, node.domain).nodes_named(node.node_name):
             raise
         raise NotFoundError(f"node '{node.node_name}' has ended") from error
     return time.perf_counter() - began
@@ -282,13 +282,13 @@ def kill_nodes(
 
     Args:
         session: The session to send the requests on.
-        survey: The nodes that are running.
+        survey: The running nodes.
         names: Full names; each may be that of several nodes.
         reason: Reason that the nodes log.
     """
     failed: list[tuple[str, RoszError]] = []
     for name in names:
-        for node in survey.members(name):
+        for node in survey.nodes_named(name):
             try:
                 kill(session, node, reason)
             except RoszError as error:

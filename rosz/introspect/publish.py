@@ -1,4 +1,4 @@
-"""Messages made of text, sent as ``rostopic pub`` sends them."""
+"""Publishing messages that are written as YAML, as ``rostopic pub`` does."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
 __all__ = ("DEFAULT_RATE", "ONCE_SECONDS", "SendOptions", "Sender")
 
 ONCE_SECONDS = 3.0
-"""How long a message that is sent once stays there for those who come late."""
+"""Seconds that a message that is sent once stays latched for late joiners."""
 DEFAULT_RATE = 10.0
-"""Messages per second from a file or stream."""
+"""Messages per second from a file or a stream."""
 
 
 class SendOptions(msgspec.Struct, frozen=True, kw_only=True):
     """How messages are sent.
 
     Attributes:
-        rate: Per second; ``None`` to send and latch.
-        once: Send one, and end.
-        verbose: Tell what is sent.
-        substitute: Fill in ``now`` and ``auto`` anew for each message.
-        ros_time: Take them from ROS time, which may be simulated.
+        rate: Messages per second; None to latch one message.
+        once: Whether to end after one message.
+        verbose: Whether to report each message.
+        substitute: Whether to replace ``now`` and ``auto`` again for each message.
+        ros_time: Whether they are ROS time, which may be simulated.
     """
 
     rate: float | None = None
@@ -40,13 +40,13 @@ class SendOptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Sender:
-    """Sends on one topic until it is done, or its context ends.
+    """Publishes messages on one topic until it has sent them, or the context is shut down.
 
     Args:
-        node: The node that sends.
-        publisher: What it sends with.
-        options: How.
-        say: Told what is going on, a line at a time.
+        node: The node that publishes.
+        publisher: The publisher.
+        options: How messages are sent.
+        report: Function called with each line of progress.
     """
 
     def __init__(
@@ -54,18 +54,18 @@ class Sender:
         node: Node,
         publisher: Publisher[Any],
         options: SendOptions,
-        say: Callable[[str], object],
+        report: Callable[[str], object],
     ) -> None:
         self._node = node
         self._publisher = publisher
         self._options = options
-        self._say = say
+        self._report = report
 
     def send(self, arguments: Sequence[Any]) -> None:
-        """Send what the arguments of the command line say.
+        """Send the message of command-line arguments.
 
         Raises:
-            EncodeError: They do not fit the type.
+            EncodeError: The arguments do not fit the type.
         """
         if self._options.rate is None:
             self._latch(arguments, once=self._options.once)
@@ -74,19 +74,19 @@ class Sender:
             self._repeat(arguments, self._options.rate)
 
     def send_documents(self, documents: Iterable[Any], *, only_one: bool = False) -> None:
-        """Send the documents of a file or a stream, one after the other.
+        """Send the messages of a file or a stream, one after the other.
 
         Args:
-            documents: A dictionary of fields, or a list of their values, each.
-            only_one: Whether it is known that there is just one, which is then repeated.
+            documents: Dictionaries of fields, or lists of their values.
+            only_one: Whether there is known to be just one, which is then repeated.
 
         Raises:
-            EncodeError: One of them does not fit the type.
-            YamlError: One of them is no YAML.
+            EncodeError: A document does not fit the type.
+            YamlError: A document is not YAML.
         """
         rate = self._options.rate
         if only_one and rate is not None:
-            self._say("Got one message and a rate, publishing repeatedly")
+            self._report("Got one message and a rate, publishing repeatedly")
             for document in documents:
                 self._repeat(_arguments(document), rate)
             return
@@ -111,7 +111,7 @@ class Sender:
         message = self._make(arguments)
         shown = f"[{message}]" if self._options.verbose else "message"
         end = f" for {ONCE_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
-        self._say(f"publishing and latching {shown}{end}")
+        self._report(f"publishing and latching {shown}{end}")
         self._publisher.publish(message)
 
     def _stay(self, seconds: float | None) -> None:
@@ -122,7 +122,7 @@ class Sender:
         pace = self._node.rate(rate)
         while not self._node.is_shutdown:
             if self._options.verbose:
-                self._say(f"publishing {message}")
+                self._report(f"publishing {message}")
             self._publisher.publish(message)
             pace.sleep()
             if self._options.substitute:

@@ -1,4 +1,4 @@
-"""The lines that nodes log, as they are published on ``/rosout``."""
+"""Lines of the log of all nodes, as published on ``/rosout``."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _RESET = "\033[0m"
 
 
 class LogLine(msgspec.Struct, frozen=True):
-    """One line.
+    """A line of the log.
 
     Attributes:
         level: ``DEBUG``, ``INFO``, ``WARN``, ``ERROR`` or ``FATAL``.
-        stamp: Seconds since the Unix epoch, by ROS time of the node.
-        node: Full name of the node, and behind it, after a point, the part of it that logs.
-        text: What it says.
+        stamp: ROS time of the node in seconds since the Unix epoch.
+        node: Full name of the node, and the name of its child logger behind a dot.
+        text: Text of the line.
         file: Source file.
-        line: Line in it.
-        function: Function in it.
+        line: Line in the source file.
+        function: Name of the function.
     """
 
     level: str
@@ -40,11 +40,11 @@ class LogLine(msgspec.Struct, frozen=True):
 
 
 def ros1_node(name: str, nodes: Iterable[str]) -> str:
-    """Return the name of a logger with the full name of its node in place of ROS 2's form.
+    """Return the name of a logger with the full name of its node in ROS 1's form.
 
     Args:
-        name: Such as ``ns.talker.arm``, a part called arm of node ``/ns/talker``.
-        nodes: Full names of the nodes that are known.
+        name: Name in ROS 2's form: ``ns.talker.arm`` is the logger arm of node ``/ns/talker``.
+        nodes: Full names of the known nodes.
     """
     best = ""
     for node in nodes:
@@ -55,7 +55,7 @@ def ros1_node(name: str, nodes: Iterable[str]) -> str:
 
 
 def read_line(message: Log, nodes: Iterable[str]) -> LogLine:
-    """Return a message of ``/rosout`` as a line."""
+    """Return the line in a message of ``/rosout``."""
     return LogLine(
         level=severity_name(max(message.level, 10)),
         stamp=message.stamp.to_sec(),
@@ -68,15 +68,15 @@ def read_line(message: Log, nodes: Iterable[str]) -> LogLine:
 
 
 class LogFilter:
-    """Which lines are wanted.
+    """A condition on lines of the log.
 
     Args:
-        nodes: Full names of nodes, or namespaces of such; all when there are none.
-        level: The least level.
-        pattern: Regular expression that the text must hold; empty for any.
+        nodes: Full names of nodes, or namespaces; empty for all.
+        level: Lowest level.
+        pattern: Regular expression that must match in the text; empty for any text.
 
     Raises:
-        UsageError: There is no such level, or the pattern is no regular expression.
+        UsageError: The level does not exist, or the pattern is not a regular expression.
     """
 
     def __init__(self, nodes: Iterable[str] = (), level: str = "DEBUG", pattern: str = "") -> None:
@@ -85,10 +85,10 @@ class LogFilter:
         try:
             self._pattern = re.compile(pattern)
         except re.error as error:
-            raise UsageError(f"'{pattern}' is no regular expression: {error}") from error
+            raise UsageError(f"'{pattern}' is not a regular expression: {error}") from error
 
     def accepts(self, line: LogLine) -> bool:
-        """Tell whether a line is wanted."""
+        """Return whether a line passes."""
         if parse_severity(line.level) < self._level or not self._pattern.search(line.text):
             return False
         return not self._nodes or any(_belongs(line.node, node) for node in self._nodes)
@@ -104,7 +104,7 @@ def format_line(line: LogLine, *, color: bool = False, verbose: bool = False) ->
     Args:
         line: The line.
         color: Whether to colour it by its level.
-        verbose: Whether to say where in the source it comes from.
+        verbose: Whether to add its place in the source.
     """
     text = f"[{line.level}] [{line.stamp:.6f}] [{line.node}]: {line.text}"
     if verbose:

@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 __all__ = (
     "ServiceEntry",
-    "call",
-    "find",
+    "call_service",
+    "find_server",
     "list_services",
-    "server",
-    "uri",
+    "service_key",
+    "services_of_type",
     "wait_for_server",
 )
 
 
 class ServiceEntry(msgspec.Struct, frozen=True):
-    """A service that is served.
+    """A service.
 
     Attributes:
-        name: Its name.
-        types: Names of its types, as ROS 1 spells them; more than one is a fault of somebody.
+        name: Full name of the service.
+        types: Names of its types, as ROS 1 spells them; more than one is a fault.
         nodes: Full names of the nodes that serve it.
     """
 
@@ -42,7 +42,7 @@ class ServiceEntry(msgspec.Struct, frozen=True):
 
 
 def list_services(view: View) -> list[ServiceEntry]:
-    """Return the services that somebody serves, sorted by name."""
+    """Return the services that nodes serve, sorted by name."""
     entries: list[ServiceEntry] = []
     for name, types in view.services().items():
         nodes = tuple(sorted({token.node_name for token in view.servers(name)}))
@@ -50,17 +50,17 @@ def list_services(view: View) -> list[ServiceEntry]:
     return entries
 
 
-def find(view: View, type_name: str) -> list[str]:
-    """Return the names of the services of a type, which may be spelled as in ROS 1 or 2."""
+def services_of_type(view: View, type_name: str) -> list[str]:
+    """Return the names of the services of a type, in ROS 1's or ROS 2's spelling."""
     wanted = short_type(type_name)
     return [entry.name for entry in list_services(view) if wanted in entry.types]
 
 
-def server(view: View, name: str) -> Token:
-    """Return who serves a service, the first of several.
+def find_server(view: View, name: str) -> Token:
+    """Return the token of the server of a service, the first of several.
 
     Raises:
-        NotFoundError: Nobody does.
+        NotFoundError: No node serves it.
     """
     servers = view.servers(name)
     if not servers:
@@ -68,13 +68,13 @@ def server(view: View, name: str) -> Token:
     return servers[0]
 
 
-def uri(token: Token) -> str:
-    """Return where a service is called: its key expression on Zenoh."""
+def service_key(token: Token) -> str:
+    """Return the Zenoh key expression that a service is called on."""
     return entity_key(token.domain, token.name, token.type_name, token.type_hash)
 
 
 def wait_for_server(context: Context, name: str, warn: Callable[[str], object]) -> Token:
-    """Return who serves a service, and wait while nobody does.
+    """Return the token of the server of a service, and wait while there is none.
 
     Args:
         context: The context whose graph is watched.
@@ -86,16 +86,16 @@ def wait_for_server(context: Context, name: str, warn: Callable[[str], object]) 
     """
     view = context.graph.refresh()
     try:
-        return server(view, name)
+        return find_server(view, name)
     except NotFoundError as error:
         warn(f"service [{name}] is not there yet ({error})")
     view = context.graph.wait_for(
         lambda view: bool(view.servers(name)), threading.TIMEOUT_MAX / 2, f"service '{name}'"
     )
-    return server(view, name)
+    return find_server(view, name)
 
 
-def call(client: Client, values: Sequence[Any], now: int) -> tuple[Any, Any]:
+def call_service(client: Client, values: Sequence[Any], now: int) -> tuple[Any, Any]:
     """Call a service with values from a command line, and return request and response.
 
     Args:

@@ -54,9 +54,9 @@ class Survey(msgspec.Struct, frozen=True):
         process = self.process(token)
         return "unknown host" if process is None else process.host
 
-    def members(self, node: str) -> list[Token]:
+    def nodes_named(self, name: str) -> list[Token]:
         """Return one token for each node of a full name."""
-        found = {(t.zid, t.node_id): t for t in self.view.tokens if t.node_name == node}
+        found = {(t.zid, t.node_id): t for t in self.view.tokens if t.node_name == name}
         return [found[key] for key in sorted(found)]
 
 

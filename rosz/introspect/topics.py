@@ -1,4 +1,4 @@
-"""Topics as rostopic lists and describes them."""
+"""Topics: listing and describing them as rostopic does."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from rosz.wire import Kind, Token
 __all__ = (
     "Topic",
     "by_host",
-    "describe",
-    "describe_list",
-    "end_row",
-    "find",
+    "entity_row",
+    "find_topic",
+    "format_topic",
+    "format_topics",
     "in_namespace",
-    "info",
     "list_topics",
+    "topics_of_type",
 )
 
 
@@ -28,10 +28,10 @@ class Topic(msgspec.Struct, frozen=True):
     """A topic.
 
     Attributes:
-        name: Its name.
-        types: Names of its types, as ROS 1 spells them; more than one is a fault of somebody.
-        publishers: Full names of the nodes that publish, one per publisher.
-        subscribers: Full names of the nodes that subscribe, one per subscription.
+        name: Full name of the topic.
+        types: Names of its types, as ROS 1 spells them; more than one is a fault.
+        publishers: Full name of the node of each publisher.
+        subscribers: Full name of the node of each subscription.
     """
 
     name: str
@@ -41,55 +41,55 @@ class Topic(msgspec.Struct, frozen=True):
 
     @property
     def type_text(self) -> str:
-        """Its type, or its types."""
+        """The types as one text."""
         return ", ".join(self.types)
 
 
 def list_topics(tokens: Iterable[Token]) -> list[Topic]:
-    """Return the topics among some tokens, sorted by name."""
-    ends: dict[str, tuple[set[str], list[str], list[str]]] = {}
+    """Return the topics of some tokens, sorted by name."""
+    found: dict[str, tuple[set[str], list[str], list[str]]] = {}
     for token in tokens:
         if token.kind not in {Kind.PUBLISHER, Kind.SUBSCRIPTION}:
             continue
-        types, publishers, subscribers = ends.setdefault(token.name, (set(), [], []))
+        types, publishers, subscribers = found.setdefault(token.name, (set(), [], []))
         types.add(short_type(token.type_name))
         side = publishers if token.kind is Kind.PUBLISHER else subscribers
         side.append(token.node_name)
     return [
         Topic(name, tuple(sorted(types)), tuple(sorted(pubs)), tuple(sorted(subs)))
-        for name, (types, pubs, subs) in sorted(ends.items())
+        for name, (types, pubs, subs) in sorted(found.items())
     ]
 
 
 def in_namespace(name: str, namespace: str) -> bool:
-    """Tell whether a global name is a namespace, or lies in it; all names lie in ``/``."""
+    """Return whether a global name is a namespace, or is in it; all names are in ``/``."""
     return name == namespace or name.startswith(f"{namespace.rstrip('/')}/")
 
 
 def by_host(survey: Survey) -> dict[str, list[Token]]:
-    """Return the tokens of every host, by its name."""
+    """Return the tokens of the nodes of each host, by host name."""
     found: dict[str, list[Token]] = {}
     for token in survey.view.tokens:
         found.setdefault(survey.host(token), []).append(token)
     return dict(sorted(found.items()))
 
 
-def find(topics: Iterable[Topic], type_name: str) -> list[str]:
-    """Return the names of the topics of a type, which may be spelled as in ROS 1 or 2."""
+def topics_of_type(topics: Iterable[Topic], type_name: str) -> list[str]:
+    """Return the names of the topics of a type, in ROS 1's or ROS 2's spelling."""
     wanted = short_type(type_name)
     return [topic.name for topic in topics if wanted in topic.types]
 
 
-def describe_list(
+def format_topics(
     topics: Iterable[Topic], *, publishers: bool = True, subscribers: bool = True, indent: str = ""
 ) -> str:
     """Return what ``rostopic list -v`` prints.
 
     Args:
         topics: The topics.
-        publishers: Whether to tell what is published.
-        subscribers: Whether to tell what is subscribed to.
-        indent: What every line begins with.
+        publishers: Whether to list published topics.
+        subscribers: Whether to list subscribed topics.
+        indent: Beginning of every line.
     """
     known = list(topics)
     lines: list[str] = []
@@ -110,11 +110,11 @@ def _counted(indent: str, topic: Topic, count: int, what: str) -> str:
     return f"{indent} * {topic.name} [{topic.type_text}] {count} {what}{'s' * (count > 1)}"
 
 
-def info(survey: Survey, name: str) -> tuple[Topic, list[Token], list[Token]]:
+def find_topic(survey: Survey, name: str) -> tuple[Topic, list[Token], list[Token]]:
     """Return a topic with its publishers and its subscriptions.
 
     Raises:
-        NotFoundError: Nobody publishes it or subscribes to it.
+        NotFoundError: No node publishes it or subscribes to it.
     """
     publishers = survey.view.publishers(name)
     subscriptions = survey.view.subscriptions(name)
@@ -123,13 +123,13 @@ def info(survey: Survey, name: str) -> tuple[Topic, list[Token], list[Token]]:
     return list_topics((*publishers, *subscriptions))[0], publishers, subscriptions
 
 
-def describe(survey: Survey, name: str) -> str:
+def format_topic(survey: Survey, name: str) -> str:
     """Return what ``rostopic info`` prints about a topic.
 
     Raises:
-        NotFoundError: Nobody publishes it or subscribes to it.
+        NotFoundError: No node publishes it or subscribes to it.
     """
-    topic, publishers, subscriptions = info(survey, name)
+    topic, publishers, subscriptions = find_topic(survey, name)
     mixed = len(topic.types) > 1
     lines = [f"Type: {topic.type_text}", ""]
     for title, tokens in (("Publishers", publishers), ("Subscribers", subscriptions)):
@@ -141,8 +141,8 @@ def describe(survey: Survey, name: str) -> str:
     return "\n".join([*lines, ""])
 
 
-def end_row(survey: Survey, token: Token) -> dict[str, str | int]:
-    """Return one end of a topic as plain values."""
+def entity_row(survey: Survey, token: Token) -> dict[str, str | int]:
+    """Return a publisher or subscription as values for JSON."""
     row: dict[str, str | int] = {"node": token.node_name, "type": short_type(token.type_name)}
     process = survey.process(token)
     if process is not None:

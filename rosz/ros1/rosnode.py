@@ -83,7 +83,7 @@ def get_nodes_by_machine(machine: str) -> list[str]:
         ROSNodeException: No node runs there.
     """
     try:
-        return nodes.on_machine(nodes.list_nodes(survey()), machine)
+        return nodes.nodes_on_machine(nodes.list_nodes(survey()), machine)
     except NotFoundError as error:
         raise ROSNodeException(str(error)) from error
 
@@ -98,14 +98,14 @@ def kill_nodes(node_names: Sequence[str]) -> tuple[list[str], list[str]]:
         The names of the nodes that are gone, and of those that are not.
     """
     found = survey()
-    known = [name for name in node_names if found.members(name)]
+    known = [name for name in node_names if found.nodes_named(name)]
     stayed = {name for name, _ in nodes.kill_nodes(ready_context().session, found, known, _KILLED)}
     gone = [name for name in known if name not in stayed]
     return gone, [name for name in node_names if name not in gone]
 
 
 def _member(found: Survey, name: str) -> Token | None:
-    members = found.members(name)
+    members = found.nodes_named(name)
     return members[-1] if members else None
 
 
@@ -198,7 +198,7 @@ def get_node_info_description(node_name: str) -> str:
     member = _member(found, node_name)
     if member is None:
         return f"Node [{node_name}]\nPublications: None\n\nSubscriptions: None\n\nServices: None\n"
-    return nodes.describe(found, member).partition("\n")[2]
+    return nodes.format_node(found, member).partition("\n")[2]
 
 
 def get_node_connection_info_description(node_api: str, master: Master) -> str:  # noqa: ARG001
@@ -216,7 +216,7 @@ def get_node_connection_info_description(node_api: str, master: Master) -> str: 
         if uri(found, token) == node_api:
             process = found.process(token)
             pid = f"Pid: {process.pid}\n" if process is not None else ""
-            return pid + nodes.connections(found, token)
+            return pid + nodes.format_connections(found, token)
     raise ROSNodeIOException(f"Communication with node[{node_api}] failed!")
 
 

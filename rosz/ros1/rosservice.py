@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from rosz.errors import EncodeError, NotFoundError, RoszError
-from rosz.introspect.services import call, find, server, uri
+from rosz.introspect.services import call_service as send_call
+from rosz.introspect.services import find_server, service_key, services_of_type
 from rosz.names import short_type
 from rosz.ros1.genpy import get_printable_message_args, get_service_class
 from rosz.ros1.rosgraph.masterapi import Master
@@ -61,7 +62,7 @@ def get_service_list(
 def _server(service_name: str) -> Any:
     """Return the server of a service, or None if there is none."""
     try:
-        return server(survey().view, service_name)
+        return find_server(survey().view, service_name)
     except NotFoundError:
         return None
 
@@ -81,12 +82,12 @@ def get_service_node(service_name: str) -> str | None:
 def get_service_uri(service_name: str) -> str | None:
     """Return the key expression of a service on Zenoh, or None if no node serves it."""
     token = _server(service_name)
-    return None if token is None else uri(token)
+    return None if token is None else service_key(token)
 
 
 def rosservice_find(service_type: str) -> list[str]:
     """Return the names of the services of a type."""
-    return find(survey().view, service_type)
+    return services_of_type(survey().view, service_type)
 
 
 def get_service_class_by_name(service_name: str) -> type[Any]:
@@ -152,7 +153,7 @@ def call_service(
     node = unnamed_node()
     client = node.client(name, found)
     try:
-        return call(client, list(service_args), node.now())
+        return send_call(client, list(service_args), node.now())
     except EncodeError as error:
         given = "\n".join(f" * {one} (type {type(one).__name__})" for one in service_args)
         raise ROSServiceException(

@@ -18,7 +18,7 @@ from rosz.introspect.fields import FieldPath, find_target
 from rosz.introspect.measure import RateMeter, format_rate, format_rates
 from rosz.introspect.publish import ONCE_SECONDS
 from rosz.introspect.survey import Survey
-from rosz.introspect.topics import describe, find, list_topics
+from rosz.introspect.topics import format_topic, list_topics, topics_of_type
 from rosz.names import short_type
 from rosz.ros1 import rospy
 from rosz.ros1.genpy import get_message_class, get_printable_message_args
@@ -139,7 +139,7 @@ def get_topic_class(
 
 def find_by_type(topic_type: str) -> list[str]:
     """Return the names of the topics of a type."""
-    return find(list_topics(survey().view.tokens), topic_type)
+    return topics_of_type(list_topics(survey().view.tokens), topic_type)
 
 
 def get_topic_list(master: Master | None = None) -> tuple[list[Any], list[Any]]:  # noqa: ARG001
@@ -170,7 +170,7 @@ def get_info_text(topic: str) -> str:
         ROSTopicException: The topic has no publishers and no subscribers.
     """
     try:
-        return describe(survey(), topic)
+        return format_topic(survey(), topic)
     except RoszError as error:
         raise ROSTopicException(f"Unknown topic {topic}") from error
 

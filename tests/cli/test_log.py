@@ -112,7 +112,7 @@ def test_levels(shell: Shell) -> None:
         (["levels"], 2, "rosz log levels NODE"),
         (["--level", "loud"], 2, "'loud' is not a level"),
         (["-n", "0"], 2, "-n is 0; expected 1 or more lines"),
-        (["--grep", "("], 2, "'(' is no regular expression"),
+        (["--grep", "("], 2, "'(' is not a regular expression"),
     ],
 )
 def test_errors(shell: Shell, words: list[str], code: int, text: str) -> None:

@@ -164,7 +164,7 @@ class Master:
             MasterError: There is no such node.
         """
         found = survey()
-        members = found.members(node_name)
+        members = found.nodes_named(node_name)
         if not members:
             raise MasterError(f"unknown node [{node_name}]")
         return uri(found, members[-1])
