@@ -20,6 +20,8 @@ from hosts.world import World
 SERVANTS = re.compile(r"sshd: |sshd \[|rosz core|rosz launch -|bash|sftp")
 """What runs on hosts beside the nodes and agents of a launch."""
 
+EXAMPLE = Path(__file__).parents[2] / "launch/several_machines.launch"
+
 SLEEPER = '<node pkg="tools" type="sleeper.sh" name="sleeper" machine="far" output="screen" {}/>'
 
 
@@ -99,6 +101,17 @@ def test_nodes_run_there_and_are_one_system(scene: Scene) -> None:
     assert re.match(r"  /pub +running +\d+ +0 +\d+ % +\d+ MB .* robot$", table[2])
     assert table[3].split()[-1] == "laptop"
     assert (robot.home / ".ros/log/latest/pub-1-stdout.log").exists()
+    run.send(signal.SIGINT)
+    assert run.exit_code() == 0, run.output
+    assert nodes_on(robot) == nodes_on(laptop) == []
+
+
+def test_the_example(scene: Scene) -> None:
+    laptop, robot = scene
+    laptop.rosz("core", ROSZ_LISTEN="tcp/0.0.0.0:7447").wait_for("started core")
+    run = laptop.rosz("launch", str(EXAMPLE), "robot:=robot")
+    assert run.wait_for("process[publisher-1]").endswith("] on robot")
+    run.wait_for("I heard 5")
     run.send(signal.SIGINT)
     assert run.exit_code() == 0, run.output
     assert nodes_on(robot) == nodes_on(laptop) == []
