@@ -1,4 +1,4 @@
-"""What rosz takes from the process environment, read in this one place.
+"""The environment variables of this process, which are read only here.
 
 ROS's own variables keep their meaning (``ROS_DOMAIN_ID``, ``ROS_NAMESPACE``, ``ROS_PACKAGE_PATH``,
 ``ROS_HOME``, ``ROS_LOG_DIR``, ``ROS_DISTRO``, rmw_zenoh's ``ZENOH_SESSION_CONFIG_URI`` and
@@ -21,7 +21,7 @@ from rosz.packages import PackageIndex
 __all__ = ("DEFAULT_RENDEZVOUS", "Environment", "package_index")
 
 DEFAULT_RENDEZVOUS = "tcp/localhost:7447"
-"""Where sessions of one machine meet; rmw_zenoh's router port."""
+"""The endpoint where the sessions of one machine meet, with the port of rmw_zenoh's router."""
 
 _MAX_DOMAIN = 232
 
@@ -35,20 +35,21 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         connect: ``ROSZ_CONNECT``, endpoints of other machines, separated by commas.
         listen: ``ROSZ_LISTEN``, endpoints to accept other machines on, separated by commas.
         mode: ``ROSZ_MODE``: ``peer`` (mesh) or ``client`` (of the core at the rendezvous, or of
-            one of ``connect``); when unset, ``client`` where ``connect`` is given and ``listen``
-            is not: nothing can dial a peer that listens on loopback alone, so a mesh would end at
-            the machine.
-        multicast: ``ROSZ_MULTICAST=1`` looks for others on the local network.
-        shared_memory: ``ROSZ_SHM``: samples of so many bytes and more go by shared memory; 0: off.
-        keys: ``ROSZ_KEYS``, folder of the keys that links beyond this machine need.
+            one of ``connect``). When unset, it is ``client`` if ``connect`` is given and ``listen``
+            is not: others cannot connect to a peer that listens on loopback only, so a mesh would
+            end at the machine.
+        multicast: ``ROSZ_MULTICAST=1``: whether to look for others on the local network.
+        shared_memory: ``ROSZ_SHM``, the size in bytes from which samples use shared memory; 0: off.
+        keys: ``ROSZ_KEYS``, the folder of the keys that links beyond this machine need.
         namespace: ``ROS_NAMESPACE``.
         distro: ``ROS_DISTRO``; ``humble`` selects that release's wire format.
         zenoh_config: ``ZENOH_SESSION_CONFIG_URI``, a Zenoh configuration file.
         zenoh_override: ``ZENOH_CONFIG_OVERRIDE``, ``path/to/key=json;…``.
-        package_roots: Folders to look for packages in, first ones first.
-        completion: ``ROSZ_COMPLETION_TIMEOUT``: seconds that the TAB key waits at most; 0.5.
+        package_roots: The folders to search for packages, in this order.
+        completion: ``ROSZ_COMPLETION_TIMEOUT``, the longest time in seconds that the TAB key waits;
+            0.5 when unset.
         console_format: ``ROSCONSOLE_FORMAT``.
-        color: Whether terminals get colours; ``NO_COLOR`` and ``TERM=dumb`` say no.
+        color: Whether terminals get colours; not with ``NO_COLOR`` or ``TERM=dumb``.
         home: ``ROS_HOME`` or ``~/.ros``.
         log_dir: ``ROS_LOG_DIR`` or ``<home>/log``.
     """
@@ -77,25 +78,26 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         """Read the settings.
 
         Args:
-            environ: Variables; those of the process when not given.
-            cwd: Folder whose workspace is searched for packages; the working one when not given.
+            environ: The variables; those of the process when not given.
+            cwd: The folder whose workspace is searched for packages; the working directory when not
+                given.
 
         Raises:
-            UsageError: A variable has a value that means nothing.
+            UsageError: A variable has a value without a meaning.
         """
         env = os.environ if environ is None else environ
         home = Path(env.get("ROS_HOME") or Path(env.get("HOME") or "/") / ".ros")
         connect = _endpoints("ROSZ_CONNECT", env)
         listen = _endpoints("ROSZ_LISTEN", env)
+        rendezvous = env.get("ROSZ_RENDEZVOUS", "")
         return cls(
-            domain=_domain(env.get("ROS_DOMAIN_ID", "")),
-            rendezvous=_endpoint("ROSZ_RENDEZVOUS", env.get("ROSZ_RENDEZVOUS", ""))
-            or DEFAULT_RENDEZVOUS,
+            domain=_number("ROS_DOMAIN_ID", env, f"a number from 0 to {_MAX_DOMAIN}", _MAX_DOMAIN),
+            rendezvous=_endpoint("ROSZ_RENDEZVOUS", rendezvous) or DEFAULT_RENDEZVOUS,
             connect=connect,
             listen=listen,
             mode=_mode(env.get("ROSZ_MODE", ""), dials=bool(connect and not listen)),
             multicast=_switch("ROSZ_MULTICAST", env),
-            shared_memory=_bytes("ROSZ_SHM", env.get("ROSZ_SHM", "")),
+            shared_memory=_number("ROSZ_SHM", env, "a number of bytes, 0 for off"),
             keys=Path(env["ROSZ_KEYS"]).expanduser().absolute() if env.get("ROSZ_KEYS") else None,
             namespace=env.get("ROS_NAMESPACE", ""),
             distro=env.get("ROS_DISTRO", ""),
@@ -111,19 +113,19 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def package_index(environment: Environment) -> PackageIndex:
-    """Return the packages on the path, then those that rosz and pip-installed packages bring.
+    """Return the packages on the path, then those of rosz and of pip-installed packages.
 
     Installed distributions register folders of packages under the entry point group
     ``rosz.packages``: each entry names a module, and its folder is searched.
     """
-    # Asking what is installed takes longer than most commands do, and few need it.
+    # Reading what is installed takes longer than most commands, and few need it.
     return PackageIndex(
-        lambda: [*environment.package_roots, *_registered_roots(), *shipped_roots()]
+        lambda: [*environment.package_roots, *_registered_roots(), *_shipped_roots()]
     )
 
 
-def shipped_roots() -> list[Path]:
-    """Return the folders of packages that rosz itself carries."""
+def _shipped_roots() -> list[Path]:
+    """Return the folders of the packages that are part of rosz."""
     package = Path(__file__).parent
     share = package / "share"
     source_tree = package.parent / "interfaces"
@@ -155,7 +157,7 @@ def _package_roots(env: Mapping[str, str], cwd: Path) -> tuple[Path, ...]:
 
 
 def _workspace(cwd: Path) -> list[Path]:
-    """Find the workspace around a folder: the nearest ``src`` upwards, or the package it is in."""
+    """Return the workspace of a folder: the nearest ``src`` above it, or its package."""
     for folder in [cwd, *cwd.parents]:
         if folder.name == "src":
             return [folder]
@@ -194,11 +196,10 @@ def _switch(name: str, env: Mapping[str, str]) -> bool:
     return text == "1"
 
 
-def _domain(text: str) -> int:
-    if not text:
-        return 0
-    if not text.isascii() or not text.isdigit() or int(text) > _MAX_DOMAIN:
-        raise UsageError(f"ROS_DOMAIN_ID is '{text}'; expected a number from 0 to {_MAX_DOMAIN}")
+def _number(name: str, env: Mapping[str, str], expected: str, largest: float = math.inf) -> int:
+    text = env.get(name, "") or "0"
+    if not text.isascii() or not text.isdigit() or int(text) > largest:
+        raise UsageError(f"{name} is '{text}'; expected {expected}")
     return int(text)
 
 
@@ -219,11 +220,3 @@ def _seconds(name: str, env: Mapping[str, str], default: float) -> float:
     if not 0 < seconds < math.inf:
         raise UsageError(f"{name} is '{text}'; expected a number of seconds")
     return seconds
-
-
-def _bytes(name: str, text: str) -> int:
-    if not text:
-        return 0
-    if not text.isascii() or not text.isdigit():
-        raise UsageError(f"{name} is '{text}'; expected a number of bytes, 0 for off")
-    return int(text)

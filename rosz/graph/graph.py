@@ -220,23 +220,13 @@ class Graph:
             self._handle(event)
 
     def wait_for_node(self, name: str, timeout: float) -> View:
-        """Wait for the node of a full name.
-
-        Raises:
-            WaitTimeout: The node did not appear in time.
-            ClosedError: The graph was closed meanwhile.
-        """
+        """Wait for the node of a full name; the errors are those of `wait_for`."""
         return self._wait_for_name(
             lambda view: name in view.nodes(), timeout, f"node '{name}'", name, View.nodes
         )
 
     def wait_for_topic(self, name: str, timeout: float) -> View:
-        """Wait for a publisher of a topic.
-
-        Raises:
-            WaitTimeout: No publisher appeared in time.
-            ClosedError: The graph was closed meanwhile.
-        """
+        """Wait for a publisher of a topic; the errors are those of `wait_for`."""
         return self._wait_for_name(
             lambda view: bool(view.publishers(name)),
             timeout,
@@ -246,12 +236,7 @@ class Graph:
         )
 
     def wait_for_service(self, name: str, timeout: float) -> View:
-        """Wait for a server of a service.
-
-        Raises:
-            WaitTimeout: No server appeared in time.
-            ClosedError: The graph was closed meanwhile.
-        """
+        """Wait for a server of a service; the errors are those of `wait_for`."""
         return self._wait_for_name(
             lambda view: bool(view.servers(name)),
             timeout,
@@ -261,12 +246,7 @@ class Graph:
         )
 
     def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> View:
-        """Wait until a topic has at least a number of subscriptions.
-
-        Raises:
-            WaitTimeout: It had fewer in time.
-            ClosedError: The graph was closed meanwhile.
-        """
+        """Wait for a number of subscriptions of a topic; the errors are those of `wait_for`."""
         return self.wait_for(
             lambda view: len(view.subscriptions(topic)) >= count,
             timeout,

@@ -74,7 +74,7 @@ class Authority:
             )
         key = _new_key()
         subject = _subject(f"{name} authority")
-        certificate = _Draft(subject, key.public_key(), days).sign(subject, key, authority=True)
+        certificate = _sign(subject, key.public_key(), days, subject, key)
         _write(home, key, certificate)
         return cls(folder)
 
@@ -103,8 +103,10 @@ class Authority:
                 f"'{name}' has keys already: '{folder}'. To replace them, delete that folder first"
             )
         key = _new_key()
-        draft = _Draft(_subject(name), key.public_key(), days, [name, *addresses])
-        certificate = draft.sign(self.certificate.subject, self._key, authority=False)
+        issuer = self.certificate.subject
+        certificate = _sign(
+            _subject(name), key.public_key(), days, issuer, self._key, [name, *addresses]
+        )
         _write(folder, key, certificate)
         _create(folder / AUTHORITY, (self.folder / _HOME / CERTIFICATE).read_bytes())
         return folder
@@ -115,52 +117,53 @@ class Authority:
         return sorted(folder for folder in found if folder.name != _HOME)
 
 
-class _Draft:
-    """A certificate that is not signed yet."""
+def _sign(
+    subject: Name, public: Any, days: float, issuer: Name, key: Any, places: Sequence[str] = ()
+) -> Certificate:
+    """Sign a certificate.
 
-    def __init__(self, subject: Name, public: Any, days: float, places: Sequence[str] = ()) -> None:
-        self._subject = subject
-        self._public = public
-        self._days = days
-        self._places = [_place(text) for text in places]
+    Args:
+        subject: The name of the holder.
+        public: The public key of the holder.
+        days: The lifetime in days.
+        issuer: The name of the authority.
+        key: The private key of the authority.
+        places: The host names and addresses of the holder; none for the authority itself.
+    """
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes
 
-    def sign(self, issuer: Name, key: EllipticCurvePrivateKey, *, authority: bool) -> Certificate:
-        from cryptography import x509
-        from cryptography.hazmat.primitives import hashes
-
-        now = dt.datetime.now(dt.UTC)
-        end = _end(now, self._days)
-        usage = x509.KeyUsage(
-            digital_signature=not authority,
-            content_commitment=False,
-            key_encipherment=False,
-            data_encipherment=False,
-            key_agreement=False,
-            key_cert_sign=authority,
-            crl_sign=authority,
-            encipher_only=False,
-            decipher_only=False,
-        )
-        builder = (
-            x509.CertificateBuilder(issuer, self._subject, self._public)
-            .serial_number(x509.random_serial_number())
-            .not_valid_before(min(now, end) - _CLOCKS_DIFFER)
-            .not_valid_after(end)
-            .add_extension(x509.BasicConstraints(authority, 0 if authority else None), True)
-            .add_extension(usage, True)
-            .add_extension(x509.SubjectKeyIdentifier.from_public_key(self._public), False)
-            .add_extension(
-                x509.AuthorityKeyIdentifier.from_issuer_public_key(key.public_key()), False
-            )
-        )
-        if not authority:
-            both = [
-                x509.oid.ExtendedKeyUsageOID.SERVER_AUTH,
-                x509.oid.ExtendedKeyUsageOID.CLIENT_AUTH,
-            ]
-            builder = builder.add_extension(x509.ExtendedKeyUsage(both), False)
-            builder = builder.add_extension(x509.SubjectAlternativeName(self._places), False)
-        return builder.sign(key, hashes.SHA256())
+    authority = not places
+    now = dt.datetime.now(dt.UTC)
+    end = _end(now, days)
+    usage = x509.KeyUsage(
+        digital_signature=not authority,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        key_cert_sign=authority,
+        crl_sign=authority,
+        encipher_only=False,
+        decipher_only=False,
+    )
+    issuer_key = x509.AuthorityKeyIdentifier.from_issuer_public_key(key.public_key())
+    builder = (
+        x509.CertificateBuilder(issuer, subject, public)
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(min(now, end) - _CLOCKS_DIFFER)
+        .not_valid_after(end)
+        .add_extension(x509.BasicConstraints(authority, 0 if authority else None), True)
+        .add_extension(usage, True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(public), False)
+        .add_extension(issuer_key, False)
+    )
+    if not authority:
+        oid = x509.oid.ExtendedKeyUsageOID
+        both_ends = x509.ExtendedKeyUsage([oid.SERVER_AUTH, oid.CLIENT_AUTH])
+        names = x509.SubjectAlternativeName([_general_name(place) for place in places])
+        builder = builder.add_extension(both_ends, False).add_extension(names, False)
+    return builder.sign(key, hashes.SHA256())
 
 
 def read_certificate(file: Path) -> Certificate:
@@ -212,7 +215,7 @@ def _subject(name: str) -> Name:
     return x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
 
 
-def _place(text: str) -> GeneralName:
+def _general_name(text: str) -> GeneralName:
     from cryptography import x509
 
     try:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final, Literal, Self, TypedDict
+from typing import Any, Final, Literal, Self, TypedDict
 
 import zenoh
 
 from rosz.errors import TransportError
 from rosz.session.at_exit import ENDING, ClosedSession, leak_at_exit
 from rosz.session.declared import Declared, open_channel, translate_errors
-from rosz.session.samples import Stamp, stamp_of, to_timestamp
-
-if TYPE_CHECKING:
-    from types import TracebackType
+from rosz.session.samples import Sample, Stamp, to_timestamp
 
 __all__ = (
     "TARGETS",
@@ -64,42 +61,27 @@ class Cancellation:
         self.token.cancel()  # type: ignore[no-untyped-call]  # missing in zenoh's stub
 
 
-class Reply:
-    """One reply that arrived; when not ``ok`` the payload is the text of the error."""
+class Reply(Sample):
+    """One reply that arrived; when not ``ok`` its payload is the text of the error."""
 
-    __slots__ = ("_raw", "_sample", "ok")
+    __slots__ = ("ok",)
 
     def __init__(self, raw: zenoh.Reply) -> None:
-        self._raw = raw
-        self._sample = sample = raw.ok  # each access makes a new object
+        sample: Any = raw.ok
         self.ok = sample is not None
+        if sample is None:
+            sample = _Error(raw)
+        super().__init__(sample)
 
-    @property
-    def key(self) -> str:
-        """The key that the reply is for; empty for an error."""
-        return "" if self._sample is None else str(self._sample.key_expr)
 
-    @property
-    def payload(self) -> bytes:
-        """The value, or the text of the error."""
-        result = self._sample or self._raw.result
-        return result.payload.to_bytes()
+class _Error:
+    """What a reply with an error has in place of a sample."""
 
-    @property
-    def attachment(self) -> bytes | None:
-        """The bytes sent beside the payload."""
-        raw = None if self._sample is None else self._sample.attachment
-        return None if raw is None else raw.to_bytes()
+    key_expr = ""
+    attachment = timestamp = kind = None
 
-    @property
-    def stamp(self) -> Stamp | None:
-        """The time of the write, by the clock of the network."""
-        return None if self._sample is None else stamp_of(self._sample.timestamp)
-
-    @property
-    def deleted(self) -> bool:
-        """Whether the reply says that the key was deleted."""
-        return self._sample is not None and self._sample.kind == zenoh.SampleKind.DELETE
+    def __init__(self, raw: zenoh.Reply) -> None:
+        self.payload = raw.result.payload
 
 
 class Replies:
@@ -247,12 +229,7 @@ class Query:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -11,7 +11,7 @@ import re
 import socket
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 import msgspec
 
@@ -22,9 +22,6 @@ from rosz.session.config import SessionConfig, keys_of
 from rosz.session.opening import places_of
 from rosz.session.session import Session
 from rosz.wire import Endpoint
-
-if TYPE_CHECKING:
-    from types import TracebackType
 
 __all__ = ("Router",)
 
@@ -86,12 +83,7 @@ class Router:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

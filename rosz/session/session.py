@@ -11,7 +11,7 @@ import logging
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING, Any, Self, Unpack
+from typing import Any, Self, Unpack
 
 import zenoh
 
@@ -50,9 +50,6 @@ from rosz.session.zenoh_workarounds import (
 )
 from rosz.worker import start_thread
 
-if TYPE_CHECKING:
-    from types import TracebackType
-
 __all__ = ("Session",)
 
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
@@ -63,6 +60,10 @@ _log = logging.getLogger("rosz.session")
 
 class Session:
     """One connection to the network.
+
+    Every method raises `ClosedError` when the session is closed. Those that take a key raise
+    `TransportError` when it is malformed, and those that take a timeout raise `UsageError` when it
+    is not a number.
 
     Args:
         raw: The open session of Zenoh.
@@ -136,10 +137,6 @@ class Session:
             attachment: The bytes to send beside the payload.
             stamp: The time of the write.
             block: Whether to wait for a slow link instead of dropping the write.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
         with translate_errors(f"write '{key}'"):
             self._raw.put(
@@ -153,12 +150,7 @@ class Session:
     def delete(
         self, key: str, *, attachment: bytes | None = None, stamp: Stamp | None = None
     ) -> None:
-        """Delete a value, waiting for a slow link rather than dropping the deletion.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
-        """
+        """Delete a value, waiting for a slow link rather than dropping the deletion."""
         with translate_errors(f"delete '{key}'"):
             self._raw.delete(
                 key,
@@ -182,10 +174,6 @@ class Session:
             reliable: Whether links should be reliable.
             block: Whether a full link makes ``put`` wait instead of dropping the sample.
             cache: The number of samples kept for late joiners (transient local); 0 for none.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
         congestion = _CONGESTION[block]
         reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
@@ -219,10 +207,6 @@ class Session:
             history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
             remote_only: Whether to ignore what this session itself publishes.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
         origin = zenoh.Locality.REMOTE if remote_only else None
         entity = self._subscribe(key, open_channel(), history, recover, origin)
@@ -240,10 +224,6 @@ class Session:
             depth: The number of samples to keep; a new one replaces the oldest.
             history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
         handler: Any = zenoh.handlers.RingChannel(depth)
         return PullSubscriber(key, self._subscribe(key, handler, history, recover, None))
@@ -273,10 +253,6 @@ class Session:
             callback: Function called with each query on the queryable's thread; it has to close the
                 query.
             complete: Whether the replies are all there are; ROS 2 clients query only such.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
         with translate_errors(f"serve '{key}'"):
             entity = self._raw.declare_queryable(key, open_channel(), complete=complete)
@@ -290,10 +266,6 @@ class Session:
         Args:
             key: The key expression whose queries get replies here.
             complete: Whether the replies are all there are; ROS 2 clients query only such.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
         with translate_errors(f"serve '{key}'"):
             return Queryable(
@@ -301,12 +273,7 @@ class Session:
             )
 
     def token(self, key: str) -> Closable:
-        """Declare a liveliness token, which others see until it is closed or the link ends.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
-        """
+        """Declare a liveliness token, which others see until it is closed or the link ends."""
         with translate_errors(f"declare token '{key}'"):
             return Declared(f"token '{key}'", self._raw.liveliness().declare_token(key))
 
@@ -317,10 +284,6 @@ class Session:
             key: The key expression that the tokens match.
             callback: Function called on the watch's thread with the key of a token, and with
                 whether it appeared (true) or disappeared (false).
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
 
         def deliver(raw: zenoh.Sample) -> None:
@@ -353,12 +316,8 @@ class Session:
             parameters: The part of the selector after the ``?``.
             target: Who gets the query.
             any_key: Whether replies may be for keys that ``key`` does not match.
-            cancel: The cancellation that can end the query early.
-
-        Raises:
-            ClosedError: The session is closed, or ``cancel`` was cancelled.
-            TransportError: The key is malformed.
-            UsageError: The timeout is not a number.
+            cancel: The cancellation that can end the query early; one that was cancelled before
+                makes the query raise `ClosedError`.
         """
         with translate_errors(f"query '{key}'"):
             handler = self._raw.get(
@@ -375,12 +334,7 @@ class Session:
         return Replies(handler)
 
     def querier(self, key: str, *, timeout: float, target: Target = "all") -> Querier:
-        """Declare a query that is made often; the arguments are those of `query`.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
-        """
+        """Declare a query that is made often; the arguments are those of `query`."""
         with translate_errors(f"query '{key}'"):
             entity = self._raw.declare_querier(
                 key,
@@ -391,12 +345,7 @@ class Session:
         return Querier(key, entity, timeout)
 
     def get(self, key: str, *, timeout: float, **options: Unpack[QueryOptions]) -> list[Reply]:
-        """Send a query, and wait for all replies; the arguments are those of `query`.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
-        """
+        """Send a query, and wait for all replies; the arguments are those of `query`."""
         return list(self.query(key, timeout=timeout, **options))
 
     def get_async(
@@ -416,10 +365,6 @@ class Session:
             on_done: Function called after the last reply, or when the time limit is reached.
             timeout: Time limit in seconds, as for `query`.
             options: The options of `query`.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
         """
         replies = self.query(key, timeout=timeout, **options)
 
@@ -435,12 +380,7 @@ class Session:
             deliver()
 
     def live_tokens(self, key: str, timeout: float) -> list[str]:
-        """Return the keys of all liveliness tokens that match, sorted.
-
-        Raises:
-            ClosedError: The session is closed.
-            TransportError: The key is malformed.
-        """
+        """Return the keys of all liveliness tokens that match, sorted."""
         with translate_errors(f"look for tokens '{key}'"):
             handler = self._raw.liveliness().get(
                 key, open_channel(), timeout=clamp_timeout(timeout)
@@ -507,12 +447,7 @@ class Session:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
