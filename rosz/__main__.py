@@ -1,17 +1,18 @@
 """The ``rosz`` command, also as ``python -m rosz``."""
 
-# What signal itself is made of: that loads so much first that a Ctrl-C falls into it.
-import _signal as signal  # type: ignore[import-not-found]  # not told of, as an implementation's
+# The module signal is a layer over _signal that takes long to import; Ctrl-C could interrupt that.
+import _signal as signal  # type: ignore[import-not-found]  # it has no stubs
 
 __all__ = ("main",)
 
 
 def main() -> None:
-    """Run the command line of this process, and exit with its code.
+    """Run the command line of this process, and exit with its exit code.
 
-    Until a command says what Ctrl-C is to do, it ends the process as if it were no Python program:
-    an exception among imports would show a traceback, or be lost in what Python calls back. Also
-    what a script starts in the background, deaf to Ctrl-C by the shell, ends by it, as in ROS 1.
+    Until a command sets a handler, Ctrl-C ends the process at once, as it ends a program in C: an
+    exception raised by an import would print a traceback, or get lost in a callback. This is also
+    true for a command that a script starts in the background, where the shell makes programs
+    ignore Ctrl-C; ROS 1's commands end there too.
     """
     if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, signal.SIG_IGN):
         signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -1,7 +1,7 @@
-"""``python -m rosz.script SCRIPT [ARGUMENTS]``: how rosz starts Python scripts.
+"""Run a Python script: ``python -m rosz.script SCRIPT [ARGUMENTS]``, as rosz starts scripts.
 
-The same as ``python -m rosz.ros1``, but that Ctrl-C before the script has begun ends the process as
-if it were no Python program: a traceback from among imports of ours would tell its author nothing.
+It is the same as ``python -m rosz.ros1``, but Ctrl-C ends the process without a traceback until the
+script begins: a traceback from an import of rosz would tell the script's author nothing.
 """
 
 import signal

@@ -1,4 +1,4 @@
-"""``rosz core``: hold the meeting point and a replica of the parameters."""
+"""``rosz core``: run a meeting point with a copy of the parameters."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from contextlib import ExitStack, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from rosz.cli import suggest
+from rosz.cli.console import print_lines, until_stopped
 from rosz.cli.declare import App, Option
-from rosz.cli.group import print_lines, until_stopped
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
@@ -27,31 +28,38 @@ def core_command(
     listen: Annotated[
         list[str] | None,
         Option(
-            metavar="ENDPOINT", help="Listen there as well, such as tcp/0.0.0.0:7447; repeatable."
+            metavar="ENDPOINT",
+            help="Listen at this endpoint as well, such as tcp/0.0.0.0:7447; repeatable.",
         ),
     ] = None,
     connect: Annotated[
         list[str] | None,
-        Option(metavar="ENDPOINT", help="Connect to another machine, tcp/robot1:7447; repeatable."),
+        Option(
+            metavar="ENDPOINT",
+            help="Connect to this endpoint, such as tcp/robot1:7447; repeatable.",
+        ),
     ] = None,
     keys: Annotated[
-        str, Option(metavar="DIR", help="Keys that links beyond this machine need.")
+        str, Option(metavar="DIR", help="Folder of the keys for links beyond this machine.")
     ] = "",
-    store: Annotated[str, Option(metavar="FILE", help="Keep the parameters in a file.")] = "",
+    store: Annotated[
+        str,
+        Option(metavar="FILE", help="Keep the parameters in a file.", autocompletion=suggest.files),
+    ] = "",
     port: Annotated[str, Option("-p", "--port", hidden=True)] = "",
 ) -> None:
-    """Hold the meeting point of this machine and a replica of the parameters, until stopped.
+    """Run a meeting point with a copy of the parameters, until it is stopped.
 
-    Nothing needs it; it links machines, and keeps parameters when no node runs.
+    No node needs a core. It links machines, and keeps parameters when no node runs.
     """
     if port:
         raise UsageError(
-            "there is no master, and so no port of it: ROSZ_RENDEZVOUS moves the meeting point,"
+            "there is no master, and so no port: ROSZ_RENDEZVOUS moves the meeting point,"
             " ROS_DOMAIN_ID keeps groups of nodes apart"
         )
     import msgspec
 
-    from rosz.cli.zenohlog import zenoh_log_bounded
+    from rosz.cli.zenohlog import summarize_zenoh_log
     from rosz.environment import Environment
     from rosz.params.replica import Replica
     from rosz.session.router import Router
@@ -60,8 +68,8 @@ def core_command(
     if keys:
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     file = Path(store).absolute() if store else None
-    bounded = nullcontext() if environment.keys is None else zenoh_log_bounded()
-    with bounded, until_stopped() as ready, ExitStack() as stack:
+    logging = nullcontext() if environment.keys is None else summarize_zenoh_log()
+    with logging, until_stopped() as ready, ExitStack() as stack:
         storage = None if file is None else _open_storage(file, stack)
         router = stack.enter_context(Router(environment, listen or (), connect or ()))
         domain = environment.domain
@@ -83,7 +91,7 @@ def _open_storage(file: Path, stack: ExitStack) -> Storage:
 
 
 def _set_core_params(replica: Replica) -> None:
-    """Set the parameters that a ROS 1 core sets, unless somebody has set them before."""
+    """Set the parameters that a ROS 1 core sets, unless they are set already."""
     from rosz.launch.run.network import core_params, write_params
 
     known = core_params(str(uuid.uuid1()))

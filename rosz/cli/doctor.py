@@ -1,4 +1,4 @@
-"""``rosz doctor``: what is wrong, what shows it, and what to do; roswtf's successor."""
+"""``rosz doctor``: find problems, as roswtf does."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
-from rosz.cli.bounds import seconds
+from rosz.cli.console import count, paint, print_json, takes_escapes
 from rosz.cli.declare import App, Option
-from rosz.cli.group import print_json, takes_escapes
+from rosz.cli.limits import seconds
 
 if TYPE_CHECKING:
     from rosz.doctor import Examination, Finding
@@ -16,20 +16,19 @@ if TYPE_CHECKING:
 __all__ = ("app",)
 
 app = App()
-_COLORS = {"error": "31", "warning": "33"}
 
 
 @app.command()
 def doctor_command(
     *,
     wait: Annotated[
-        float, Option(metavar="SECONDS", help="Listen to samples for so long, at most.")
+        float, Option(metavar="SECONDS", help="Time limit for listening to samples.")
     ] = 1.0,
-    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
 ) -> int:
-    """Name what is wrong on this machine and network, with what shows it and what to do.
+    """Find problems on this machine and network, and print what shows them and what to do.
 
-    Exit code 1 if there is an error; a warning, which may be meant, is none.
+    The exit code is 1 if there is an error. A warning, which may be intended, is not an error.
     """
     if wait:
         seconds("--wait", wait)
@@ -56,7 +55,7 @@ def _show(findings: Iterable[Finding], examination: Examination) -> list[Finding
         found.append(finding)
         title = f"{finding.level.upper()} {finding.name}"
         if colored:
-            title = f"\033[{_COLORS[finding.level]}m{title}\033[0m"
+            title = paint(title, finding.level)
         evidence = "".join(f"  - {line}\n" for line in listed(finding.evidence))
         sys.stdout.write(f"{title}: {finding.text}\n{evidence}  what to do: {finding.remedy}\n\n")
         sys.stdout.flush()
@@ -67,11 +66,7 @@ def _show(findings: Iterable[Finding], examination: Examination) -> list[Finding
 def _summary(found: list[Finding], nodes: int) -> str:
     errors = sum(finding.level == "error" for finding in found)
     warnings = len(found) - errors
-    domain = f"{nodes} {'node' if nodes == 1 else 'nodes'}"
+    domain = count(nodes, "node")
     if not found:
         return f"looked at {domain}: all is well\n"
-    return f"looked at {domain}: {_count(errors, 'error')}, {_count(warnings, 'warning')}\n"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
+    return f"looked at {domain}: {count(errors, 'error')}, {count(warnings, 'warning')}\n"

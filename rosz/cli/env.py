@@ -1,4 +1,4 @@
-"""``rosz env``: print what to eval in a shell, so that ROS 1's command names mean rosz."""
+"""``rosz env``: print shell code that makes ROS 1's command names run rosz."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import sys
 from pathlib import Path, PurePath
 from typing import Annotated
 
+from rosz.cli import suggest
+from rosz.cli.console import print_json
 from rosz.cli.declare import App, Argument, Option
-from rosz.cli.group import print_json
+from rosz.cli.shells import SHELLS, script
 from rosz.errors import UsageError, near_miss
 
 __all__ = ("app",)
@@ -19,24 +21,25 @@ app = App()
 @app.command()
 def env_command(
     shell: Annotated[
-        str, Argument(metavar="[SHELL]", help="bash, zsh or fish; by SHELL when not given.")
+        str,
+        Argument(
+            "SHELL",
+            help="bash, zsh or fish; the one in the variable SHELL if omitted.",
+            autocompletion=suggest.shells,
+        ),
     ] = "",
     *,
-    json: Annotated[
-        bool, Option("--json", help="Print the settings that rosz reads, as JSON.")
-    ] = False,
+    json: Annotated[bool, Option("--json", help="Print the settings of rosz as JSON.")] = False,
 ) -> None:
-    """Print what makes rostopic, roslaunch and the like mean rosz.
+    """Print shell code that makes rostopic, roslaunch and the like run rosz.
 
-    Use it as: eval "$(rosz env)", in fish: rosz env fish | source
+    Use it as: eval "$(rosz env)". In fish: rosz env fish | source
     """
     if json:
         from rosz.environment import Environment
 
         print_json(Environment.read())
         return
-    from rosz.introspect.shells import SHELLS, script
-
     name = shell or PurePath(os.environ.get("SHELL", "")).name
     home = str(Path(__file__).parent.parent)
     for known in SHELLS:
@@ -45,7 +48,7 @@ def env_command(
             return
     if shell:
         raise UsageError(
-            f"'{shell}' is no shell that is known; expected {', '.join(SHELLS)}"
+            f"'{shell}' is not a known shell; expected {', '.join(SHELLS)}"
             f"{near_miss(shell, SHELLS)}"
         )
     sys.stdout.write(script("bash", home, sys.executable))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from rosz.cli import suggest
+from rosz.cli.console import print_lines
 from rosz.cli.declare import App, Argument, Option
-from rosz.cli.group import print_lines
 
 __all__ = ("app",)
 
@@ -18,23 +19,29 @@ def gen_command(
     packages: Annotated[
         list[str] | None,
         Argument(
-            metavar="[PACKAGE]...", help="Names or folders; the one around this folder if none."
+            "PACKAGE",
+            help="Names or folders; the package around the working folder if omitted.",
+            autocompletion=suggest.packages,
         ),
     ] = None,
     *,
     output: Annotated[
         str,
         Option(
-            "-o", "--output", metavar="FOLDER", help="Where; src in the package when not given."
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="Folder to write to; src in the package if omitted.",
+            autocompletion=suggest.files,
         ),
     ] = "",
     check: Annotated[
-        bool, Option("--check", help="Write nothing; exit code 1 if something is stale.")
+        bool, Option("--check", help="Write nothing; the exit code is 1 if a module is stale.")
     ] = False,
 ) -> int:
     """Write Python modules for messages and services, for editors and type checkers.
 
-    Running programs needs none of this: what is not generated is compiled when it is imported.
+    Programs do not need them: a module that is not written is compiled when it is imported.
     """
     from rosz.environment import Environment, package_index
     from rosz.workspace.generate import Generator

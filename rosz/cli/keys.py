@@ -1,38 +1,42 @@
-"""``rosz keys``: make keys for machines and people, and check them and the rules beside them."""
+"""``rosz keys``: make and check keys for machines and people, and the rules beside them."""
 
 from __future__ import annotations
 
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+from rosz.cli.console import count, print_json
 from rosz.cli.declare import App, Argument, Option
+from rosz.cli.limits import at_least
 from rosz.errors import UsageError
-
-if TYPE_CHECKING:
-    from rosz.security.review import Review
 
 __all__ = ("app",)
 
 app = App("Make and check the keys that links between machines need (ROSZ_KEYS).")
 
 _Folder = Annotated[
-    str, Option("--dir", "-d", metavar="DIR", help="Folder of all keys; ROSZ_KEYS, or here.")
+    str,
+    Option(
+        "--dir",
+        "-d",
+        metavar="DIR",
+        help="Folder of all keys; ROSZ_KEYS or the working folder if omitted.",
+    ),
 ]
 
 
 @app.command("init")
 def init_keys(
-    folder: Annotated[str, Argument(metavar="DIR")],
+    folder: Annotated[str, Argument("DIR")],
     *,
     name: Annotated[
-        str, Option(metavar="NAME", help="What certificates call the authority.")
+        str, Option(metavar="NAME", help="Name of the authority in certificates.")
     ] = "rosz",
-    days: Annotated[int, Option(metavar="DAYS", help="How long it is good for.")] = 3650,
+    days: Annotated[int, Option(metavar="DAYS", help="Time until the authority expires.")] = 3650,
 ) -> None:
-    """Make a folder of keys, with an authority that signs them."""
-    from rosz.cli.bounds import at_least
+    """Make a folder for keys, with an authority that signs them."""
     from rosz.security.authority import Authority
 
     at_least("--days", days, 1, "days")
@@ -46,20 +50,19 @@ def init_keys(
 
 @app.command("add")
 def add_keys(
-    names: Annotated[list[str], Argument(metavar="HOST|USER...")],
+    names: Annotated[list[str], Argument("HOST|USER")],
     *,
     address: Annotated[
         list[str] | None,
         Option(
             metavar="ADDRESS",
-            help="An address or further name that others reach the host at; repeatable.",
+            help="An address or another name of the host; repeatable.",
         ),
     ] = None,
-    days: Annotated[int, Option(metavar="DAYS", help="How long they are good for.")] = 825,
+    days: Annotated[int, Option(metavar="DAYS", help="Time until the keys expire.")] = 825,
     folder: _Folder = "",
 ) -> None:
     """Make keys for machines or people."""
-    from rosz.cli.bounds import at_least
     from rosz.security.authority import Authority
 
     at_least("--days", days, 1, "days")
@@ -74,15 +77,15 @@ def add_keys(
 @app.command("list")
 def list_keys(
     *,
-    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
     folder: _Folder = "",
 ) -> None:
-    """List who has keys, until when, and what for."""
+    """List the holders of keys, with their addresses and the dates on which the keys expire."""
     from rosz.security.review import review
 
     found = review(_folder(folder, "list --dir"))
     if json:
-        _print_json(found)
+        print_json(found)
         return
     for one in found.holders:
         places = f" ({', '.join(one.places)})" if one.places else ""
@@ -91,16 +94,18 @@ def list_keys(
 
 @app.command("check")
 def check_keys(
-    folder: Annotated[str, Argument(metavar="[DIR]")] = "",
+    folder: Annotated[
+        str, Argument("DIR", help="ROSZ_KEYS or the working folder if omitted.")
+    ] = "",
     *,
-    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
 ) -> int:
-    """Check certificates, access to key files, and rules; exit 1 if something is wrong."""
+    """Check certificates, access to key files, and rules; exit code 1 if something is wrong."""
     from rosz.security.review import review
 
     found = review(_folder(folder, "check"))
     if json:
-        _print_json(found)
+        print_json(found)
     else:
         for one in found.holders:
             sys.stdout.write(f"{one.name}: until {one.until:%Y-%m-%d}\n")
@@ -109,21 +114,20 @@ def check_keys(
             for who, allowed in place.allowed.items():
                 sys.stdout.writelines(f"  {who}: {line}\n" for line in allowed)
         sys.stdout.writelines(f"WRONG: {line}\n" for line in found.wrong)
-        count = len(found.holders)
-        holders = "1 holder" if count == 1 else f"{count} holders"
+        holders = count(len(found.holders), "holder")
         sys.stdout.write(f"{holders} of keys, {len(found.wrong)} wrong\n")
     return int(bool(found.wrong))
 
 
 def _folder(given: str, command: str) -> Path:
-    """Return the folder of keys that is meant.
+    """Return the folder of keys to use.
 
     Args:
-        given: On the command line.
-        command: What takes a folder at its end.
+        given: The folder on the command line; may be empty.
+        command: A command that takes a folder as its last word, for the error text.
 
     Raises:
-        UsageError: None is given, and the keys are not here but in a folder beside.
+        UsageError: No folder is given, and the keys are in the folder ``keys`` instead of here.
     """
     named = given or os.environ.get("ROSZ_KEYS")
     here = Path.cwd()
@@ -138,9 +142,3 @@ def _has_keys(folder: Path) -> bool:
     from rosz.security import CERTIFICATE
 
     return (folder / CERTIFICATE).is_file() or any(folder.glob(f"*/{CERTIFICATE}"))
-
-
-def _print_json(found: Review) -> None:
-    import msgspec
-
-    sys.stdout.write(msgspec.json.format(msgspec.json.encode(found)).decode() + "\n")

@@ -1,66 +1,101 @@
-"""``rosz launch``: roslaunch's command line, and questions to running launches."""
+"""``rosz launch``: roslaunch's command line, and control of running launches."""
 
 from __future__ import annotations
 
 import os
 import sys
+import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-from rosz.cli.bounds import seconds
+import msgspec
+
+from rosz.cli import suggest
+from rosz.cli.console import print_error
 from rosz.cli.declare import App, Argument, Option
-from rosz.errors import UsageError
+from rosz.cli.limits import seconds
+from rosz.environment import Environment, package_index
+from rosz.errors import LaunchError, NotFoundError, TransportError, UsageError
+
+if TYPE_CHECKING:
+    from rosz.launch.plan import LaunchText, Plan
+    from rosz.launch.run import (
+        LaunchStatus,
+        NodeStatus,
+        Options,
+        RouterProcess,
+        StatusClient,
+        Workplace,
+    )
+    from rosz.node.context import Context
+    from rosz.packages import PackageIndex
 
 __all__ = ("app",)
 
 app = App()
 
+_LISTED = 8
+_WAIT_PERIOD = 0.1
+_SAMPLE_SECONDS = 0.4
+"""Time between the two measurements of processor time that give a share."""
+
 
 @app.command()
-def command(
+def launch_command(
     words: Annotated[
         list[str] | None,
         Argument(
-            metavar="[PACKAGE] FILE... [ARG:=VALUE...]",
-            help="Launch files: one of a package, or paths; '-' reads one from standard input.",
+            "FILE|ARG:=VALUE",
+            help="Launch files: PACKAGE FILE, or paths; '-' is standard input. ARG:=VALUE sets an"
+            " arg of the files.",
+            autocompletion=suggest.launch_words,
         ),
     ] = None,
     *,
-    screen: Annotated[bool, Option("--screen", help="All nodes write to the screen.")] = False,
-    log: Annotated[bool, Option("--log", help="No node writes to the screen.")] = False,
+    screen: Annotated[bool, Option("--screen", help="Show the output of all nodes.")] = False,
+    log: Annotated[bool, Option("--log", help="Write the output of all nodes to files.")] = False,
     required: Annotated[
-        bool, Option("--required", help="The launch ends when any node ends.")
+        bool, Option("--required", help="End the launch when any node ends.")
     ] = False,
     wait: Annotated[
-        bool, Option("--wait", help="Wait until a core or another launch is there.")
+        bool, Option("--wait", help="Wait until a core or another launch runs.")
     ] = False,
     local: Annotated[bool, Option("--local", help="Leave out nodes of other machines.")] = False,
     prefix: Annotated[
         bool, Option("--prefix", help="Begin each line with the name of its node.")
     ] = False,
-    verbose: Annotated[bool, Option("-v", help="Say more.")] = False,
+    verbose: Annotated[bool, Option("-v", help="Print more.")] = False,
     no_summary: Annotated[
-        bool, Option("--no-summary", help="Do not print what will be done.")
+        bool, Option("--no-summary", help="Do not print what will be started.")
     ] = False,
     disable_title: Annotated[
-        bool, Option("--disable-title", help="Leave the title of the terminal.")
+        bool, Option("--disable-title", help="Do not change the title of the terminal.")
     ] = False,
     sigint_timeout: Annotated[
-        float, Option(metavar="SECONDS", help="From SIGINT to SIGTERM, when ending nodes.")
+        float,
+        Option(metavar="SECONDS", help="Time from SIGINT to SIGTERM when nodes are stopped."),
     ] = 15.0,
     sigterm_timeout: Annotated[
-        float, Option(metavar="SECONDS", help="From SIGTERM to SIGKILL.")
+        float, Option(metavar="SECONDS", help="Time from SIGTERM to SIGKILL.")
     ] = 2.0,
     keys: Annotated[
-        str, Option(metavar="DIR", help="Keys that links beyond this machine need.")
+        str, Option(metavar="DIR", help="Folder of the keys for links beyond this machine.")
     ] = "",
     pid: Annotated[
-        str, Option(metavar="FILE", help="Write the process id of the launch to a file.")
+        str,
+        Option(
+            metavar="FILE",
+            help="Write the process id of the launch to a file.",
+            autocompletion=suggest.files,
+        ),
     ] = "",
     nodes: Annotated[bool, Option("--nodes", help="List the nodes.")] = False,
-    args: Annotated[str | None, Option(metavar="NODE", help="Print what starts a node.")] = None,
+    args: Annotated[
+        str | None, Option(metavar="NODE", help="Print the command line of a node.")
+    ] = None,
     find_node: Annotated[
-        str | None, Option(metavar="NODE", help="Print the file that a node is in.")
+        str | None, Option(metavar="NODE", help="Print the file that declares a node.")
     ] = None,
     files: Annotated[bool, Option("--files", help="List the files.")] = False,
     ros_args: Annotated[
@@ -70,40 +105,49 @@ def command(
         bool, Option("--dump-params", help="Print all parameters as YAML.")
     ] = False,
     dump_plan: Annotated[
-        bool, Option("--dump-plan", help="Print all that would be done as JSON.")
+        bool, Option("--dump-plan", help="Print the whole plan of the launch as JSON.")
     ] = False,
     status: Annotated[bool, Option("--status", help="List the nodes of running launches.")] = False,
     restart: Annotated[
-        str | None, Option(metavar="NODE", help="Have a running launch restart a node.")
+        str | None,
+        Option(
+            metavar="NODE",
+            help="Restart a node of a running launch.",
+            autocompletion=suggest.nodes,
+        ),
     ] = None,
     stop: Annotated[
-        str | None, Option(metavar="NODE", help="Have a running launch end a node.")
+        str | None,
+        Option(
+            metavar="NODE", help="Stop a node of a running launch.", autocompletion=suggest.nodes
+        ),
     ] = None,
-    json: Annotated[bool, Option("--json", help="With --status: as JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="Print JSON, with --status.")] = False,
     machine: Annotated[
         list[str] | None,
         Option(
             metavar="[NAME=][USER@]ADDRESS[:PORT]",
-            help="Where a machine of the file is; without NAME, where nodes run that name none.",
+            help="Address of a machine of the file; without NAME, of the machine for nodes that"
+            " name none.",
         ),
     ] = None,
     lost_after: Annotated[
         float,
-        Option(metavar="SECONDS", help="Without a word from another machine: it is lost."),
+        Option(metavar="SECONDS", help="Time without a sign of another machine until it is lost."),
     ] = 30.0,
     agent: Annotated[bool, Option("--agent", hidden=True)] = False,
     skip_log_check: Annotated[bool, Option("--skip-log-check", hidden=True)] = True,
     port: Annotated[str, Option("--port", "-p", hidden=True)] = "",
     core: Annotated[bool, Option("--core", hidden=True)] = False,
 ) -> int:
-    """Start the nodes of a launch file, and watch them until the end.
+    """Start the nodes of launch files, and run until they end.
 
-    Without options it does what roslaunch does. 'name:=value' sets an arg of the file.
+    Without options it does what roslaunch does.
     """
-    del skip_log_check  # roslaunch's scripts give it; rosz never spends time on that check
+    del skip_log_check  # roslaunch's scripts pass it; rosz has no such check
     if core or port:
         raise UsageError(
-            "there is no master, and so no port: 'rosz core' keeps a meeting point, ROS_DOMAIN_ID"
+            "there is no master, and so no port: 'rosz core' runs a meeting point, ROS_DOMAIN_ID"
             " keeps groups of nodes apart"
         )
     if agent:
@@ -113,11 +157,8 @@ def command(
         return 0
     _check_named(args=args, find_node=find_node, restart=restart, stop=stop)
     if status or restart or stop:
-        from rosz.cli.launch_control import control
-
-        return control(
-            words or (), status=status, restart=restart or "", stop=stop or "", as_json=json
-        )
+        _control(words or (), status=status, restart=restart or "", stop=stop or "", as_json=json)
+        return 0
     question = _question(
         nodes=nodes,
         args=args,
@@ -127,11 +168,9 @@ def command(
         dump_params=dump_params,
         dump_plan=dump_plan,
     )
-    from rosz.cli.launch_job import Job
-
-    job = Job(words or (), Path(keys).expanduser().absolute() if keys else None)
+    launch = _Launch(words or (), Path(keys).expanduser().absolute() if keys else None)
     if question is not None:
-        sys.stdout.write(job.answer(*question))
+        sys.stdout.write(launch.answer(*question))
         return 0
     from rosz.launch.run import MachineOption, Options, Timeouts
 
@@ -153,20 +192,299 @@ def command(
     )
     if pid:
         Path(pid).expanduser().write_text(str(os.getpid()))
-    return job.run(options, wait=wait)
+    return launch.run(options, wait=wait)
 
 
 def _check_named(**nodes: str | None) -> None:
-    """See that options for a node name one: a script's empty variable must not start a launch."""
+    """Refuse an empty node name: a script's empty variable must not start a launch."""
     for option, node in nodes.items():
         if node == "":
             raise UsageError(f"--{option.replace('_', '-')} is ''; expected the name of a node")
 
 
-def _question(**asked: str | bool | None) -> tuple[str, str] | None:
-    """Return which of roslaunch's questions is asked, and about which node."""
-    chosen = [(name, str(value)) for name, value in asked.items() if value]
+def _question(**options: str | bool | None) -> tuple[str, str] | None:
+    """Return the one of roslaunch's questions that is asked, and its node."""
+    chosen = [(name, str(value)) for name, value in options.items() if value]
     if len(chosen) > 1:
-        options = ", ".join(f"--{name.replace('_', '-')}" for name, _ in chosen)
-        raise UsageError(f"{options}: only one of them can be answered at a time")
+        listing = ", ".join(f"--{name.replace('_', '-')}" for name, _ in chosen)
+        raise UsageError(f"{listing}: only one of them can be answered at a time")
     return chosen[0] if chosen else None
+
+
+class _Launch:
+    """What a command line of ``rosz launch`` names.
+
+    Args:
+        words: The positional words.
+        keys: Folder of the keys that the launch uses instead of ``ROSZ_KEYS``.
+    """
+
+    def __init__(self, words: Sequence[str], keys: Path | None) -> None:
+        from rosz.launch.plan import SystemContext, parse_arguments
+
+        self.environ = dict(os.environ)
+        if keys is not None:
+            self.environ["ROSZ_KEYS"] = str(keys)
+        self.cwd = Path.cwd()
+        self.environment = Environment.read(self.environ, self.cwd)
+        self.packages = package_index(self.environment)
+        self.arguments = parse_arguments(words)
+        for warning in self.arguments.warnings:
+            print_error(f"WARNING: {warning}")
+        self.files = _find_files(self.arguments.rest, self.packages)
+        self._add_own_packages()
+        self.context = SystemContext(self.packages, self.environ, self.cwd, _AnonymousNames())
+
+    def _add_own_packages(self) -> None:
+        """Add the packages that the files are in to the package path, if they are not on it."""
+        roots = self.environment.package_roots
+        for file in self.files:
+            folders = Path(file).absolute().parents if isinstance(file, str) else ()
+            own = next((folder for folder in folders if (folder / "package.xml").is_file()), None)
+            if own is not None and not any(own.is_relative_to(root) for root in roots):
+                roots = (*roots, own)
+        if roots != self.environment.package_roots:
+            self.environment = msgspec.structs.replace(self.environment, package_roots=roots)
+            self.packages = package_index(self.environment)
+
+    @property
+    def namespace(self) -> str:
+        """The namespace of all nodes."""
+        return self.arguments.ns or self.environment.namespace
+
+    def plan(self) -> Plan:
+        """Return the plan of the launch.
+
+        Raises:
+            RoszError: A file is wrong or missing.
+        """
+        from rosz.launch.plan import plan
+
+        return plan(self.files, self.arguments.args, self.context, ns=self.namespace)
+
+    def workplace(self) -> Workplace:
+        """Return what is needed to make the commands of nodes."""
+        from rosz.launch.run import Workplace
+
+        return Workplace(self.packages, self.environment, self.environ, str(self.cwd))
+
+    def answer(self, question: str, node: str) -> str:
+        """Return the answer to one of roslaunch's questions."""
+        from rosz.launch.plan import describe_args, report
+
+        if question == "ros_args":
+            docs = describe_args(self.files, self.arguments.args, self.context, ns=self.namespace)
+            return f"{report.describe(docs)}\n"
+        plan = self.plan()
+        ns = self.namespace or "/"
+        if question == "args":
+            find = self.workplace().find
+            return f"{report.node_args(plan, node, find, self.environ, ns=ns)}\n"
+        if question == "find_node":
+            return f"{report.node_file(plan, node, ns=ns)}\n"
+        if question == "dump_plan":
+            return msgspec.json.format(plan.to_json()).decode() + "\n"
+        listings = {"nodes": report.list_nodes, "files": report.list_files}
+        return f"{listings.get(question, report.dump_params)(plan)}\n"
+
+    def run(self, options: Options, *, wait: bool) -> int:
+        """Run the plan, and return the exit code."""
+        from rosz.launch.run import RouterProcess, interrupted_by_signals, needs_router
+
+        plan = self.plan()
+        if not needs_router(len(plan.nodes), self.environment, self.environ):
+            return self._run_plan(plan, options, wait=wait)
+        with interrupted_by_signals(), RouterProcess(self.environment, self.environ) as router:
+            self.environment, self.environ = router.environment, router.environ
+            return self._run_plan(plan, options, wait=wait, router=router)
+
+    def _run_plan(
+        self, plan: Plan, options: Options, *, wait: bool, router: RouterProcess | None = None
+    ) -> int:
+        from rosz.launch.run import Network, Runner
+        from rosz.node.context import Context
+
+        with Context(self.environment) as context:
+            if wait:
+                _wait_for_peer(context)
+            runner = Runner(
+                plan,
+                self.workplace(),
+                Network(context, router),
+                options,
+                out=sys.stdout,
+                err=sys.stderr,
+            )
+            return runner.run()
+
+
+class _AnonymousNames:
+    """Makes names unique, also when two are made within a millisecond."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def __call__(self, base: str) -> str:
+        import socket
+
+        from rosz import names
+
+        self._count += 1
+        moment = time.time_ns() // 1_000_000 + self._count
+        return names.anonymous(base, socket.gethostname(), os.getpid(), moment)
+
+
+def _wait_for_peer(context: Context) -> None:
+    if not context.session.peers():
+        sys.stdout.write("nobody else is there yet; waiting for a core or another launch\n")
+        sys.stdout.flush()
+    while not context.session.peers():
+        time.sleep(_WAIT_PERIOD)
+
+
+def _find_files(words: Sequence[str], packages: PackageIndex) -> list[str | LaunchText]:
+    """Return the launch files that a command line names.
+
+    Args:
+        words: A package and one of its files, then paths; or paths alone. One of them may be ``-``.
+        packages: The packages on the package path.
+
+    Raises:
+        UsageError: No file is named, or standard input is named twice.
+        NotFoundError: A file does not exist.
+    """
+    if not words:
+        raise UsageError("no launch file is given: rosz launch PACKAGE FILE, or rosz launch PATH")
+    if words.count("-") > 1:
+        raise UsageError("'-' is given twice; standard input can be read only once")
+    first, rest = _first_file(words, packages)
+    for word in rest:
+        if word != "-" and not Path(word).is_file():
+            raise NotFoundError(f"launch file '{word}' is not there")
+    from rosz.launch.plan import LaunchText
+
+    return [LaunchText(sys.stdin.buffer.read()) if word == "-" else word for word in (first, *rest)]
+
+
+def _first_file(words: Sequence[str], packages: PackageIndex) -> tuple[str, Sequence[str]]:
+    """Return the first launch file, and the words that follow it."""
+    name = words[0]
+    is_file = name == "-" or Path(name).is_file()
+    if len(words) > 1 and "/" not in name and name != "-":
+        try:
+            return str(packages.find(name).file(words[1])), words[2:]
+        except NotFoundError:
+            if not is_file:
+                raise
+    if is_file:
+        return name, words[1:]
+    if Path(name).is_dir() and ("/" in name or name not in packages.names()):
+        raise NotFoundError(f"'{name}' is a folder; name a launch file in it")
+    raise NotFoundError(f"launch file '{name}' is not there{_hint(name, packages)}")
+
+
+def _hint(name: str, packages: PackageIndex) -> str:
+    """Return where a file of that name is, or what else the word may mean."""
+    if "/" in name:
+        return ""
+    if Path("launch", name).is_file():
+        return f"; did you mean 'launch/{name}'?"
+    if name in packages.names():
+        own = sorted({file.name for file in packages.find(name).path.rglob("*.launch")})
+        if not own:
+            return f"; '{name}' is a package, and has no launch files"
+        which = f", such as {', '.join(own[:_LISTED])}"
+        return f"; '{name}' is a package: name one of its launch files as well{which}"
+    holders = [
+        package.name
+        for package in packages.packages()
+        if (package.path / "launch" / name).is_file()
+    ]
+    if holders:
+        return f"; package '{holders[0]}' has it: rosz launch {holders[0]} {name}"
+    return "; give its path, or a package and a file: rosz launch PACKAGE FILE"
+
+
+def _control(words: Sequence[str], *, status: bool, restart: str, stop: str, as_json: bool) -> None:
+    """Print the status of running launches, or restart or stop one of their nodes.
+
+    Raises:
+        UsageError: More than one action is given, or a file as well.
+        LaunchError: No launch is running, or it refuses.
+        NotFoundError: No launch has such a node.
+    """
+    from rosz.introspect.connect import command_config
+    from rosz.launch.run import StatusClient
+    from rosz.session import Session
+
+    if words or (status, bool(restart), bool(stop)).count(True) > 1:
+        raise UsageError("--status, --restart and --stop stand alone: one of them, and no file")
+    environment = Environment.read()
+    try:
+        session = Session.open(command_config(environment))
+    except TransportError as error:
+        raise LaunchError(
+            f"no launch is running: nobody answers at {environment.rendezvous}"
+        ) from error
+    with session:
+        client = StatusClient(session, environment.domain)
+        if restart:
+            client.request("restart", restart)
+        elif stop:
+            client.request("stop", stop)
+        else:
+            _print_status(client, environment.domain, as_json=as_json)
+
+
+def _print_status(client: StatusClient, domain: int, *, as_json: bool) -> None:
+    before = {(launch.host, launch.pid): launch for launch in client.statuses()}
+    if not before:
+        raise LaunchError(f"no launch is running in domain {domain}")
+    if as_json:
+        text = msgspec.json.format(msgspec.json.encode(list(before.values())))
+        sys.stdout.write(f"{text.decode()}\n")
+        return
+    time.sleep(_SAMPLE_SECONDS)
+    for launch in client.statuses():
+        earlier = before.get((launch.host, launch.pid), launch)
+        sys.stdout.write(_table(launch, earlier))
+
+
+def _table(launch: LaunchStatus, before: LaunchStatus) -> str:
+    """Return the status of a launch as text.
+
+    Args:
+        launch: The status.
+        before: An earlier status; shares of processor time are counted from it.
+    """
+    head = ("NODE", "STATE", "PID", "RESTARTS", "CPU", "MEMORY", "UPTIME", "MACHINE")
+    earlier = {node.name: node.cpu for node in before.nodes}
+    seconds = launch.sampled - before.sampled
+    rows = [head, *(_row(node, earlier.get(node.name, node.cpu), seconds) for node in launch.nodes)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    title = f"{', '.join(launch.files)} (launch {launch.pid} on {launch.host}, run {launch.run_id})"
+    return "\n".join([title, *(f"  {line}" for line in lines), ""])
+
+
+def _row(node: NodeStatus, cpu_before: float, seconds: float) -> tuple[str, ...]:
+    share = f"{100 * max(0.0, node.cpu - cpu_before) / seconds:.0f} %" if seconds > 0 else "-"
+    running = bool(node.pid)
+    return (
+        node.name,
+        f"{node.state}: {node.detail}" if node.detail else node.state,
+        str(node.pid or "-"),
+        str(node.restarts),
+        share if running else "-",
+        f"{node.memory / 1e6:.0f} MB" if running else "-",
+        _duration(node.uptime) if running else "-",
+        node.machine or "-",
+    )
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

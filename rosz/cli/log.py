@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Annotated
 
-from rosz.cli.bounds import at_least
-from rosz.cli.declare import App, Argument, Option
-from rosz.cli.group import (
-    Call,
+from rosz.cli import suggest
+from rosz.cli.call import Call
+from rosz.cli.console import (
     print_json,
+    print_json_line,
     print_lines,
     takes_escapes,
     until_stopped,
     warn,
 )
+from rosz.cli.declare import App, Argument, Option
+from rosz.cli.limits import at_least
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
     from rosz.introspect.rosout import LogFilter
-    from rosz.msgs.rcl_interfaces.msg import Log
-    from rosz.node import Node
     from rosz.session import Sample
 
 __all__ = ("app",)
@@ -37,33 +37,45 @@ _ROSOUT = "/rosout"
 
 @app.command()
 def log_command(
+    call: Call,
     words: Annotated[
         list[str] | None,
         Argument(
-            metavar="[NODE]... | level NODE LOGGER LEVEL | levels NODE",
-            help="Nodes or namespaces to follow; all when none is given.",
+            "NODE",
+            help="Nodes or namespaces to follow; all if omitted. 'level NODE LOGGER LEVEL' sets the"
+            " level of a logger, 'levels NODE' lists the levels.",
+            autocompletion=suggest.nodes,
         ),
     ] = None,
     *,
     level: Annotated[
-        str, Option("--level", "-l", metavar="LEVEL", help="The least level to show.")
+        str,
+        Option(
+            "--level",
+            "-l",
+            metavar="LEVEL",
+            help="The lowest level to print.",
+            autocompletion=suggest.levels,
+        ),
     ] = "DEBUG",
     grep: Annotated[
-        str, Option("--grep", metavar="PATTERN", help="Only texts that hold this.")
+        str,
+        Option("--grep", metavar="PATTERN", help="Print only messages that contain this pattern."),
     ] = "",
     count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="End after so many lines.")
+        int | None, Option("-n", metavar="COUNT", help="Stop after this number of messages.")
     ] = None,
-    verbose: Annotated[bool, Option("-v", "--verbose", help="With places in the source.")] = False,
-    json: Annotated[bool, Option("--json", help="As JSON, one line each.")] = False,
+    verbose: Annotated[
+        bool, Option("-v", "--verbose", help="Print places in the source code as well.")
+    ] = False,
+    json: Annotated[bool, Option("--json", help="Print one line of JSON per message.")] = False,
 ) -> None:
-    """Follow what nodes log; 'level' sets the level of a logger, 'levels' lists them.
+    """Follow the log of nodes, or set and list the levels of their loggers.
 
-    The levels are DEBUG, INFO, WARN, ERROR and FATAL; the logger of a node itself is 'rosout'.
+    The levels are DEBUG, INFO, WARN, ERROR and FATAL. The logger of the node itself is 'rosout'.
     """
     if count is not None:
         at_least("-n", count, 1, "lines")
-    call = Call(())
     words = words or []
     if words[:1] == ["level"]:
         _set_level(call, words)
@@ -113,10 +125,9 @@ def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
 def _follow(
     call: Call, wanted: LogFilter, count: int | None, *, verbose: bool, as_json: bool
 ) -> None:
-    import msgspec
-
     from rosz.errors import DecodeError
     from rosz.introspect.rosout import format_line, read_line
+    from rosz.introspect.subscribe import subscribe_samples
     from rosz.msgs.rcl_interfaces.msg import Log
     from rosz.node import Node
 
@@ -128,30 +139,22 @@ def _follow(
         Node(_TOOL, anonymous=True, context=context) as node,
     ):
         ready()
-        for sample in _samples(node, Log):
+        queue: SimpleQueue[Sample | None] = SimpleQueue()
+        subscribe_samples(node, _ROSOUT, Log._type_name, Log._type_hash, queue.put)
+        node.on_shutdown(lambda _: queue.put(None))
+        while (sample := queue.get()) is not None:
             try:
                 line = read_line(Log.from_cdr(sample.payload), context.graph.view().nodes())
             except DecodeError as error:
-                warn(f"something on {_ROSOUT} is no line of a log: {error}")
+                warn(f"a message on {_ROSOUT} is not a log message: {error}")
                 continue
             if not wanted.accepts(line):
                 continue
             if as_json:
-                print_lines([msgspec.json.encode(line).decode()])
+                print_json_line(line)
             else:
                 print_lines([format_line(line, color=color, verbose=verbose)])
             if left is not None:
                 left -= 1
                 if left <= 0:
                     return
-
-
-def _samples(node: Node, log_type: type[Log]) -> Iterator[Sample]:
-    """Yield what is published on ``/rosout`` from now on, until the node ends."""
-    from rosz.introspect.subscribe import subscribe_samples
-
-    queue: SimpleQueue[Sample | None] = SimpleQueue()
-    subscribe_samples(node, _ROSOUT, log_type._type_name, log_type._type_hash, queue.put)
-    node.on_shutdown(lambda _: queue.put(None))
-    while (sample := queue.get()) is not None:
-        yield sample

@@ -1,6 +1,7 @@
-"""Entry of the ``rosz`` command: finds the group, imports only that, and turns errors into lines.
+"""Entry point of the ``rosz`` command: it imports one command, runs it and reports errors.
 
-Data goes to stdout, talk to stderr. Exit code 0, 1 (it failed), 2 (wrong usage), 130 (Ctrl-C).
+Data goes to standard output, everything else to standard error. The exit code is 0 for success, 1
+for failure, 2 for wrong usage and 130 for Ctrl-C.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 from typing import TYPE_CHECKING, NoReturn
 
+from rosz.cli.commands import COMMANDS, format_rows, load
 from rosz.errors import RoszError, UsageError, near_miss
 
 if TYPE_CHECKING:
@@ -21,61 +22,42 @@ if TYPE_CHECKING:
 
     from rosz.cli.declare import App
 
-__all__ = ("COMMANDS", "main", "run")
+__all__ = ("main", "run")
 
-COMMANDS = {
-    "launch": "start the nodes of a launch file",
-    "run": "run an executable of a package",
-    "core": "hold the meeting point and a replica of the parameters, until stopped",
-    "param": "get and set parameters",
-    "reconfigure": "read and change settings of nodes while they run",
-    "topic": "list, show, measure and publish topics",
-    "service": "list and call services",
-    "node": "list, inspect, ping and end nodes",
-    "msg": "show message types",
-    "srv": "show service types",
-    "gen": "write Python modules for the messages of a package",
-    "pkg": "list, find, create and check packages",
-    "log": "follow the log of all nodes, set levels",
-    "keys": "make and check the keys that links between machines need",
-    "doctor": "name what is wrong, what shows it and what to do",
-    "turtlesim": "take pictures of turtlesims",
-    "env": "print what to eval in a shell",
-}
 _INTERRUPTED = 130
-_GARBAGE = 10_000
-"""New objects after which Python looks for rings of them: loading modules makes many, and none."""
+_GC_THRESHOLD = 10_000
+"""New objects between two garbage collections: imports create many objects and no garbage."""
 
 
 def main() -> None:
-    """Run the command line of this process, and exit with its code."""
-    gc.set_threshold(_GARBAGE)
-    _stand_in_for_closed_streams()
+    """Run the command line of this process, and exit with its exit code."""
+    gc.set_threshold(_GC_THRESHOLD)
+    _replace_closed_streams()
     _name_stdout()
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        _forget_stdout()
+        _discard_stdout()
     except OSError as error:
-        _forget_stdout()
-        code = code or _fail(_of_system(error), 1)
-    _leave(code)
+        _discard_stdout()
+        code = code or _fail(_describe(error), 1)
+    _exit(code)
 
 
-def _stand_in_for_closed_streams() -> None:
-    """Have somewhere to write to, and nothing to read, where the shell closed a stream (``>&-``).
+def _replace_closed_streams() -> None:
+    """Open a stream for every standard stream that the shell has closed (``>&-``).
 
-    The three are opened in the order of their numbers, so that no file, and no connection, gets
-    the number of one of them.
+    They are opened in the order of their numbers, so that no file and no connection gets the number
+    of a standard stream.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115  # for good, and pathlib takes long to load
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115  # stays open; importing pathlib takes long
 
 
 class _Stdout(io.FileIO):
-    """Standard output, whose errors tell where they come from."""
+    """Standard output; its errors name it."""
 
     def write(self, data: ReadableBuffer, /) -> int:
         try:
@@ -86,14 +68,14 @@ class _Stdout(io.FileIO):
 
 
 def _name_stdout() -> None:
-    """Have errors of standard output, at whatever write they come, told as such."""
+    """Replace standard output by a stream whose errors name it, wherever they are raised."""
     given = sys.stdout
     if not isinstance(given, io.TextIOWrapper) or given.closed or given.name != "<stdout>":
         return
     raw = _Stdout(given.fileno(), "w", closefd=False)
     raw.name = given.name
     sys.stdout = io.TextIOWrapper(
-        raw if given.write_through else io.BufferedWriter(raw),  # as python -u has it
+        raw if given.write_through else io.BufferedWriter(raw),  # unbuffered for python -u
         encoding=given.encoding,
         errors=given.errors,
         line_buffering=given.line_buffering,
@@ -101,15 +83,15 @@ def _name_stdout() -> None:
     )
 
 
-def _leave(code: int) -> NoReturn:
-    """End the process, without the interpreter's taking itself apart where nobody needs that.
+def _exit(code: int) -> NoReturn:
+    """End the process without finalizing the interpreter, where that makes no difference.
 
-    That takes longer than most commands, and frees what is freed with the process anyway.
+    Finalizing takes longer than most commands, and frees what the system frees anyway.
     """
     threading = sys.modules.get("threading")
     if threading is not None and not all(one.daemon for one in threading.enumerate()[1:]):
-        sys.exit(code)  # which waits for them
-    atexit._run_exitfuncs()  # noqa: SLF001  # the only way to what sys.exit would run
+        sys.exit(code)  # this waits for the other threads
+    atexit._run_exitfuncs()  # noqa: SLF001  # the only way to run what sys.exit would run
     os._exit(code)
 
 
@@ -117,10 +99,10 @@ def run(argv: Sequence[str]) -> int:
     """Run one command line.
 
     Args:
-        argv: Arguments without the program name.
+        argv: The arguments without the program name.
 
     Returns:
-        The exit code; every error that is ours, or the system's, has been printed as one line.
+        The exit code; every error of rosz and of the system has been printed as one line.
     """
     try:
         return _dispatch(list(argv))
@@ -129,92 +111,73 @@ def run(argv: Sequence[str]) -> int:
     except RoszError as error:
         return _fail(error, 1)
     except BrokenPipeError:
-        _forget_stdout()
+        _discard_stdout()
         return 0
     except OSError as error:
-        return _fail(_of_system(error), 1)
+        return _fail(_describe(error), 1)
     except KeyboardInterrupt:
         return _INTERRUPTED
 
 
-def _of_system(error: OSError) -> str:
-    """Return what to say of the system's refusal, which often tells no place."""
+def _describe(error: OSError) -> str:
+    """Return the text of an error of the system, with its place if known."""
     if error.filename:
         return f"{error.filename}: {error.strerror}"
     try:
-        os.getcwd()  # noqa: PTH109  # pathlib takes long to load
+        os.getcwd()  # noqa: PTH109  # importing pathlib takes long
     except FileNotFoundError:
         return "the working folder has been deleted: change to another one with 'cd'"
     return error.strerror or str(error)
 
 
 def _dispatch(argv: list[str]) -> int:
-    if argv[:1] == ["help"]:
-        argv = [*argv[1:], "--help"]
-    if not argv or argv[0] in {"-h", "--help"}:
-        from rosz.cli.help import overview
+    if argv[:1] == ["help"] and argv[1:2] and argv[1] in COMMANDS:
+        from rosz.cli.manual import pages
 
-        sys.stdout.write(overview(COMMANDS))
+        if len(argv) > 2 or argv[1] not in pages():  # noqa: PLR2004  # a command of a group
+            argv = [*argv[1:], "--help"]
+    if not argv or argv[0] in {"-h", "--help"}:
+        sys.stdout.write(_overview())
         return 0 if argv else 2
-    if argv[0] in {"-V", "--version", "version"}:
+    name, *words = argv
+    if name in {"-V", "--version", "version"}:
         sys.stdout.write(f"rosz {_version()}\n")
         return 0
-    name = argv[0]
     if name == "complete":
         from rosz.cli.complete import complete
 
-        return complete(argv[1:])
+        return complete(words)
     if name not in COMMANDS:
         hint = near_miss(name, COMMANDS) or "; 'rosz --help' lists them"
-        raise UsageError(f"'{name}' is no command{hint}")
-    module = import_module(f"rosz.cli.{name}")
-    return _invoke(module.app, argv[1:], f"rosz {name}")
+        raise UsageError(f"'{name}' is not a command{hint}")
+    return _invoke(load(name), words, f"rosz {name}")
+
+
+def _overview() -> str:
+    """Return the help of ``rosz``."""
+    return (
+        "Usage: rosz COMMAND [ARGS]...\n\n"
+        "Commands:\n"
+        f"{format_rows(COMMANDS.items())}\n"
+        "'rosz COMMAND --help' describes a command, 'rosz help' lists the pages of the manual.\n"
+    )
 
 
 def _invoke(app: App, argv: list[str], program: str) -> int:
-    """Run a command, or tell what there is, or have typer say why the line is none."""
+    """Run a command line of an app, by typer unless it is sound; return the exit code."""
     from rosz.cli.reading import read
 
-    run_it = read(app, argv) if argv or not app.text else None
-    if run_it is None:
-        from rosz.cli.help import asked_for
+    alone = bool(app.help) and not argv
+    command = None if alone else read(app, argv)
+    if command is None:
+        from rosz.cli.typer_app import run as run_typer
 
-        text = asked_for(app, argv, program)
-        if text:
-            sys.stdout.write(text)
-            return 0 if argv else 2
-    code = _ask_typer(app, argv, program) if run_it is None else run_it()
+        code = run_typer(app, ["--help"] if alone else argv, program)
+    else:
+        code = command()
+    if alone:
+        return 2
     return code if isinstance(code, int) else 0
-
-
-def _ask_typer(app: App, argv: list[str], program: str) -> object:
-    """Run a typer app without letting it exit the process or print tracebacks."""
-    import typer
-    from typer.exceptions import TyperException
-
-    from rosz.cli.typed import to_typer
-
-    context, words = app.sorted_out(argv)
-    try:
-        return to_typer(app, context)(args=words, prog_name=program, standalone_mode=False)
-    except typer.Abort:
-        return _INTERRUPTED
-    except SystemExit as error:
-        # The only case in which typer does so here: nobody reads the output any more.
-        raise BrokenPipeError from error
-    except TyperException as error:
-        if app.text and words and words[0] in app.commands:
-            program += f" {words[0]}"
-        text = getattr(error, "format_message", error.__str__)()
-        return _fail(_in_our_words(text, program), getattr(error, "exit_code", 2))
-
-
-def _in_our_words(text: str, program: str) -> str:
-    """Return what typer says of a line, as all else here is said."""
-    text = text[:1].lower() + text[1:].rstrip(".").replace(". Did you mean", "; did you mean")
-    if text.startswith("no such option: -") and text[-1:].isdigit():
-        text += "; a negative value goes behind '--'"
-    return text if text.endswith("?") else f"{text}; see '{program} --help'"
 
 
 def _version() -> str:
@@ -231,6 +194,6 @@ def _fail(what: object, code: int) -> int:
     return code
 
 
-def _forget_stdout() -> None:
-    """Keep the interpreter from complaining, at its end, that nobody reads its output."""
+def _discard_stdout() -> None:
+    """Keep the interpreter from reporting, at its end, that nobody reads standard output."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

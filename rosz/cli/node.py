@@ -1,37 +1,51 @@
-"""``rosz node``: what rosnode does."""
+"""``rosz node``: the commands of rosnode."""
 
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+import time
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
-from rosz.cli.bounds import at_least
-from rosz.cli.declare import Argument, Context, Option
-from rosz.cli.group import call_of, new_group, print_json, print_lines, until_stopped
-from rosz.errors import UsageError
+from rosz.cli import suggest
+from rosz.cli.call import Call, new_group
+from rosz.cli.console import print_error, print_json, print_lines, until_stopped
+from rosz.cli.declare import Argument, Option
+from rosz.cli.limits import at_least
+from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+    from rosz.session import Session
+    from rosz.wire import Token
 
 __all__ = ("app",)
 
-app = new_group("List, inspect, ping and end nodes.")
+app = new_group("List, inspect, ping and kill nodes.")
 
 _TOOL = "rosnode"
-_Json = Annotated[bool, Option("--json", help="As JSON.")]
+_PING_PERIOD = 1.0
+_REASON = "user request"
+
+_Json = Annotated[bool, Option("--json", help="Print JSON.")]
 
 
 @app.command("list")
 def list_command(
-    context: Context,
-    namespace: Annotated[str, Argument(metavar="[NAMESPACE]")] = "",
+    call: Call,
+    namespace: Annotated[
+        str, Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.nodes)
+    ] = "",
     *,
-    everything: Annotated[bool, Option("-a", "--all", help="With where they are.")] = False,
-    places: Annotated[bool, Option("-u", help="Only where they are.")] = False,
+    everything: Annotated[
+        bool, Option("-a", "--all", help="Print where each node runs as well.")
+    ] = False,
+    places: Annotated[bool, Option("-u", help="Print only where each node runs.")] = False,
     json: _Json = False,
 ) -> None:
     """List nodes."""
     from rosz.introspect.nodes import list_nodes
     from rosz.introspect.topics import in_namespace
 
-    call = call_of(context)
     space = call.resolve(namespace, _TOOL) if namespace else "/"
     survey = call.survey(processes=everything or places or json)
     nodes = [node for node in list_nodes(survey) if in_namespace(node.name, space)]
@@ -45,31 +59,84 @@ def list_command(
 
 @app.command("info")
 def info_command(
-    context: Context,
-    nodes: Annotated[list[str], Argument(metavar="NODE...")],
+    call: Call,
+    nodes: Annotated[list[str], Argument("NODE", autocompletion=suggest.nodes)],
     *,
     quiet: Annotated[
-        bool, Option("-q", "--quiet", help="Do not ask the nodes themselves.")
+        bool, Option("-q", "--quiet", help="Do not send requests to the nodes themselves.")
     ] = False,
     json: _Json = False,
 ) -> None:
-    """Tell what nodes publish, subscribe to and serve, and whom they are connected with."""
-    from rosz.cli.node_talk import info
+    """Print the topics, services and connections of nodes."""
+    from rosz.introspect.nodes import find_nodes, format_connections, format_node
+    from rosz.introspect.survey import take_survey
 
-    info(call_of(context), nodes, quiet=quiet, as_json=json)
+    rows: list[dict[str, Any]] = []
+    with call.session() as session:
+        survey = take_survey(session, call.domain, processes=True)
+        chosen = [node for name in nodes for node in find_nodes(survey, call.resolve(name, _TOOL))]
+        for node in chosen:
+            if json:
+                rows.append(_info_row(session, survey, node, quiet=quiet))
+                continue
+            print_lines([format_node(survey, node)])
+            if not quiet:
+                print_lines([f"\ncontacting node {survey.address(node)} ..."])
+                print_lines([_process_text(session, node) + format_connections(survey, node)])
+    if json:
+        print_json(rows)
+
+
+def _process_text(session: Session, node: Token) -> str:
+    from rosz.introspect.nodes import get_info
+
+    try:
+        info = get_info(session, node)
+    except NotFoundError as error:
+        return f"{error}\n"
+    return f"Pid: {info.pid}\nCommand: {' '.join(info.argv)}\n"
+
+
+def _info_row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> dict[str, Any]:
+    from rosz.introspect.nodes import get_info
+    from rosz.names import short_type
+    from rosz.wire import Kind
+
+    row: dict[str, Any] = {"name": node.node_name, "session": node.zid}
+    kinds = {
+        Kind.PUBLISHER: "publications",
+        Kind.SUBSCRIPTION: "subscriptions",
+        Kind.SERVICE: "services",
+        Kind.CLIENT: "clients",
+    }
+    for kind, title in kinds.items():
+        row[title] = [
+            {"name": token.name, "type": short_type(token.type_name), "hash": token.type_hash}
+            for token in survey.view.entities(kind)
+            if (token.zid, token.node_id) == (node.zid, node.node_id)
+        ]
+    process = survey.process(node)
+    if process is not None:
+        row |= {"host": process.host, "pid": process.pid, "started": process.started}
+        if not quiet:
+            row["argv"] = get_info(session, node).argv
+    return row
 
 
 @app.command("machine")
 def machine_command(
-    context: Context,
-    machine: Annotated[str, Argument(metavar="[MACHINE]")] = "",
+    call: Call,
+    machine: Annotated[
+        str,
+        Argument("MACHINE", help="Lists all machines if omitted.", autocompletion=suggest.machines),
+    ] = "",
     *,
     json: _Json = False,
 ) -> None:
-    """List the machines that nodes run on, or the nodes on one of them."""
+    """List the machines that nodes run on, or the nodes on one machine."""
     from rosz.introspect.nodes import list_nodes, machines, nodes_on_machine
 
-    nodes = list_nodes(call_of(context).survey(processes=True))
+    nodes = list_nodes(call.survey(processes=True))
     found = nodes_on_machine(nodes, machine) if machine else machines(nodes)
     if json:
         print_json(found)
@@ -79,57 +146,144 @@ def machine_command(
 
 @app.command("ping")
 def ping_command(
-    context: Context,
-    node: Annotated[str, Argument(metavar="NODE")] = "",
+    call: Call,
+    node: Annotated[str, Argument("NODE", autocompletion=suggest.nodes)] = "",
     *,
     everybody: Annotated[bool, Option("-a", "--all", help="Ping all nodes once.")] = False,
     count: Annotated[
-        int | None, Option("-c", metavar="COUNT", help="Ping so often; for ever otherwise.")
+        int | None,
+        Option("-c", metavar="COUNT", help="Number of pings; without it, ping until stopped."),
     ] = None,
 ) -> int:
-    """Tell how long a node takes to answer; exit code 1 if it does not."""
+    """Print how long a node takes to reply; exit code 1 if it does not reply."""
     if everybody and (node or count is not None):
         raise UsageError("--all pings every node once: it takes no node and no -c")
     if count is not None:
         at_least("-c", count, 1, "pings")
-    from rosz.cli.node_talk import ping, ping_all
-
-    call = call_of(context)
     if everybody:
-        return ping_all(call)
+        return _ping_all(call)
     if not node:
         names = call.survey().view.nodes()
-        there = "there are:\n" + "\n".join(names) if names else "none is running"
-        raise UsageError(f"no node is given; {there}")
-    with until_stopped() as ready:
-        ready()
-        return ping(call, node, count)
+        running = "there are:\n" + "\n".join(names) if names else "none is running"
+        raise UsageError(f"no node is given; {running}")
+    _ping_often(call, node, count)
     return 0
+
+
+def _ping_often(call: Call, name: str, count: int | None) -> None:
+    """Ping a node a number of times, or until stopped."""
+    from rosz.introspect.nodes import PING_TIMEOUT, find_nodes
+    from rosz.introspect.survey import take_survey
+
+    full = call.resolve(name, _TOOL)
+    print_lines([f"rosnode: node is [{full}]"])
+    times: list[float] = []
+    with until_stopped() as ready, call.session() as session:
+        ready()
+        survey = take_survey(session, call.domain, processes=True)
+        node = find_nodes(survey, full)[-1]
+        print_lines([f"pinging {full} with a timeout of {PING_TIMEOUT}s"])
+        try:
+            while True:
+                times.append(_ping(session, survey, node))
+                if count is not None and len(times) >= count:
+                    return
+                time.sleep(_PING_PERIOD)
+        finally:
+            if len(times) > 1:
+                print_lines([f"ping average: {sum(times) / len(times):f}ms"])
+
+
+def _ping(session: Session, survey: Survey, node: Token) -> float:
+    """Ping a node, print its reply, and return how many milliseconds it took."""
+    from rosz.introspect.nodes import ping
+
+    taken = ping(session, node) * 1e3
+    print_lines([f"reply from {survey.address(node)}\ttime={taken:f}ms"])
+    return taken
+
+
+def _ping_all(call: Call) -> int:
+    """Ping every node once, and return the exit code."""
+    from rosz.introspect.nodes import PING_TIMEOUT
+    from rosz.introspect.survey import take_survey
+
+    with call.session() as session:
+        survey = take_survey(session, call.domain, processes=True)
+        names = sorted(set(survey.view.nodes()))
+        print_lines(["Will ping the following nodes: ", *(f" * {name}" for name in names), ""])
+        code = 0
+        for name in names:
+            print_lines([f"pinging {name} with a timeout of {PING_TIMEOUT}s"])
+            for node in survey.nodes_named(name):
+                try:
+                    _ping(session, survey, node)
+                except RoszError as error:
+                    code = 1
+                    print_error(f"cannot ping [{name}]: {error}")
+    return code
 
 
 @app.command("kill")
 def kill_command(
-    context: Context,
-    nodes: Annotated[list[str] | None, Argument(metavar="[NODE]...")] = None,
+    call: Call,
+    nodes: Annotated[
+        list[str] | None,
+        Argument("NODE", help="Asks which one if omitted.", autocompletion=suggest.nodes),
+    ] = None,
     *,
-    everybody: Annotated[bool, Option("-a", "--all", help="End all nodes.")] = False,
+    everybody: Annotated[bool, Option("-a", "--all", help="Kill all nodes.")] = False,
 ) -> int:
-    """Have nodes end, and wait until they are gone."""
+    """Shut nodes down, and wait until they have ended."""
     if everybody and nodes:
         raise UsageError("--all ends every node: it takes no names")
-    from rosz.cli.node_talk import choose, kill
-
-    call = call_of(context)
     if not everybody and not nodes:
-        nodes = choose(call, sys.stdin)
+        nodes = _choose(call, sys.stdin)
         if not nodes:
             return 0
-    return kill(call, nodes or (), everybody=everybody)
+    from rosz.introspect.nodes import kill_nodes
+    from rosz.introspect.survey import take_survey
+
+    with call.session() as session:
+        survey = take_survey(session, call.domain, processes=True)
+        known = sorted(set(survey.view.nodes()))
+        chosen = known if everybody else [call.resolve(name, _TOOL) for name in nodes or ()]
+        unknown = [name for name in chosen if name not in known]
+        if unknown:
+            listing = ", ".join(f"'{name}'{near_miss(name, known)}" for name in unknown)
+            raise NotFoundError(f"unknown node(s): {listing}")
+        if not chosen:
+            print_error("No nodes running")
+            return 0
+        several = ["killing:", *(f" * {name}" for name in chosen)]
+        print_lines(several if len(chosen) > 1 else [f"killing {chosen[0]}"])
+        failed = kill_nodes(session, survey, chosen, _REASON)
+    if failed:
+        lines = [f" * {name}: {error}" for name, error in failed]
+        print_error("\n".join(["ERROR: Failed to kill:", *lines]))
+        return 1
+    print_lines(["killed"])
+    return 0
+
+
+def _choose(call: Call, source: TextIO) -> list[str]:
+    """Ask which node to kill; return no name if no node runs or nothing is chosen."""
+    names = sorted(set(call.survey().view.nodes()))
+    if not names:
+        print_error("No nodes running")
+        return []
+    print_lines(f"{number}. {name}" for number, name in enumerate(names, 1))
+    sys.stdout.write("\nPlease enter the number of the node you wish to kill.\n> ")
+    sys.stdout.flush()
+    for line in source:
+        answer = line.strip()
+        if answer.isdecimal() and 1 <= int(answer) <= len(names):
+            return [names[int(answer) - 1]]
+        print_lines([f"'{answer}' is not one of them; enter a number from 1 to {len(names)}"])
+    return []
 
 
 @app.command("cleanup")
 def cleanup_command() -> None:
-    """Forget nodes that are dead: there is nothing to do, since nobody keeps them."""
-    print_lines(
-        ["a node that is dead is gone from all lists at once: there is nothing to clean up"]
-    )
+    """Do nothing: dead nodes are not kept anywhere, so there is nothing to clean up."""
+    print_lines(["a dead node is gone from all lists at once: there is nothing to clean up"])

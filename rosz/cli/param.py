@@ -1,37 +1,46 @@
-"""``rosz param``: what rosparam does, and searching and watching."""
+"""``rosz param``: the commands of rosparam, and ``search`` and ``watch``."""
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Annotated
 
-from rosz import names, remap
-from rosz.cli.bounds import at_least
-from rosz.cli.declare import App, Argument, Context, Option, values_last
-from rosz.cli.group import print_json, print_lines, until_stopped, write_file
-from rosz.cli.param_plain import plain
-from rosz.cli.param_show import (
-    as_yaml,
-    complain,
-    not_set,
-    print_change,
-    show_preview,
-    tell,
-    tell_slow,
+from rosz import names
+from rosz.cli import suggest
+from rosz.cli.call import Call
+from rosz.cli.console import (
+    print_error,
+    print_json,
+    print_json_line,
+    print_lines,
+    until_stopped,
+    warn,
+    write_file,
 )
-from rosz.errors import ParamNotFound, UsageError
+from rosz.cli.declare import App, Argument, Option, values_last
+from rosz.cli.limits import at_least
+from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, YamlError
 
 if TYPE_CHECKING:
+    from rosz.params import Value
     from rosz.params.remote import ParamClient
-    from rosz.params.replica import Changed
+    from rosz.params.replica import Changed, Outcome
+    from rosz.params.tree import Difference
 
 __all__ = ("app",)
 
 _TOOL = "rosparam"
-_FAILED = 1
-_TAKING = frozenset({"-t", "--textfile", "-b", "--binfile"})
+_STDIN = "<stdin>"
+
+# Most values are written alike in YAML and in Python, and importing a YAML parser takes longer than
+# getting or setting a value.
+_WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_INTEGER = re.compile(r"0|-?[1-9][0-9]{0,17}", re.ASCII)
+_FRACTION = re.compile(r"-?[0-9]{1,18}\.[0-9]{1,18}", re.ASCII)
+_YAML_WORDS = frozenset({"yes", "no", "on", "off", "true", "false", "null", "y", "n"})
 
 
 def _is_special(word: str) -> bool:
@@ -39,26 +48,27 @@ def _is_special(word: str) -> bool:
     return bool(separator) and left.startswith("__") and names.is_valid(left.lstrip("_"))
 
 
-app = App("Get and set parameters.", remapped=_is_special)
+app = App("Get and set parameters.", is_remapping=_is_special)
 
-_Verbose = Annotated[bool, Option("-v", help="Tell what is done, on stderr.")]
-_Json = Annotated[bool, Option("--json", help="As JSON.")]
-_Name = Annotated[str, Argument(metavar="NAME")]
-_Space = Annotated[str, Argument(metavar="[NAMESPACE]")]
+_Verbose = Annotated[bool, Option("-v", help="Print each step to standard error.")]
+_Json = Annotated[bool, Option("--json", help="Print JSON.")]
+_Name = Annotated[str, Argument("NAME", autocompletion=suggest.params)]
+_Space = Annotated[str, Argument("NAMESPACE", autocompletion=suggest.params)]
 
 
 @app.command("list")
 def list_command(
-    context: Context,
+    call: Call,
     namespace: Annotated[
-        str | None, Argument(metavar="[NAMESPACE]", help="All when not given.")
+        str | None,
+        Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.params),
     ] = None,
     *,
     json: _Json = False,
 ) -> None:
     """List parameters."""
-    with _client(context) as (client, resolve):
-        space = "/" if namespace is None else resolve(namespace).rstrip("/") + "/"
+    with _client(call) as client:
+        space = "/" if namespace is None else _resolve(call, namespace).rstrip("/") + "/"
         found = [name for name in client.names() if name.startswith(space)]
     if json:
         print_json(found)
@@ -68,81 +78,97 @@ def list_command(
 
 @app.command("get")
 def get_command(
-    context: Context,
+    call: Call,
     name: _Name,
     *,
     readable: Annotated[
-        bool, Option("-p", help="For reading; it may not be YAML any more.")
+        bool, Option("-p", help="Print it for reading; the output may not be valid YAML.")
     ] = False,
     verbose: _Verbose = False,
     json: _Json = False,
 ) -> int:
-    """Print a parameter, or all below a namespace, as YAML."""
-    with _client(context) as (client, resolve):
-        full = resolve(name)
-        tell(verbose, f"getting parameter [{full}]")
+    """Print a parameter, or all parameters below a namespace, as YAML."""
+    with _client(call) as client:
+        full = _resolve(call, name)
+        _log(verbose, f"getting parameter [{full}]")
         try:
             value = client.get(full)
         except ParamNotFound as error:
-            return not_set("Parameter", error)
+            return _fail_not_set("Parameter", error)
     if json:
         print_json(value)
     else:
-        sys.stdout.write(plain(value) or as_yaml(value, readable=readable))
+        sys.stdout.write(_format_scalar(value) or _format_yaml(value, readable=readable))
     return 0
 
 
-@app.command("set", arrange=values_last(_TAKING))
+@app.command("set", arrange=values_last(frozenset({"-t", "--textfile", "-b", "--binfile"})))
 def set_command(
-    context: Context,
+    call: Call,
     name: _Name,
     value: Annotated[
-        str | None, Argument(metavar="[VALUE]", help="YAML; - reads it from stdin.")
+        str | None, Argument("VALUE", help="The value in YAML; '-' reads it from standard input.")
     ] = None,
     *,
     text_file: Annotated[
-        str, Option("-t", "--textfile", metavar="FILE", help="Set to the text in a file.")
+        str,
+        Option(
+            "-t",
+            "--textfile",
+            metavar="FILE",
+            help="Set it to the text in a file.",
+            autocompletion=suggest.files,
+        ),
     ] = "",
     binary_file: Annotated[
-        str, Option("-b", "--binfile", metavar="FILE", help="Set to the bytes in a file.")
+        str,
+        Option(
+            "-b",
+            "--binfile",
+            metavar="FILE",
+            help="Set it to the bytes in a file.",
+            autocompletion=suggest.files,
+        ),
     ] = "",
     verbose: _Verbose = False,
 ) -> None:
-    """Set a parameter; a dict sets what it holds and leaves the rest."""
+    """Set a parameter; a dict sets the parameters in it and keeps the others."""
     given = [word for word in (value, text_file or None, binary_file or None) if word is not None]
     if len(given) > 1:
         raise UsageError("a value, --textfile and --binfile exclude each other: give only one")
     if not given:
         raise UsageError("no value is given; expected one in YAML, or --textfile or --binfile")
-    from rosz.cli.param_files import read_value
     from rosz.params import condense, normalise, spread
 
-    with _client(context) as (client, resolve):
-        full = resolve(name)
-        found = read_value(value, text_file, binary_file)
+    with _client(call) as client:
+        full = _resolve(call, name)
+        found = _read_value(value, text_file, binary_file)
         changes = condense(spread(full, normalise(found, full)))
-        tell_slow(client, client.write(changes))
+        _warn_slow(client, client.write(changes))
     for path, item in changes:
-        tell(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
+        _log(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
 
 
 @app.command("delete")
-def delete_command(context: Context, name: _Name, *, verbose: _Verbose = False) -> int:
-    """Delete a parameter and all below it."""
-    with _client(context) as (client, resolve):
-        full = resolve(name)
+def delete_command(call: Call, name: _Name, *, verbose: _Verbose = False) -> int:
+    """Delete a parameter and all parameters below it."""
+    with _client(call) as client:
+        full = _resolve(call, name)
         try:
-            tell_slow(client, client.delete(full))
+            _warn_slow(client, client.delete(full))
         except ParamNotFound as error:
-            return not_set("parameter", error)
-    tell(verbose, "deleted all parameters" if full == "/" else f"deleted parameter [{full}]")
+            return _fail_not_set("parameter", error)
+    _log(verbose, "deleted all parameters" if full == "/" else f"deleted parameter [{full}]")
     return 0
 
 
 @app.command("dump")
 def dump_command(
-    context: Context,
-    file: Annotated[str, Argument(metavar="[FILE]", help="stdout when not given, or -.")] = "",
+    call: Call,
+    file: Annotated[
+        str,
+        Argument("FILE", help="Standard output if omitted, or '-'.", autocompletion=suggest.files),
+    ] = "",
     namespace: _Space = "",
     *,
     verbose: _Verbose = False,
@@ -151,123 +177,238 @@ def dump_command(
     """Write parameters to a file as YAML."""
     from rosz.params.yaml import dump
 
-    with _client(context) as (client, resolve):
-        full = resolve(namespace)
-        tell(verbose, f"dumping namespace [{full}] to file [{file}]")
+    with _client(call) as client:
+        full = _resolve(call, namespace)
+        _log(verbose, f"dumping namespace [{full}] to file [{file}]")
         try:
             value = client.get(full)
         except ParamNotFound as error:
-            return not_set("Parameter", error)
+            return _fail_not_set("Parameter", error)
     if json:
         print_json(value)
     elif file in {"", "-"}:
         sys.stdout.write(dump(value))
     else:
-        from rosz.cli.param_files import check_target
-
-        check_target(file)
+        _check_target(file)
         write_file(file, dump(value).encode())
     return 0
 
 
 @app.command("load")
 def load_command(
-    context: Context,
-    file: Annotated[str, Argument(metavar="FILE", help="- is stdin.")],
+    call: Call,
+    file: Annotated[
+        str, Argument("FILE", help="'-' is standard input.", autocompletion=suggest.files)
+    ],
     namespace: _Space = "",
     *,
     dry_run: Annotated[
-        bool, Option("--dry-run", help="Tell what would change, and change nothing.")
+        bool, Option("--dry-run", help="Print what would change, and change nothing.")
     ] = False,
     verbose: _Verbose = False,
-    json: Annotated[bool, Option("--json", help="The dry run's answer as JSON.")] = False,
+    json: Annotated[bool, Option("--json", help="Print the result of --dry-run as JSON.")] = False,
 ) -> None:
-    """Set parameters from a YAML file, all of them or, where one is wrong, none."""
+    """Set parameters from a YAML file; if one of them is wrong, set none."""
     if json and not dry_run:
         raise UsageError("--json is for --dry-run: loading prints nothing")
-    from rosz.cli.param_files import read_text
     from rosz.params import condense, spread
     from rosz.params.tree import preview
     from rosz.params.yaml import load_documents
 
-    text, source = read_text(file)
-    with _client(context) as (client, resolve):
-        tell(verbose, f"reading parameters from [{source}]")
-        documents = load_documents(text, resolve(namespace), source)
+    if file == "-":
+        text, source = _read_stdin(), _STDIN
+    else:
+        text, source = _decode(_read_bytes(file, NotFoundError), file), file
+    with _client(call) as client:
+        _log(verbose, f"reading parameters from [{source}]")
+        documents = load_documents(text, _resolve(call, namespace), source)
         changes = condense(change for space, value in documents for change in spread(space, value))
         if dry_run:
-            show_preview(preview(client.get("/"), changes), as_json=json)
+            _print_preview(preview(client.get("/"), changes), as_json=json)
             return
-        tell_slow(client, client.write(changes))
+        _warn_slow(client, client.write(changes))
     for path, item in changes:
-        tell(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
+        _log(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
 
 
 @app.command("search")
 def search_command(
-    context: Context,
+    call: Call,
     name: _Name,
     namespace: _Space = "",
     *,
     json: _Json = False,
 ) -> int:
-    """Look for a parameter in a namespace, or node, and then upwards; print its full name."""
-    with _client(context) as (client, resolve):
-        found = client.search(name, resolve(namespace))
+    """Print the full name of a parameter, searched in a namespace and then in those above it."""
+    with _client(call) as client:
+        found = client.search(name, _resolve(call, namespace))
     if json:
         print_json(found)
     elif found is not None:
         print_lines([found])
     if found is None:
-        complain(f"ERROR: Cannot find parameter [{name}] in an upwards search")
-        return _FAILED
+        print_error(f"ERROR: Cannot find parameter [{name}] in an upwards search")
+        return 1
     return 0
 
 
 @app.command("watch")
 def watch_command(
-    context: Context,
+    call: Call,
     name: _Name,
     *,
     count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="End after so many changes.")
+        int | None, Option("-n", metavar="COUNT", help="Stop after this number of changes.")
     ] = None,
     json: _Json = False,
 ) -> None:
-    """Print changes of a parameter, or of all in a namespace, as they come."""
+    """Print changes of a parameter, or of all parameters in a namespace, as they happen."""
     if count is not None:
         at_least("-n", count, 1, "changes")
     from queue import SimpleQueue
 
     changes: SimpleQueue[Changed] = SimpleQueue()
-    with until_stopped() as ready, _client(context, lasting=True) as (client, resolve):
-        full = resolve(name)
+    with until_stopped() as ready, _client(call, lasting=True) as client:
+        full = _resolve(call, name)
         with client.follow() as follower, follower.watch(full, changes.put):
             ready()
-            complain(f"watching [{full}]; press Ctrl-C to end")
+            print_error(f"watching [{full}]; press Ctrl-C to end")
             left = count
             while left is None or left > 0:
-                print_change(changes.get(), as_json=json)
+                _print_change(changes.get(), as_json=json)
                 left = None if left is None else left - 1
 
 
 @contextmanager
-def _client(
-    context: Context, *, lasting: bool = False
-) -> Iterator[tuple[ParamClient, Callable[[str], str]]]:
-    """Give the way to the store, and what turns names into global ones."""
-    from rosz.environment import Environment
-    from rosz.introspect.connect import open_context, open_session
-    from rosz.params.paths import resolve
+def _client(call: Call, *, lasting: bool = False) -> Iterator[ParamClient]:
+    """Open a client of the parameter store."""
     from rosz.params.remote import ParamClient
 
-    environment = Environment.read()
-    node = remap.parse(context.argv).node_name(_TOOL, environment.namespace)
     with ExitStack() as stack:
         if lasting:
-            session = stack.enter_context(
-                open_context(environment, context.argv, lasting=True)
-            ).session
+            session = stack.enter_context(call.context(lasting=True)).session
         else:
-            session = stack.enter_context(open_session(environment))
-        yield ParamClient(session, environment.domain), lambda name: resolve(name, node)
+            session = stack.enter_context(call.session())
+        yield ParamClient(session, call.domain)
+
+
+def _resolve(call: Call, name: str) -> str:
+    from rosz.params.paths import resolve
+
+    return resolve(name, call.node_name(_TOOL))
+
+
+def _read_value(value: str | None, text_file: str, binary_file: str) -> Value:
+    """Return the value to set."""
+    if binary_file:
+        return _read_bytes(binary_file, UsageError)
+    if text_file:
+        return _decode(_read_bytes(text_file, UsageError), text_file)
+    word = value or ""
+    found = _parse_scalar(word)
+    if found is not None:
+        return found
+    from rosz.params.yaml import load
+
+    return load(_read_stdin(), _STDIN) if word == "-" else load(word, "<value>")
+
+
+def _parse_scalar(word: str) -> Value | None:
+    """Return the value of a word that needs no YAML parser; ``None`` for any other word."""
+    if _INTEGER.fullmatch(word):
+        return int(word)
+    if _FRACTION.fullmatch(word):
+        return float(word)
+    if word in {"true", "false"}:
+        return word == "true"
+    return word if _WORD.fullmatch(word) and word.lower() not in _YAML_WORDS else None
+
+
+def _format_scalar(value: Value) -> str:
+    """Return the line for a value that needs no YAML; empty for any other value."""
+    if isinstance(value, bool):
+        return f"{value}\n".lower()
+    if isinstance(value, int) or (isinstance(value, str) and _WORD.fullmatch(value)):
+        return f"{value}\n" if str(value).lower() not in _YAML_WORDS else ""
+    return ""
+
+
+def _format_yaml(value: Value, *, readable: bool) -> str:
+    from rosz.params.yaml import format_get, pretty
+
+    return pretty(value) if readable else format_get(value)
+
+
+def _read_stdin() -> str:
+    return _decode(sys.stdin.buffer.read(), _STDIN)
+
+
+def _read_bytes(file: str, error: type[RoszError]) -> bytes:
+    from pathlib import Path
+
+    if not Path(file).is_file():
+        what = "is not a regular file" if Path(file).exists() else "does not exist"
+        raise error(f"file '{file}' {what}")
+    return Path(file).read_bytes()
+
+
+def _decode(content: bytes, file: str) -> str:
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        reason = f"byte {content[error.start]:#04x} is not UTF-8; save the file as UTF-8"
+        raise YamlError(reason, file, line) from error
+
+
+def _check_target(file: str) -> None:
+    """Refuse to write through a link, which somebody else may have put there."""
+    from pathlib import Path
+
+    if Path(file).is_symlink():
+        raise UsageError(f"'{file}' is a link to '{Path(file).readlink()}'; name the file itself")
+
+
+def _print_preview(differences: list[Difference], *, as_json: bool) -> None:
+    if as_json:
+        print_json(differences)
+        return
+    print_lines(_change_line(found.name, found.old, found.new) for found in differences)
+    print_error(f"{len(differences)} parameters would change; nothing is written")
+
+
+def _print_change(change: Changed, *, as_json: bool) -> None:
+    if as_json:
+        print_json_line(change)
+    else:
+        print_lines([_change_line(change.name, change.old, change.new)])
+
+
+def _change_line(name: str, old: Value | None, new: Value | None) -> str:
+    from rosz.params.yaml import inline
+
+    if old is None:
+        return f"+ {name}: {inline(new)}"
+    if new is None:
+        return f"- {name}: {inline(old)}"
+    return f"~ {name}: {inline(old)} -> {inline(new)}"
+
+
+def _fail_not_set(word: str, error: ParamNotFound) -> int:
+    """Print in rosparam's words that a parameter is not set, and return the exit code."""
+    hint = str(error).partition(" is not set")[2]
+    print_error(f"ERROR: {word} [{error.name}] is not set{hint}")
+    return 1
+
+
+def _warn_slow(client: ParamClient, outcome: Outcome) -> None:
+    """Name the processes that have not applied a write, or do not answer at all."""
+    if outcome.slow:
+        warn(f"written, but not yet known to {', '.join(outcome.slow)}, which did not answer")
+    for label in client.silent:
+        warn(f"{label} does not answer")
+
+
+def _log(verbose: bool, text: str) -> None:
+    if verbose:
+        print_error(text)

@@ -3,37 +3,45 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from rosz.cli import suggest
+from rosz.cli.console import count, paint, print_json, takes_escapes, warn
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import NotFoundError
 
 if TYPE_CHECKING:
     from rosz.packages import Package, PackageIndex
+    from rosz.workspace import Checked, Problem
 
 __all__ = ("app",)
 
 app = App("List, find, create and check packages.")
 
+_Json = Annotated[bool, Option("--json", help="Print JSON.")]
+
+_BUILT_IN = frozenset(
+    {"catkin", "message_generation", "message_runtime", "roslib", "rospy", "roscpp"}
+)
+"""Dependencies of ROS 1 packages that rosz provides, though not as packages."""
+_CATKIN_TARGETS = frozenset({"all", "clean", "install", "run_tests", "tests", "test"})
+
 
 @app.command("list")
 def list_packages(
     *,
-    names: Annotated[bool, Option("--names", "-n", help="Only their names.")] = False,
-    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
+    names: Annotated[bool, Option("--names", "-n", help="Print only the names.")] = False,
+    json: _Json = False,
 ) -> None:
     """List all packages with their folders."""
     index = _index()
     packages = index.packages()
     for fault in index.broken:
-        sys.stderr.write(f"WARNING: {fault}\n")
+        warn(str(fault))
     if json:
-        import msgspec
-
-        rows = {package.name: str(package.path) for package in packages}
-        sys.stdout.write(msgspec.json.format(msgspec.json.encode(rows)).decode() + "\n")
+        print_json({package.name: str(package.path) for package in packages})
         return
     for package in packages:
         sys.stdout.write(f"{package.name}\n" if names else f"{package.name} {package.path}\n")
@@ -42,16 +50,15 @@ def list_packages(
 @app.command("find")
 def find_package(
     name: Annotated[
-        str, Argument(metavar="[PACKAGE]", help="The workspace is meant if none is named.")
+        str,
+        Argument("PACKAGE", help="The workspace if omitted.", autocompletion=suggest.packages),
     ] = "",
     *,
-    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
+    json: _Json = False,
 ) -> None:
     """Print the folder of a package."""
     package = _index().find(name) if name else _workspace()
     if json:
-        from rosz.cli.group import print_json
-
         print_json({"name": package.name, "path": str(package.path)})
     else:
         sys.stdout.write(f"{package.path}\n")
@@ -59,43 +66,45 @@ def find_package(
 
 @app.command("create")
 def create_package(
-    name: Annotated[str, Argument(metavar="NAME")],
-    dependencies: Annotated[list[str] | None, Argument(metavar="[DEPENDENCY]...")] = None,
+    name: Annotated[str, Argument("NAME")],
+    dependencies: Annotated[
+        list[str] | None, Argument("DEPENDENCY", autocompletion=suggest.packages)
+    ] = None,
     *,
     description: Annotated[
-        str, Option("--description", "-d", metavar="TEXT", help="What it is.")
+        str, Option("--description", "-d", metavar="TEXT", help="Description of the package.")
     ] = "",
     maintainer: Annotated[
-        str, Option("--maintainer", "-m", metavar="NAME", help="Who looks after it.")
+        str, Option("--maintainer", "-m", metavar="NAME", help="Name of the maintainer.")
     ] = "",
     license_name: Annotated[
-        str, Option("--license", "-l", metavar="NAME", help="Under what terms.")
+        str, Option("--license", "-l", metavar="NAME", help="Name of the license.")
     ] = "",
     bare: Annotated[
-        bool, Option("--bare", help="Without them: two files, as catkin_create_pkg does.")
+        bool, Option("--bare", help="Create only the files that catkin_create_pkg creates.")
     ] = False,
 ) -> None:
-    """Create a package in the present folder, with a message, a talker and a launch file."""
+    """Create a package in the working folder, with a message, a talker and a launch file."""
     from rosz.workspace import create, create_bare
 
     facts = {"description": description, "maintainer": maintainer, "license_name": license_name}
     if bare:
         made = create_bare(Path.cwd(), name, dependencies or [], **facts)
-        _tell_of_bare(made, Path.cwd())
+        _print_created(made, Path.cwd())
     else:
         folder = create(Path.cwd(), name, dependencies or [], **facts)
     index = _index()
     for dependency in dependencies or []:
         if dependency not in index.names() and dependency not in _BUILT_IN:
-            sys.stderr.write(f"WARNING: dependency '{dependency}' is not on the package path\n")
+            warn(f"dependency '{dependency}' is not on the package path")
     if not bare:
         sys.stdout.write(
             f"created {folder}\nrun it with: rosz launch {folder / 'launch' / 'talker.launch'}\n"
         )
 
 
-def _tell_of_bare(made: Sequence[Path], parent: Path) -> None:
-    """Say what has been made, in the words of catkin_create_pkg."""
+def _print_created(made: Sequence[Path], parent: Path) -> None:
+    """Print what has been created, in the words of catkin_create_pkg."""
     for path in made:
         kind = "folder" if path.is_dir() else "file"
         sys.stdout.write(f"Created {kind} {path.relative_to(parent)}\n")
@@ -105,43 +114,11 @@ def _tell_of_bare(made: Sequence[Path], parent: Path) -> None:
     )
 
 
-@app.command("check", tolerant=True)
-def check_command(
-    words: Annotated[
-        list[str] | None,
-        Argument(
-            metavar="[FOLDER|PACKAGE]...", help="The workspace around the present folder, if none."
-        ),
-    ] = None,
-    *,
-    setup: Annotated[
-        bool, Option("--setup", help="Write devel/setup.bash and its kin, as catkin_make.")
-    ] = False,
-    json: Annotated[bool, Option("--json", help="As JSON.")] = False,
-) -> int:
-    """Check packages: manifest, definitions, launch files, .cfg files and scripts.
-
-    Exit code 1 if there is an error. Options and targets of catkin_make are passed over.
-    """
-    from rosz.cli.pkg_check import check_packages, set_up
-
-    code = check_packages(words or (), as_json=json)
-    if setup:
-        set_up()
-    return code
-
-
-# What ROS 1 packages list as dependencies and rosz brings, though not as packages.
-_BUILT_IN = frozenset(
-    {"catkin", "message_generation", "message_runtime", "roslib", "rospy", "roscpp"}
-)
-
-
 def _workspace() -> Package:
-    """Return the first place that packages are looked for in, as ``roscd`` alone goes there.
+    """Return the first folder of the package path, where ``roscd`` alone goes.
 
     Raises:
-        NotFoundError: There is none but what is installed.
+        NotFoundError: The package path is empty.
     """
     from rosz.environment import Environment
     from rosz.packages import Package
@@ -159,3 +136,115 @@ def _index() -> PackageIndex:
     from rosz.environment import Environment, package_index
 
     return package_index(Environment.read())
+
+
+@app.command("check", tolerant=True)
+def check_command(
+    words: Annotated[
+        list[str] | None,
+        Argument(
+            "FOLDER|PACKAGE",
+            help="The workspace around the working folder if omitted.",
+            autocompletion=suggest.packages_and_folders,
+        ),
+    ] = None,
+    *,
+    setup: Annotated[
+        bool, Option("--setup", help="Write devel/setup.bash and the like, as catkin_make does.")
+    ] = False,
+    json: _Json = False,
+) -> int:
+    """Check packages: manifest, definitions, launch files, .cfg files and scripts.
+
+    The exit code is 1 if there is an error. Options and targets of catkin_make are ignored.
+    """
+    import os
+
+    from rosz.environment import Environment, package_index
+    from rosz.workspace import check, find_packages
+
+    cwd = Path.cwd()
+    environment = Environment.read()
+    folders = find_packages(_without_options(words or (), cwd), cwd, package_index(environment))
+    done = check(folders, environment, os.environ)
+    if json:
+        checked = list(done)
+        print_json(checked)
+    else:
+        checked = _print_checked(done, len(folders), cwd, colored=environment.color)
+    if setup:
+        _write_setup(cwd)
+    return int(any(one.level == "error" for each in checked for one in each.problems))
+
+
+def _without_options(words: Sequence[str], cwd: Path) -> list[str]:
+    """Leave out the words that tell catkin_make how to build."""
+    found: list[str] = []
+    before = ""
+    for word in words:
+        counts = before in {"-j", "-l"} and word.isdecimal()
+        target = word in _CATKIN_TARGETS and not (cwd / word).is_dir()
+        if not word.startswith("-") and not counts and not target:
+            found.append(word)
+        before = word
+    return found
+
+
+def _print_checked(
+    done: Iterable[Checked], total: int, cwd: Path, *, colored: bool
+) -> list[Checked]:
+    """Print the problems of each package as they are found, and a summary."""
+    terminal = takes_escapes(sys.stderr)
+    colored = colored and takes_escapes(sys.stdout)
+    checked: list[Checked] = []
+    for each in done:
+        checked.append(each)
+        if terminal:
+            sys.stderr.write(f"\r\033[K[{100 * len(checked) // total:3d}%] {each.name}")
+            sys.stderr.flush()
+        if each.problems and terminal:
+            sys.stderr.write("\r\033[K")
+        for problem in each.problems:
+            sys.stdout.write(_format_problem(problem, cwd, colored=colored))
+        sys.stdout.flush()
+    if terminal:
+        sys.stderr.write("\r\033[K")
+    problems = [one for each in checked for one in each.problems]
+    errors = sum(one.level == "error" for one in problems)
+    counts = f"{count(errors, 'error')}, {count(len(problems) - errors, 'warning')}"
+    verdict = "" if errors else "; nothing needs building"
+    sys.stdout.write(f"checked {count(len(checked), 'package')}: {counts}{verdict}\n")
+    return checked
+
+
+def _format_problem(problem: Problem, cwd: Path, *, colored: bool) -> str:
+    level = paint(problem.level, problem.level) if colored else problem.level
+    return f"{_shorten(problem.place, cwd)}: {level}: {problem.text}\n"
+
+
+def _shorten(place: str, cwd: Path) -> str:
+    """Shorten a path below the working folder."""
+    return place.removeprefix(f"{cwd}/")
+
+
+def _write_setup(cwd: Path) -> None:
+    """Write the files that course documents source after catkin_make.
+
+    Raises:
+        NotFoundError: There is no workspace around the working folder.
+        UsageError: catkin has its own files there.
+    """
+    import shlex
+
+    from rosz.cli.shells import SHELLS
+    from rosz.workspace import write_setup
+
+    workspace = next((f for f in (cwd, *cwd.parents) if (f / "src").is_dir()), None)
+    if workspace is None:
+        raise NotFoundError(f"no workspace around {cwd}: expected a folder 'src' with packages")
+    lines: dict[str, str] = {}
+    for shell in SHELLS:
+        command = f"{shlex.quote(sys.executable)} -P -m rosz env {shell}"
+        lines[shell] = f"{command} | source\n" if shell == "fish" else f'eval "$({command})"\n'
+    files = write_setup(workspace, lines)
+    sys.stdout.write(f"in a new shell: source {_shorten(str(files[0]), cwd)}\n")

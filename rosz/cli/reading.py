@@ -1,188 +1,122 @@
-"""Reading a sound command line, without typer.
+"""Read a sound command line from the declarations of its command, without typer.
 
-Whatever is not plainly sound (a word too many, a value that is no number, ``--help``, letters of
-options run together) is left to typer, which knows what to do with it or what to say.
+All other lines (an unknown option, a missing argument, ``--help``, letters of options run together)
+are left to typer, which knows what they mean or what is wrong with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
-from rosz.cli.declare import App, Argument, Command, Context, Option
+from rosz.cli.declare import App, Argument, Command, Parameter
 
-__all__ = ("Parameter", "options", "parameters", "read")
+__all__ = ("read",)
 
-_END = "--"
-
-
-class _Unsound(Exception):  # it never gets out of here
-    """The line is none that can be read here."""
+_END_OF_OPTIONS = "--"
 
 
-class Parameter:
-    """One argument of a command's function.
-
-    Args:
-        name: Of the argument.
-        kind: Type of a value: `str`, `int`, `float` or `bool`, or `Context`.
-        mark: What it is on the command line; None for a context.
-        many: Whether it takes several values.
-        required: Whether it has to be given.
-        default: What it is when it is not given.
-    """
-
-    __slots__ = ("default", "kind", "many", "mark", "name", "required")
-
-    def __init__(
-        self,
-        name: str,
-        kind: Callable[[str], Any],
-        mark: Argument | Option | None,
-        *,
-        many: bool,
-        required: bool,
-        default: Any = None,
-    ) -> None:
-        self.default = default
-        self.name = name
-        self.kind = kind
-        self.mark = mark
-        self.many = many
-        self.required = required
+class _NotSound(Exception):  # it does not leave this module
+    """The command line has to be read by typer."""
 
 
 def read(app: App, argv: Sequence[str]) -> Callable[[], Any] | None:
-    """Return what a command line asks for, ready to be called; ``None`` where typer has to look.
+    """Return a function that runs a command line; ``None`` if typer has to read it.
 
     Args:
         app: The commands.
-        argv: What follows the name of the app.
+        argv: The words that follow the name of the app.
     """
-    context, words = app.sorted_out(argv)
-    name = words.pop(0) if app.text and words else ""
+    remappings, words = app.split(argv)
+    name = words.pop(0) if app.help and words else ""
     command = app.commands.get(name)
     if command is None:
         return None
     try:
-        values = _Line(command).values(words)
-    except _Unsound:
+        values = _Reader(command).values(words, remappings)
+    except _NotSound:
         return None
-    function = command.function
-    for one in parameters(function):
-        if one.kind is Context:
-            values[one.name] = context
-    return lambda: function(**values)
+    return lambda: command.function(**values)
 
 
-def parameters(function: Callable[..., Any]) -> list[Parameter]:
-    """Return the arguments of a command's function, in order."""
-    code: Any = getattr(function, "__code__")  # noqa: B009  # which a Callable need not have
-    names = code.co_varnames[: code.co_argcount]
-    given = getattr(function, "__defaults__") or ()  # noqa: B009
-    defaults: dict[str, Any] = dict(zip(names[len(names) - len(given) :], given, strict=True))
-    defaults |= getattr(function, "__kwdefaults__") or {}  # noqa: B009
-    hints = get_type_hints(function, include_extras=True)
-    hints.pop("return", None)
-    return [_parameter(name, hint, defaults) for name, hint in hints.items()]
-
-
-def options(function: Callable[..., Any]) -> dict[str, Parameter]:
-    """Return the options of a command's function by all their spellings."""
-    return {
-        spelling: one
-        for one in parameters(function)
-        if isinstance(one.mark, Option)
-        for spelling in one.mark.spelled(one.name)
-    }
-
-
-def _parameter(name: str, hint: Any, defaults: Mapping[str, Any]) -> Parameter:
-    mark = next(iter(getattr(hint, "__metadata__", ())), None)
-    kind = hint if mark is None else hint.__origin__
-    if get_origin(kind) in {Union, UnionType}:
-        (kind,) = (one for one in get_args(kind) if one is not NoneType)
-    many = get_origin(kind) is list
-    return Parameter(
-        name,
-        get_args(kind)[0] if many else kind,
-        mark,
-        many=many,
-        required=name not in defaults,
-        default=defaults.get(name),
-    )
-
-
-class _Line:
+class _Reader:
     """Reads the words of one command.
 
     Args:
-        command: Whose they are.
+        command: The command.
     """
 
     def __init__(self, command: Command) -> None:
         self._interspersed = command.interspersed
-        self._options = options(command.function)
-        self._arguments = [
-            one for one in parameters(command.function) if isinstance(one.mark, Argument)
-        ]
+        self._parameters = command.parameters()
+        self._options = {word: one for one in self._parameters for word in one.spellings}
         self._values: dict[str, Any] = {}
 
-    def values(self, words: Iterable[str]) -> dict[str, Any]:
-        """Return the values by the names of their arguments; what is not given is left out."""
+    def values(self, words: Sequence[str], remappings: Sequence[str]) -> dict[str, Any]:
+        """Return the values of the parameters that are given, by name.
+
+        Args:
+            words: The words that follow the name of the command.
+            remappings: The remappings of the command line.
+
+        Raises:
+            _NotSound: Typer has to read the words.
+        """
         positional: list[str] = []
         left = iter(words)
         for word in left:
-            if word == _END:
+            if word == _END_OF_OPTIONS:
                 positional += left
             elif word.startswith("-") and word != "-":
-                self._option(word, left)
+                self._read_option(word, left)
             else:
                 positional.append(word)
                 if not self._interspersed:
                     positional += left
-        self._place(positional)
-        needed = {one.name for one in self._options.values() if one.required}
-        if needed - self._values.keys():
-            raise _Unsound
+        self._assign(positional)
+        for one in self._parameters:
+            if one.mark is None:
+                self._values[one.name] = one.kind(remappings)
+            elif one.required and one.name not in self._values:
+                raise _NotSound
         return self._values
 
-    def _option(self, word: str, left: Iterable[str]) -> None:
+    def _read_option(self, word: str, left: Iterator[str]) -> None:
         name, given, text = word.partition("=") if word.startswith("--") else (word, "", "")
         one = self._options.get(name)
         if one is None or (given and one.kind is bool):
-            raise _Unsound
+            raise _NotSound
         if one.kind is bool:
             self._values[one.name] = True
             return
         if not given:
-            text = next(iter(left), _END)
+            text = next(left, _END_OF_OPTIONS)
             if text.startswith("-") and text != "-":
-                raise _Unsound
-        value = _value(one, text)
+                raise _NotSound
+        value = _convert(one, text)
         if one.many:
             self._values.setdefault(one.name, []).append(value)
         else:
             self._values[one.name] = value
 
-    def _place(self, words: list[str]) -> None:
-        """Give the positional words to the arguments in turn; a list takes all that are left."""
-        for one in self._arguments:
-            if one.required and not words:
-                raise _Unsound
-            if one.many and words:
-                self._values[one.name] = [_value(one, word) for word in words]
-                words = []
-            elif words:
-                self._values[one.name] = _value(one, words[0])
-                words = words[1:]
+    def _assign(self, words: list[str]) -> None:
+        """Assign positional words to the arguments in turn; a list takes all that are left."""
+        for one in self._parameters:
+            if not words:
+                return
+            if not isinstance(one.mark, Argument):
+                continue
+            if one.many:
+                self._values[one.name] = [_convert(one, word) for word in words]
+                return
+            self._values[one.name] = _convert(one, words[0])
+            words = words[1:]
         if words:
-            raise _Unsound
+            raise _NotSound
 
 
-def _value(one: Parameter, word: str) -> Any:
+def _convert(one: Parameter, word: str) -> Any:
     try:
         return one.kind(word)
     except ValueError:
-        raise _Unsound from None
+        raise _NotSound from None

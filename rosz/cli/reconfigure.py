@@ -1,4 +1,4 @@
-"""``rosz reconfigure``: what dynparam does, and describing and watching."""
+"""``rosz reconfigure``: the commands of dynparam, and ``describe`` and ``watch``."""
 
 from __future__ import annotations
 
@@ -7,53 +7,56 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rosz.cli.bounds import at_least, seconds
-from rosz.cli.declare import Argument, Context, Option, values_last
-from rosz.cli.group import (
-    call_of,
-    new_group,
+from rosz.cli import suggest
+from rosz.cli.call import Call, new_group
+from rosz.cli.console import (
+    print_error,
     print_json,
+    print_json_line,
     print_lines,
     until_stopped,
     warn,
     write_file,
 )
-from rosz.cli.reconfigure_show import flatten, show_change, show_description
-from rosz.errors import NotFoundError, UsageError, WaitTimeout, near_miss
+from rosz.cli.declare import Argument, Option, values_last
+from rosz.cli.limits import at_least, seconds
+from rosz.errors import NotFoundError, WaitTimeout, near_miss
 
 if TYPE_CHECKING:
-    from rosz.reconfigure import Client, Config
+    from rosz.reconfigure import Client, Config, Description, Group, Setting
 
 __all__ = ("app",)
 
 app = new_group("Read and change settings of nodes while they run (dynamic_reconfigure).")
 
 _TOOL = "dynparam"
-_ANSWER_SECONDS = 10.0
-_SILENT_SECONDS = 1.0
+_TIMEOUT = 10.0
+_QUIET_SECONDS = 1.0
+"""Time to wait for a node before saying so."""
 _FOR_EVER = 1e9
 
-_Json = Annotated[bool, Option("--json", help="As JSON.")]
-_Server = Annotated[str, Argument(metavar="NODE")]
-_File = Annotated[str, Argument(metavar="FILE", help="- for the standard streams.")]
+_Json = Annotated[bool, Option("--json", help="Print JSON.")]
+_Node = Annotated[str, Argument("NODE", autocompletion=suggest.nodes)]
+_Setting = Annotated[str, Argument("SETTING", help="All settings if omitted.")]
 _Timeout = Annotated[
     float | None,
     Option(
         "-t",
         "--timeout",
         metavar="SECONDS",
-        help="Wait so long for the node and its answer; else it must be there, and answer in 10.",
+        help="Time limit to wait for the node and for its reply. Without it the node must be"
+        " running, and reply within 10 seconds.",
     ),
 ]
-_Wait = Annotated[bool, Option("--wait", help="Wait until the node is there.")]
+_Wait = Annotated[bool, Option("--wait", help="Wait until the node runs.")]
 
 
 @app.command("list")
-def list_command(context: Context, *, json: _Json = False) -> None:
-    """List what can be configured, mostly nodes."""
+def list_command(call: Call, *, json: _Json = False) -> None:
+    """List the nodes that have settings."""
     from rosz.reconfigure import find_servers
 
-    found = find_servers(call_of(context).survey().view)
+    found = find_servers(call.survey().view)
     if json:
         print_json(found)
     else:
@@ -62,20 +65,20 @@ def list_command(context: Context, *, json: _Json = False) -> None:
 
 @app.command("get")
 def get_command(
-    context: Context,
-    node: _Server,
-    setting: Annotated[str, Argument(metavar="[SETTING]")] = "",
+    call: Call,
+    node: _Node,
+    setting: _Setting = "",
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
     json: _Json = False,
 ) -> None:
-    """Print all settings of a node, as dynparam does, or the value of one."""
+    """Print all settings of a node as dynparam does, or the value of one setting."""
     from rosz.params.yaml import format_get
     from rosz.reconfigure.messages import pack_description
     from rosz.ros1.dynamic_reconfigure.encoding import decode_description, in_groups
 
-    with _client(context, node, timeout, wait=wait) as client:
+    with _client(call, node, timeout, wait=wait) as client:
         description, config = client.description(), client.config()
     if setting:
         value = config[description.setting(setting).name]
@@ -91,42 +94,36 @@ def get_command(
 
 @app.command("set", arrange=values_last(frozenset({"-t", "--timeout"})))
 def set_command(
-    context: Context,
-    node: _Server,
-    words: Annotated[
-        list[str],
-        Argument(metavar="SETTING VALUE | YAML", help="One setting, or a dictionary of several."),
+    call: Call,
+    node: _Node,
+    setting: Annotated[
+        str, Argument("SETTING|YAML", help="One setting, or a dictionary of several.")
     ],
+    value: Annotated[str | None, Argument("VALUE", help="The value of one setting.")] = None,
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
     json: _Json = False,
 ) -> None:
-    """Change settings of a node; a choice may be given by its name."""
+    """Change settings of a node; a choice can be given by its name."""
     from rosz.reconfigure import load
 
-    if len(words) > 2:  # noqa: PLR2004
-        raise UsageError(
-            f"{len(words)} words behind the node; expected a setting and its value, or a dictionary"
-        )
-    with _client(context, node, timeout, wait=wait) as client:
-        changes: Mapping[str, Any] = (
-            {words[0]: words[1]} if len(words) > 1 else load(words[0], "<value>")
-        )
+    with _client(call, node, timeout, wait=wait) as client:
+        changes = load(setting, "<value>") if value is None else {setting: value}
         _change(client, changes, as_json=json)
 
 
 @app.command("set_from_parameters")
 def set_from_parameters_command(
-    context: Context,
-    node: _Server,
+    call: Call,
+    node: _Node,
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
     json: _Json = False,
 ) -> None:
-    """Change settings of a node to the private parameters of this command (_gain:=2)."""
-    with _client(context, node, timeout, wait=wait) as client:
+    """Change settings of a node to the private parameters of this command, such as _gain:=2."""
+    with _client(call, node, timeout, wait=wait) as client:
         params = client.node.params
         changes: dict[str, Any] = params.get("~", {})
         if not changes:
@@ -139,9 +136,11 @@ def set_from_parameters_command(
 
 @app.command("dump")
 def dump_command(
-    context: Context,
-    node: _Server,
-    file: _File,
+    call: Call,
+    node: _Node,
+    file: Annotated[
+        str, Argument("FILE", help="'-' is standard output.", autocompletion=suggest.files)
+    ],
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
@@ -149,7 +148,7 @@ def dump_command(
     """Write all settings of a node to a YAML file."""
     from rosz.reconfigure import dump
 
-    with _client(context, node, timeout, wait=wait) as client:
+    with _client(call, node, timeout, wait=wait) as client:
         text = dump(client.config())
     if file == "-":
         sys.stdout.write(text)
@@ -159,54 +158,56 @@ def dump_command(
 
 @app.command("load")
 def load_command(
-    context: Context,
-    node: _Server,
-    file: _File,
+    call: Call,
+    node: _Node,
+    file: Annotated[
+        str, Argument("FILE", help="'-' is standard input.", autocompletion=suggest.files)
+    ],
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
     json: _Json = False,
 ) -> None:
-    """Change settings of a node to those of a file, also one of ROS 1's dynparam."""
+    """Change settings of a node to those in a YAML file, also one written by ROS 1's dynparam."""
     from pathlib import Path
 
     from rosz.reconfigure import load
 
     text = sys.stdin.read() if file == "-" else Path(file).read_text(encoding="utf-8")
     changes = load(text, "<stdin>" if file == "-" else file)
-    with _client(context, node, timeout, wait=wait) as client:
+    with _client(call, node, timeout, wait=wait) as client:
         _change(client, changes, as_json=json)
 
 
 @app.command("describe")
 def describe_command(
-    context: Context,
-    node: _Server,
-    setting: Annotated[str, Argument(metavar="[SETTING]")] = "",
+    call: Call,
+    node: _Node,
+    setting: _Setting = "",
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
     json: _Json = False,
 ) -> None:
-    """Tell what there is to set: types, values, bounds, choices, groups."""
-    with _client(context, node, timeout, wait=wait) as client:
+    """Print the types, values, bounds, choices and groups of the settings of a node."""
+    with _client(call, node, timeout, wait=wait) as client:
         description, config = client.description(), client.config()
-    show_description(description, config, setting, as_json=json)
+    _print_description(description, config, setting, as_json=json)
 
 
 @app.command("watch")
 def watch_command(
-    context: Context,
-    node: _Server,
+    call: Call,
+    node: _Node,
     *,
     count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="End after so many changes.")
+        int | None, Option("-n", metavar="COUNT", help="Stop after this number of changes.")
     ] = None,
     timeout: _Timeout = None,
     wait: _Wait = False,
     json: _Json = False,
 ) -> None:
-    """Print changes of a node's settings as they come."""
+    """Print changes of the settings of a node as they happen."""
     if count is not None:
         at_least("-n", count, 1, "changes")
     from queue import SimpleQueue
@@ -214,52 +215,50 @@ def watch_command(
     configs: SimpleQueue[Config] = SimpleQueue()
     with (
         until_stopped() as ready,
-        _client(context, node, timeout, wait=wait, lasting=True) as client,
+        _client(call, node, timeout, wait=wait, lasting=True) as client,
     ):
         ready()
-        before = flatten(client.config())
+        before = _flatten(client.config())
         client.config_callback = configs.put
-        sys.stderr.write(f"watching [{client.name}]; press Ctrl-C to end\n")
-        sys.stderr.flush()
+        print_error(f"watching [{client.name}]; press Ctrl-C to end")
         left = count
         while left is None or left > 0:
-            now = flatten(configs.get())
+            now = _flatten(configs.get())
             changed = [name for name in now if now[name] != before.get(name)]
             for name in changed[:left]:
-                show_change(name, before.get(name), now[name], as_json=json)
+                _print_change(name, before.get(name), now[name], as_json=json)
             left = None if left is None else left - len(changed)
             before = now
 
 
 @contextmanager
 def _client(
-    context: Context,
+    call: Call,
     name: str,
     timeout: float | None,
     *,
     wait: bool,
     lasting: bool = False,
 ) -> Iterator[Client]:
-    """Give a client of a server that is there.
+    """Open a client of a node's settings.
 
     Raises:
-        NotFoundError: It is not.
-        WaitTimeout: It did not come in time.
+        NotFoundError: The node does not run, or has no settings.
+        WaitTimeout: The node did not start in time.
     """
     if timeout is not None:
         seconds("--timeout", timeout)
     from rosz.node import Node
     from rosz.reconfigure import Client, find_servers
 
-    call = call_of(context)
     full = call.resolve(name, _TOOL)
     with (
         call.context(lasting=lasting or wait) as ros,
         Node(_TOOL, anonymous=True, context=ros) as node,
-        Client(node, full, timeout=timeout or _ANSWER_SECONDS) as client,
+        Client(node, full, timeout=timeout or _TIMEOUT) as client,
     ):
         if wait or timeout is not None:
-            _wait_for(client, _FOR_EVER if wait else timeout or _ANSWER_SECONDS)
+            _wait_for(client, _FOR_EVER if wait else timeout or _TIMEOUT)
         else:
             known = find_servers(ros.graph.refresh())
             if client.name not in known:
@@ -270,17 +269,16 @@ def _client(
 
 def _wait_for(client: Client, seconds: float) -> None:
     try:
-        client.wait(min(seconds, _SILENT_SECONDS))
+        client.wait(min(seconds, _QUIET_SECONDS))
     except WaitTimeout:
-        if seconds <= _SILENT_SECONDS:
+        if seconds <= _QUIET_SECONDS:
             raise
-        sys.stderr.write(f"Waiting for service {client.name}/set_parameters...\n")
-        sys.stderr.flush()
-        client.wait(seconds - _SILENT_SECONDS)
+        print_error(f"Waiting for service {client.name}/set_parameters...")
+        client.wait(seconds - _QUIET_SECONDS)
 
 
 def _change(client: Client, changes: Mapping[str, Any], *, as_json: bool) -> None:
-    """Change settings, and tell what the node made of them where that is something else."""
+    """Change settings, and warn of those that the node has set to another value."""
     wanted = client.description().convert(changes)
     config = client.update(changes)
     for name, value in wanted.items():
@@ -288,3 +286,96 @@ def _change(client: Client, changes: Mapping[str, Any], *, as_json: bool) -> Non
             warn(f"{name} is {config[name]!r} and not {value!r}: the node decided so")
     if as_json:
         print_json(config)
+
+
+def _print_description(
+    description: Description, config: Config, only: str, *, as_json: bool
+) -> None:
+    """Print all settings, or one of them, with their values.
+
+    Raises:
+        ParamError: The setting does not exist.
+    """
+    if only:
+        setting = description.setting(only)
+        if as_json:
+            print_json(_setting_row(setting, config))
+        else:
+            print_lines(_describe(setting, config, ""))
+    elif as_json:
+        rows = [_setting_row(setting, config) for setting in description.settings.values()]
+        print_json({"settings": rows, "groups": _group_rows(description)})
+    else:
+        print_lines(_describe_group(description.root, config, config["groups"], ""))
+
+
+def _describe_group(group: Group, config: Config, tree: Config, indent: str) -> Iterator[str]:
+    for setting in group.settings:
+        yield from _describe(setting, config, indent)
+    for inner in group.groups:
+        state = tree["groups"][inner.name]
+        notes = ", ".join(filter(None, (inner.type, "" if state["state"] else "not shown")))
+        yield f"{indent}[{inner.name}]{' ' + notes if notes else ''}"
+        yield from _describe_group(inner, config, state, indent + "  ")
+
+
+def _describe(setting: Setting, config: Config, indent: str) -> Iterator[str]:
+    yield f"{indent}{setting.name} ({setting.kind}) = {config[setting.name]!r}"
+    if setting.description:
+        yield f"{indent}    {setting.description}"
+    bounds = ""
+    if setting.kind in {"int", "double"}:
+        bounds = f", min {setting.min!r}, max {setting.max!r}"
+    yield f"{indent}    default {setting.default!r}{bounds}, level {setting.level}"
+    choices = setting.choices
+    width = max((len(choice.name) for choice in choices), default=0)
+    for choice in choices:
+        yield f"{indent}    {choice.name:<{width}}  {choice.value!r}  {choice.description}".rstrip()
+
+
+def _setting_row(setting: Setting, config: Config) -> dict[str, Any]:
+    return {
+        "name": setting.name,
+        "type": setting.kind,
+        "value": config[setting.name],
+        "default": setting.default,
+        "min": setting.min,
+        "max": setting.max,
+        "level": setting.level,
+        "description": setting.description,
+        "choices": setting.choices,
+    }
+
+
+def _group_rows(description: Description) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": group.name,
+            "id": group.id,
+            "parent": parent,
+            "type": group.type,
+            "settings": [setting.name for setting in group.settings],
+        }
+        for group, parent in description.groups
+    ]
+
+
+def _flatten(config: Config) -> dict[str, Any]:
+    """Return the values by name, and the states of groups by ``groups/<name>``."""
+    values = {name: value for name, value in config.items() if name != "groups"}
+    return values | dict(_states(config["groups"], "groups"))
+
+
+def _states(tree: Config, place: str) -> Iterator[tuple[str, bool]]:
+    for name, inner in tree["groups"].items():
+        yield f"{place}/{name}", inner["state"]
+        yield from _states(inner, f"{place}/{name}")
+
+
+def _print_change(name: str, old: Any, new: Any, *, as_json: bool) -> None:
+    if as_json:
+        print_json_line({"name": name, "old": old, "new": new})
+        return
+    from rosz.params.yaml import inline
+
+    print_lines([f"~ {name}: {inline(old)} -> {inline(new)}"])

@@ -1,4 +1,4 @@
-"""``rosz run``: run an executable of a package, in place of this process, as rosrun does."""
+"""``rosz run``: replace this process by an executable of a package, as rosrun does."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
 
+from rosz.cli import suggest
+from rosz.cli.console import print_error
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import LaunchError, UsageError
 
@@ -16,14 +18,22 @@ __all__ = ("app",)
 app = App()
 
 
-# What follows the package belongs to the program, options included.
+# Options behind the package belong to the program.
 @app.command(interspersed=False)
-def command(
-    words: Annotated[
+def run_command(
+    package: Annotated[str, Argument("PACKAGE", autocompletion=suggest.packages)] = "",
+    executable: Annotated[
+        str,
+        Argument(
+            "EXECUTABLE", help="An executable of the package.", autocompletion=suggest.executables
+        ),
+    ] = "",
+    arguments: Annotated[
         list[str] | None,
         Argument(
-            metavar="PACKAGE EXECUTABLE [ARGS]...",
-            help="What to run, and what to pass to it: name:=value, _param:=value, __name:=value …",
+            "ARGS",
+            help="Arguments of the program, such as name:=value, _param:=value, __name:=value.",
+            autocompletion=suggest.files,
         ),
     ] = None,
     *,
@@ -33,39 +43,41 @@ def command(
             "--prefix",
             "-p",
             metavar="COMMAND",
-            help="Put a command before it, such as 'gdb --args'.",
+            help="Run the program with a command, such as 'gdb --args'.",
         ),
     ] = "",
-    debug: Annotated[bool, Option("--debug", "-d", help="Print what is run.")] = False,
+    debug: Annotated[
+        bool, Option("--debug", "-d", help="Print the command line of the program.")
+    ] = False,
 ) -> None:
     """Run an executable of a package.
 
     A Python script runs under the interpreter of rosz, with the ROS 1 names importable.
     """
     from rosz.environment import Environment, package_index
-    from rosz.launch.run.command import Workplace, run_command
+    from rosz.launch.run.command import Workplace
+    from rosz.launch.run.command import run_command as make_command
 
-    if not words:
+    if not package:
         raise UsageError("no package is given: rosz run PACKAGE EXECUTABLE [ARGS]")
-    package, *rest = words
     environ = dict(os.environ)
     environment = Environment.read(environ)
     packages = package_index(environment)
-    if not rest:
+    if not executable:
         listing = ", ".join(packages.find(package).executables()) or "it has none"
         raise UsageError(f"no executable of package '{package}' is given: {listing}")
     workplace = Workplace(packages, environment, environ, str(Path.cwd()))
-    chosen = run_command(workplace, package, rest[0], rest[1:], prefix)
+    chosen = make_command(workplace, package, executable, arguments or [], prefix)
     if debug:
-        sys.stderr.write(f"[rosz run] {' '.join(chosen.argv)}\n")
-    _become(chosen.argv, chosen.environ)
+        print_error(f"[rosz run] {' '.join(chosen.argv)}")
+    _replace_process(chosen.argv, chosen.environ)
 
 
-def _become(argv: tuple[str, ...], environ: dict[str, str]) -> NoReturn:
+def _replace_process(argv: tuple[str, ...], environ: dict[str, str]) -> NoReturn:
     sys.stdout.flush()
     sys.stderr.flush()
     try:
-        os.execvpe(argv[0], argv, environ)  # noqa: S606  # that is what was asked for
+        os.execvpe(argv[0], argv, environ)  # noqa: S606  # the purpose of the command
     except OSError as error:
         hint = ""
         if error.errno == errno.ENOEXEC:

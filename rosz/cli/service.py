@@ -1,69 +1,74 @@
-"""``rosz service``: what rosservice does."""
+"""``rosz service``: the commands of rosservice."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
-from rosz.cli.bounds import seconds
-from rosz.cli.declare import Argument, Context, Option, values_last
-from rosz.cli.group import call_of, new_group, print_json, print_lines
+from rosz.cli import suggest
+from rosz.cli.call import Call, new_group
+from rosz.cli.console import print_json, print_lines, until_stopped, warn
+from rosz.cli.declare import Argument, Option, values_last
+from rosz.cli.limits import seconds
+from rosz.errors import EncodeError, UsageError
+
+if TYPE_CHECKING:
+    from rosz.node import Client
+    from rosz.wire import Token
 
 __all__ = ("app",)
 
 app = new_group("List and call services.")
 
 _TOOL = "rosservice"
-_Json = Annotated[bool, Option("--json", help="As JSON.")]
-_ServiceName = Annotated[str, Argument(metavar="SERVICE")]
+_Json = Annotated[bool, Option("--json", help="Print JSON.")]
+_ServiceName = Annotated[str, Argument("SERVICE", autocompletion=suggest.services)]
 
 
 @app.command("list")
 def list_command(
-    context: Context,
-    namespace: Annotated[str, Argument(metavar="[NAMESPACE]")] = "",
+    call: Call,
+    namespace: Annotated[
+        str, Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.services)
+    ] = "",
     *,
-    nodes: Annotated[bool, Option("-n", "--nodes", help="With the nodes.")] = False,
-    types: Annotated[bool, Option("-t", "--types", help="With types.")] = False,
+    nodes: Annotated[bool, Option("-n", "--nodes", help="Print the nodes as well.")] = False,
+    types: Annotated[bool, Option("-t", "--types", help="Print the types as well.")] = False,
     json: _Json = False,
 ) -> None:
     """List services."""
-    from rosz.introspect import services as library
+    from rosz.introspect.services import list_services
     from rosz.introspect.topics import in_namespace
 
-    call = call_of(context)
     space = call.resolve(namespace, _TOOL) if namespace else "/"
-    entries = [
-        entry
-        for entry in library.list_services(call.survey().view)
-        if in_namespace(entry.name, space)
-    ]
+    found = [one for one in list_services(call.survey().view) if in_namespace(one.name, space)]
     if json:
-        print_json(entries)
+        print_json(found)
         return
-    for entry in entries:
-        kind = f" [{', '.join(entry.types)}]" if types else ""
-        print_lines([entry.name + kind + (f" {','.join(entry.nodes)}" if nodes else "")])
+    for one in found:
+        kind = f" [{', '.join(one.types)}]" if types else ""
+        print_lines([one.name + kind + (f" {','.join(one.nodes)}" if nodes else "")])
 
 
 @app.command("info")
-def info_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
-    """Tell who serves a service, of what type and with what arguments."""
-    from rosz.introspect import services as library
-    from rosz.introspect.arguments import list_arguments
+def info_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+    """Print the node, the type and the arguments of a service."""
+    from rosz.introspect.services import service_key
     from rosz.names import short_type
 
-    call = call_of(context)
-    token = library.find_server(call.survey().view, call.resolve(service, _TOOL))
-    arguments = list_arguments(call.types.service(token.type_name).Request)
+    token = _server(call, service)
+    arguments = _arguments(call, token)
     type_name = short_type(token.type_name)
     if json:
-        row = {"name": token.name, "node": token.node_name, "uri": library.service_key(token)}
+        row = {"name": token.name, "node": token.node_name, "uri": service_key(token)}
         print_json(row | {"type": type_name, "args": arguments.split()})
         return
     print_lines(
         [
             f"Node: {token.node_name}",
-            f"URI: {library.service_key(token)}",
+            f"URI: {service_key(token)}",
             f"Type: {type_name}",
             f"Args: {arguments}",
         ]
@@ -71,14 +76,64 @@ def info_command(context: Context, service: _ServiceName, *, json: _Json = False
 
 
 @app.command("type")
-def type_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
+def type_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the type of a service."""
-    from rosz.introspect.services import find_server
     from rosz.names import short_type
 
-    call = call_of(context)
-    name = short_type(find_server(call.survey().view, call.resolve(service, _TOOL)).type_name)
-    _print_one("type", name, as_json=json)
+    _print_one("type", short_type(_server(call, service).type_name), as_json=json)
+
+
+@app.command("find")
+def find_command(
+    call: Call,
+    type_name: Annotated[str, Argument("TYPE", autocompletion=suggest.service_types)],
+    *,
+    json: _Json = False,
+) -> None:
+    """List the services of a type."""
+    from rosz.introspect.services import services_of_type
+
+    found = services_of_type(call.survey().view, type_name)
+    if json:
+        print_json(found)
+    else:
+        print_lines(found)
+
+
+@app.command("args")
+def args_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+    """Print the arguments of a service."""
+    names = _arguments(call, _server(call, service))
+    if json:
+        print_json({"args": names.split()})
+    else:
+        print_lines([names])
+
+
+@app.command("node")
+def node_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+    """Print the node that provides a service."""
+    _print_one("node", _server(call, service).node_name, as_json=json)
+
+
+@app.command("uri")
+def uri_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+    """Print the Zenoh key of a service."""
+    from rosz.introspect.services import service_key
+
+    _print_one("uri", service_key(_server(call, service)), as_json=json)
+
+
+def _server(call: Call, service: str) -> Token:
+    from rosz.introspect.services import find_server
+
+    return find_server(call.survey().view, call.resolve(service, _TOOL))
+
+
+def _arguments(call: Call, token: Token) -> str:
+    from rosz.introspect.arguments import list_arguments
+
+    return list_arguments(call.types.service(token.type_name).Request)
 
 
 def _print_one(title: str, value: str, *, as_json: bool) -> None:
@@ -88,78 +143,80 @@ def _print_one(title: str, value: str, *, as_json: bool) -> None:
         print_lines([value])
 
 
-@app.command("find")
-def find_command(
-    context: Context,
-    type_name: Annotated[str, Argument(metavar="TYPE")],
-    *,
-    json: _Json = False,
-) -> None:
-    """List the services of a type."""
-    from rosz.introspect.services import services_of_type
-
-    found = services_of_type(call_of(context).survey().view, type_name)
-    if json:
-        print_json(found)
-    else:
-        print_lines(found)
-
-
-@app.command("args")
-def args_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
-    """Print the arguments that a service takes."""
-    from rosz.introspect.arguments import list_arguments
-    from rosz.introspect.services import find_server
-
-    call = call_of(context)
-    token = find_server(call.survey().view, call.resolve(service, _TOOL))
-    names = list_arguments(call.types.service(token.type_name).Request)
-    if json:
-        print_json({"args": names.split()})
-    else:
-        print_lines([names])
-
-
-@app.command("node")
-def node_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
-    """Print the node that serves a service."""
-    from rosz.introspect.services import find_server
-
-    call = call_of(context)
-    token = find_server(call.survey().view, call.resolve(service, _TOOL))
-    _print_one("node", token.node_name, as_json=json)
-
-
-@app.command("uri")
-def uri_command(context: Context, service: _ServiceName, *, json: _Json = False) -> None:
-    """Print the key that a service is called by on Zenoh."""
-    from rosz.introspect.services import find_server, service_key
-
-    call = call_of(context)
-    token = find_server(call.survey().view, call.resolve(service, _TOOL))
-    _print_one("uri", service_key(token), as_json=json)
-
-
 @app.command("call", arrange=values_last(frozenset({"--timeout"})))
 def call_command(
-    context: Context,
+    call: Call,
     service: _ServiceName,
     values: Annotated[
         list[str] | None,
-        Argument(metavar="[VALUE]...", help="YAML: one dictionary, or a value per field."),
+        Argument(
+            "VALUE",
+            help="The request in YAML: one dictionary, or one value per field; read from standard"
+            " input if omitted.",
+            autocompletion=suggest.request_values,
+        ),
     ] = None,
     *,
-    verbose: Annotated[bool, Option("-v", help="Print the request too.")] = False,
+    verbose: Annotated[bool, Option("-v", help="Print the request as well.")] = False,
     wait: Annotated[bool, Option("--wait", help="Wait for the service.")] = False,
     timeout: Annotated[
-        float, Option(metavar="SECONDS", help="Wait for the answer at most so long.")
+        float, Option(metavar="SECONDS", help="Time limit for the response.")
     ] = 3600.0,
     json: _Json = False,
 ) -> None:
-    """Call a service and print its answer."""
-    from rosz.cli.service_call import CallOptions, call_service
+    """Call a service and print its response."""
+    seconds("--timeout", timeout)
+    import rosz.message.convert  # noqa: F401  # used later; Ctrl-C must not interrupt an import
+    from rosz.introspect.arguments import read_arguments
+    from rosz.introspect.services import find_server, wait_for_server
+    from rosz.node import Node
 
-    options = CallOptions(
-        verbose=verbose, wait=wait, timeout=seconds("--timeout", timeout), as_json=json
-    )
-    call_service(call_of(context), service, values or (), options)
+    arguments = read_arguments(values or ())
+    # A command that waits joins as a peer, so that it outlives the process at the rendezvous.
+    with until_stopped() as ready, call.context(lasting=wait) as context:
+        ready()
+        name = call.resolve(service, _TOOL)
+        if wait:
+            token = wait_for_server(context, name, warn)
+        else:
+            token = find_server(context.graph.refresh(), name)
+        stopped = context.session.why_silent(token.zid)
+        if stopped:
+            warn(f"service [{token.name}] does not answer as long as {stopped}")
+        service_type = context.types.service(token.type_name)
+        with (
+            Node(_TOOL, anonymous=True, context=context) as node,
+            node.client(token.name, service_type, timeout=timeout) as client,
+        ):
+            for request in _requests(arguments, service_type.Request):
+                _send(client, request, verbose=verbose, as_json=json)
+
+
+def _requests(arguments: list[Any], request_type: Any) -> Iterable[list[Any]]:
+    """Return the values of each request, from the command line or from standard input."""
+    from rosz.introspect.arguments import list_arguments, read_stream
+
+    if arguments or not request_type.__slots__:
+        return [arguments]
+    if sys.stdin.isatty():
+        raise UsageError(f"no values are given; they are: {list_arguments(request_type)}")
+    documents = read_stream(sys.stdin.buffer, warn)
+    return (one if isinstance(one, list) else [one] for one in documents)
+
+
+def _send(client: Client, values: Sequence[Any], *, verbose: bool, as_json: bool) -> None:
+    from rosz.introspect.arguments import with_arguments
+    from rosz.introspect.services import call_service
+    from rosz.message.convert import to_jsonable
+
+    try:
+        request, response = call_service(client, values, time.time_ns())
+    except EncodeError as error:
+        raise with_arguments(error, client.service_type.Request) from error
+    if as_json:
+        row = to_jsonable(response)
+        print_json({"request": to_jsonable(request), "response": row} if verbose else row)
+        return
+    if verbose:
+        print_lines([str(request), "---"])
+    print_lines([str(response)])

@@ -1,43 +1,73 @@
-"""``rosz topic``: what rostopic does."""
+"""``rosz topic``: the commands of rostopic."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
 
-from rosz.cli.bounds import at_least, per_second
-from rosz.cli.declare import Argument, Context, Option
-from rosz.cli.group import call_of, new_group, print_json, print_lines
-from rosz.errors import UsageError
+from rosz.cli import suggest
+from rosz.cli.call import Call, new_group
+from rosz.cli.console import print_json, print_json_line, print_lines, until_stopped, warn
+from rosz.cli.declare import Argument, Option
+from rosz.cli.limits import at_least, per_second
+from rosz.errors import ClosedError, EncodeError, NotFoundError, UsageError
+
+if TYPE_CHECKING:
+    from msgspec import Struct
+
+    from rosz.introspect.echo import EchoOptions
+    from rosz.introspect.fields import Filter, Target
+    from rosz.node import Context, MessageInfo, Node
+    from rosz.session import Sample
+    from rosz.wire import Token
 
 __all__ = ("app",)
 
 app = new_group("List, show, measure and publish topics.")
 
+_TOOL = "rostopic"
 _WIDEST = 1000
+_PERIOD = 1.0
+"""Seconds between two reports."""
+_DEPTH = 10_000
+"""Messages that wait while the terminal is slow."""
 
-_Json = Annotated[bool, Option("--json", help="As JSON.")]
+_Json = Annotated[bool, Option("--json", help="Print JSON.")]
 _Window = Annotated[
-    int | None, Option("-w", "--window", metavar="COUNT", help="Messages to average over.")
+    int | None, Option("-w", "--window", metavar="COUNT", help="Number of messages to average.")
 ]
 _Condition = Annotated[
     str,
-    Option("--filter", metavar="EXPRESSION", help="Python; m is the message, topic its topic."),
+    Option(
+        "--filter",
+        metavar="EXPRESSION",
+        help="Use only messages for which a Python expression is true; m is the message, topic its"
+        " topic.",
+    ),
 ]
-_TopicName = Annotated[str, Argument(metavar="TOPIC")]
+_TopicName = Annotated[str, Argument("TOPIC", autocompletion=suggest.topics)]
+_TopicOrField = Annotated[str, Argument("TOPIC_OR_FIELD", autocompletion=suggest.topics)]
 
 
 @app.command("list")
 def list_command(
-    context: Context,
-    namespace: Annotated[str, Argument(metavar="[NAMESPACE]")] = "",
+    call: Call,
+    namespace: Annotated[
+        str, Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.topics)
+    ] = "",
     *,
     verbose: Annotated[
-        bool, Option("-v", "--verbose", help="With types and numbers of ends.")
+        bool,
+        Option("-v", "--verbose", help="Print types and numbers of publishers and subscribers."),
     ] = False,
-    publishers: Annotated[bool, Option("-p", help="Only what is published.")] = False,
-    subscribers: Annotated[bool, Option("-s", help="Only what is subscribed to.")] = False,
-    types: Annotated[bool, Option("-t", "--types", help="With types.")] = False,
-    host: Annotated[bool, Option("--host", help="Grouped by host.")] = False,
+    publishers: Annotated[bool, Option("-p", help="List only published topics.")] = False,
+    subscribers: Annotated[bool, Option("-s", help="List only subscribed topics.")] = False,
+    types: Annotated[bool, Option("-t", "--types", help="Print types.")] = False,
+    host: Annotated[bool, Option("--host", help="Group topics by host.")] = False,
     json: _Json = False,
 ) -> None:
     """List topics."""
@@ -45,8 +75,7 @@ def list_command(
         raise UsageError("-p and -s exclude each other: without them both are listed")
     from rosz.introspect import topics as library
 
-    call = call_of(context)
-    space = call.resolve(namespace, "rostopic") if namespace else "/"
+    space = call.resolve(namespace, _TOOL) if namespace else "/"
     survey = call.survey(processes=host)
     groups = library.by_host(survey) if host else {"": list(survey.view.tokens)}
     found = {
@@ -67,14 +96,10 @@ def list_command(
         if host and topics:
             print_lines([f"Host [{name}]:"])
         if verbose:
-            print_lines(
-                library.format_topics(
-                    topics,
-                    publishers=not subscribers,
-                    subscribers=not publishers,
-                    indent=indent,
-                ).splitlines()
+            text = library.format_topics(
+                topics, publishers=not subscribers, subscribers=not publishers, indent=indent
             )
+            print_lines(text.splitlines())
         elif types:
             print_lines(f"{indent}{topic.name} [{topic.type_text}]" for topic in topics)
         else:
@@ -82,12 +107,11 @@ def list_command(
 
 
 @app.command("info")
-def info_command(context: Context, topic: _TopicName, *, json: _Json = False) -> None:
-    """Tell the type of a topic, who publishes it and who subscribes to it."""
+def info_command(call: Call, topic: _TopicName, *, json: _Json = False) -> None:
+    """Print the type, the publishers and the subscribers of a topic."""
     from rosz.introspect import topics as library
 
-    call = call_of(context)
-    name = call.resolve(topic, "rostopic")
+    name = call.resolve(topic, _TOOL)
     survey = call.survey(processes=True)
     if not json:
         print_lines([library.format_topic(survey, name)])
@@ -104,18 +128,12 @@ def info_command(context: Context, topic: _TopicName, *, json: _Json = False) ->
 
 
 @app.command("type")
-def type_command(
-    context: Context,
-    topic: Annotated[str, Argument(metavar="TOPIC_OR_FIELD")],
-    *,
-    json: _Json = False,
-) -> None:
-    """Print the type of a topic, or of a field of it."""
+def type_command(call: Call, topic: _TopicOrField, *, json: _Json = False) -> None:
+    """Print the type of a topic, or of a field of its messages."""
     from rosz.introspect.fields import find_target
     from rosz.introspect.subscribe import resolve_field, topic_types
 
-    call = call_of(context)
-    name = resolve_field(topic, lambda each: call.resolve(each, "rostopic"))
+    name = resolve_field(topic, lambda each: call.resolve(each, _TOOL))
     view = call.survey().view
     load = call.types.message
     text = find_target(name, topic_types(view), load).type_text(load)
@@ -127,17 +145,15 @@ def type_command(
 
 @app.command("find")
 def find_command(
-    context: Context,
-    type_name: Annotated[str, Argument(metavar="TYPE")],
+    call: Call,
+    type_name: Annotated[str, Argument("TYPE", autocompletion=suggest.topic_types)],
     *,
     json: _Json = False,
 ) -> None:
     """List the topics of a type."""
     from rosz.introspect import topics as library
 
-    found = library.topics_of_type(
-        library.list_topics(call_of(context).survey().view.tokens), type_name
-    )
+    found = library.topics_of_type(library.list_topics(call.survey().view.tokens), type_name)
     if json:
         print_json(found)
     else:
@@ -146,27 +162,30 @@ def find_command(
 
 @app.command("echo")
 def echo_command(
-    context: Context,
-    topic: Annotated[str, Argument(metavar="TOPIC_OR_FIELD")],
+    call: Call,
+    topic: _TopicOrField,
     *,
     count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="End after so many messages.")
+        int | None, Option("-n", metavar="COUNT", help="Stop after this number of messages.")
     ] = None,
-    once: Annotated[bool, Option("-1", "--once", help="End after one message.")] = False,
-    plot: Annotated[bool, Option("-p", help="As numbers with commas, for plotting.")] = False,
+    once: Annotated[bool, Option("-1", "--once", help="Stop after one message.")] = False,
+    plot: Annotated[
+        bool, Option("-p", help="Print comma-separated numbers, for plotting.")
+    ] = False,
     width: Annotated[
-        int | None, Option("-w", metavar="WIDTH", help="Fixed width of numbers.")
+        int | None, Option("-w", metavar="WIDTH", help="Print numbers with a fixed width.")
     ] = None,
     condition: _Condition = "",
-    nostr: Annotated[bool, Option("--nostr", help="Leave out texts.")] = False,
-    noarr: Annotated[bool, Option("--noarr", help="Leave out arrays.")] = False,
-    clear: Annotated[bool, Option("-c", "--clear", help="Clear the screen before each.")] = False,
-    offset: Annotated[bool, Option("--offset", help="Show times as seconds from now.")] = False,
-    raw: Annotated[bool, Option("--raw", help="Show the bytes, not decoded.")] = False,
+    nostr: Annotated[bool, Option("--nostr", help="Leave strings out.")] = False,
+    noarr: Annotated[bool, Option("--noarr", help="Leave arrays out.")] = False,
+    clear: Annotated[
+        bool, Option("-c", "--clear", help="Clear the screen before each message.")
+    ] = False,
+    offset: Annotated[bool, Option("--offset", help="Print times as seconds from now.")] = False,
+    raw: Annotated[bool, Option("--raw", help="Print the bytes without decoding them.")] = False,
     json: _Json = False,
 ) -> None:
     """Print the messages of a topic."""
-    from rosz.cli.topic_follow import echo
     from rosz.introspect.echo import EchoOptions
     from rosz.introspect.fields import Filter
 
@@ -188,89 +207,285 @@ def echo_command(
         raise UsageError(
             "--raw shows bytes: -p, --filter, --nostr and --noarr need decoded messages"
         )
-    echo(call_of(context), topic, options, count=1 if once else count, raw=raw)
+    from rosz.introspect.subscribe import find_class
+    from rosz.qos import QoS
+
+    with _open_node(call) as node:
+        target, token = _wait_for(node, topic)
+        to_text = _raw_text(options) if raw else _text(node, target, token, options)
+        printer = _Printer(to_text, 1 if once else count)
+        cls = None if raw else find_class(node.context, token)
+        qos = QoS(depth=_DEPTH)
+        node.subscription(target.topic, cls, printer.receive, qos=qos, raw=raw, with_info=True)
+        printer.wait(node.context, target.topic)
+
+
+@contextmanager
+def _open_node(call: Call) -> Iterator[Node]:
+    """Open a node that lasts until the command is stopped."""
+    import rosz.introspect.subscribe  # noqa: F401  # used later; Ctrl-C must not interrupt an import
+    from rosz.node import Node
+
+    with (
+        until_stopped() as ready,
+        call.context(lasting=True) as context,
+        Node(_TOOL, anonymous=True, context=context) as node,
+    ):
+        ready()
+        yield node
+
+
+def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
+    """Wait for a topic, or a field, and return it with a token of the topic."""
+    from rosz.introspect.subscribe import find_token, resolve_field, wait_for_target
+
+    target = wait_for_target(node.context, resolve_field(name, node.resolve), warn)
+    return target, find_token(node.context.graph.view(), target.topic, target.type_name)
+
+
+def _text(
+    node: Node, target: Target, token: Token, options: EchoOptions
+) -> Callable[[Any], str | None]:
+    from rosz.introspect.echo import Echo
+    from rosz.introspect.subscribe import find_class
+
+    kind = target.path.type_in(find_class(node.context, token))
+    return Echo(target.topic, kind, target.path, options, node.now).text
+
+
+def _raw_text(options: EchoOptions) -> Callable[[Any], str]:
+    from rosz.introspect.echo import dump_bytes
+
+    if options.as_json:
+        return lambda payload: f'{{"payload":"{payload.hex()}"}}\n'
+    return lambda payload: f"{dump_bytes(payload)}\n---\n"
+
+
+class _Printer:
+    """Prints messages on the subscription's thread; the main thread waits for the end.
+
+    Args:
+        to_text: A function that returns the text of a message, or ``None`` to leave it out.
+        count: The number of messages to print; ``None`` for no limit.
+    """
+
+    def __init__(self, to_text: Callable[[Any], str | None], count: int | None) -> None:
+        self._to_text = to_text
+        self._left = count
+        self._ended = threading.Event()
+        self._error: Exception | None = None
+
+    def receive(self, message: Any, info: MessageInfo) -> None:
+        """Print a message."""
+        if self._ended.is_set():
+            return
+        try:
+            if info.lost:
+                warn(f"{info.lost} messages are missing here")
+            text = self._to_text(message)
+            if text is None:
+                return
+            sys.stdout.write(text)
+            sys.stdout.flush()
+        except LookupError as error:
+            warn(f"a message is left out: {error}")
+            return
+        except Exception as error:  # noqa: BLE001  # raised in the main thread
+            self._error = error
+            self._ended.set()
+            return
+        if self._left is not None:
+            self._left -= 1
+            if not self._left:
+                self._ended.set()
+
+    def wait(self, context: Context, topic: str) -> None:
+        """Wait for the last message.
+
+        Raises:
+            ClosedError: Something else has shut the context down.
+        """
+        withdraw = context.on_shutdown(lambda _: self._ended.set())
+        self._ended.wait()
+        withdraw()
+        if self._error is not None:
+            raise self._error
+        if context.is_shutdown:
+            raise ClosedError(f"no more of '{topic}': {context.reason or 'shut down'}")
 
 
 @app.command("hz")
 def hz_command(
-    context: Context,
-    topics: Annotated[list[str], Argument(metavar="TOPIC...")],
+    call: Call,
+    topics: Annotated[list[str], Argument("TOPIC", autocompletion=suggest.topics)],
     *,
     window: _Window = None,
     condition: _Condition = "",
     wall_time: Annotated[
-        bool, Option("--wall-time", help="Measure wall time, not simulated time.")
+        bool, Option("--wall-time", help="Measure wall time instead of simulated time.")
     ] = False,
     json: _Json = False,
 ) -> None:
-    """Print every second how many messages come."""
-    from rosz.cli.topic_follow import hz
+    """Print once per second how many messages arrive per second."""
     from rosz.introspect.fields import Filter
+    from rosz.introspect.measure import RateMeter, format_rate, format_rates
 
-    chosen = Filter(condition) if condition else None
-    hz(
-        call_of(context),
-        topics,
-        window=_window(window),
-        condition=chosen,
-        wall_time=wall_time,
-        as_json=json,
-    )
+    accepted = Filter(condition) if condition else None
+    size = _window(window)
+    with _open_node(call) as node:
+        clock = time.monotonic_ns if wall_time else node.context.clock.steady
+        meters: dict[str, RateMeter] = {}
+        for name in topics:
+            target, token = _wait_for(node, name)
+            meter = meters[target.topic] = RateMeter(size)
+            _measure(node, token, lambda meter=meter: meter.tick(clock()), accepted)  # type: ignore[misc]
+            if not json:
+                print_lines([f"subscribed to [{token.name}]"])
+        while _wait_period(node):
+            found = {name: meter.stats() for name, meter in meters.items()}
+            if json:
+                _print_stats(found)
+            else:
+                text = format_rates(found) if len(found) > 1 else format_rate(*found.values())
+                print_lines([text])
+
+
+def _measure(node: Node, token: Token, tick: Callable[[], None], condition: Filter | None) -> None:
+    """Call a function for every message of a topic, or for those that meet a condition."""
+    from rosz.introspect.subscribe import find_class
+    from rosz.qos import QoS
+
+    if condition is None:
+        _open_tap(node, token, lambda _: tick())
+        return
+
+    def receive(message: Any) -> None:
+        if condition.accepts(message, token.name):
+            tick()
+
+    cls = find_class(node.context, token)
+    node.subscription(token.name, cls, receive, qos=QoS(depth=_DEPTH))
 
 
 @app.command("bw")
 def bw_command(
-    context: Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
+    call: Call, topic: _TopicName, *, window: _Window = None, json: _Json = False
 ) -> None:
-    """Print every second how many bytes come."""
-    from rosz.cli.topic_follow import bw
+    """Print once per second how many bytes arrive per second."""
+    from rosz.introspect.measure import BandwidthMeter, format_bandwidth
 
-    bw(call_of(context), topic, window=_window(window), as_json=json)
+    meter = BandwidthMeter(_window(window))
+    with _open_node(call) as node:
+        _, token = _wait_for(node, topic)
+        _open_tap(node, token, lambda sample: meter.add(sample.size, time.monotonic_ns()))
+        if not json:
+            print_lines([f"subscribed to [{token.name}]"])
+        while _wait_period(node):
+            stats = meter.stats(time.monotonic_ns())
+            if json:
+                _print_stats({token.name: stats})
+            elif stats is not None:
+                print_lines([format_bandwidth(stats)])
 
 
 @app.command("delay")
 def delay_command(
-    context: Context, topic: _TopicName, *, window: _Window = None, json: _Json = False
+    call: Call, topic: _TopicName, *, window: _Window = None, json: _Json = False
 ) -> None:
-    """Print every second how old messages are, by the stamp in their header."""
-    from rosz.cli.topic_follow import delay
+    """Print once per second the age of the messages, by the stamp in their header."""
+    from rosz.introspect.measure import DelayMeter, format_delay, read_stamp
+    from rosz.introspect.subscribe import find_class
 
-    delay(call_of(context), topic, window=_window(window), as_json=json)
+    meter = DelayMeter(_window(window))
+    with _open_node(call) as node:
+        target, token = _wait_for(node, topic)
+        cls = find_class(node.context, token)
+        if not cls._has_header:
+            raise NotFoundError(
+                f"'{cls._type}' of topic '{target.topic}' has no header, so its age cannot be told"
+            )
+
+        def receive(sample: Sample) -> None:
+            meter.add(read_stamp(sample.payload, token.type_name), node.now())
+
+        _open_tap(node, token, receive)
+        if not json:
+            print_lines([f"subscribed to [{token.name}]"])
+        while _wait_period(node):
+            if json:
+                _print_stats({token.name: meter.stats()})
+            elif meter.begun:
+                print_lines([format_delay(meter.stats())])
 
 
 def _window(given: int | None) -> int | None:
     if given is None or given < 0:
-        return None  # as for ROS 1's tools
-    return at_least("-w", given, 2, "messages")  # there is no time between fewer
+        return None  # as in ROS 1's tools
+    return at_least("-w", given, 2, "messages")  # there is no time between fewer messages
+
+
+def _open_tap(node: Node, token: Token, callback: Callable[[Sample], None]) -> None:
+    from rosz.introspect.subscribe import subscribe_samples
+
+    subscribe_samples(node, token.name, token.type_name, token.type_hash, callback)
+
+
+def _wait_period(node: Node) -> bool:
+    """Wait until the next report; return whether one is due."""
+    if node.is_shutdown:
+        return False
+    node.context.wait_for_shutdown(_PERIOD)
+    return True
+
+
+def _print_stats(found: Mapping[str, Struct | None]) -> None:
+    """Print statistics as JSON, one line for each topic that has sent something."""
+    import msgspec
+
+    for name, stats in found.items():
+        if stats is not None:
+            print_json_line({"topic": name, **msgspec.structs.asdict(stats)})
 
 
 @app.command("pub")
 def pub_command(
-    context: Context,
+    call: Call,
     topic: _TopicName,
-    type_name: Annotated[str, Argument(metavar="TYPE")],
+    type_name: Annotated[str, Argument("TYPE", autocompletion=suggest.topic_type)],
     values: Annotated[
         list[str] | None,
-        Argument(metavar="[VALUE]...", help="YAML: one dictionary, or a value per field."),
+        Argument(
+            "VALUE",
+            help="The message in YAML: one dictionary, or one value per field; read from standard"
+            " input if omitted.",
+            autocompletion=suggest.pub_values,
+        ),
     ] = None,
     *,
     rate: Annotated[
-        float | None, Option("-r", "--rate", metavar="HZ", help="Send so often.")
+        float | None, Option("-r", "--rate", metavar="HZ", help="Publish at this rate.")
     ] = None,
-    once: Annotated[bool, Option("-1", "--once", help="Send one message and end.")] = False,
+    once: Annotated[bool, Option("-1", "--once", help="Publish one message and stop.")] = False,
     latch: Annotated[
         bool, Option("-l", "--latch", help="Latch also with -f, -r and standard input.")
     ] = False,
     file: Annotated[
-        str, Option("-f", "--file", metavar="FILE", help="Read messages from a YAML file.")
+        str,
+        Option(
+            "-f",
+            "--file",
+            metavar="FILE",
+            help="Read messages from a YAML file.",
+            autocompletion=suggest.files,
+        ),
     ] = "",
-    verbose: Annotated[bool, Option("-v", help="Print what is sent.")] = False,
+    verbose: Annotated[bool, Option("-v", help="Print what is published.")] = False,
     substitute: Annotated[
         bool,
-        Option("-s", "--substitute-keywords", help="Fill in now and auto for each message."),
+        Option("-s", "--substitute-keywords", help="Replace 'now' and 'auto' in each message."),
     ] = False,
     use_rostime: Annotated[
-        bool, Option("--use-rostime", help="Take now and auto from ROS time.")
+        bool, Option("--use-rostime", help="Take 'now' and 'auto' from ROS time.")
     ] = False,
 ) -> None:
     """Publish messages."""
@@ -280,10 +495,41 @@ def pub_command(
         per_second("-r", rate)
     if values and file:
         raise UsageError("-f gives the messages: no values are taken beside it")
-    from rosz.cli.topic_pub import pub
-    from rosz.introspect.publish import SendOptions
+    from pathlib import Path
 
-    options = SendOptions(
-        rate=rate, once=once, verbose=verbose, substitute=substitute, ros_time=use_rostime
+    from rosz.introspect.arguments import (
+        list_arguments,
+        read_arguments,
+        read_file,
+        read_stream,
+        with_arguments,
     )
-    pub(call_of(context), topic, type_name, values or (), options, latch=latch, file=file)
+    from rosz.introspect.publish import DEFAULT_RATE, Sender, SendOptions
+    from rosz.node import Node
+
+    arguments = read_arguments(values or ())
+    documents = read_file(Path(file)) if file else None
+    with until_stopped() as ready, call.context(lasting=not once) as context:
+        cls = context.types.message(type_name)
+        ready()
+        from_elsewhere = bool(file) or (not arguments and bool(cls.__slots__))
+        if from_elsewhere and not file and sys.stdin.isatty():
+            raise UsageError(f"no values are given; they are: {list_arguments(cls)}")
+        latched = rate is None or latch
+        if from_elsewhere and rate is None and not latch and not once:
+            rate = DEFAULT_RATE
+        options = SendOptions(
+            rate=rate, once=once, verbose=verbose, substitute=substitute, ros_time=use_rostime
+        )
+        with Node(_TOOL, anonymous=True, context=context) as node:
+            publisher = node.publisher(topic, cls, latch=latched, queue_size=100)
+            sender = Sender(node, publisher, options, lambda line: print_lines([line]))
+            try:
+                if not from_elsewhere:
+                    sender.send(arguments)
+                elif documents is not None:
+                    sender.send_documents(documents, only_one=len(documents) == 1)
+                else:
+                    sender.send_documents(read_stream(sys.stdin.buffer, warn))
+            except EncodeError as error:
+                raise with_arguments(error, cls) from error

@@ -1,4 +1,4 @@
-"""``rosz turtlesim``: pictures of running turtlesims."""
+"""``rosz turtlesim``: save pictures of turtlesims."""
 
 from __future__ import annotations
 
@@ -6,30 +6,44 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from rosz.cli.declare import Argument, Context, Option
-from rosz.cli.group import call_of, new_group, write_file
+from rosz.cli import suggest
+from rosz.cli.call import Call, new_group
+from rosz.cli.console import write_file
+from rosz.cli.declare import Argument, Option
 from rosz.errors import UsageError
 
 __all__ = ("app",)
 
-app = new_group("Look at turtlesims; 'rosz run turtlesim turtlesim_node' starts one.")
+app = new_group("Save pictures of turtlesims; 'rosz run turtlesim turtlesim_node' starts one.")
 
 
 @app.command("snapshot")
 def snapshot(
-    context: Context,
-    file: Annotated[str, Argument(metavar="FILE.png", help="Where to; '-' is stdout.")],
+    call: Call,
+    file: Annotated[
+        str,
+        Argument(
+            "FILE.png",
+            help="The file to write; '-' is standard output.",
+            autocompletion=suggest.files,
+        ),
+    ],
     *,
     node: Annotated[
-        str, Option("--node", metavar="NODE", help="Which one, if several are running.")
+        str,
+        Option(
+            "--node",
+            metavar="NODE",
+            help="The turtlesim, if several run.",
+            autocompletion=suggest.nodes,
+        ),
     ] = "",
 ) -> None:
     """Save a picture of the field with its turtles."""
     from rosz.turtlesim.snapshot import fetch
 
     if file != "-" and Path(file).suffix.lower() != ".png":
-        raise UsageError(f"'{file}' does not end in .png: that is what is written")
-    call = call_of(context)
+        raise UsageError(f"'{file}' does not end in .png; the picture is written as PNG")
     with call.session() as session:
         picture = fetch(session, call.domain, call.resolve(node) if node else "")
     if file == "-":

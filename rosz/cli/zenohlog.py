@@ -1,7 +1,7 @@
-"""What Zenoh logs by itself, as warnings of a command: each kind once in a while.
+"""Summarize what Zenoh logs by itself: each kind of message once per minute.
 
-Zenoh writes to standard output, a line for each attempt of somebody who may not be linked to this
-machine; and who is refused tries again five times a second, for days.
+Zenoh writes to standard output, one line for each attempt to connect that it refuses; and a peer
+that is refused tries again five times a second, for days.
 """
 
 from __future__ import annotations
@@ -14,57 +14,59 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-__all__ = ("Digest", "zenoh_log_bounded")
+from rosz.cli.console import print_error
+
+__all__ = ("LogSummary", "summarize_zenoh_log")
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _LINE = re.compile(r"\S+ +(?:WARN|ERROR) .*?zenoh_link_tls\S*: (?P<reason>.*)")
 _MISLEADING = re.compile(r"\.? Hint: .*")
-_LOOKED = "tls handshake eof"
-"""Somebody has only looked whether anybody is there, as whoever has keys does first."""
+_PROBE = "tls handshake eof"
+"""A peer has only probed the port, as a peer with keys does first."""
 _NUMBER = re.compile(r"\d+")
 _EVERY_SECONDS = 60.0
 _KINDS = 100
 _STANDARD_OUTPUT = 1
 
 
-class Digest:
-    """Lines of Zenoh's log, told in short.
+class LogSummary:
+    """A summary of Zenoh's log.
 
     Args:
-        tell: Gets each line that is to be read.
-        clock: Seconds.
+        write: Function called with each line of the summary.
+        clock: Clock in seconds.
     """
 
     def __init__(
-        self, tell: Callable[[str], object], clock: Callable[[], float] = time.monotonic
+        self, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic
     ) -> None:
-        self._tell = tell
+        self._write = write
         self._clock = clock
-        self._told: dict[str, tuple[float, int]] = {}
+        self._seen: dict[str, tuple[float, int]] = {}
 
-    def take(self, line: str) -> None:
-        """Tell of a line, unless another of its kind has been told within a minute."""
+    def add(self, line: str) -> None:
+        """Write a line, unless one of its kind has been written within a minute."""
         line = _COLOUR.sub("", line).strip()
         match = _LINE.fullmatch(line)
         reason = _MISLEADING.sub("", match["reason"]) if match else line
-        if reason == _LOOKED:
+        if reason == _PROBE:
             return
         kind = _NUMBER.sub("0", reason)
-        since, more = self._told.pop(kind, (-_EVERY_SECONDS, 0))
+        since, more = self._seen.pop(kind, (-_EVERY_SECONDS, 0))
         now = self._clock()
         if now - since < _EVERY_SECONDS:
-            self._told[kind] = (since, more + 1)
+            self._seen[kind] = (since, more + 1)
             return
-        while len(self._told) >= _KINDS:
-            del self._told[next(iter(self._told))]
-        self._told[kind] = (now, 0)
+        while len(self._seen) >= _KINDS:
+            del self._seen[next(iter(self._seen))]
+        self._seen[kind] = (now, 0)
         again = f" ({more} times more since)" if more else ""
-        self._tell(f"WARNING: a link is refused: {reason}{again}" if match else reason)
+        self._write(f"WARNING: a link is refused: {reason}{again}" if match else reason)
 
 
 @contextmanager
-def zenoh_log_bounded() -> Iterator[None]:
-    """Have what Zenoh logs go to standard error as a `Digest`, unless ``RUST_LOG`` asks for all."""
+def summarize_zenoh_log() -> Iterator[None]:
+    """Write a `LogSummary` of Zenoh's log to standard error, unless ``RUST_LOG`` is set."""
     if "RUST_LOG" in os.environ:
         yield
         return
@@ -74,8 +76,8 @@ def zenoh_log_bounded() -> Iterator[None]:
     reader, writer = os.pipe()
     os.dup2(writer, _STANDARD_OUTPUT)
     os.close(writer)
-    digest = Digest(lambda line: sys.stderr.write(f"{line}\n"))
-    thread = threading.Thread(target=_pass_on, args=(reader, digest), name="rosz-log", daemon=True)
+    summary = LogSummary(print_error)
+    thread = threading.Thread(target=_read, args=(reader, summary), name="rosz-log", daemon=True)
     thread.start()
     sys.stdout = os.fdopen(os.dup(own), "w", buffering=1, encoding=before.encoding)
     try:
@@ -88,7 +90,7 @@ def zenoh_log_bounded() -> Iterator[None]:
         thread.join(1)
 
 
-def _pass_on(reader: int, digest: Digest) -> None:
+def _read(reader: int, summary: LogSummary) -> None:
     with os.fdopen(reader, encoding="utf-8", errors="replace") as lines:
         for line in lines:
-            digest.take(line)
+            summary.add(line)

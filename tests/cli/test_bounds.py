@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from rosz.cli.main import COMMANDS
-from rosz.cli.reading import options, read
-from rosz.cli.typed import to_typer
+from rosz.cli.commands import COMMANDS, load
+from rosz.cli.reading import read
+from rosz.cli.typer_app import run as run_typer
 from rosz.errors import UsageError
 
 COUNTS = ["0", "-1", "2000000000"]
@@ -44,10 +42,9 @@ LINES = {
 
 
 def _call(name: str, words: list[str], *, typer: bool) -> None:
-    app: Any = import_module(f"rosz.cli.{name}").app
+    app = load(name)
     if typer:
-        context, left = app.sorted_out(words)
-        to_typer(app, context)(args=left, prog_name="x", standalone_mode=False)
+        run_typer(app, words, "x")
         return
     ready = read(app, words)
     assert ready is not None
@@ -78,17 +75,13 @@ def test_a_number_out_of_bounds_is_refused(
 
 def test_no_number_is_left_out() -> None:
     tried = {
-        (name, words[0] if import_module(f"rosz.cli.{name}").app.text else "", option)
+        (name, words[0] if load(name).help else "", option)
         for name, *words in map(str.split, LINES)
         for option in words
         if option.startswith("-")
     }
     for name in COMMANDS:
-        for command, declared in import_module(f"rosz.cli.{name}").app.commands.items():
-            numbers = {
-                one.name: [s for s, o in options(declared.function).items() if o.name == one.name]
-                for one in options(declared.function).values()
-                if one.kind in {int, float}
-            }
-            for spellings in numbers.values():
-                assert any((name, command, each) in tried for each in spellings), spellings
+        for command, declared in load(name).commands.items():
+            for one in declared.parameters():
+                if one.spellings and one.kind in {int, float}:
+                    assert any((name, command, word) in tried for word in one.spellings), one.name

@@ -5,20 +5,20 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from importlib import import_module
 
 import pytest
 from network import Network
 
+from rosz.cli.commands import COMMANDS, load
 from rosz.cli.declare import App
-from rosz.cli.main import COMMANDS, run
+from rosz.cli.main import run
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_its_module(name: str) -> None:
-    assert isinstance(import_module(f"rosz.cli.{name}").app, App)
+    assert isinstance(load(name), App)
 
 
 def test_the_overview_loads_nothing() -> None:
@@ -33,7 +33,12 @@ def test_the_overview_loads_nothing() -> None:
 @pytest.mark.parametrize("name", [*COMMANDS])
 def test_a_command_loads_little(name: str) -> None:
     heavy = {"asyncio", "numpy", "rosz.node", "rosz.msgs.std_msgs", "rich"}
-    code = f"import sys, rosz.cli.{name}; print(sorted({heavy} & set(sys.modules)))"
+    code = f"""
+import sys
+from rosz.cli.commands import load
+load({name!r})
+print(sorted({heavy} & set(sys.modules)))
+"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
 
@@ -97,7 +102,7 @@ def test_a_command_loads_what_it_needs(network: Network, line: str, needs: set[s
 @pytest.mark.parametrize(
     ("argv", "code", "text"),
     [
-        (["parma"], 2, "'parma' is no command; did you mean 'param'?"),
+        (["parma"], 2, "'parma' is not a command; did you mean 'param'?"),
         (["param", "gte"], 2, "rosz: no such command 'gte'; did you mean 'get'?\n"),
         (["param", "get"], 2, "rosz: missing argument 'NAME'; see 'rosz param get --help'\n"),
     ],
@@ -169,9 +174,9 @@ def test_a_full_disk_is_told_of_standard_output(
 STOPPED_TWICE = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_DFL)
-from rosz.cli import group
-group._SAME_WISH_SECONDS = float(sys.argv[1])
-with group.until_stopped() as ready:
+from rosz.cli import console
+console._SAME_REQUEST_SECONDS = float(sys.argv[1])
+with console.until_stopped() as ready:
     ready()
     try:
         signal.raise_signal(signal.SIGTERM)

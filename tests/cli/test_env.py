@@ -9,7 +9,7 @@ import pytest
 from network import Network
 
 from rosz.cli import env
-from rosz.introspect.shells import COMMANDS, program
+from rosz.cli.shells import ALIASES, program
 
 from .shell import Shell
 
@@ -35,14 +35,14 @@ def evaluate(
     )
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ALIASES)
 def test_the_programs_are_those_of_the_table(command: str) -> None:
     assert (BIN / command).read_text() == program(command)
 
 
 def test_all_programs_may_be_executed() -> None:
     found = {path.name for path in BIN.iterdir()}
-    assert found == {*COMMANDS, "rospack", "rosls", "rosed"}
+    assert found == {*ALIASES, "rospack", "rosls", "rosed"}
     assert all(path.stat().st_mode & 0o111 == 0o111 for path in BIN.iterdir())
 
 
@@ -172,7 +172,7 @@ def test_the_shell_is_guessed(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> 
 def test_an_unknown_shell(shell: Shell) -> None:
     result = shell("env", "fsh")
     assert result.code == 2
-    assert "'fsh' is no shell that is known; expected bash, zsh, fish; did you mean 'fish'?" in (
+    assert "'fsh' is not a known shell; expected bash, zsh, fish; did you mean 'fish'?" in (
         result.err
     )
 

@@ -180,7 +180,7 @@ def test_kill_one_of_a_list(shell: Shell, network: Network) -> None:
     assert result.code == 0
     assert result.out.startswith(
         "1. /stays\n2. /victim\n\nPlease enter the number of the node you wish to kill.\n> "
-        "'x' is none of them; please enter a number from 1 to 2\n"
+        "'x' is not one of them; enter a number from 1 to 2\n"
     )
     assert victim.exit_code() == 0
 

@@ -18,7 +18,7 @@ from params.network import Network, until
 from params.ros1 import Ros1, available
 
 from rosz.cli.main import run
-from rosz.cli.param_plain import plain, read_plain
+from rosz.cli.param import _format_scalar, _parse_scalar
 from rosz.params.replica import Replica
 from rosz.params.yaml import format_get, load, pretty
 
@@ -316,7 +316,7 @@ def test_loading_is_all_or_nothing(replica: Replica, param: Command, tmp_path: P
     )
     (tmp_path / "bad.yaml").write_bytes(b"a: 2\nb: \xff\n")
     assert param("load", "bad.yaml")[2] == (
-        "rosz: bad.yaml:2: byte 0xff is no UTF-8; save the file as UTF-8\n"
+        "rosz: bad.yaml:2: byte 0xff is not UTF-8; save the file as UTF-8\n"
     )
     (tmp_path / "bad.yaml").write_text("a: 2\n~private: 3\n")
     assert "the key '~private' in '/' is private" in param("load", "bad.yaml")[2]
@@ -452,16 +452,16 @@ def test_a_writer_is_told_who_did_not_hear(
      "é", "a: b", "1e5", "e1", "nan", "inf", "NaN", 1.5, [1], {}],
 )  # fmt: skip
 def test_what_is_printed_without_yaml_is_as_with_it(value: Any) -> None:
-    assert plain(value) in {"", format_get(value)}
-    assert plain(value) in {"", pretty(value)}
+    assert _format_scalar(value) in {"", format_get(value)}
+    assert _format_scalar(value) in {"", pretty(value)}
 
 
 @pytest.mark.parametrize(
     ("word", "value"), [("3", 3), ("-12", -12), ("0.50", 0.5), ("true", True), ("c3_po", "c3_po")]
 )
 def test_what_is_read_without_yaml(word: str, value: Any) -> None:
-    assert read_plain(word) == value
-    assert type(read_plain(word)) is type(value)
+    assert _parse_scalar(word) == value
+    assert type(_parse_scalar(word)) is type(value)
 
 
 @pytest.mark.parametrize(
@@ -470,11 +470,11 @@ def test_what_is_read_without_yaml(word: str, value: Any) -> None:
      "y", "No", "9" * 30, "deg(3)", "a b", "a:", "[1]", "é", "1.0.0", "3\n"],
 )  # fmt: skip
 def test_what_needs_yaml_is_left_to_it(word: str) -> None:
-    assert read_plain(word) is None
+    assert _parse_scalar(word) is None
 
 
 @given(st.from_regex(r"[-0-9a-zA-Z_.]{1,8}", fullmatch=True))
 def test_no_word_means_something_else_in_yaml(word: str) -> None:
-    found = read_plain(word)
+    found = _parse_scalar(word)
     if found is not None:
         assert (type(found), found) == (type(load(word)), load(word))

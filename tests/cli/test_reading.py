@@ -10,20 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.exceptions import TyperException
 
-from rosz.cli.declare import App, Argument, Context, Option, values_last
+from rosz.cli.declare import App, Argument, Option, values_last
 from rosz.cli.reading import read
-from rosz.cli.typed import to_typer
+from rosz.cli.typer_app import translate
 
-app = App("Try it.", remapped=lambda word: ":=" in word)
+app = App("Try it.", is_remapping=lambda word: ":=" in word)
 lone = App()
 seen: list[tuple[Any, ...]] = []
 
 
 @app.command("take")
 def take(
-    context: Context,
-    first: Annotated[str, Argument(metavar="FIRST")],
-    more: Annotated[list[str] | None, Argument(metavar="[MORE]...")] = None,
+    remappings: tuple,  # type: ignore[type-arg]  # called as a type
+    first: Annotated[str, Argument("FIRST")],
+    more: Annotated[list[str] | None, Argument("MORE")] = None,
     *,
     flag: Annotated[bool, Option("-f", "--flag")] = False,
     count: Annotated[int | None, Option("-n", metavar="COUNT")] = None,
@@ -31,13 +31,13 @@ def take(
     each: Annotated[list[str] | None, Option("--each", hidden=True)] = None,
 ) -> None:
     """Take what there is."""
-    seen.append((context.argv, first, more or None, flag, count, rate_of_all, each or None))
+    seen.append((remappings, first, more or None, flag, count, rate_of_all, each or None))
 
 
 @app.command("set", arrange=values_last(frozenset({"-t"})))
 def set_(
-    name: Annotated[str, Argument()],
-    value: Annotated[int, Argument()] = 7,
+    name: Annotated[str, Argument("NAME")],
+    value: Annotated[int, Argument("VALUE")] = 7,
     *,
     text: Annotated[str, Option("-t")] = "",
 ) -> int:
@@ -48,7 +48,7 @@ def set_(
 
 @app.command("run", interspersed=False)
 def run(
-    words: Annotated[list[str], Argument()], *, flag: Annotated[bool, Option("-f")] = False
+    words: Annotated[list[str], Argument("WORD")], *, flag: Annotated[bool, Option("-f")] = False
 ) -> None:
     """Leave options behind a word to what that names."""
     seen.append((words, flag))
@@ -56,7 +56,7 @@ def run(
 
 @lone.command()
 def only(
-    what: Annotated[str, Argument()] = "", *, flag: Annotated[bool, Option("-f")] = False
+    what: Annotated[str, Argument("WHAT")] = "", *, flag: Annotated[bool, Option("-f")] = False
 ) -> None:
     """Be alone."""
     seen.append((what, flag))
@@ -65,9 +65,9 @@ def only(
 def by_typer(group: App, argv: list[str]) -> tuple[Any, Any]:
     """Return what the function got, and returned, when typer called it; no Nones: it refused."""
     seen.clear()
-    context, words = group.sorted_out(argv)
+    remappings, words = group.split(argv)
     try:
-        code = to_typer(group, context)(args=words, prog_name="x", standalone_mode=False)
+        code = translate(group, remappings)(args=words, prog_name="x", standalone_mode=False)
     except (TyperException, typer.Exit):
         return None, None
     return (seen[-1], code) if seen else (None, None)

@@ -121,7 +121,7 @@ def test_groups_are_set_by_name(shell: Shell, robot: Robot) -> None:
         (["set", "robot", "gian", "1"], 1, "there is no setting 'gian'; did you mean 'gain'?"),
         (["set", "robot", "gain", "x"], 1, "'gain' cannot be 'x': expected a number"),
         (["set", "robot", "[1]"], 1, "<value>: [1]: expected a dictionary of names to values"),
-        (["set", "robot", "a", "b", "c"], 2, "3 words behind the node; expected a setting and"),
+        (["set", "robot", "a", "b", "c"], 2, "got unexpected extra argument(s) (c); see 'rosz"),
         (["set", "robot"], 2, "missing argument"),
         (["describe", "robot", "gian"], 1, "there is no setting 'gian'; did you mean 'gain'?"),
         (["load", "robot", "no.yaml"], 1, "no.yaml: No such file or directory"),

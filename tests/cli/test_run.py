@@ -67,4 +67,4 @@ def test_errors_are_one_line(workspace: Path, words: tuple[str, ...]) -> None:
 def test_help(workspace: Path) -> None:
     done = rosz(workspace, "run", "--help")
     assert done.returncode == 0
-    assert "PACKAGE EXECUTABLE [ARGS]" in done.stdout
+    assert "[PACKAGE] [EXECUTABLE] [ARGS]..." in done.stdout

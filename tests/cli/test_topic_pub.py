@@ -135,10 +135,9 @@ def test_no_values_on_a_terminal(shell: Shell) -> None:
 
 def test_a_negative_value_without_two_dashes(shell: Shell) -> None:
     result = shell("topic", "pub", "/x", "std_msgs/Float64", "-2")
-    told = (
-        "rosz: no such option: -2; a negative value goes behind '--'; see 'rosz topic pub --help'\n"
-    )
-    assert (result.code, result.out, result.err) == (2, "", told)
+    expected = "rosz: no such option: -2; write '--' before a negative value; see 'rosz topic pub"
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith(expected)
 
 
 def test_an_unfinished_document_is_told(shell: Shell) -> None:

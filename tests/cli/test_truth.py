@@ -10,12 +10,11 @@ import subprocess
 import sys
 import threading
 import time
-from importlib import import_module
 
 import pytest
 from network import Network, Program, eventually, repeats
 
-from rosz.cli.grammar import _commands, _options
+from rosz.cli.commands import load
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import Node
@@ -354,9 +353,8 @@ SHOWING = {
     ("group", "command"), [(group, name) for group, names in SHOWING.items() for name in names]
 )
 def test_what_lists_or_shows_does_it_as_json_too(group: str, command: str) -> None:
-    commands = _commands(import_module(f"rosz.cli.{group}").app)
-    callback = commands[command] if command else next(iter(commands.values()))
-    assert any("--json" in option.names for option in _options(callback))
+    parameters = load(group).commands[command].parameters()
+    assert any("--json" in one.spellings for one in parameters)
 
 
 def test_measures_as_json(shell: Shell, talker: Node) -> None:

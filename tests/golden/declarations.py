@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from importlib import import_module
 from typing import Any
 
-from rosz.cli.declare import App, Command, Option
-from rosz.cli.main import COMMANDS
-from rosz.cli.reading import Parameter, parameters
+from rosz.cli.commands import COMMANDS, load
+from rosz.cli.declare import Command, Option, Parameter
 
 __all__ = ("as_json", "lines")
 
@@ -19,7 +17,7 @@ def lines() -> list[str]:
     found = [""]
     for name in COMMANDS:
         found.append(name)
-        found += [f"{name} {command}" for command in _app(name).commands if command]
+        found += [f"{name} {command}" for command in load(name).commands if command]
     return found
 
 
@@ -45,27 +43,21 @@ def _declarations() -> dict[str, dict[str, Any]]:
     return {line: dict(_declaration(line)) for line in lines() if line}
 
 
-def _app(name: str) -> App:
-    app: App = import_module(f"rosz.cli.{name}").app
-    return app
-
-
 def _declaration(line: str) -> Iterator[tuple[str, Any]]:
     group, _, name = line.partition(" ")
-    app = _app(group)
+    app = load(group)
     if name not in app.commands:
-        yield "help", app.text
+        yield "help", app.help
         return
     command = app.commands[name]
     yield "help", _text(command)
-    taken = [one for one in parameters(command.function) if one.mark is not None]
+    taken = [one for one in command.parameters() if one.mark is not None]
     yield "arguments", [_argument(one) for one in taken if not isinstance(one.mark, Option)]
     yield "options", [_option(one) for one in taken if isinstance(one.mark, Option)]
 
 
 def _text(command: Command) -> str:
-    text = command.help or command.function.__doc__ or ""
-    return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+    return "\n\n".join(" ".join(part.split()) for part in command.help.split("\n\n"))
 
 
 def _argument(one: Parameter) -> dict[str, Any]:
@@ -85,6 +77,6 @@ def _option(one: Parameter) -> dict[str, Any]:
     shared = _argument(one)
     if one.kind is bool:
         del shared["metavar"]
-    return {"names": sorted(one.mark.spelled(one.name), key=len), **shared} | (
+    return {"names": sorted(one.spellings, key=len), **shared} | (
         {"hidden": True} if one.mark.hidden else {}
     )

@@ -69,7 +69,7 @@ _VARIABLE = [
         (r"(?<=average: )[\d.]+(?=ms)", "<t>"),
         (r"\b1\d{18}\b", "<nanoseconds>"),
         (r"\b1\d{9}\.\d+\b", "<seconds>"),
-        (r"(?<=secs: )-?1\d{9}(\n *nsecs: +)\d+", r"<s>\1<ns>"),
+        (r"(?<=secs: )-?1\d{9}(\n *nsecs:) +\d+", r"<s>\1 <ns>"),
         (r"\b[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}\b", "<run>"),
         (r"(?<=-)\d+(?=\.log\b)", "<pid>"),
         (r"^\d{4}-\d\d-\d\d[ T][\d:.]+", "<date>"),

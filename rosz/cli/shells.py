@@ -1,9 +1,9 @@
-"""What makes ROS 1's command names mean rosz in a shell, and in all that is started from it.
+"""Shell code that makes ROS 1's command names run rosz, here and in all that the shell starts.
 
 A folder of small programs goes on the PATH, so that ``timeout 5 rostopic …``, ``nohup roscore`` and
-scripts find them as well. Only roscd, which changes the shell's own folder, is a function. Another
-folder goes on the PYTHONPATH, so that scripts that are run directly can import rospy. Where a
-person types, the TAB key asks ``rosz complete``.
+scripts find them as well. Only roscd, which changes the working folder of the shell, is a function.
+Another folder goes on the PYTHONPATH, so that scripts that are run directly can import rospy. In an
+interactive shell, the TAB key runs ``rosz complete``.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from __future__ import annotations
 import shlex
 from typing import Literal
 
-__all__ = ("COMMANDS", "SHELLS", "Shell", "program", "script")
+__all__ = ("ALIASES", "SHELLS", "Shell", "program", "script")
 
 Shell = Literal["bash", "zsh", "fish"]
 SHELLS: tuple[Shell, ...] = ("bash", "zsh", "fish")
 
-COMMANDS = {
+ALIASES = {
     "catkin_create_pkg": "pkg create --bare",
     "catkin_make": "pkg check --setup",
     "roscore": "core",
@@ -30,7 +30,7 @@ COMMANDS = {
     "rostopic": "topic",
     "roswtf": "doctor",
 }
-"""ROS 1's commands, and what they are here."""
+"""ROS 1's commands, with the commands of rosz that replace them."""
 
 _HELPERS = ("roscd", "rosed", "rosls", "rospack")
 
@@ -94,15 +94,15 @@ end
 
 
 def script(shell: Shell, home: str, python: str) -> str:
-    """Return what a shell has to evaluate.
+    """Return the code for a shell to evaluate.
 
     Args:
-        shell: Which one.
-        home: The folder of rosz itself.
-        python: The interpreter that has rosz.
+        shell: The shell.
+        home: The folder of the package ``rosz``.
+        python: The Python interpreter that has rosz.
     """
     text = {"bash": _POSIX + _BASH, "zsh": _POSIX + _ZSH, "fish": _FISH}[shell]
-    names = " ".join(("rosz", *COMMANDS, *_HELPERS))
+    names = " ".join(("rosz", *ALIASES, *_HELPERS))
     return text.format(
         folder=shlex.quote(f"{home}/cli/bin"),
         modules=shlex.quote(f"{home}/ros1/shell"),
@@ -112,5 +112,5 @@ def script(shell: Shell, home: str, python: str) -> str:
 
 
 def program(command: str) -> str:
-    """Return the text of the program that stands for one of ROS 1's commands."""
-    return f'#!/bin/sh\nexec "${{ROSZ_PYTHON:-python3}}" -P -m rosz {COMMANDS[command]} "$@"\n'
+    """Return the text of the program that replaces one of ROS 1's commands."""
+    return f'#!/bin/sh\nexec "${{ROSZ_PYTHON:-python3}}" -P -m rosz {ALIASES[command]} "$@"\n'

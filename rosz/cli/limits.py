@@ -1,4 +1,4 @@
-"""Numbers of a command line, held to what makes sense."""
+"""Limits of the numbers on a command line."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from rosz.errors import UsageError
 
 __all__ = ("at_least", "per_second", "seconds")
 
-_LONGEST = 1e9
-"""Thirty years: what waits for longer is a slip, and more than some clocks of the system hold."""
 _MOST = 1_000_000_000
+_LONGEST = 1e9
+"""Thirty years. A longer time is a mistake, and more than some system clocks can hold."""
 
 
 def seconds(option: str, value: float) -> float:
-    """Return how long something may take.
+    """Return a time limit if it makes sense.
 
     Args:
-        option: What gives it.
-        value: Seconds.
+        option: The option that gives it.
+        value: The time limit in seconds.
 
     Raises:
-        UsageError: It is no time.
+        UsageError: The value is not a sensible time.
     """
     if not 0 < value <= _LONGEST:
         raise UsageError(f"{option} is {value:g}; expected seconds above 0, at most {_LONGEST:g}")
@@ -27,14 +27,14 @@ def seconds(option: str, value: float) -> float:
 
 
 def per_second(option: str, value: float) -> float:
-    """Return how often something is to be done.
+    """Return a rate if it makes sense.
 
     Args:
-        option: What gives it.
-        value: Times a second.
+        option: The option that gives it.
+        value: The rate in hertz.
 
     Raises:
-        UsageError: It is no rate.
+        UsageError: The value is not a sensible rate.
     """
     if not 1 / _LONGEST <= value <= _MOST:
         raise UsageError(f"{option} is {value:g}; expected a rate above 0, at most {_MOST:g} Hz")
@@ -42,17 +42,17 @@ def per_second(option: str, value: float) -> float:
 
 
 def at_least(option: str, value: int, fewest: int, what: str, most: int = _MOST) -> int:
-    """Return how many of something there are to be.
+    """Return a number if it is in its bounds.
 
     Args:
-        option: What gives it.
+        option: The option that gives it.
         value: The number.
-        fewest: Least number.
-        what: Of what, in the plural.
-        most: Largest number.
+        fewest: The least number.
+        what: The things that are counted, in the plural.
+        most: The largest number.
 
     Raises:
-        UsageError: It is fewer or more.
+        UsageError: The number is too small or too large.
     """
     if value < fewest:
         raise UsageError(f"{option} is {value}; expected {fewest} or more {what}")

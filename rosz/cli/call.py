@@ -1,0 +1,119 @@
+"""One call of a command: its settings, names and connections."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rosz import names, remap
+from rosz.cli.console import warn
+from rosz.cli.declare import App
+from rosz.environment import Environment
+from rosz.introspect.connect import open_context, open_session
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+    from rosz.node import Context
+    from rosz.session import Session
+    from rosz.typestore import TypeStore
+
+__all__ = ("Call", "new_group")
+
+
+class Call:
+    """One call of a command.
+
+    Args:
+        argv: The remappings of the command line.
+    """
+
+    def __init__(self, argv: Sequence[str] = ()) -> None:
+        self.argv = tuple(argv)
+        self.environment = Environment.read()
+        self._remappings = remap.parse(argv)
+
+    @property
+    def domain(self) -> int:
+        """The ROS domain."""
+        return self.environment.domain
+
+    def node_name(self, tool: str) -> str:
+        """Return the full name of a tool's node, which private names belong to.
+
+        Args:
+            tool: The base name of the node when no remapping gives another one.
+        """
+        return self._remappings.node_name(tool, self.environment.namespace)
+
+    def resolve(self, name: str, tool: str = "rosz") -> str:
+        """Return the global name that a name means to a tool.
+
+        Args:
+            name: The name as it is typed.
+            tool: The base name of the tool's node.
+
+        Raises:
+            InvalidName: The name is not valid.
+        """
+        node = self.node_name(tool)
+        return names.resolve(name, node, self._remappings.resolved_remaps(node))
+
+    @property
+    def types(self) -> TypeStore:
+        """The message and service types."""
+        from rosz.environment import package_index
+        from rosz.typestore import TypeStore
+
+        return TypeStore(package_index(self.environment), self.environment.home / "rosz")
+
+    def session(self) -> Session:
+        """Open a session for a short query.
+
+        Raises:
+            TransportError: Nobody answers.
+        """
+        return open_session(self.environment)
+
+    def context(self, *, lasting: bool = False) -> Context:
+        """Open the context of a node that publishes, subscribes or calls.
+
+        Args:
+            lasting: Whether the command runs until it is stopped.
+
+        Raises:
+            TransportError: Nobody answers.
+        """
+        return open_context(self.environment, self.argv, lasting=lasting)
+
+    def survey(self, *, processes: bool = False) -> Survey:
+        """Return the nodes, topics and services of the domain.
+
+        Args:
+            processes: Whether to ask for the processes of the nodes as well.
+
+        Raises:
+            TransportError: Nobody answers.
+        """
+        from rosz.introspect.survey import take_survey
+
+        with self.session() as session:
+            survey = take_survey(session, self.domain, processes=processes)
+        for damage in survey.damaged:
+            warn(f"ignoring an invalid name of a node or topic: {damage}")
+        return survey
+
+
+def new_group(text: str) -> App:
+    """Return a group of commands that take remappings anywhere, as ROS 1's tools do.
+
+    So a command can be a node of a launch file.
+
+    Args:
+        text: The description of the group.
+    """
+    return App(text, is_remapping=_is_remapping)
+
+
+def _is_remapping(word: str) -> bool:
+    left, separator, _ = word.partition(":=")
+    return bool(separator and left) and names.is_valid(left.lstrip("_") or "x")

@@ -1,0 +1,55 @@
+"""The table of all commands: where each is declared, and what it is for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rosz.cli.declare import App
+
+__all__ = ("COMMANDS", "format_rows", "load")
+
+COMMANDS = {
+    "launch": "start the nodes of a launch file",
+    "run": "run an executable of a package",
+    "core": "run a meeting point with a copy of the parameters",
+    "param": "get and set parameters",
+    "reconfigure": "read and change settings of nodes while they run",
+    "topic": "list, show, measure and publish topics",
+    "service": "list and call services",
+    "node": "list, inspect, ping and kill nodes",
+    "msg": "show message types",
+    "srv": "show service types",
+    "gen": "write Python modules for the messages of a package",
+    "pkg": "list, find, create and check packages",
+    "log": "follow the log of all nodes, set levels",
+    "keys": "make and check the keys that links between machines need",
+    "doctor": "find problems, and print what shows them and what to do",
+    "turtlesim": "save pictures of turtlesims",
+    "env": "print shell code that makes ROS 1's command names run rosz",
+    "help": "list and print the pages of the manual",
+}
+"""Every command with its summary, in the order of ``rosz --help``."""
+
+_APPS = {"msg": "types:msg", "srv": "types:srv", "help": "manual:app"}
+"""Where an app is that is not ``app`` in the module of its command's name."""
+
+
+def load(name: str) -> App:
+    """Import a command.
+
+    Args:
+        name: One of `COMMANDS`.
+    """
+    module, _, attribute = _APPS.get(name, f"{name}:app").partition(":")
+    app: App = getattr(import_module(f"rosz.cli.{module}"), attribute)
+    return app
+
+
+def format_rows(rows: Iterable[tuple[str, str]]) -> str:
+    """Return names with their descriptions as lines of two columns."""
+    listed = list(rows)
+    width = max((len(name) for name, _ in listed), default=0)
+    return "".join(f"  {name:<{width}}  {text}\n" for name, text in listed)

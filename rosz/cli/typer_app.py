@@ -1,0 +1,130 @@
+"""Run a command line with typer, which writes help and explains what is wrong with a line."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, get_type_hints
+
+import typer
+from typer.exceptions import TyperException
+
+from rosz.cli.declare import App, Command, Option, Parameter
+from rosz.errors import UsageError
+
+__all__ = ("run", "translate")
+
+_SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+_NUMBERS: dict[Any, str] = {int: "integer", float: "number"}
+
+
+def run(app: App, argv: Sequence[str], program: str) -> Any:
+    """Run a command line, and return what its command returns.
+
+    Args:
+        app: The commands.
+        argv: The words that follow the name of the app.
+        program: The name of the app as it is typed, such as ``rosz topic``.
+
+    Raises:
+        UsageError: The command line is wrong.
+        KeyboardInterrupt: Ctrl-C was pressed.
+        BrokenPipeError: Nobody reads the output any more.
+    """
+    remappings, words = app.split(argv)
+    try:
+        return translate(app, remappings)(args=words, prog_name=program, standalone_mode=False)
+    except typer.Abort as error:
+        raise KeyboardInterrupt from error
+    except SystemExit as error:  # typer raises it here for a broken pipe only
+        raise BrokenPipeError from error
+    except TyperException as error:
+        if app.help and words and words[0] in app.commands:
+            program += f" {words[0]}"
+        raise UsageError(_reword(error.format_message(), program)) from error
+
+
+def _reword(text: str, program: str) -> str:
+    """Return an error text of typer in the form of the other errors."""
+    text = text[:1].lower() + text[1:].rstrip(".").replace(". Did you mean", "; did you mean")
+    if text.startswith("no such option: -") and text[-1:].isdigit():
+        text += "; write '--' before a negative value"
+    return text if text.endswith("?") else f"{text}; see '{program} --help'"
+
+
+def translate(app: App, remappings: Sequence[str]) -> typer.Typer:
+    """Return the app as typer declares it.
+
+    Args:
+        app: The commands.
+        remappings: The remappings of the command line.
+    """
+    made = typer.Typer(
+        help=app.help or None,
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings=_SETTINGS,
+    )
+    if app.help:
+        made.callback()(_group)  # without a callback, one command alone is not a group for typer
+    for name, command in app.commands.items():
+        made.command(
+            name or None,
+            help=command.help,
+            short_help=" ".join(command.help.partition("\n\n")[0].split()),
+            context_settings=_SETTINGS
+            | {
+                "allow_interspersed_args": command.interspersed,
+                "ignore_unknown_options": command.tolerant,
+            },
+        )(_typed(command, remappings))
+    return made
+
+
+def _group() -> None: ...
+
+
+def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
+    """Return a function for typer: it has typer's annotations, and calls the command's."""
+    function = command.function
+    hints = get_type_hints(function, include_extras=True)
+    signature = inspect.signature(function).parameters
+    fixed: dict[str, Any] = {}
+    kept: list[inspect.Parameter] = []
+    for one in command.parameters():
+        if one.mark is None:
+            fixed[one.name] = one.kind(remappings)
+        else:
+            annotation = _annotate(hints[one.name].__origin__, one)
+            kept.append(signature[one.name].replace(annotation=annotation))
+
+    def call(**values: Any) -> Any:
+        return function(**values, **fixed)
+
+    call.__annotations__ = {one.name: one.annotation for one in kept}
+    call.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]  # for inspect
+    return call
+
+
+def _annotate(hint: Any, one: Parameter) -> Any:
+    """Return a type annotated for typer."""
+    parser = _parser(one.kind) if one.kind in _NUMBERS else None
+    mark = one.mark
+    assert mark is not None  # noqa: S101  # the caller has looked
+    if isinstance(mark, Option):
+        option = typer.Option(
+            *one.spellings, metavar=mark.metavar, help=mark.help, hidden=mark.hidden, parser=parser
+        )
+        return Annotated[hint, option]
+    return Annotated[hint, typer.Argument(metavar=mark.metavar, help=mark.help, parser=parser)]
+
+
+def _parser(kind: Callable[[str], Any]) -> Callable[[Any], Any]:
+    def parse(word: Any) -> Any:
+        try:
+            return kind(word)
+        except ValueError as error:
+            raise typer.BadParameter(f"'{word}' is not a valid {_NUMBERS[kind]}") from error
+
+    return parse

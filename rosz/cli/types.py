@@ -1,0 +1,153 @@
+"""``rosz msg`` and ``rosz srv``: the commands of rosmsg and rossrv."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+from rosz.cli import suggest
+from rosz.cli.call import Call, new_group
+from rosz.cli.console import print_json, print_lines
+from rosz.cli.declare import App, Argument, Option
+from rosz.errors import UsageError
+
+if TYPE_CHECKING:
+    from rosz.introspect.definitions import Definitions
+    from rosz.typestore import Kind
+
+__all__ = ("msg", "srv")
+
+_Json = Annotated[bool, Option("--json", help="Print JSON.")]
+_Single = Annotated[bool, Option("-s", help="Print all on one line.")]
+_TypeName = Annotated[
+    str,
+    Argument(
+        "TYPE",
+        help="PACKAGE/NAME, or NAME alone; read from standard input if omitted.",
+        autocompletion=suggest.definitions,
+    ),
+]
+_Package = Annotated[
+    str,
+    Argument(
+        "PACKAGE",
+        help="A package; read from standard input if omitted.",
+        autocompletion=suggest.packages,
+    ),
+]
+
+
+class _Types:
+    """The commands for one kind of types.
+
+    Args:
+        kind: The kind.
+    """
+
+    def __init__(self, kind: Kind) -> None:
+        self._kind: Kind = kind
+
+    def show(
+        self,
+        call: Call,
+        name: _TypeName = "",
+        *,
+        raw: Annotated[
+            bool, Option("-r", "--raw", help="Print the definition as written, with comments.")
+        ] = False,
+        json: _Json = False,
+    ) -> None:
+        definitions = self._definitions(call)
+        wanted = _given(name)
+        found = definitions.find(wanted)
+        if json:
+            print_json([definitions.summary(one) for one in found])
+            return
+        for one in found:
+            if "/" not in wanted:
+                print_lines([f"[{_short(one)}]:"])
+            print_lines([definitions.text(one) if raw else definitions.show(one)])
+
+    def list(self, call: Call, *, json: _Json = False) -> None:
+        _print(call.types.names(self._kind), as_json=json)
+
+    def md5(self, call: Call, name: _TypeName = "", *, json: _Json = False) -> None:
+        definitions = self._definitions(call)
+        _print_hashes(definitions, name, definitions.md5, as_json=json)
+
+    def hash(self, call: Call, name: _TypeName = "", *, json: _Json = False) -> None:
+        definitions = self._definitions(call)
+        _print_hashes(definitions, name, definitions.hash, as_json=json)
+
+    def package(
+        self, call: Call, package: _Package = "", *, single: _Single = False, json: _Json = False
+    ) -> None:
+        names = call.types.names(self._kind, _given(package, "package"))
+        _print(names, single=single, as_json=json)
+
+    def packages(self, call: Call, *, single: _Single = False, json: _Json = False) -> None:
+        _print(call.types.packages(self._kind), single=single, as_json=json)
+
+    def _definitions(self, call: Call) -> Definitions:
+        from rosz.introspect.definitions import Definitions
+
+        return Definitions(call.types, self._kind)
+
+
+def _print_hashes(
+    definitions: Definitions, name: str, compute: Callable[[str], str], *, as_json: bool
+) -> None:
+    wanted = _given(name)
+    hashes = {one: compute(one) for one in definitions.find(wanted)}
+    if as_json:
+        print_json({_short(one): value for one, value in hashes.items()})
+        return
+    for one, value in hashes.items():
+        print_lines([value if "/" in wanted else f"[{_short(one)}]: {value}"])
+
+
+def _print(names: list[str], *, single: bool = False, as_json: bool) -> None:
+    if as_json:
+        print_json(names)
+    else:
+        print_lines([" ".join(names)] if single else names)
+
+
+def _short(name: str) -> str:
+    package, _, base = name.split("/")
+    return f"{package}/{base}"
+
+
+def _given(word: str, what: str = "type") -> str:
+    """Return a word of the command line; if there is none, of standard input, as rosmsg does."""
+    if word:
+        return word
+    for line in sys.stdin:
+        if line.strip():
+            return line.strip()
+    raise UsageError(f"no {what} is given")
+
+
+def _new_app(kind: Kind, word: str) -> App:
+    """Return the commands that show definitions.
+
+    Args:
+        kind: The kind of types.
+        word: The name of that kind in help.
+    """
+    app = new_group(f"Show {word} types.")
+    types = _Types(kind)
+    show = f"Print a {word} type, with the fields of the types in it."
+    app.command("show", help=show)(types.show)
+    app.command("info", help=f"{show} The same as show.")(types.show)
+    app.command("list", help=f"List all {word} types.")(types.list)
+    app.command("md5", help=f"Print the MD5 sum by which ROS 1 knows a {word} type.")(types.md5)
+    app.command("hash", help=f"Print the hash by which ROS 2 knows a {word} type.")(types.hash)
+    app.command("package", help=f"List the {word} types of a package.")(types.package)
+    app.command("packages", help=f"List the packages that have {word} types.")(types.packages)
+    return app
+
+
+msg = _new_app("msg", "message")
+srv = _new_app("srv", "service")
