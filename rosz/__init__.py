@@ -7,12 +7,12 @@
 ...     for tick in node.rate(10):
 ...         chatter.publish(String(data=f"hello {tick}"))
 
-The names here load what they need on first use, so that a command does not pay for all of them.
+The names are imported on first use, so that a command loads only what it needs.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # that of typing, which takes longer to load than all that is needed here
+TYPE_CHECKING = False  # typing takes longer to import than everything else here
 if TYPE_CHECKING:
     from typing import Any
 

@@ -32,14 +32,7 @@ P = TypeVar("P", bound=Closable)
 class NodeCore:
     """A node without the methods that make publishers, subscriptions, services and timers.
 
-    Args:
-        name: Base name; ``__name:=`` on the command line overrides it.
-        namespace: Namespace; ``ROS_NAMESPACE`` when not given, and ``__ns:=`` overrides both.
-        anonymous: Whether to make the name unique to this process and moment.
-        context: The context, shared with other nodes of the process; when not given, the node opens
-            one and shuts it down at its end.
-        argv: Command line without the program name; that of the process when not given. Ignored
-            with a ``context``, which has read one already.
+    For its arguments see `rosz.Node`.
 
     Attributes:
         name: Full name.
@@ -51,11 +44,6 @@ class NodeCore:
         clock: Clock of the node, closed with it.
         log: Log of the node.
         process: What the graph tells about the process of the node.
-
-    Raises:
-        InvalidName: The name or namespace is not legal.
-        TransportError: The session cannot be opened.
-        UsageError: A variable of the environment has an invalid value.
     """
 
     def __init__(

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rosz.errors import (
+    ClosedError,
     DecodeError,
     EncodeError,
     RoszError,
@@ -80,8 +81,10 @@ class Service(Entity):
             query.reply(
                 self.key, payload, attachment=pack_attachment(sequence, time.time_ns(), gid)
             )
+        except ClosedError:
+            return  # the session ends, and the client gets no response
         except TransportError as error:
-            self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
+            self.node.log.warning("cannot respond to a call of '%s': %s", self.name, error)
         except (ServiceError, DecodeError) as error:
             self._refuse(query, str(error))
         finally:
@@ -116,7 +119,7 @@ class Service(Entity):
         try:
             query.reply_error(text)
         except RoszError as error:
-            self.node.log.warning("cannot answer a call of '%s': %s", self.name, error)
+            self.node.log.warning("cannot respond to a call of '%s': %s", self.name, error)
 
 
 def to_response(response: type[Message], result: Any) -> Message:

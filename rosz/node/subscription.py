@@ -53,7 +53,7 @@ class Subscription(Entity, Generic[M]):
 
     Without a message type it receives all types from the start, so that nothing is missed. When the
     graph shows a publisher, a subscription of that publisher's type is announced, so that others
-    see who listens.
+    see it.
 
     Args:
         node: The node that the subscription belongs to.
@@ -384,7 +384,7 @@ class GenericSubscription(Subscription[Any]):
 
 
 class _Queue:
-    """The newest samples, and those who wait for them.
+    """The newest samples, and the threads and event loops that wait for them.
 
     A lock serves as the bell: it is locked while nothing new has come, and releasing it wakes one
     waiter. That takes a fraction of the time of a condition, on a path that every sample goes.

@@ -15,7 +15,7 @@ _ANSWER = "\x1eanswer:"
 
 
 def ask(script: str, question: object, home: Path) -> Any:
-    """Run a script with the system's Python, and return what it answers.
+    """Run a script with the system's Python, and return its output.
 
     Args:
         script: Gets `question`, and calls `answer` with its result. Skips the test where rospy is

@@ -1,4 +1,4 @@
-"""A simulated clock that tells when somebody falls asleep on it, so that tests need not guess."""
+"""A simulated clock that shows when a thread begins to sleep, so that tests need not guess."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class SimulatedClock(Clock):
 
 
 class Task:
-    """A call on a thread of its own, and what became of it."""
+    """A call on a thread of its own, and its result."""
 
     def __init__(self, function: Callable[[], object]) -> None:
         self._function = function
@@ -63,7 +63,7 @@ class Task:
         return not self._thread.is_alive()
 
     def result(self) -> object:
-        """Wait for the call, and return or raise what it did."""
+        """Wait for the call, and return its result or raise its error."""
         self._thread.join(PATIENCE)
         assert self.done, "the call has not returned"
         if self._error is not None:

@@ -231,7 +231,7 @@ def test_wall_sleeps_under_way_keep_to_wall_time() -> None:
 
 
 class Interrupted(Beds):
-    """Does, in the midst of falling asleep, what a signal handler may do there."""
+    """Do what a signal handler may do while a sleep begins."""
 
     def __init__(self, handler: Callable[[], None]) -> None:
         super().__init__()
@@ -252,7 +252,7 @@ def test_closing_while_the_same_thread_falls_asleep(simulated: bool) -> None:
 
 @contextmanager
 def signals_to_this_thread(handler: Callable[..., None], clock: SimulatedClock) -> Iterator[None]:
-    """Send signals from when somebody sleeps until the end of the block.
+    """Send signals from the first sleep to the end of the block.
 
     One is not always enough: Python sees it only later if it comes just before a thread blocks.
     """

@@ -37,7 +37,7 @@ PARTNER = """
 
 
 def play_partner(node: Node) -> None:
-    """Do what the program does, on a node of this process."""
+    """Run the program on a node of this process."""
     back = node.publisher("back", Int32)
     node.subscription("out", Int32, lambda m: back.publish(m.data + 1), queue_size=100)
     ask_back = node.client("subject/twice", AddTwoInts)
@@ -46,7 +46,7 @@ def play_partner(node: Node) -> None:
 
 
 class Subject:
-    """The node under test, and what its callbacks said."""
+    """The node under test, and the results of its callbacks."""
 
     def __init__(self, node: Node) -> None:
         self.node = node

@@ -1,4 +1,4 @@
-"""Programs end: those that close what they opened, and those that forget."""
+"""Programs end, whether they close what they opened or not."""
 
 from __future__ import annotations
 

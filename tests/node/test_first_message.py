@@ -62,7 +62,7 @@ def test_never_closed(network: Network) -> None:
 
 
 def test_order_of_what_is_held(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was held comes first, then what follows, all of it numbered."""
+    """Held samples come first, then the later ones, numbered without gaps."""
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)
     network.context()
     got: SimpleQueue[tuple[str, int]] = SimpleQueue()
@@ -101,7 +101,7 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
 
 
 def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever does not answer, what is held is sent in the end."""
+    """Held samples are sent in the end, even if a peer does not respond."""
     network.context()
     subscription = network.node("listener").subscription("chatter", String)
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)
@@ -114,6 +114,6 @@ def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.Monkey
 
 
 def test_nobody_else_no_wait(network: Network) -> None:
-    """Who comes first has nobody to wait for."""
+    """The first process has no peer to wait for."""
     talker = network.node("talker")
     assert talker.context.settled.is_set()

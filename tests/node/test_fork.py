@@ -1,4 +1,4 @@
-"""A forked child can use nothing of its parent's, is told so at once, and harms nobody."""
+"""A forked child cannot use the nodes of its parent, gets an error at once, and harms nothing."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ PARENT = """
     publisher = node.publisher("chatter", String)
     latched = node.publisher("latched", String, latch=True)
     subscription = node.subscription("chatter", String)
+    generic = node.subscription("chatter")
     node.subscription("chatter", String, lambda m: None)
     node.service("add", AddTwoInts, lambda request: request.a + request.b)
     client = node.client("add", AddTwoInts)
@@ -29,6 +30,7 @@ PARENT = """
         "publish": lambda: publisher.publish("x"),
         "latched": lambda: latched.publish("x"),
         "get": lambda: subscription.get(1),
+        "generic": lambda: generic.get(1),
         "call": lambda: client(1, 2),
         "wait": lambda: client.wait_for_service(1),
         "declare": lambda: node.publisher("new", String),
@@ -48,10 +50,23 @@ PARENT = """
                 print(name, "failed:", type(error).__name__, error, flush=True)
             else:
                 print(name, "went through", flush=True)
+        generic.close()
         node.close()
         node.context.close()
 """
-NAMES = ("publish", "latched", "get", "call", "wait", "declare", "listen", "serve", "set", "graph")
+NAMES = (
+    "publish",
+    "latched",
+    "get",
+    "generic",
+    "call",
+    "wait",
+    "declare",
+    "listen",
+    "serve",
+    "set",
+    "graph",
+)
 
 
 def test_everything_is_refused(network: Network) -> None:
@@ -90,7 +105,7 @@ def test_what_it_is_told(network: Network) -> None:
 
 
 def test_contexts_do_not_add_up(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is registered for a fork can never be taken back."""
+    """A function that is registered for forks cannot be unregistered."""
     registered: list[object] = []
     monkeypatch.setattr(os, "register_at_fork", lambda **after: registered.append(after))
     for _ in range(2):
@@ -99,7 +114,7 @@ def test_contexts_do_not_add_up(network: Network, monkeypatch: pytest.MonkeyPatc
 
 
 def test_multiprocessing(network: Network) -> None:
-    """A child that does not touch rosz computes and ends as ever; so does one that is spawned."""
+    """A child that does not use rosz works and ends as usual; so does one that is spawned."""
     program = network.program(
         PARENT
         + """

@@ -65,7 +65,7 @@ def test_type_is_told_once_on_both_sides(network: Network, log: Log) -> None:
 
 
 def test_whoever_comes_second(network: Network, log: Log) -> None:
-    """The one that was there first is told of, too."""
+    """There is a warning about the older entity, too."""
     listener = network.node("listener")
     listener.subscription("chatter", Int32)
     talker = network.node("talker")

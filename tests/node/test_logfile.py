@@ -22,7 +22,7 @@ from rosz.node.log_handlers import FileHandler, log_file_name
 
 
 class Bench:
-    """A logger that writes to a file only, and what was said of trouble."""
+    """A logger that writes to a file only, and the problems that it reported."""
 
     def __init__(self, path: Path, max_bytes: int = 1000, backups: int = 2) -> None:
         self.path = path
@@ -139,7 +139,7 @@ def test_folder_that_is_removed_and_made_anew(bench: Bench) -> None:
 
 
 def test_file_that_others_put_aside_or_remove(bench: Bench) -> None:
-    """So do two nodes of one name, and whoever tidies up."""
+    """The same holds for two nodes of one name, and for a person who tidies up."""
     other = Bench(bench.path)
     bench.write("first")
     for number in range(40):

@@ -239,7 +239,7 @@ def test_wait_ends_with_the_node(network: Network, talker: Node) -> None:
 
 
 def test_a_signal_handler_may_publish(network: Network) -> None:
-    """It runs in the midst of whatever the main thread does, publishing included."""
+    """It interrupts the main thread anywhere, also while that publishes."""
     heard: SimpleQueue[str] = SimpleQueue()
     network.node("listener").subscription("chatter", String, lambda m: heard.put(m.data))
     program = network.program(
@@ -301,7 +301,7 @@ class TestConnections:
     def test_first_message_for_one_alone(
         self, network: Network, talker: Node, listener: Node
     ) -> None:
-        """rospy's SubscribeListener: each newcomer gets its own greeting, nobody else hears it."""
+        """rospy's SubscribeListener: each new subscriber gets a message of its own."""
         publisher = talker.publisher("chatter", String)
         first = listener.subscription("chatter", String)
         publisher.on_connection(lambda link: link.publish(String(f"hello {link.node}")))
@@ -337,7 +337,7 @@ class TestConnections:
             assert lost.get(timeout=PATIENCE) == ("psst", 0)
 
     def test_callback_may_do_anything(self, talker: Node, listener: Node) -> None:
-        """It may wait for the graph, and may raise: other callbacks go on."""
+        """The callback may wait for the graph, and may raise: other callbacks go on."""
         seen: SimpleQueue[str] = SimpleQueue()
 
         def connected(link: SubscriberLink[String]) -> None:

@@ -1,4 +1,4 @@
-"""The queue of a subscription: who receives what, and who wakes whom."""
+"""The queue of a subscription: order of decoding, and waking of waiters."""
 
 from __future__ import annotations
 

@@ -292,7 +292,7 @@ def test_a_foreign_node_brings_them(network: Network, talker: Node) -> None:
 def test_wanted_while_it_has_a_look(
     network: Network, talker: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """That there is nobody foreign does not make it forget that somebody asked for them."""
+    """A process that turns out to be rosz does not undo a request of another one."""
     looking, go_on = threading.Event(), threading.Event()
 
     def look_long(lookout: Ros2PeerDetector, _suspects: set[str]) -> bool:

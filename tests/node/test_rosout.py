@@ -14,7 +14,7 @@ from rosz.node.log import NodeLog
 
 
 class Bench:
-    """A log without console, and what it publishes."""
+    """A log without console, and the lines that it publishes."""
 
     def __init__(self) -> None:
         self.clock = SimulatedClock()

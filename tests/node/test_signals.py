@@ -135,7 +135,7 @@ def test_second_signal_during_a_hook_that_hangs(network: Network) -> None:
 
 
 def test_put_in_the_background_by_a_script(network: Network) -> None:
-    """A shell that is not interactive starts what it does not wait for deaf to Ctrl-C."""
+    """A shell that is not interactive starts background jobs with Ctrl-C ignored."""
     program = network.program(
         """
         import signal
@@ -267,7 +267,7 @@ def test_asyncio_owns_the_main_thread(
 
 
 def test_node_off_the_main_thread(network: Network) -> None:
-    """Where somebody else owns the main thread, signals are theirs."""
+    """Signals are left alone if the node is not made in the main thread."""
     program = network.program(
         """
         import threading

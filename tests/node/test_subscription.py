@@ -26,7 +26,7 @@ def listener(network: Network) -> Node:
 
 
 def meet(talker: Node, listener: Node) -> None:
-    """Wait until what the listener declared so far is known to the talker."""
+    """Wait until the talker knows what the listener has declared so far."""
     listener.subscription("meet", String)
     talker.publisher("meet", String).wait_for_subscribers()
 
@@ -68,7 +68,7 @@ def test_callbacks_come_one_at_a_time_in_order(talker: Node, listener: Node) -> 
 
 @pytest.mark.parametrize("with_callback", [True, False])
 def test_newest_samples_are_kept(talker: Node, listener: Node, with_callback: bool) -> None:
-    """Behind a slow callback, or with nobody taking, ``queue_size`` newest ones wait."""
+    """Behind a slow callback, or without a reader, the ``queue_size`` newest samples wait."""
     got: SimpleQueue[int] = SimpleQueue()
     gate = threading.Event()
 

@@ -38,7 +38,7 @@ def test_older_process_ends(network: Network) -> None:
 
 
 def test_only_that_node_ends(network: Network) -> None:
-    """The others of its context go on, and so does what they declared."""
+    """The other nodes of its context go on, with all that they declared."""
     context = network.context()
     old, neighbour = Node("king", context=context), Node("queen", context=context)
     subscription = neighbour.subscription("reign", String)

@@ -14,7 +14,7 @@ from rosz.node.timer import Timer, TimerEvent
 
 
 class Bench:
-    """A simulated clock, and what timers on it did."""
+    """A simulated clock, and the calls of timers on it."""
 
     def __init__(self, start: int = START) -> None:
         self.clock = SimulatedClock(start)
@@ -38,7 +38,7 @@ class Bench:
         self.errors.put((text, error))
 
     def tick(self, time_ns: int) -> TimerEvent:
-        """Let a sleeping timer come to a time, and return what it called back with."""
+        """Advance the clock for a sleeping timer, and return the event of its call."""
         self.clock.wait_for_sleeper()
         self.clock.advance(time_ns)
         return self.events.get(timeout=PATIENCE)

@@ -1,4 +1,4 @@
-"""Waits that are told nonsense refuse it, rather than end at once or never."""
+"""Waits with an invalid timeout raise, rather than end at once or never."""
 
 from __future__ import annotations
 
