@@ -1,4 +1,4 @@
-"""Real genpy in a process of its own, asked one thing at a time."""
+"""Runs real genpy in another process."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Oracle:
         )
 
     def ask(self, **request: Any) -> dict[str, Any]:
-        """Return the answer: a value, or the error that genpy raises."""
+        """Return the response: a value, or the error of genpy."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(json.dumps(request) + "\n")

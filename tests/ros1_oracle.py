@@ -1,4 +1,4 @@
-"""One snippet run twice: on Debian's real modules, and on rosz's of the same names."""
+"""Runs a snippet twice: on Debian's ROS 1 modules, and on those of rosz."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def _has(module: str) -> bool:
 
 
 def real(snippet: str, module: str, package: str) -> Any:
-    """Return what ``result`` is when a snippet has run on the real modules.
+    """Return the ``result`` of a snippet on the real modules.
 
     Args:
-        snippet: Sets ``result``; has ``tried(function, *arguments)``.
-        module: A module that it needs.
-        package: What to install where that is missing.
+        snippet: Code that sets ``result``; it may use ``tried(function, *arguments)``.
+        module: Real module that the snippet needs.
+        package: Debian package of that module.
     """
     if not _has(module):
         pytest.skip(f"needs ROS 1's {module} (Debian: {package})")
@@ -69,7 +69,7 @@ def real(snippet: str, module: str, package: str) -> Any:
 
 
 def ours(snippet: str) -> Any:
-    """Return what ``result`` is when a snippet has run on rosz's modules."""
+    """Return the ``result`` of a snippet on the modules of rosz."""
     space: dict[str, Any] = {}
     install()
     try:
@@ -81,7 +81,7 @@ def ours(snippet: str) -> Any:
 
 
 def same(snippet: str, module: str, package: str) -> None:
-    """Check that a snippet comes to the same on both."""
+    """Check that a snippet has the same result on both."""
     expected = real(snippet, module, package)
     found = ours(snippet)
     assert found == expected, f"rosz: {found}\nreal: {expected}"

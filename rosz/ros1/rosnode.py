@@ -10,9 +10,9 @@ from rosz.errors import NotFoundError, RoszError
 from rosz.introspect import nodes
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import in_namespace
-from rosz.ros1.rosgraph.masterapi import Master, MasterException, uri
+from rosz.ros1.rosgraph.masterapi import Master, MasterException
 from rosz.ros1.rosgraph.names import script_resolve_name
-from rosz.ros1.state import ready_context, survey
+from rosz.ros1.state import ready_context, survey, token_uri
 from rosz.wire import Token
 
 __all__ = (
@@ -146,7 +146,7 @@ def rosnode_ping(
             return False
         sent += 1
         if verbose:
-            address = uri(found, member)
+            address = token_uri(found, member)
             sys.stdout.write(f"reply from {address}\ttime={passed:f}ms\n")
     return True
 
@@ -213,7 +213,7 @@ def get_node_connection_info_description(node_api: str, master: Master) -> str: 
     """
     found = survey()
     for token in found.view.tokens:
-        if uri(found, token) == node_api:
+        if token_uri(found, token) == node_api:
             process = found.process(token)
             pid = f"Pid: {process.pid}\n" if process is not None else ""
             return pid + nodes.format_connections(found, token)

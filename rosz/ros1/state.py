@@ -19,6 +19,7 @@ from rosz.lifecycle import Lifecycle
 from rosz.node import Context, Node
 from rosz.params.api import Params
 from rosz.ros1.exceptions import ROSInitException
+from rosz.wire import Token
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
@@ -41,6 +42,7 @@ __all__ = (
     "set_arguments",
     "state",
     "survey",
+    "token_uri",
     "unnamed_node",
     "when_ready",
 )
@@ -220,6 +222,12 @@ def node_uri(zid: str, node_id: int, host: str) -> str:
         host: Host name.
     """
     return f"rosz://{host}/{zid}/{node_id}"
+
+
+def token_uri(found: Survey, token: Token) -> str:
+    """Return the URI of the node of a token; the host of a ROS 2 node is ``unknown``."""
+    process = found.process(token)
+    return node_uri(token.zid, token.node_id, process.host if process else "unknown")
 
 
 def has_node() -> bool:

@@ -1,4 +1,4 @@
-"""ROS 1's names in processes of their own: what a process can import is a matter of the process."""
+"""The importer of ROS 1's names; each test runs in its own process."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_a_read_only_home(tmp_path: Path, workspace: Path) -> None:
     assert run(code, tmp_path, workspace, ROS_HOME="/proc/nothing") == "18\n"
 
 
-def test_a_bad_definition_names_its_place(tmp_path: Path, workspace: Path) -> None:
+def test_errors_in_definitions_have_a_place(tmp_path: Path, workspace: Path) -> None:
     (workspace / "parts" / "msg" / "Bad.msg").write_text("int32 x\nint32\n")
     code = """
         import rosz.ros1
@@ -169,7 +169,7 @@ def test_a_bad_definition_names_its_place(tmp_path: Path, workspace: Path) -> No
     assert run(code, tmp_path, workspace) == f"{file}:2:6: expected a name after type 'int32'\n"
 
 
-def test_other_imports_are_left_alone(tmp_path: Path, workspace: Path) -> None:
+def test_other_imports_are_unchanged(tmp_path: Path, workspace: Path) -> None:
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "__init__.py").write_text("WHO = 'another one'\n")
     (tmp_path / "mail").mkdir()
@@ -245,7 +245,7 @@ def test_a_package_of_a_shipped_name_may_add_types(tmp_path: Path, workspace: Pa
     assert run(code, tmp_path, workspace) == "rosz.msgs.std_msgs.msg\n"
 
 
-def test_installing_twice_and_taking_back(tmp_path: Path, workspace: Path) -> None:
+def test_install_twice_and_uninstall(tmp_path: Path, workspace: Path) -> None:
     code = """
         import sys
         from rosz.ros1.importer import install, type_store, uninstall
@@ -267,7 +267,7 @@ def test_installing_twice_and_taking_back(tmp_path: Path, workspace: Path) -> No
     assert run(code, tmp_path, workspace) == "gone\n"
 
 
-def test_threads_import_at_once(tmp_path: Path, workspace: Path) -> None:
+def test_threads_import_concurrently(tmp_path: Path, workspace: Path) -> None:
     code = """
         import rosz.ros1
         from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""A script under ``python -m rosz.ros1`` cannot tell that it was not run by the interpreter."""
+"""A script under ``python -m rosz.ros1`` behaves as under the interpreter."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ print(sorted(globals()))
 
 
 @pytest.mark.parametrize("what", SAME)
-def test_it_is_as_if_run_by_the_interpreter(tmp_path: Path, what: str) -> None:
+def test_script_runs_as_by_the_interpreter(tmp_path: Path, what: str) -> None:
     (tmp_path / "neighbour.py").write_text("")
     ours = run(tmp_path, SAME[what], "a", "b:=c", "-x")
     expected = plain(tmp_path, "a", "b:=c", "-x")
@@ -91,7 +91,7 @@ def test_it_is_as_if_run_by_the_interpreter(tmp_path: Path, what: str) -> None:
     )
 
 
-def test_the_folder_of_a_link_is_that_of_its_target(tmp_path: Path) -> None:
+def test_links_are_followed_to_the_folder(tmp_path: Path) -> None:
     real = tmp_path / "real"
     real.mkdir()
     (real / "node.py").write_text("import sys\nprint(sys.path[0], sys.argv[0])\n")
@@ -128,7 +128,7 @@ PYTHON_2 = {
 
 
 @pytest.mark.parametrize("script", PYTHON_2)
-def test_python_2_is_named_in_one_line(tmp_path: Path, script: str) -> None:
+def test_python_2_syntax_is_explained_in_one_line(tmp_path: Path, script: str) -> None:
     done = run(tmp_path, script)
     path = tmp_path / "node.py"
     assert done.stderr.startswith(f"rosz: {path}{PYTHON_2[script]}")
@@ -137,7 +137,7 @@ def test_python_2_is_named_in_one_line(tmp_path: Path, script: str) -> None:
     assert done.returncode == 1
 
 
-def test_tabs_and_spaces_are_named_in_one_line(tmp_path: Path) -> None:
+def test_mixed_tabs_and_spaces_are_explained_in_one_line(tmp_path: Path) -> None:
     done = run(tmp_path, "def f():\n\tif 1:\n        return 2\n")
     assert done.stderr == (
         f"rosz: {tmp_path}/node.py:3:1: indented by tabs and spaces in turn, as Python 2 allowed;"
@@ -155,7 +155,7 @@ HINTS = {
 
 
 @pytest.mark.parametrize("script", HINTS)
-def test_names_of_python_2_are_explained_behind_the_traceback(tmp_path: Path, script: str) -> None:
+def test_python_2_names_are_explained_after_the_traceback(tmp_path: Path, script: str) -> None:
     done = run(tmp_path, script)
     expected = plain(tmp_path)
     assert done.stderr == f"{expected.stderr}rosz: {HINTS[script]}\n"
@@ -163,11 +163,11 @@ def test_names_of_python_2_are_explained_behind_the_traceback(tmp_path: Path, sc
 
 
 @pytest.mark.parametrize("name", ["print_input", "xrange2"])
-def test_other_names_are_not(tmp_path: Path, name: str) -> None:
+def test_other_names_are_not_explained(tmp_path: Path, name: str) -> None:
     assert "rosz:" not in run(tmp_path, f"{name}()\n").stderr
 
 
-def test_errors_of_use(tmp_path: Path) -> None:
+def test_usage_errors(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "rosz.ros1"]
     environ = {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, capture_output=True, env=environ, timeout=30, check=False)
@@ -187,7 +187,7 @@ def test_errors_of_use(tmp_path: Path) -> None:
         ("from rosz.errors import ParamNotFound; raise ParamNotFound('/x')", "'/x' is not set"),
     ],
 )
-def test_an_error_of_rosz_is_one_line_with_its_place(tmp_path: Path, line: str, text: str) -> None:
+def test_errors_of_rosz_are_one_line_with_a_place(tmp_path: Path, line: str, text: str) -> None:
     script = tmp_path / "node.py"
     script.write_text(f"\n{line}\n")
     done = subprocess.run(

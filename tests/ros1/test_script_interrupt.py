@@ -1,4 +1,4 @@
-"""Ctrl-C before a script has begun, or while it imports, ends it without a word."""
+"""Ctrl-C before a script runs, or while it imports, ends it without a traceback."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SLOW = "import os, sys, time\nos.write(1, b'loading\\n')\ntime.sleep(600)\n"
 
 
 @pytest.mark.parametrize("module", ["rosz.script", "rosz.ros1"])
-def test_while_it_imports(network: Network, module: str) -> None:
+def test_ctrl_c_during_imports(network: Network, module: str) -> None:
     (network.folder / "slow.py").write_text(SLOW)
     script = network.folder / "script.py"
     script.write_text("import slow\n")
@@ -23,8 +23,8 @@ def test_while_it_imports(network: Network, module: str) -> None:
     assert program.output == "loading"
 
 
-def test_while_rosz_itself_is_loaded(network: Network) -> None:
-    # Whoever lists what is on the path before ours is there first.
+def test_ctrl_c_while_rosz_loads(network: Network) -> None:
+    # The folder comes before that of the real msgspec on the path.
     (network.folder / "msgspec.py").write_text(SLOW)
     script = network.folder / "script.py"
     script.write_text("print('begun')\n")
@@ -39,7 +39,7 @@ def test_while_rosz_itself_is_loaded(network: Network) -> None:
 
 
 @pytest.mark.parametrize("module", ["rosz.script", "rosz.ros1"])
-def test_a_script_that_has_begun_catches_it(network: Network, module: str) -> None:
+def test_a_running_script_catches_ctrl_c(network: Network, module: str) -> None:
     script = network.folder / "script.py"
     script.write_text(
         "import time\n"

@@ -11,12 +11,11 @@ from collections.abc import Iterable
 from typing import Any, NoReturn
 
 from rosz.errors import ParamError, ParamNotFound, RoszError, TransportError
-from rosz.introspect.survey import Survey
 from rosz.names import short_type
 from rosz.params.api import Params
 from rosz.ros1.rosgraph.names import make_caller_id
 from rosz.ros1.rosgraph.rosenv import get_master_uri
-from rosz.ros1.state import node_uri, params_of, ready_context, survey
+from rosz.ros1.state import params_of, ready_context, survey, token_uri
 from rosz.wire import Kind, Token
 
 __all__ = (
@@ -167,7 +166,7 @@ class Master:
         members = found.nodes_named(node_name)
         if not members:
             raise MasterError(f"unknown node [{node_name}]")
-        return uri(found, members[-1])
+        return token_uri(found, members[-1])
 
     def lookupService(self, service: str) -> str:  # noqa: N802  # ROS 1's
         """Return the URI of the node that serves a service.
@@ -179,7 +178,7 @@ class Master:
         servers = found.view.servers(service)
         if not servers:
             raise MasterError("no provider")
-        return uri(found, servers[0])
+        return token_uri(found, servers[0])
 
     def getPublishedTopics(self, subgraph: str) -> Pairs:  # noqa: N802  # ROS 1's
         """Return the topics that have publishers, with their types.
@@ -205,12 +204,6 @@ class Master:
             raise MasterFailure(str(error)) from error
         kinds = Kind.PUBLISHER, Kind.SUBSCRIPTION, Kind.SERVICE
         return [_with_nodes(view.entities(kind)) for kind in kinds]
-
-
-def uri(found: Survey, token: Token) -> str:
-    """Return the URI of the node of a token; the host of a ROS 2 node is ``unknown``."""
-    process = found.process(token)
-    return node_uri(token.zid, token.node_id, process.host if process else "unknown")
 
 
 def _types(tokens: Iterable[Token]) -> Pairs:

@@ -83,7 +83,7 @@ def test_printable_arguments() -> None:
     )
 
 
-def test_filling_and_its_errors() -> None:
+def test_fill_message_args() -> None:
     twist = Twist()
     genpy.message.fill_message_args(twist, [{"linear": {"x": 1}}])
     assert twist.linear.x == 1.0
@@ -105,7 +105,7 @@ def test_serialisation_round_trips() -> None:
         wrong.serialize(io.BytesIO())
 
 
-def test_times_are_those_of_messages() -> None:
+def test_times_are_the_classes_of_fields() -> None:
     assert isinstance(Header().stamp, genpy.Time)
     assert isinstance(genpy.Time(1) - genpy.Time(), genpy.Duration)
     assert isinstance(genpy.Duration(1), genpy.TVal)

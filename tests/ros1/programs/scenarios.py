@@ -1,4 +1,4 @@
-"""The programs and how they are started: one or several, with what arguments, interrupted when."""
+"""The scenarios: programs that run together, their arguments and signals."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ class Part(NamedTuple):
     """A program of a scenario.
 
     Attributes:
-        script: Its file.
-        arguments: Its command line.
+        script: File name.
+        arguments: Command-line arguments.
         variables: Environment variables.
-        after: A line that the program before it has to write first.
-        interrupt_at: A line of its own upon which it gets a signal.
-        signal: Which one.
+        after: Line that the previous program must write before this one starts.
+        interrupt_at: Line of this program after which it gets the signal.
+        signal: The signal.
     """
 
     script: str
@@ -32,14 +32,14 @@ class Scenario(NamedTuple):
     """Programs that run together.
 
     Attributes:
-        name: Its name.
+        name: Name of the scenario.
         parts: The programs, in the order of their start.
-        unlike: Lines in which ROS and rosz say the same in other words: what they hold.
+        ignored: Texts of lines that ROS and rosz word differently.
     """
 
     name: str
     parts: tuple[Part, ...]
-    unlike: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
 
 
 _MISMATCH = ("Could not process inbound connection: topic types", "they do not reach each other")
@@ -49,11 +49,11 @@ def _alone(
     script: str,
     *arguments: str,
     name: str = "",
-    unlike: tuple[str, ...] = (),
+    ignored: tuple[str, ...] = (),
     **variables: str,
 ) -> Scenario:
     part = Part(f"{script}.py", arguments, tuple(variables.items()))
-    return Scenario(name or script, (part,), unlike)
+    return Scenario(name or script, (part,), ignored)
 
 
 def _interrupted(
@@ -122,7 +122,7 @@ SCENARIOS = (
     _alone("topics_peers"),
     _alone("topics_unregister"),
     _alone("topics_publish_forms"),
-    _alone("topics_same_twice", unlike=_MISMATCH),
+    _alone("topics_same_twice", ignored=_MISMATCH),
     _alone("topics_no_queue_size"),
     _alone("topics_wait"),
     _alone("topics_published"),
@@ -155,7 +155,7 @@ SCENARIOS = (
     ),
     _alone("time_no_clock"),
     _alone("time_backwards"),
-    _alone("shutdown_hooks", unlike=("] [TIME]: shutdown hook ",)),
+    _alone("shutdown_hooks", ignored=("] [TIME]: shutdown hook ",)),
     _alone("shutdown_after"),
     _alone("shutdown_exit_code", "code", name="shutdown_code"),
     _alone("shutdown_exit_code", "text", name="shutdown_text"),

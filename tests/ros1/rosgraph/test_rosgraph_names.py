@@ -15,7 +15,7 @@ ARGUMENTS = ["a:=b", "_a:=b", "__name:=x", "a:=", ":=b", "/a:=~b", "a:=b:=c", "x
 
 
 @pytest.mark.parametrize("function", ONE)
-def test_functions_of_one_name(function: str) -> None:
+def test_functions_of_one_argument(function: str) -> None:
     skipped = "[1:-1]" if function == "namespace" else ""
     same(
         f"""
@@ -39,7 +39,7 @@ def test_predicates(function: str) -> None:
     )
 
 
-def test_joining_and_resolving() -> None:
+def test_join_and_resolve() -> None:
     same(
         f"""
         from rosgraph import names

@@ -1,4 +1,4 @@
-"""rospkg and roslib.packages over folders of packages, against the real ones where they can be."""
+"""rospkg and roslib, compared with the real ones where possible."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ def packs(tmp_path: Path) -> rospkg.RosPack:
     return rospkg.RosPack([str(tmp_path)])
 
 
-def test_finding(packs: rospkg.RosPack, tmp_path: Path) -> None:
+def test_find_packages(packs: rospkg.RosPack, tmp_path: Path) -> None:
     assert sorted(packs.list()) == ["arm", "finger", "hand"]
     assert packs.get_path("finger") == str(tmp_path / "deep" / "down" / "finger")
     assert packs.ros_paths == packs.get_ros_paths() == [str(tmp_path)]
 
 
-def test_a_missing_package_is_told_as_rospkg_does(tmp_path: Path) -> None:
+def test_error_of_a_missing_package(tmp_path: Path) -> None:
     same(
         f"""
         import rospkg
@@ -77,7 +77,7 @@ def test_manifest(packs: rospkg.RosPack, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("packs")
-def test_manifest_fields_are_those_of_rospkg(tmp_path: Path) -> None:
+def test_manifest_equals_that_of_rospkg(tmp_path: Path) -> None:
     same(
         f"""
         import rospkg
@@ -121,7 +121,7 @@ def test_package_of_a_file(tmp_path: Path) -> None:
     assert roslib.get_dir_pkg("/") == (None, None)
 
 
-def test_what_rosz_ships_is_found() -> None:
+def test_shipped_packages_are_found() -> None:
     assert "std_msgs" in rospkg.RosPack().list()
     assert Path(rospkg.RosPack().get_path("std_msgs"), "msg", "String.msg").is_file()
     assert roslib.get_pkg_dir("std_msgs") == rospkg.RosPack().get_path("std_msgs")
@@ -145,7 +145,7 @@ def test_folders_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def test_pkg_dir_of_nothing() -> None:
+def test_pkg_dir_of_a_missing_package() -> None:
     assert roslib.get_pkg_dir("no_such_thing", required=False) is None
     with pytest.raises(roslib.InvalidROSPkgException, match="'no_such_thing' not found"):
         roslib.get_pkg_dir("no_such_thing")
@@ -163,7 +163,7 @@ def test_files_of_a_package(packs: rospkg.RosPack, tmp_path: Path) -> None:
         roslib.find_resource("leg", "move.py", rospack=packs)
 
 
-def test_load_manifest_makes_the_code_of_a_package_importable(
+def test_load_manifest_extends_the_module_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "path", list(sys.path))

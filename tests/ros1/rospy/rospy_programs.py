@@ -1,4 +1,4 @@
-"""Programs written for rospy, run as ``python -m rosz.ros1`` on the network of a test."""
+"""Runs rospy programs with ``python -m rosz.ros1`` on the network of a test."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def show(label, function):
 
 
 def start(network: Network, script: str, *argv: str, **variables: str) -> Program:
-    """Start a program; it has `show`, and its lines are written whole."""
+    """Start a program that has the function `show`."""
     path = network.folder / f"program{next(_NUMBERS)}.py"
     path.write_text(_SHOW + dedent(script))
     return network.run("-m", "rosz.ros1", str(path), *argv, **variables)
 
 
 def run(network: Network, script: str, *argv: str, code: int = 0, **variables: str) -> list[str]:
-    """Run a program to its end, and return its lines."""
+    """Run a program, and return its lines."""
     program = start(network, script, *argv, **variables)
     ended = program.exit_code(30)
     assert ended == code, program.output

@@ -1,4 +1,4 @@
-"""rospy's logging functions; lines as real rospy 1.15 writes them."""
+"""rospy's log functions; the lines are those of real rospy 1.15."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def stamped(lines: list[str]) -> list[str]:
     return [_STAMP.sub("[T]", line) for line in lines]
 
 
-def test_levels_and_forms(network: Network) -> None:
+def test_levels_and_formats(network: Network) -> None:
     assert stamped(
         run(
             network,
@@ -53,7 +53,7 @@ def test_levels_and_forms(network: Network) -> None:
     ]
 
 
-def test_not_too_often(network: Network) -> None:
+def test_once_and_throttled_messages(network: Network) -> None:
     assert stamped(
         run(
             network,
@@ -104,7 +104,7 @@ def test_streams(network: Network) -> None:
         ("${function}:${message}", "speak:text"),
     ],
 )
-def test_the_form_of_a_line(network: Network, form: str, line: str) -> None:
+def test_console_format(network: Network, form: str, line: str) -> None:
     assert run(
         network,
         """
@@ -118,7 +118,7 @@ def test_the_form_of_a_line(network: Network, form: str, line: str) -> None:
     ) == [line]
 
 
-def test_levels_set_by_service_and_pythons_own_loggers(network: Network) -> None:
+def test_levels_set_by_service_and_by_python_logging(network: Network) -> None:
     assert stamped(
         run(
             network,

@@ -1,4 +1,4 @@
-"""numpy_msg: sequences of numbers as numpy arrays, there and back."""
+"""numpy_msg: sequences of numbers as numpy arrays, encoded and decoded."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_kinds_of_numbers(kind: type, field: str, values: list[float], dtype: ty
     assert getattr(back, field).tolist() == values
 
 
-def test_octets_and_texts_stay() -> None:
+def test_octets_and_texts_are_not_arrays() -> None:
     assert numpy_msg(Image).from_cdr(Image(data=b"ab").to_cdr()).data == b"ab"
     state = MultiDOFJointState(joint_names=["a"])
     assert numpy_msg(MultiDOFJointState).from_cdr(state.to_cdr()).joint_names == ["a"]

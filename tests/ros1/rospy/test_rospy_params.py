@@ -1,4 +1,4 @@
-"""rospy's parameter functions, its master, and its names; as real rospy 1.15 has them."""
+"""rospy's parameters, master and names; the outputs are those of real rospy 1.15."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_names(network: Network) -> None:
     assert inside[2:6] == ["'' /deep/ ", "'a' /deep/a a", "'/a' /a /a", "'~a' /deep/you/a ~a"]
 
 
-def test_what_is_absent_says_why(network: Network) -> None:
+def test_missing_names_say_what_to_use_instead(network: Network) -> None:
     lines = run(
         network,
         """

@@ -1,4 +1,4 @@
-"""rospy's services and their callers; outputs as real rospy 1.15 has them."""
+"""rospy's services and their callers; the outputs are those of real rospy 1.15."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ERROR = "ServiceException | service [/s] responded with an error: "
         ("Empty", "lambda r: []", "EmptyResponse()"),
     ],
 )
-def test_what_a_handler_may_return(network: Network, kind: str, handler: str, shown: str) -> None:
+def test_valid_results_of_handlers(network: Network, kind: str, handler: str, shown: str) -> None:
     arguments = {"AddTwoInts": "3, 4", "SetBool": "True", "Empty": ""}[kind]
     (line,) = run(
         network,
@@ -71,9 +71,7 @@ def test_what_a_handler_may_return(network: Network, kind: str, handler: str, sh
         ("AddTwoInts", "refuse", "mine"),
     ],
 )
-def test_what_a_handler_may_not_return(
-    network: Network, kind: str, handler: str, shown: str
-) -> None:
+def test_invalid_results_of_handlers(network: Network, kind: str, handler: str, shown: str) -> None:
     lines = run(
         network,
         f"""{BEGIN}
@@ -88,7 +86,7 @@ def test_what_a_handler_may_not_return(
     assert lines == [f"call -> {ERROR}{text.encode()!r}"]
 
 
-def test_what_a_handler_raises_is_logged_and_told(network: Network) -> None:
+def test_handler_errors_are_logged_and_sent_to_the_caller(network: Network) -> None:
     lines = run(
         network,
         BEGIN
@@ -119,7 +117,7 @@ def test_what_a_handler_raises_is_logged_and_told(network: Network) -> None:
     )
 
 
-def test_what_a_call_takes(network: Network) -> None:
+def test_arguments_of_calls(network: Network) -> None:
     assert run(
         network,
         BEGIN
@@ -155,7 +153,7 @@ def test_what_a_call_takes(network: Network) -> None:
     ]
 
 
-def test_waiting(network: Network) -> None:
+def test_wait_for_service(network: Network) -> None:
     assert run(
         network,
         BEGIN
@@ -208,7 +206,7 @@ def test_calls_between_processes_and_from_handlers(network: Network) -> None:
     assert server.exit_code() == 0
 
 
-def test_a_call_ends_with_the_node(network: Network) -> None:
+def test_shutdown_ends_a_call(network: Network) -> None:
     assert run(
         network,
         BEGIN
@@ -233,7 +231,7 @@ def test_a_call_ends_with_the_node(network: Network) -> None:
     ]
 
 
-def test_a_wait_that_is_no_time_is_refused(network: Network) -> None:
+def test_invalid_timeouts_are_refused(network: Network) -> None:
     lines = run(
         network,
         f"""{BEGIN}

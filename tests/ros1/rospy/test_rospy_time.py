@@ -1,4 +1,4 @@
-"""rospy's times, rates and timers; as real rospy 1.15 has them."""
+"""rospy's times, rates and timers; the outputs are those of real rospy 1.15."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_differences_and_comparisons() -> None:
     ("arguments", "error"),
     [((-1,), TypeError), ((0, -1), TypeError), ((1.5, 3), ValueError), (("a",), ValueError)],
 )
-def test_what_is_no_time(arguments: tuple[Any, ...], error: type[Exception]) -> None:
+def test_invalid_times(arguments: tuple[Any, ...], error: type[Exception]) -> None:
     with pytest.raises(error):
         Time(*arguments)
 

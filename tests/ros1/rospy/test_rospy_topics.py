@@ -1,4 +1,4 @@
-"""rospy's publishers and subscribers; outputs as real rospy 1.15 has them."""
+"""rospy's publishers and subscribers; the outputs are those of real rospy 1.15."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BEGIN = """
 """
 
 
-def test_what_publish_takes(network: Network) -> None:
+def test_arguments_of_publish(network: Network) -> None:
     lines = run(
         network,
         BEGIN
@@ -69,12 +69,12 @@ def test_what_publish_takes(network: Network) -> None:
         "empty -> None",
         "not empty -> TypeError | Invalid number of arguments, args should be [] args are(1,)",
     ]
-    # Nobody listens: as in rospy no exception, but a warning.
+    # Without subscribers rospy warns instead of raising an exception.
     assert "a message on '/number' cannot be published" in lines[-2]
     assert lines[-1] == "unheard -> None"
 
 
-def test_what_makes_no_topic(network: Network) -> None:
+def test_invalid_topics(network: Network) -> None:
     assert run(
         network,
         BEGIN
@@ -107,7 +107,7 @@ def test_what_makes_no_topic(network: Network) -> None:
     ]
 
 
-def test_a_missing_queue_size_is_warned_of(network: Network) -> None:
+def test_a_missing_queue_size_warns(network: Network) -> None:
     lines = run(
         network,
         BEGIN + "\n    rospy.Publisher('x', String)\n",
@@ -117,7 +117,7 @@ def test_a_missing_queue_size_is_warned_of(network: Network) -> None:
     assert lines[1].strip() == "rospy.Publisher('x', String)"
 
 
-def test_subscribers_of_a_process_share_a_thread_and_take_turns(network: Network) -> None:
+def test_subscribers_of_a_topic_share_a_thread(network: Network) -> None:
     assert run(
         network,
         BEGIN
@@ -148,7 +148,7 @@ def test_subscribers_of_a_process_share_a_thread_and_take_turns(network: Network
     ) == ["['a0', 'b0!', 'a1', 'b1!', 'a2', 'b2!'] 1 1 1", "True", "bz!"]
 
 
-def test_a_callback_that_fails_does_not_keep_others_from_theirs(network: Network) -> None:
+def test_a_failing_callback_does_not_stop_the_others(network: Network) -> None:
     lines = run(
         network,
         BEGIN
@@ -193,7 +193,7 @@ def test_latched_messages_reach_later_subscribers_of_the_process(network: Networ
     ) == ["['a two', 'b two', 'c two'] two True"]
 
 
-def test_a_publisher_that_begins_to_latch(network: Network) -> None:
+def test_a_second_publisher_can_make_a_topic_latch(network: Network) -> None:
     assert run(
         network,
         BEGIN
@@ -206,7 +206,7 @@ def test_a_publisher_that_begins_to_latch(network: Network) -> None:
     ) == ["kept 2"]
 
 
-def test_topics_made_before_init_node_work_after_it(network: Network) -> None:
+def test_topics_created_before_init_node(network: Network) -> None:
     assert run(
         network,
         """
@@ -245,7 +245,7 @@ def test_headers_are_numbered(network: Network) -> None:
     ) == ["1 3000000000", "2 3000000000", "[(1, 3.0, 'map'), (2, 3.0, 'map')]"]
 
 
-def test_slow_callbacks_get_the_newest(network: Network) -> None:
+def test_slow_callbacks_receive_the_newest_messages(network: Network) -> None:
     first, last = run(
         network,
         BEGIN
@@ -310,7 +310,7 @@ def test_any_message(network: Network) -> None:
     assert lines[5] == "abc"
 
 
-def test_a_listener_meets_each_subscriber(network: Network) -> None:
+def test_a_listener_is_notified_of_each_subscriber(network: Network) -> None:
     assert run(
         network,
         BEGIN
@@ -371,7 +371,7 @@ def test_remapped_topics_reach_other_nodes(network: Network) -> None:
         ("geometry_msgs.msg.Point", "'x', 0, 0", "field x must be float type"),
     ],
 )
-def test_wrong_values_are_told_in_genpys_words(kind: str, value: str, text: str) -> None:
+def test_errors_of_values_are_those_of_genpy(kind: str, value: str, text: str) -> None:
     from importlib import import_module
 
     from rosz.errors import EncodeError

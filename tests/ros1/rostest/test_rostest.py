@@ -1,4 +1,4 @@
-"""rostest and rosunit: tests that are nodes, and what they leave."""
+"""rostest and rosunit: tests that are nodes, and their result files."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCRIPT = """
 """
 
 
-def test_a_test_that_passes(network: Network) -> None:
+def test_passing_test(network: Network) -> None:
     network.node("talker").publisher("chatter", String)
     file = network.folder / "out.xml"
     program = network.program(SCRIPT.format(answer=42), f"--gtest_output=xml:{file}")
@@ -38,7 +38,7 @@ def test_a_test_that_passes(network: Network) -> None:
     assert [case.get("name") for case in suite] == ["test_answer", "test_there"]
 
 
-def test_a_test_that_fails(network: Network) -> None:
+def test_failing_test(network: Network) -> None:
     network.node("talker").publisher("chatter", String)
     program = network.program(SCRIPT.format(answer=41))
     assert program.exit_code() == 1

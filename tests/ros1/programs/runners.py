@@ -1,14 +1,16 @@
-"""Programs run together: on real rospy with a real roscore, and on rosz."""
+"""Runs programs together: on real rospy with a real roscore, and on rosz."""
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from ast import literal_eval
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple
 from xmlrpc.client import ServerProxy
@@ -16,7 +18,6 @@ from xmlrpc.client import ServerProxy
 import pytest
 from network import Network, eventually
 
-from .likeness import likeness
 from .scenarios import Part, Scenario
 
 __all__ = ("Outcome", "Ros", "Rosz")
@@ -25,23 +26,37 @@ SCRIPTS = Path(__file__).parent / "scripts"
 PACKAGES = Path(__file__).parent / "packages"
 _DEBIAN = "/usr/bin/python3"
 _GENPY = Path("/usr/lib/genpy")
-_PATIENCE = 25.0
+_TIMEOUT = 25.0
 _NEEDED = (
     "genpy, rospy, rosgraph_msgs, std_srvs, geometry_msgs, nav_msgs, sensor_msgs, diagnostic_msgs,"
     " roscpp.srv, numpy"
 )
 
+_CHANGING: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
+    (re.compile(r"\[\d{9,}\.\d+"), "[TIME"),
+    (re.compile(r"0x[0-9a-f]{6,}"), "0xADDRESS"),
+    (re.compile(r"http://[\w.-]+:\d+/?"), "http://HOST:PORT/"),
+    (re.compile(r"\x1b\[[\d;]*m"), ""),
+    (re.compile(r"Thread-\d+"), "Thread-N"),
+    (re.compile(r"the rosdep view is empty: .*\n"), ""),
+    # Debug messages of the library; those of the programs begin with "my".
+    (re.compile(r"(?m)^\[DEBUG\] \[TIME[^:]*: (?!my ).*\n"), ""),
+    (re.compile(r"(?m)^\['Traceback .*\]$"), lambda found: _listed(found[0])),
+)
+_FRAME = re.compile(r'\s*File "(?P<path>[^"]+)", line \d+')
+_MARKS = re.compile(r"\s+[~^]+\s*")
+
 
 class Outcome(NamedTuple):
-    """How a program ended, without what no two runs share."""
+    """The normalized output and the exit code of a program."""
 
     stdout: str
     stderr: str
     code: int
 
 
-class _Actor:
-    """A running program, with what it writes to each of its streams."""
+class _Running:
+    """A running program and its output."""
 
     def __init__(self, command: Sequence[str], variables: dict[str, str], folder: Path) -> None:
         self._changed = threading.Condition()
@@ -72,7 +87,7 @@ class _Actor:
         return thread
 
     def wait_for(self, line: str) -> None:
-        """Wait until it has written a line to its standard output."""
+        """Wait until the program has written a line to stdout."""
 
         def written() -> bool:
             ended = not self._readers[0].is_alive()
@@ -80,35 +95,35 @@ class _Actor:
 
         with self._changed:
             while not written():
-                if not self._changed.wait(_PATIENCE):
+                if not self._changed.wait(_TIMEOUT):
                     break
 
-    def outcome(self, unlike: Sequence[str]) -> Outcome:
-        """Wait for its end, and return how it was, without lines that hold certain texts."""
+    def outcome(self, ignored: Sequence[str]) -> Outcome:
+        """Wait for the end of the program; remove lines that contain an ignored text."""
         try:
-            code = self.process.wait(_PATIENCE)
+            code = self.process.wait(_TIMEOUT)
         except subprocess.TimeoutExpired:
             self.close()
             code = 999
         for reader in self._readers:
-            reader.join(_PATIENCE)
-        texts = [likeness(text, str(SCRIPTS), unlike) for text in self._texts.values()]
+            reader.join(_TIMEOUT)
+        texts = [normalize(text, str(SCRIPTS), ignored) for text in self._texts.values()]
         return Outcome(texts[0], texts[1], code)
 
     def close(self) -> None:
-        """Leave nothing of it behind."""
+        """Kill the program if it still runs."""
         if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
         for reader in self._readers:
-            reader.join(_PATIENCE)
+            reader.join(_TIMEOUT)
         for stream in (self.process.stdout, self.process.stderr):
             if stream is not None:
                 stream.close()
 
 
-class _Stage:
-    """Something to run programs on."""
+class _Runner:
+    """Base class of what runs programs."""
 
     def command(self, part: Part) -> list[str]:
         """Return the command line of a program."""
@@ -118,32 +133,32 @@ class _Stage:
         """Return the environment of all programs."""
         raise NotImplementedError
 
-    def play(self, scenario: Scenario, folder: Path) -> list[Outcome]:
-        """Run the programs of a scenario, and return how they ended."""
-        actors: list[_Actor] = []
+    def run(self, scenario: Scenario, folder: Path) -> list[Outcome]:
+        """Run the programs of a scenario."""
+        running: list[_Running] = []
         try:
             for part in scenario.parts:
                 if part.after:
-                    actors[-1].wait_for(part.after)
+                    running[-1].wait_for(part.after)
                 variables = self.variables() | dict(part.variables)
-                actors.append(_Actor(self.command(part), variables, folder))
-            for part, actor in zip(scenario.parts, actors, strict=True):
+                running.append(_Running(self.command(part), variables, folder))
+            for part, program in zip(scenario.parts, running, strict=True):
                 if part.interrupt_at:
-                    actor.wait_for(part.interrupt_at)
-                    # What the line announces begins right behind it.
+                    program.wait_for(part.interrupt_at)
+                    # The program announces a wait that begins right after the line.
                     threading.Event().wait(0.3)
-                    actor.process.send_signal(part.signal)
-            return [actor.outcome(scenario.unlike) for actor in actors]
+                    program.process.send_signal(part.signal)
+            return [program.outcome(scenario.ignored) for program in running]
         finally:
-            for actor in actors:
-                actor.close()
+            for program in running:
+                program.close()
 
 
-class Ros(_Stage):
-    """Debian's rospy, and a roscore of its own.
+class Ros(_Runner):
+    """Runs programs on Debian's rospy with a roscore.
 
     Args:
-        folder: Where ROS writes.
+        folder: Folder for the files of ROS.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -176,15 +191,15 @@ class Ros(_Stage):
         self._own = set(self._parameters())
 
     def command(self, part: Part) -> list[str]:
-        """Return the command line for the system's Python."""
+        """Return the command line for Debian's Python."""
         return [_DEBIAN, str(SCRIPTS / part.script), *part.arguments]
 
     def variables(self) -> dict[str, str]:
-        """Return what leads to the roscore."""
+        """Return the environment with the URI of the roscore."""
         return self._variables
 
     def clean(self) -> None:
-        """Take away the parameters that programs have left."""
+        """Delete the parameters that programs have left."""
         for name in sorted(set(self._parameters()) - self._own):
             self._master.deleteParam("/test", name)
 
@@ -205,10 +220,10 @@ class Ros(_Stage):
             [_DEBIAN, "-c", f"import {_NEEDED}"], capture_output=True, text=True, check=False
         )
         if done.returncode:
-            pytest.skip(f"ROS 1 to compare with is not whole: {done.stderr.splitlines()[-1]}")
+            pytest.skip(f"ROS 1 to compare with is incomplete: {done.stderr.splitlines()[-1]}")
 
     def _generate(self) -> None:
-        """Have genpy make Python of our own packages, as catkin_make would."""
+        """Generate Python modules of the test packages with genpy, as catkin_make does."""
         for package in PACKAGES.iterdir():
             for kind in ("msg", "srv"):
                 target = self._generated / package.name / kind
@@ -223,25 +238,25 @@ class Ros(_Stage):
             (target.parent / "__init__.py").touch()
 
     def _parameters(self) -> list[str]:
-        answer = self._master.getParamNames("/test")
-        assert isinstance(answer, list)
-        names: list[str] = answer[2]
+        reply = self._master.getParamNames("/test")
+        assert isinstance(reply, list)
+        names: list[str] = reply[2]
         return names
 
     def _complete(self) -> bool:
-        """Tell whether the roscore has all that it brings along."""
+        """Return whether the roscore has started completely."""
         try:
             if self._core.poll() is not None:
                 pytest.fail("roscore ended")
-            answer = self._master.lookupNode("/test", "/rosout")
+            reply = self._master.lookupNode("/test", "/rosout")
         except OSError:
             return False
-        assert isinstance(answer, list)
-        return bool(answer[0] == 1)
+        assert isinstance(reply, list)
+        return bool(reply[0] == 1)
 
 
-class Rosz(_Stage):
-    """A network of its own with nothing on it.
+class Rosz(_Runner):
+    """Runs programs on rosz.
 
     Args:
         network: The network.
@@ -256,8 +271,43 @@ class Rosz(_Stage):
         return [sys.executable, "-P", "-m", "rosz.ros1", script, *part.arguments]
 
     def variables(self) -> dict[str, str]:
-        """Return what leads to the network."""
+        """Return the environment of the network."""
         variables = self._network.variables(ROSZ_PACKAGE_PATH=str(PACKAGES), LANG="C.UTF-8")
-        for unlike in ("PYTHONWARNINGS", "PYTHONFAULTHANDLER"):
-            del variables[unlike]
+        for name in ("PYTHONWARNINGS", "PYTHONFAULTHANDLER"):
+            del variables[name]
         return variables
+
+
+def normalize(text: str, folder: str, ignored: Sequence[str] = ()) -> str:
+    """Replace what differs between two runs: times, addresses, ports and frames of libraries.
+
+    Args:
+        text: Output of a program.
+        folder: Folder of the programs; frames of other files are removed from tracebacks.
+        ignored: Texts; lines that contain one of them are removed.
+    """
+    for pattern, name in _CHANGING:
+        text = pattern.sub(name, text)
+    lines = [line for line in text.splitlines() if not any(word in line for word in ignored)]
+    return "\n".join(_own_frames(lines, folder)).strip().replace(folder, "SCRIPTS")
+
+
+def _listed(text: str) -> str:
+    """Return the text of a traceback that was logged as a list of lines."""
+    lines: list[str] = literal_eval(text)
+    return "".join(lines)
+
+
+def _own_frames(lines: list[str], folder: str) -> Iterator[str]:
+    """Yield lines without the frames of libraries and without marks below the other frames."""
+    depth = None
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if depth is not None and indent > depth:
+            continue
+        depth = None
+        frame = _FRAME.match(line)
+        if frame and not frame["path"].startswith(folder):
+            depth = indent
+        elif not _MARKS.fullmatch(line):
+            yield line

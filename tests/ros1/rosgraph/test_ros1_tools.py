@@ -38,7 +38,7 @@ def robot(network: Network) -> Node:
 
 
 def ask(network: Network, snippet: str, *argv: str, **variables: str) -> Any:
-    """Return what ``result`` is when a snippet has run in a process of its own."""
+    """Return the ``result`` of a snippet in another process."""
     code = _BEGIN + dedent(snippet) + "\nprint('RESULT', json.dumps(result, default=str))\n"
     program = network.program(code, *argv, **variables)
     assert program.exit_code() == 0, program.output
@@ -250,7 +250,7 @@ def test_rostopic(network: Network) -> None:
     assert found[10:] == [None, None, "ROSTopicException", "ROSTopicException"]
 
 
-def test_publishing_by_name(network: Network, robot: Node) -> None:
+def test_publish_by_type_name(network: Network, robot: Node) -> None:
     heard = robot.subscription("news", String)
     program = network.program(
         """

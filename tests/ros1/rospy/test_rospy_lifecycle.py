@@ -1,4 +1,4 @@
-"""How rospy's one node begins, lives and ends; outputs as real rospy 1.15 has them."""
+"""The node of rospy, from init_node to shutdown; the outputs are those of real rospy 1.15."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_names_come_from_the_command_line(network: Network) -> None:
     assert run(network, script, "__name:=it", ROS_NAMESPACE="home") == ["/home/it", "/home/"]
 
 
-def test_argv_instead_of_the_command_line(network: Network) -> None:
+def test_argv_replaces_the_command_line(network: Network) -> None:
     assert run(
         network,
         """
@@ -147,7 +147,7 @@ def test_argv_instead_of_the_command_line(network: Network) -> None:
     ],
     ids=["spin", "rate", "short sleeps", "time.sleep", "wait_for_service", "sleep", "slow rate"],
 )
-def test_signals_end_it(
+def test_signals_shut_the_node_down(
     network: Network, number: signal.Signals, body: str, after: list[str]
 ) -> None:
     steps = body.replace("\n", "\n        ")
@@ -167,12 +167,12 @@ def test_signals_end_it(
     program.wait_for("ready")
     program.send(number)
     assert program.exit_code() == 0, program.output
-    # Loops that look at the flag alone may see it a moment before the last hooks have been called.
+    # A loop that checks the flag may end before the last hooks have run.
     assert sorted(program.lines) == sorted([*ended(f"signal-{number.value}"), *after, "end True"])
     assert program.lines[: len(STOPPED)] == STOPPED
 
 
-def test_ctrl_c_ends_what_never_asks(network: Network) -> None:
+def test_ctrl_c_interrupts_a_program_that_does_not_check(network: Network) -> None:
     program = start(
         network, HOOKS + "    say('ready')\n    while True: time.sleep(0.05)\n", PYTHONWARNINGS=""
     )
@@ -215,7 +215,7 @@ def test_signals_left_to_the_program(network: Network) -> None:
     [("pass", 0), ("sys.exit(4)", 4), ("raise ValueError('boo')", 1)],
     ids=["end", "exit", "exception"],
 )
-def test_the_end_of_the_program(network: Network, body: str, code: int) -> None:
+def test_hooks_run_at_exit(network: Network, body: str, code: int) -> None:
     lines = run(network, f"{HOOKS}\n    say('ready')\n    {body}\n", code=code)
     assert [line for line in lines if line in ended("atexit")] == ended("atexit")
     assert ("ValueError: boo" in lines) is (code == 1)
@@ -291,7 +291,7 @@ def test_hooks_may_use_the_node(network: Network) -> None:
     assert "SystemExit: in a hook" in program.lines
 
 
-def test_a_newer_node_of_the_name_takes_over(network: Network) -> None:
+def test_a_new_node_of_the_same_name_takes_over(network: Network) -> None:
     script = """
         import rospy
         rospy.init_node("only")
@@ -325,7 +325,7 @@ def test_spin_on_another_thread(network: Network) -> None:
     ) == ["False"]
 
 
-def test_other_nodes_see_it(network: Network) -> None:
+def test_other_nodes_see_the_node(network: Network) -> None:
     node = network.node("watcher")
     program = start(
         network,
