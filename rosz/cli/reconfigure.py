@@ -75,8 +75,7 @@ def get_command(
 ) -> None:
     """Print all settings of a node as dynparam does, or the value of one setting."""
     from rosz.params.yaml import format_get
-    from rosz.reconfigure.messages import pack_description
-    from rosz.ros1.dynamic_reconfigure.encoding import decode_description, in_groups
+    from rosz.reconfigure.messages import config_tree, decode_description, pack_description
 
     with _client(call, node, timeout, wait=wait) as client:
         description, config = client.description(), client.config()
@@ -89,7 +88,8 @@ def get_command(
     elif json:
         print_json(config)
     else:
-        print_lines([repr(in_groups(config, decode_description(pack_description(description))))])
+        tree = decode_description(pack_description(description))
+        print_lines([repr(config_tree(config, tree))])
 
 
 @app.command("set", arrange=values_last(frozenset({"-t", "--timeout"})))

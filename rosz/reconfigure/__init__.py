@@ -1,15 +1,15 @@
 """dynamic_reconfigure: settings of a node that others change while it runs.
 
-A server describes its settings and is called back when some change; a client reads and changes
-those of another node. May import everything up to `rosz.introspect`.
+A server describes its settings and is called back when some change. A client reads and changes the
+settings of another node. May import everything up to the fifth floor.
+
+`messages` is public as well, for those who need settings as messages or dictionaries.
 """
 
-from rosz.reconfigure.client import Client
-from rosz.reconfigure.config import Config
-from rosz.reconfigure.description import Description, Group
-from rosz.reconfigure.saved import dump, load
+from rosz.reconfigure.client import Client, find_servers
+from rosz.reconfigure.description import Config, Description, Group
+from rosz.reconfigure.files import dump, load
 from rosz.reconfigure.server import ALL_LEVELS, Server
-from rosz.reconfigure.servers import find_servers
 from rosz.reconfigure.setting import Choice, Setting, enumeration
 
 __all__ = (

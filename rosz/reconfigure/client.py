@@ -1,4 +1,4 @@
-"""The end that reads and changes the settings of another node."""
+"""The client of dynamic_reconfigure: it reads and changes the settings of another node."""
 
 from __future__ import annotations
 
@@ -14,47 +14,61 @@ from rosz.errors import ClosedError, WaitTimeout, near_miss
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import ConfigDescription, GroupState
 from rosz.msgs.dynamic_reconfigure.srv import Reconfigure
-from rosz.reconfigure.config import Config
-from rosz.reconfigure.description import Description
+from rosz.reconfigure.description import Config, Description
 from rosz.reconfigure.messages import (
+    DESCRIPTIONS,
+    SET,
+    UPDATES,
     pack_values,
     unpack_description,
     unpack_states,
     unpack_values,
 )
-from rosz.reconfigure.servers import DESCRIPTIONS, SET, UPDATES, find_servers
 
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from rosz.graph import View
     from rosz.node import Node
 
-__all__ = ("Client",)
+__all__ = ("Client", "find_servers")
 
-_ECHO_BY: Final = 0.5
-"""Seconds that a change waits for its own announcement, so that older ones come before it."""
+_UPDATE_TIMEOUT: Final = 0.5
+"""Seconds that a change waits to receive its own update, so that older ones come before it."""
 
-_SERVICE_BY: Final = 2.0
-"""Seconds that a change waits for the service of a server that was heard of."""
+_SERVICE_TIMEOUT: Final = 2.0
+"""Seconds that a change waits for the service of a server whose description was received."""
 
-_HEARD: Final = 20
-"""Announcements remembered."""
+_MAX_RECEIVED: Final = 20
+"""Configurations remembered as received."""
 
 _BUSY: Final = "the node is busy, stopped or out of reach"
 
 
-class Client:
-    """Reads and changes the settings of another node, and is told when they change.
+def find_servers(view: View) -> list[str]:
+    """Return the sorted names of all servers, which are mostly those of their nodes.
 
-    It may be made before the server is there, and outlives it: a server that is started again
-    under the same name is followed on. No call waits longer than its timeout.
+    A service ``set_parameters`` of another type, which every ROS 2 node has, is not a server.
+    """
+    return sorted(
+        name.removesuffix(f"/{SET}")
+        for name, types in view.services().items()
+        if name.endswith(f"/{SET}") and Reconfigure._type_name in types
+    )
+
+
+class Client:
+    """Reads and changes the settings of another node, and is notified when they change.
+
+    It may be created before the server, and outlives it: it goes on with a server that is started
+    again under the same name. No call waits longer than its timeout.
 
     Args:
-        node: Who asks.
+        node: Node of the client.
         name: Name of the server, mostly that of its node.
-        timeout: Seconds that each call waits at most, unless it says otherwise.
-        config_callback: Gets the configuration that holds, and each one that holds from then on.
-        description_callback: Gets the description of what there is to set.
+        timeout: Default time limit in seconds of each call.
+        config_callback: Function called with the current configuration, and with each later one.
+        description_callback: Function called with the description of the settings.
 
     Raises:
         InvalidName: The name is not legal.
@@ -77,48 +91,48 @@ class Client:
         self.description_callback = description_callback
         self._changed = threading.Condition()
         self._turn = threading.Lock()
-        self._teller = 0
+        self._notifying_thread = 0
         self._closed = False
         self._description: Description | None = None
         self._message: ConfigMessage | None = None
         self._config: Config | None = None
-        self._heard: deque[Config] = deque(maxlen=_HEARD)
+        self._received: deque[Config] = deque(maxlen=_MAX_RECEIVED)
         with ExitStack() as stack:
             self._service = stack.enter_context(
                 node.client(f"{self.name}/{SET}", Reconfigure, timeout=timeout)
             )
-            for topic, kind, heard in (
+            for topic, kind, callback in (
                 (DESCRIPTIONS, ConfigDescription, self._on_description),
                 (UPDATES, ConfigMessage, self._on_update),
             ):
-                stack.enter_context(node.subscription(f"{self.name}/{topic}", kind, heard))
+                stack.enter_context(node.subscription(f"{self.name}/{topic}", kind, callback))
             self._parts = stack.pop_all()
         node.keep(self)
 
     def wait(self, timeout: float | None = None) -> None:
-        """Wait until the server is there.
+        """Wait for the server.
 
         Args:
-            timeout: Seconds; the client's own when not given.
+            timeout: Time limit in seconds; that of the client by default.
 
         Raises:
-            WaitTimeout: It did not come in time; the message names servers of a similar name.
+            WaitTimeout: It did not appear in time; the message names servers with similar names.
             ClosedError: The node was closed meanwhile.
         """
         limit = self.timeout if timeout is None else timeout
         try:
             self._service.wait_for_service(limit)
         except WaitTimeout as error:
-            raise self._nobody(limit) from error
+            raise self._no_server(limit) from error
 
     def description(self, timeout: float | None = None) -> Description:
-        """Return what there is to set, waiting for the server to tell.
+        """Return the description of the settings; wait for it if it has not been received.
 
         Args:
-            timeout: Seconds; the client's own when not given.
+            timeout: Time limit in seconds; that of the client by default.
 
         Raises:
-            WaitTimeout: It did not tell in time.
+            WaitTimeout: The server did not send it in time.
             ClosedError: The client was closed meanwhile.
         """
         self._wait_for(
@@ -128,13 +142,13 @@ class Client:
         return self._description
 
     def config(self, timeout: float | None = None) -> Config:
-        """Return the configuration that holds, a copy, waiting for the server to tell.
+        """Return a copy of the current configuration; wait for it if it has not been received.
 
         Args:
-            timeout: Seconds; the client's own when not given.
+            timeout: Time limit in seconds; that of the client by default.
 
         Raises:
-            WaitTimeout: It did not tell in time.
+            WaitTimeout: The server did not send it in time.
             ClosedError: The client was closed meanwhile.
         """
         self._wait_for(lambda: self._config is not None, "configuration", timeout)
@@ -145,19 +159,19 @@ class Client:
         """Change settings.
 
         Args:
-            changes: Name to value; converted to the setting's type, so that texts may be given,
-                and names of choices. ``groups`` holds states of groups by name.
-            timeout: Seconds for all of it; the client's own when not given.
+            changes: New values by name. They are converted to the type of the setting, so texts and
+                names of choices are accepted. ``groups`` holds states of groups by name.
+            timeout: Time limit in seconds of the whole call; that of the client by default.
 
         Returns:
-            The configuration that holds then. The server brings values within their bounds, and
-            may decide on others.
+            The configuration after the change. The server limits values to their bounds, and may
+            choose other values.
 
         Raises:
-            ParamError: There is no such setting, or a value cannot be one of it.
+            ParamError: There is no such setting, or a value cannot be converted.
             ServiceNotFound: The server is gone.
-            ServiceError: The server refused.
-            WaitTimeout: It did not answer in time.
+            ServiceError: The server refused the change.
+            WaitTimeout: The server did not reply in time.
             ClosedError: The client was closed meanwhile.
         """
         limit = self.timeout if timeout is None else timeout
@@ -171,38 +185,38 @@ class Client:
                 for group, parent in description.groups
                 if group.id in states
             ]
-        # The server told what it has; the way to its service may be a moment behind.
+        # The server has sent its description; its service may be discovered a moment later.
         with suppress(WaitTimeout):
-            self._service.wait_for_service(min(limit, _SERVICE_BY))
+            self._service.wait_for_service(min(limit, _SERVICE_TIMEOUT))
         try:
-            answer = self._service.call(
+            response = self._service.call(
                 Reconfigure.Request(request), max(deadline - time.monotonic(), 0.0)
             )
         except WaitTimeout as error:
             raise WaitTimeout(error.what, limit, _BUSY) from error
-        return self._settle(_decoded(description, answer.config), deadline)
+        return self._accept(_decode(description, response.config), deadline)
 
     def update_groups(self, states: Mapping[str, bool], timeout: float | None = None) -> Config:
-        """Change which groups are shown, by name; see `update`."""
+        """Change whether groups are shown, by name; see `update`."""
         return self.update({"groups": states}, timeout)
 
     def close(self) -> None:
-        """Stop listening; again is no error."""
+        """Stop receiving; a second call has no effect."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
         self._parts.close()
         self.node.forget(self)
 
-    def _settle(self, config: Config, deadline: float) -> Config:
-        """Take the answer to a change for what holds, once the announcements before it came."""
+    def _accept(self, config: Config, deadline: float) -> Config:
+        """Make the response to a change current, after the updates that were sent before it."""
         with self._changed:
-            if threading.get_ident() != self._teller:  # else it would wait for itself
+            if threading.get_ident() != self._notifying_thread:  # which would wait for itself
                 self._changed.wait_for(
-                    lambda: config in self._heard or self._closed,
-                    min(_ECHO_BY, max(deadline - time.monotonic(), 0.0)),
+                    lambda: config in self._received or self._closed,
+                    min(_UPDATE_TIMEOUT, max(deadline - time.monotonic(), 0.0)),
                 )
-            if config not in self._heard:
+            if config not in self._received:
                 self._config = config
         return deepcopy(config)
 
@@ -217,47 +231,47 @@ class Client:
             if self._closed:
                 raise ClosedError(f"the client of '{self.name}' is closed")
         if self.name not in find_servers(self.node.context.graph.view()):
-            raise self._nobody(limit)
+            raise self._no_server(limit)
         raise WaitTimeout(f"{what} from '{self.name}'", limit, _BUSY)
 
-    def _nobody(self, seconds: float) -> WaitTimeout:
+    def _no_server(self, timeout: float) -> WaitTimeout:
         known = find_servers(self.node.context.graph.view())
         listing = f"there are {', '.join(known)}" if known else "no node has any on this network"
         hint = near_miss(self.name, known).removeprefix("; ") or listing
-        return WaitTimeout(f"node with settings under '{self.name}'", seconds, hint)
+        return WaitTimeout(f"node with settings under '{self.name}'", timeout, hint)
 
     def _on_description(self, message: ConfigDescription) -> None:
         description = unpack_description(message)
-        with self._telling():
+        with self._one_callback():
             with self._changed:
                 self._description = description
                 self._changed.notify_all()
             if self.description_callback is not None:
                 self.description_callback(description)
             if self._message is not None:
-                self._tell(description, self._message)
+                self._notify(description, self._message)
 
     def _on_update(self, message: ConfigMessage) -> None:
-        with self._telling():
+        with self._one_callback():
             self._message = message
             if self._description is not None:
-                self._tell(self._description, message)
+                self._notify(self._description, message)
 
     @contextmanager
-    def _telling(self) -> Iterator[None]:
-        """Have callbacks run one at a time, whichever topic they come from."""
+    def _one_callback(self) -> Iterator[None]:
+        """Call callbacks one at a time, whichever topic they belong to."""
         with self._turn:
-            self._teller = threading.get_ident()
+            self._notifying_thread = threading.get_ident()
             try:
                 yield
             finally:
-                self._teller = 0
+                self._notifying_thread = 0
 
-    def _tell(self, description: Description, message: ConfigMessage) -> None:
-        config = _decoded(description, message)
+    def _notify(self, description: Description, message: ConfigMessage) -> None:
+        config = _decode(description, message)
         with self._changed:
             self._config = config
-            self._heard.append(config)
+            self._received.append(config)
             self._changed.notify_all()
         if self.config_callback is not None:
             self.config_callback(deepcopy(config))
@@ -277,7 +291,7 @@ class Client:
         return f"<Client of {self.name}>"
 
 
-def _decoded(description: Description, message: ConfigMessage) -> Config:
+def _decode(description: Description, message: ConfigMessage) -> Config:
     known = {n: one for n, one in unpack_values(message).items() if n in description.settings}
     values = description.defaults() | description.convert(known)
     return description.config(values, unpack_states(message))

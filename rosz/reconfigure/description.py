@@ -1,34 +1,64 @@
-"""All settings of a node, in their groups."""
+"""All settings of a node, in groups, and their values."""
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, Final, Self
 
 import msgspec
 
 from rosz.errors import ParamError, near_miss
-from rosz.reconfigure.config import Config
 from rosz.reconfigure.setting import Kind, Setting
 
-__all__ = ("Description", "Group")
+__all__ = ("Config", "Description", "Group")
 
-ROOT = "Default"
-_ORDER: tuple[Kind, ...] = ("bool", "int", "str", "double")
-_UNNUMBERED = -1
+_ROOT: Final = "Default"
+_ORDER: Final[tuple[Kind, ...]] = ("bool", "int", "str", "double")
+_UNNUMBERED: Final = -1
+
+
+class Config(dict[str, Any]):
+    """Values of all settings by name, also as attributes: ``config["gain"]`` is ``config.gain``.
+
+    ``config["groups"]`` is the root of the tree of groups: a `Config` with ``id``, ``parent``,
+    ``name``, ``type``, ``state`` (whether it is shown), ``groups`` by name, and ``parameters``.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(f"this configuration has no '{name}'") from None
+
+    def __setattr__(self, name: str, value: object) -> None:
+        self[name] = value
+
+    def __delattr__(self, name: str) -> None:
+        try:
+            del self[name]
+        except KeyError:
+            raise AttributeError(f"this configuration has no '{name}'") from None
+
+    def copy(self) -> Self:
+        """Return a shallow copy."""
+        return type(self)(self)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return type(self)({key: copy.deepcopy(value, memo) for key, value in self.items()})
 
 
 class Group(msgspec.Struct, frozen=True):
     """Settings that belong together.
 
     Attributes:
-        name: Its name; only that of a sibling must differ.
-        settings: Its settings.
-        groups: Groups inside it.
+        name: Name; groups in the same group must have different names.
+        settings: Settings of the group itself.
+        groups: Groups in the group.
         type: How a window shows it: empty, ``collapse``, ``tab``, ``hide`` or ``apply``.
-        state: Whether it is shown at first.
-        id: Its number; given by `Description` where it is -1.
+        state: Whether it is shown by default.
+        id: Number; `Description` replaces -1 by a new one.
     """
 
     name: str
@@ -40,20 +70,20 @@ class Group(msgspec.Struct, frozen=True):
 
 
 class Description:
-    """What a server lets others set.
+    """All settings that a server has.
 
     Args:
-        settings: Those in no group.
-        groups: The groups, with theirs.
-        root: The root of it all instead, where there is one already; its number is 0.
+        settings: Settings in no group.
+        groups: Groups of further settings.
+        root: Group with the id 0 that holds everything, instead of settings and groups.
 
     Attributes:
-        root: The group that everything is in.
-        groups: Every group with the number of the one around it, the root first.
-        settings: Every setting by its name.
+        root: Group that holds everything.
+        groups: Every group with the id of its parent, the root first.
+        settings: Every setting by name.
 
     Raises:
-        ParamError: Two settings have one name, or two groups one number.
+        ParamError: Two settings have the same name, or two groups the same id.
     """
 
     def __init__(
@@ -63,7 +93,7 @@ class Description:
         *,
         root: Group | None = None,
     ) -> None:
-        whole = root or Group(ROOT, tuple(settings), tuple(groups), id=0)
+        whole = root or Group(_ROOT, tuple(settings), tuple(groups), id=0)
         taken = [group.id for group, _ in _walk(whole, 0)]
         numbers = itertools.count(max(taken) + 1)
         self.root = _numbered(whole, numbers)
@@ -75,21 +105,21 @@ class Description:
                     raise ParamError(f"two settings have the name '{setting.name}'")
                 self.settings[setting.name] = setting
         if len({group.id for group, _ in self.groups}) < len(self.groups):
-            raise ParamError(f"two groups have one number; the numbers are {taken}")
+            raise ParamError(f"two groups have the same id; the ids are {taken}")
 
     def defaults(self) -> dict[str, Any]:
-        """Return the value that each setting has at first."""
+        """Return the default value of each setting."""
         return {name: setting.default for name, setting in self.settings.items()}
 
     def states(self) -> dict[int, bool]:
-        """Return which groups, by number, are shown at first."""
+        """Return whether each group is shown by default, by id."""
         return {group.id: group.state for group, _ in self.groups}
 
     def setting(self, name: str) -> Setting:
-        """Return the setting of a name.
+        """Return the setting with a name.
 
         Raises:
-            ParamError: There is none.
+            ParamError: There is no such setting.
         """
         found = self.settings.get(name)
         if found is None:
@@ -98,13 +128,13 @@ class Description:
         return found
 
     def convert(self, changes: Mapping[str, object]) -> dict[str, Any]:
-        """Return changes as the types that the settings have.
+        """Return changes with each value converted to the type of its setting.
 
         Args:
-            changes: Name to new value; ``groups`` is left out.
+            changes: New values by name; ``groups`` is left out.
 
         Raises:
-            ParamError: There is no such setting, or a value cannot be one of it.
+            ParamError: There is no such setting, or a value cannot be converted.
         """
         return {
             name: self.setting(name).convert(value)
@@ -113,11 +143,11 @@ class Description:
         }
 
     def clamp(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return values of the right types, each within its setting's bounds."""
+        """Return values with each limited to the bounds of its setting."""
         return {name: self.settings[name].clamp(value) for name, value in values.items()}
 
     def level(self, old: Mapping[str, Any], new: Mapping[str, Any]) -> int:
-        """Return the levels of all settings that differ, or-ed."""
+        """Return the bitwise or of the levels of all settings whose values differ."""
         level = 0
         for name, setting in self.settings.items():
             if old[name] != new[name]:
@@ -125,13 +155,13 @@ class Description:
         return level
 
     def read_states(self, groups: object) -> dict[int, bool]:
-        """Return states of groups by number.
+        """Return states of groups by id.
 
         Args:
-            groups: States by the groups' names, or a tree as under ``groups`` of a `Config`.
+            groups: States by the names of groups, or a tree as in ``groups`` of a `Config`.
 
         Raises:
-            ParamError: It is neither, or there is no such group.
+            ParamError: The argument is neither, or there is no such group.
         """
         if not isinstance(groups, Mapping):
             raise ParamError(f"'groups' is {groups!r}; expected a dictionary of names to states")
@@ -151,11 +181,11 @@ class Description:
         return states
 
     def config(self, values: Mapping[str, Any], states: Mapping[int, bool]) -> Config:
-        """Return values and states as one configuration.
+        """Return values and states as a configuration.
 
         Args:
-            values: A value for every setting.
-            states: States of groups by number; those missing are as at first.
+            values: Value of every setting by name.
+            states: States of groups by id; the default state for those missing.
         """
         config = Config(
             (name, values[name])

@@ -1,9 +1,15 @@
-"""Settings as the messages of dynamic_reconfigure, and back."""
+"""Settings as the messages of dynamic_reconfigure, and back.
+
+The ``pack_`` and ``unpack_`` functions translate a `Description` and values. The ``encode_`` and
+``decode_`` functions translate trees of dictionaries, the form in which generated modules and the
+clients of dynamic_reconfigure have them: a group is a dictionary with ``name``, ``type``,
+``state``, ``id``, ``parent``, ``parameters`` and ``groups``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
@@ -19,10 +25,24 @@ from rosz.msgs.dynamic_reconfigure.msg import (
 )
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import Group as GroupMessage
-from rosz.reconfigure.description import Description, Group
-from rosz.reconfigure.setting import Kind, Setting, kind_of
+from rosz.reconfigure.description import Config, Description, Group
+from rosz.reconfigure.setting import Kind, Scalar, Setting, kind_of
 
 __all__ = (
+    "DESCRIPTIONS",
+    "SET",
+    "UPDATES",
+    "config_tree",
+    "decode_config",
+    "decode_description",
+    "describe",
+    "encode_config",
+    "encode_description",
+    "encode_groups",
+    "extract_params",
+    "get_tree",
+    "group_dict",
+    "initial_config",
     "pack_config",
     "pack_description",
     "pack_values",
@@ -31,12 +51,17 @@ __all__ = (
     "unpack_values",
 )
 
-_LEVELS = 0xFFFFFFFF
-_ROOT = 0
+DESCRIPTIONS: Final = "parameter_descriptions"
+UPDATES: Final = "parameter_updates"
+SET: Final = "set_parameters"
+"""Names of the topics and the service of a server, below its namespace."""
+
+_LEVELS: Final = 0xFFFFFFFF
+_ROOT: Final = 0
 
 
 def pack_values(values: Mapping[str, Any]) -> ConfigMessage:
-    """Write values, each as the type that it has."""
+    """Return the message of values, each with its own type."""
     message = ConfigMessage()
     for name, value in values.items():
         match kind_of(value):
@@ -54,7 +79,10 @@ def pack_values(values: Mapping[str, Any]) -> ConfigMessage:
 def pack_config(
     description: Description, values: Mapping[str, Any], states: Mapping[int, bool]
 ) -> ConfigMessage:
-    """Write values with the states of all groups: the root, then inner groups before outer."""
+    """Return the message of values and of the states of all groups, inner groups before outer ones.
+
+    The root comes first all the same.
+    """
     message = pack_values(values)
     (root, parent), *_ = description.groups
     message.groups = [GroupState(root.name, states.get(root.id, root.state), root.id, parent)]
@@ -69,18 +97,18 @@ def _packed_states(group: Group, states: Mapping[int, bool]) -> Iterator[GroupSt
 
 
 def unpack_values(message: ConfigMessage) -> dict[str, Any]:
-    """Read values: truth values first, then whole numbers, texts and numbers."""
+    """Return the values of a message: bools first, then ints, strs and doubles."""
     parts: tuple[Iterable[Any], ...] = (message.bools, message.ints, message.strs, message.doubles)
     return {one.name: one.value for part in parts for one in part}
 
 
 def unpack_states(message: ConfigMessage) -> dict[int, bool]:
-    """Read the states of groups, by number."""
+    """Return the states of the groups of a message by id."""
     return {state.id: state.state for state in message.groups}
 
 
 def pack_description(description: Description) -> ConfigDescription:
-    """Write a description."""
+    """Return the message of a description."""
     settings = description.settings
     return ConfigDescription(
         groups=[_packed(group, parent) for group, parent in description.groups],
@@ -101,18 +129,18 @@ def _packed(group: Group, parent: int) -> GroupMessage:
 
 
 def unpack_description(message: ConfigDescription) -> Description:
-    """Read a description.
+    """Return the description of a message.
 
     Raises:
-        DecodeError: It contradicts itself.
+        DecodeError: The message contradicts itself.
     """
     try:
-        return Description(root=_tree(message))
+        return Description(root=_unpack_groups(message))
     except (ParamError, KeyError, RecursionError) as error:
         raise DecodeError(message._type, -1, f"it contradicts itself: {error}") from error
 
 
-def _tree(message: ConfigDescription) -> Group:
+def _unpack_groups(message: ConfigDescription) -> Group:
     limits = [unpack_values(one) for one in (message.dflt, message.min, message.max)]
     children: dict[int, list[GroupMessage]] = {}
     roots: list[GroupMessage] = []
@@ -122,18 +150,18 @@ def _tree(message: ConfigDescription) -> Group:
         else:
             children.setdefault(group.parent, []).append(group)
     if len(roots) != 1:
-        raise ParamError(f"{len(roots)} groups have the number 0, expected one")
+        raise ParamError(f"{len(roots)} groups have the id 0, expected one")
 
-    def built(group: GroupMessage) -> Group:
+    def build(group: GroupMessage) -> Group:
         return Group(
             name=group.name,
             settings=tuple(_setting(one, limits) for one in group.parameters),
-            groups=tuple(map(built, children.get(group.id, ()))),
+            groups=tuple(map(build, children.get(group.id, ()))),
             type=group.type,
             id=group.id,
         )
 
-    return built(roots[0])
+    return build(roots[0])
 
 
 def _setting(one: ParamDescription, limits: list[dict[str, Any]]) -> Setting:
@@ -143,3 +171,228 @@ def _setting(one: ParamDescription, limits: list[dict[str, Any]]) -> Setting:
     except msgspec.ValidationError as error:
         raise ParamError(f"'{one.name}' is of the unknown type '{one.type}'") from error
     return Setting(one.name, default, one.description, one.level, low, high, one.edit_method, kind)
+
+
+def describe(config_description: dict[str, Any]) -> Description:
+    """Return the description of a generated module.
+
+    Args:
+        config_description: Root group of the module.
+
+    Raises:
+        ParamError: The group contradicts itself.
+    """
+    return Description(root=_group_of(config_description))
+
+
+def _group_of(given: dict[str, Any]) -> Group:
+    return Group(
+        name=given["name"],
+        settings=tuple(_setting_of(one) for one in given["parameters"]),
+        groups=tuple(_group_of(one) for one in given["groups"]),
+        type=given["type"],
+        state=bool(given.get("state", True)),
+        id=given["id"],
+    )
+
+
+def _setting_of(given: dict[str, Any]) -> Setting:
+    return Setting(
+        name=given["name"],
+        default=given["default"],
+        description=given["description"],
+        level=given["level"],
+        min=given["min"],
+        max=given["max"],
+        edit_method=given["edit_method"],
+        kind=given["type"],
+    )
+
+
+def extract_params(group: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the parameters of a group, then those of the groups in it."""
+    return [*group["parameters"], *(p for one in _inner_groups(group) for p in extract_params(one))]
+
+
+def _inner_groups(group: Mapping[str, Any]) -> list[Any]:
+    """Return the groups in a group, which has them as a list if generated, by name if decoded."""
+    groups = group["groups"]
+    return list(groups.values()) if isinstance(groups, Mapping) else list(groups)
+
+
+def encode_description(descr: Any) -> ConfigDescription:
+    """Return the message that describes a generated module, such as ``my_pkg.cfg.MyConfig``."""
+    return ConfigDescription(
+        groups=encode_groups(None, descr.config_description),
+        max=encode_config(descr.max),
+        min=encode_config(descr.min),
+        dflt=encode_config(descr.defaults),
+    )
+
+
+def encode_groups(
+    parent: object,  # noqa: ARG001  # part of the public signature
+    group: Mapping[str, Any],
+) -> list[GroupMessage]:
+    """Return the messages of a group and of all groups in it; ``parent`` is ignored."""
+    parameters = [
+        ParamDescription(
+            one["name"],
+            one["type"],
+            one["level"] & _LEVELS,
+            one["description"],
+            one["edit_method"],
+        )
+        for one in group["parameters"]
+    ]
+    message = GroupMessage(group["name"], group["type"], parameters, group["parent"], group["id"])
+    return [message, *(one for inner in group["groups"] for one in encode_groups(message, inner))]
+
+
+def encode_config(config: Mapping[str, Any], flat: bool = True) -> ConfigMessage:
+    """Return the message of a configuration, or of a part of one.
+
+    Args:
+        config: Values by name, and groups under ``groups``.
+        flat: Whether the groups are a tree; otherwise they are a list.
+    """
+    message = pack_values({name: one for name, one in config.items() if isinstance(one, Scalar)})
+    for one in config.values():
+        if isinstance(one, Mapping) and flat:
+            message.groups += [_state(one), *_inner_states(one)]
+        elif isinstance(one, list | Mapping):
+            message.groups = [_state(group) for group in one]
+    return message
+
+
+def _inner_states(group: Mapping[str, Any]) -> Iterator[GroupState]:
+    for inner in group["groups"].values():
+        yield from _inner_states(inner)
+        yield _state(inner)
+
+
+def _state(group: Mapping[str, Any]) -> GroupState:
+    return GroupState(group["name"], group["state"], group["id"], group["parent"])
+
+
+def group_dict(group: Any) -> Config:
+    """Return a group of a message as a dictionary without groups and parameters."""
+    return Config(
+        id=group.id,
+        parent=group.parent,
+        name=group.name,
+        type=getattr(group, "type", ""),
+        state=getattr(group, "state", True),
+        groups=Config(),
+        parameters=Config(),
+    )
+
+
+def decode_description(msg: ConfigDescription) -> Config:
+    """Return the root group of a description, with parameters as lists and groups by name."""
+    bounds = {
+        "min": decode_config(msg.min),
+        "max": decode_config(msg.max),
+        "default": decode_config(msg.dflt),
+    }
+    root = get_tree(msg)
+    messages = {group.id: group for group in msg.groups}
+    for group in _groups_of(root):
+        group["parameters"] = [
+            {
+                "name": one.name,
+                **{key: values[one.name] for key, values in bounds.items()},
+                "type": one.type,
+                "level": one.level,
+                "description": one.description,
+                "edit_method": one.edit_method,
+            }
+            for one in messages[group["id"]].parameters
+        ]
+    return root
+
+
+def _groups_of(group: Config) -> Iterator[Config]:
+    yield group
+    for inner in group["groups"].values():
+        yield from _groups_of(inner)
+
+
+def get_tree(m: Any, group: Any = None) -> Config:
+    """Return the tree of the groups of a message.
+
+    Args:
+        m: Message of type ``Config`` or ``ConfigDescription``.
+        group: A group of the message; without it, the root.
+
+    Returns:
+        The root, or the groups in ``group`` by name.
+    """
+    root = group if group is not None else next(one for one in m.groups if one.id == _ROOT)
+    inside = Config()
+    for one in m.groups:
+        if one.id != _ROOT and one.parent == root.id:
+            inside[one.name] = group_dict(one)
+            inside[one.name]["groups"] = get_tree(m, one)
+    if root.id != _ROOT:
+        return inside
+    tree = group_dict(root)
+    tree["groups"] = inside
+    return tree
+
+
+def initial_config(msg: ConfigMessage, description: Mapping[str, Any] | None = None) -> Config:
+    """Return the configuration of a message, with the default states of its groups.
+
+    Args:
+        msg: Message to decode.
+        description: Root group of a generated module; without it, groups are left out.
+    """
+    config = Config(unpack_values(msg))
+    if not msg.groups or description is None:
+        return config
+    config["groups"] = get_tree(msg)
+    described = {group["id"]: group for group in _described_groups(description)}
+    for group in _groups_of(config["groups"]):
+        known = described.get(group["id"])
+        if known is not None:
+            group["state"] = group["state"] if group["id"] == _ROOT else known["state"]
+            for one in known["parameters"]:
+                group["parameters"][one["name"]] = config[one["name"]]
+    return config
+
+
+def _described_groups(group: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    yield group
+    for inner in _inner_groups(group):
+        yield from _described_groups(inner)
+
+
+def decode_config(msg: ConfigMessage, description: Mapping[str, Any] | None = None) -> Config:
+    """Return the configuration of a message.
+
+    Args:
+        msg: Message to decode.
+        description: Root group, as `decode_description` returns it; without it, groups are left
+            out. With it, each group holds its parameters.
+    """
+    config = Config(unpack_values(msg))
+    if not msg.groups or description is None:
+        return config
+    config["groups"] = get_tree(msg)
+    described = {group["id"]: group for group in _described_groups(description)}
+    for group in _groups_of(config["groups"]):
+        for one in described.get(group["id"], {"parameters": ()})["parameters"]:
+            if one["name"] in config:
+                group[one["name"]] = config[one["name"]]
+    return config
+
+
+def config_tree(config: Config, description: Mapping[str, Any]) -> Config:
+    """Return a configuration as `decode_config` returns it: each group holds its parameters.
+
+    Args:
+        config: Configuration as `Description.config` returns it.
+        description: Root group, as `decode_description` returns it.
+    """
+    return decode_config(encode_config(config), description)

@@ -1,4 +1,4 @@
-"""The end that has the settings."""
+"""The server of dynamic_reconfigure: it lets other nodes change the settings of its node."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from rosz.errors import ParamError
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import ConfigDescription
 from rosz.msgs.dynamic_reconfigure.srv import Reconfigure
-from rosz.reconfigure.config import Config
-from rosz.reconfigure.description import Description
+from rosz.reconfigure.description import Config, Description
 from rosz.reconfigure.messages import (
+    DESCRIPTIONS,
+    SET,
+    UPDATES,
     pack_config,
     pack_description,
     unpack_states,
     unpack_values,
 )
-from rosz.reconfigure.servers import DESCRIPTIONS, SET, UPDATES
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -30,40 +31,40 @@ if TYPE_CHECKING:
 __all__ = ("ALL_LEVELS", "Server")
 
 ALL_LEVELS: Final = ~0
-"""What a callback is given for levels the first time: every bit is set."""
+"""The level that a callback is called with the first time: every bit is set."""
 
 Callback = Callable[[Config, int], Mapping[str, Any] | None]
 _UNSET: Final = object()
 
 
 class Server:
-    """Lets others change settings of a node while it runs.
+    """Lets others change the settings of a node while it runs.
 
-    The first values are those of the parameter store, and defaults where it has none; all values
-    are written there, so that a node that is started again goes on with them. Others find the
-    server by the topics and the service of ROS 1's dynamic_reconfigure, in its namespace:
-    ``parameter_descriptions``, ``parameter_updates`` and ``set_parameters``.
+    The first values are those in the parameter store, or defaults. All values are written to the
+    store, so a node that is started again goes on with them. Clients find the server by the topics
+    and the service of dynamic_reconfigure in its namespace: ``parameter_descriptions``,
+    ``parameter_updates`` and ``set_parameters``.
 
     Attributes:
-        node: Whose settings they are.
-        description: What there is to set.
-        callback: Asked about changes; may be replaced.
-        name: What clients know it by: its namespace.
+        node: Node that has the settings.
+        description: Description of the settings.
+        callback: Function called before a change; may be replaced.
+        name: Namespace of the server, which is its name for clients.
 
     Args:
-        node: Whose settings they are.
-        description: What there is to set.
-        callback: Gets a configuration that is about to hold, and the or-ed levels of what changes
-            (`ALL_LEVELS` the first time, while the server is made). It may change the
-            configuration, or return another one. What it raises refuses the change, and is told
-            to whoever asked for it. One call at a time.
-        namespace: Where settings, topics and service are: the node's own when empty, below it when
+        node: Node that has the settings.
+        description: Description of the settings.
+        callback: Function called with the new configuration before it takes effect, and with the
+            bitwise or of the levels of the settings that change (`ALL_LEVELS` the first time, in
+            the constructor). It may change the configuration, or return another one. An exception
+            refuses the change and is reported to the client. Calls do not overlap.
+        namespace: Namespace of settings, topics and service: that of the node if empty, below it if
             relative.
-        follow: Whether changes in the parameter store (``rosz param set``) hold as well; ROS 1
-            takes no notice of them.
+        follow: Whether changes in the parameter store (``rosz param set``) take effect as well,
+            which they do not in dynamic_reconfigure.
 
     Raises:
-        ParamError: What the callback returned cannot be the values of settings.
+        ParamError: The callback returned values that the settings cannot have.
         InvalidName: The namespace is not legal.
         ClosedError: The node is closed.
     """
@@ -96,29 +97,29 @@ class Server:
             if follow:
                 watch = node.params.watch(self.name, self._follow)
                 stack.callback(watch.close)
-            # Last: who finds the service finds all else.
+            # The service comes last: a client that finds it finds everything else.
             stack.enter_context(node.service(f"{self.name}/{SET}", Reconfigure, self._set))
             self._parts = stack.pop_all()
         node.keep(self)
 
     @property
     def config(self) -> Config:
-        """The values that hold, a copy."""
+        """A copy of the current configuration."""
         with self._lock:
             return self.description.config(self._values, self._states)
 
     def update(self, changes: Mapping[str, Any]) -> Config:
-        """Change settings, as others do by the service.
+        """Change settings, as clients do by the service.
 
         Args:
-            changes: Name to value; converted to the setting's type, and brought within its bounds.
-                ``groups`` holds states of groups by name.
+            changes: New values by name. They are converted to the type of the setting and limited
+                to its bounds. ``groups`` holds states of groups by name.
 
         Returns:
-            What holds then: the callback may have decided otherwise.
+            The configuration after the change; the callback may have chosen other values.
 
         Raises:
-            ParamError: There is no such setting, or a value cannot be one of it.
+            ParamError: There is no such setting, or a value cannot be converted.
             ClosedError: The node is closed.
         """
         values = self.description.convert(changes)
@@ -126,7 +127,7 @@ class Server:
         return self._change(values, states)
 
     def close(self) -> None:
-        """Withdraw topics and service; the values stay in the store. Again is no error."""
+        """Close topics and service; the values stay in the store. A second call has no effect."""
         self._parts.close()
         self.node.forget(self)
 
@@ -139,19 +140,19 @@ class Server:
             return self.config
 
     def _apply(self, values: dict[str, Any], states: dict[int, bool], level: int) -> None:
-        """Ask the callback, then make what it decides hold, and known."""
+        """Call the callback, then make the result current and publish it."""
         with self._lock:
             description = self.description
             config = description.config(values, states)
-            decided: Mapping[str, Any] | None = None
+            chosen: Mapping[str, Any] | None = None
             if self.callback is not None:
-                decided = self.callback(config, level)
-            if decided is None:
-                decided = config
-            known = {name: one for name, one in decided.items() if name in description.settings}
+                chosen = self.callback(config, level)
+            if chosen is None:
+                chosen = config
+            known = {name: one for name, one in chosen.items() if name in description.settings}
             self._values = values | description.convert(known)
-            if "groups" in decided:
-                self._states = states | description.read_states(decided["groups"])
+            if "groups" in chosen:
+                self._states = states | description.read_states(chosen["groups"])
             self._store()
             self._updates.publish(pack_config(description, self._values, self._states))
 
@@ -162,7 +163,7 @@ class Server:
             return Reconfigure.Response(pack_config(self.description, self._values, self._states))
 
     def _stored(self) -> dict[str, Any]:
-        """Return what the parameter store has, as far as it can be a value of its setting."""
+        """Return the values in the parameter store that can be converted for their settings."""
         found: dict[str, Any] = {}
         params = self.node.params
         for name, setting in self.description.settings.items():
@@ -179,7 +180,7 @@ class Server:
         return found
 
     def _store(self) -> None:
-        """Write what the store has otherwise, as one change."""
+        """Write the values that differ from those in the store, as one change."""
         params = self.node.params
         changed: dict[str, object] = {}
         for name, value in self._values.items():
@@ -190,7 +191,7 @@ class Server:
             params.update(changed)
 
     def _follow(self, _change: Changed) -> None:
-        # The store is read anew: a change told late must not bring back an old value.
+        # The store is read again: a late notification must not bring back an old value.
         with self._lock:
             stored = self._stored()
             differing = {n: value for n, value in stored.items() if value != self._values[n]}
@@ -213,7 +214,7 @@ class Server:
 
 
 def _private(namespace: str) -> str:
-    """Return a namespace as a name that the node resolves: relative ones are below the node."""
+    """Return a namespace as a name for the node to resolve; a relative one lies below the node."""
     if namespace.startswith(("/", "~")):
         return namespace
     return f"~{namespace}"

@@ -1,6 +1,6 @@
-"""One setting: its type, its bounds, and what other values become when they are given to it.
+"""One setting: its type, its bounds, and the conversion of values to it.
 
-The rules are those of ROS 1's dynamic_reconfigure (ROS wiki, dynamic_reconfigure).
+The rules are those of dynamic_reconfigure (ROS wiki, dynamic_reconfigure).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BOUNDS: Final[dict[Kind, tuple[Scalar, Scalar]]] = {
     "str": ("", ""),
     "double": (float("-inf"), float("inf")),
 }
-"""Least and greatest value of a setting that has no bounds of its own; a text has none at all."""
+"""Least and greatest value of a setting without bounds of its own; a str has none at all."""
 
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 _TRUE: Final = frozenset({"true", "yes", "on", "t", "y", "1"})
@@ -42,9 +42,9 @@ class Choice(msgspec.Struct, frozen=True):
     """One value of an enumeration.
 
     Attributes:
-        name: What people write instead of the value.
-        value: The value.
-        description: What it means.
+        name: Name that people write instead of the value.
+        value: Value.
+        description: Meaning, as shown to people.
     """
 
     name: str
@@ -53,20 +53,20 @@ class Choice(msgspec.Struct, frozen=True):
 
 
 class Setting(msgspec.Struct, frozen=True):
-    """What a node lets others set.
+    """A value of a node that others can change.
 
     Attributes:
-        name: A letter, then letters, digits and underscores.
-        default: Its value where the parameter store has none.
-        description: What it is for.
-        level: Bits that the node is given when it changes.
-        min: Least value, of a number.
-        max: Greatest value, of a number.
-        edit_method: The values it may have, as `enumeration` writes them; any when empty.
-        kind: Its type; that of the default when not given.
+        name: Name: a letter, then letters, digits and underscores.
+        default: Value if the parameter store has none.
+        description: Purpose, as shown to people.
+        level: Bits that the node's callback gets when the setting changes.
+        min: Least value of a number.
+        max: Greatest value of a number.
+        edit_method: Values that the setting can have, as `enumeration` writes them; any if empty.
+        kind: Type; that of the default if not given.
 
     Raises:
-        ParamError: The name is none, or default and bounds do not fit the type.
+        ParamError: The name is not legal, or default and bounds do not fit the type.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Setting(msgspec.Struct, frozen=True):
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
             raise ParamError(
-                f"'{self.name}' is no name of a setting: expected a letter, then letters, digits"
+                f"'{self.name}' is not a name of a setting: expected a letter, then letters, digits"
                 " and underscores"
             )
         kind = self.kind or kind_of(self.default)
@@ -98,37 +98,37 @@ class Setting(msgspec.Struct, frozen=True):
 
     @property
     def choices(self) -> tuple[Choice, ...]:
-        """The values it may have by name; none where it may have any."""
+        """The values that the setting can have, by name; empty if it can have any value."""
         return _choices(self.edit_method)
 
     def convert(self, value: object) -> Any:
-        """Return what a value becomes as a value of this setting, bounds aside.
+        """Return a value converted to the type of the setting, whatever its bounds.
 
-        Texts are read: numbers, truth values, names of choices in any case. A number loses what
-        is behind its point where an int is expected.
+        Texts are parsed: numbers, bools, and names of choices in any case. A float loses its
+        fraction where an int is expected.
 
         Args:
-            value: What somebody wants it to be.
+            value: Value to convert.
 
         Raises:
-            ParamError: It cannot be one; the message names the choices, where there are some.
+            ParamError: The value cannot be converted; the message names the choices, if any.
         """
         choices = self.choices if isinstance(value, str) else ()
         for choice in choices:
             if choice.name.lower() == str(value).lower():
                 return choice.value
         try:
-            found = _CONVERTED[self._kind](_plain(value))
+            found = _CONVERTERS[self._kind](_plain(value))
         except (TypeError, ValueError, OverflowError):
             names = ", ".join(choice.name for choice in choices)
             raise ParamError(
                 f"'{self.name}' cannot be {value!r}: expected {_EXPECTED[self._kind]}"
                 f"{' or one of ' + names if names else ''}"
             ) from None
-        return self._fitting(found)
+        return self._check_range(found)
 
     def clamp(self, value: Any) -> Any:
-        """Return the value within the bounds that is nearest to a value of the right type."""
+        """Return the value within the bounds that is nearest to a converted value."""
         if self._kind in {"bool", "str"}:
             return value
         low, high = self.min, self.max
@@ -139,13 +139,13 @@ class Setting(msgspec.Struct, frozen=True):
         return self.kind or kind_of(self.default)
 
     def _exact(self, what: str, value: Scalar) -> Scalar:
-        """Return default, min or max as the setting's type, which they must have."""
+        """Return default, min or max as the type of the setting, which they must have."""
         kind = self._kind
         if kind_of(value) != kind and not (kind == "double" and kind_of(value) == "int"):
             raise ParamError(f"'{self.name}' has type {kind}, but {what} is {value!r}")
-        return self._fitting(float(value) if kind == "double" else value)
+        return self._check_range(float(value) if kind == "double" else value)
 
-    def _fitting(self, value: Scalar) -> Scalar:
+    def _check_range(self, value: Scalar) -> Scalar:
         low, high = BOUNDS["int"]
         if self._kind == "int" and not low <= value <= high:  # type: ignore[operator]  # ints
             raise ParamError(
@@ -155,23 +155,23 @@ class Setting(msgspec.Struct, frozen=True):
 
 
 def kind_of(value: object) -> Kind:
-    """Return the type of a setting with a value.
+    """Return the type of a setting that has a value.
 
     Raises:
-        ParamError: It is of no such type.
+        ParamError: No setting can have the value.
     """
     for kind, base in (("bool", bool), ("int", int), ("double", float), ("str", str)):
         if isinstance(value, base):
             return kind  # type: ignore[return-value]  # one of the four
-    raise ParamError(f"{value!r} is no value of a setting: expected bool, int, float or str")
+    raise ParamError(f"{value!r} is not a value of a setting: expected bool, int, float or str")
 
 
 def enumeration(choices: Iterable[Choice], description: str = "") -> str:
-    """Write choices as the ``edit_method`` of a setting, as ROS 1's tools read it.
+    """Return choices as the ``edit_method`` of a setting, as other tools read it.
 
     Args:
-        choices: The values, all of one type.
-        description: What the enumeration is.
+        choices: Values, all of one type.
+        description: Meaning of the enumeration, as shown to people.
     """
     rows = [
         {
@@ -186,7 +186,7 @@ def enumeration(choices: Iterable[Choice], description: str = "") -> str:
 
 
 def _choices(edit_method: str) -> tuple[Choice, ...]:
-    # It comes from the network: it is read as plain data, never run.
+    # The text comes from the network: it is parsed as a literal, never evaluated.
     try:
         rows = ast.literal_eval(edit_method)["enum"] if edit_method else ()
         return tuple(
@@ -195,11 +195,11 @@ def _choices(edit_method: str) -> tuple[Choice, ...]:
             if isinstance(row["value"], Scalar)
         )
     except (ValueError, SyntaxError, TypeError, KeyError, AttributeError, RecursionError):
-        return ()  # an edit method that is no enumeration
+        return ()  # some other edit method
 
 
 def _plain(value: object) -> object:
-    """Take a numpy scalar for the Python value it is."""
+    """Return a numpy scalar as a Python value."""
     item = getattr(value, "item", None)
     return item() if callable(item) else value
 
@@ -236,7 +236,7 @@ def _number(value: Any) -> Any:
     return value
 
 
-_CONVERTED: Final[dict[Kind, Callable[[Any], Scalar]]] = {
+_CONVERTERS: Final[dict[Kind, Callable[[Any], Scalar]]] = {
     "bool": _bool,
     "int": _int,
     "str": _str,

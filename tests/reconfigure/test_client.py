@@ -70,7 +70,7 @@ def test_what_it_gives_is_the_callers_own(network: Network) -> None:
 
 def test_a_callback_may_change_settings(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     # Were it to wait for the announcement, which is its own to take in, it would take that long.
-    monkeypatch.setattr(client_module, "_ECHO_BY", 2 * PATIENCE)
+    monkeypatch.setattr(client_module, "_UPDATE_TIMEOUT", 2 * PATIENCE)
     robot = Robot(network.node("robot"))
     done = threading.Event()
 
@@ -89,7 +89,7 @@ def test_a_callback_may_change_settings(network: Network, monkeypatch: pytest.Mo
 def test_a_change_holds_here_before_it_is_announced(
     network: Network, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(client_module, "_ECHO_BY", 0.0)
+    monkeypatch.setattr(client_module, "_UPDATE_TIMEOUT", 0.0)
     Robot(network.node("robot"))
     client = Client(network.node("other"), "robot")
     assert client.config().steps == 50

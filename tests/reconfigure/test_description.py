@@ -20,9 +20,9 @@ from .robots import ROBOT, SIZES
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"name": "1st", "default": 1}, "'1st' is no name of a setting"),
-        ({"name": "a-b", "default": 1}, "'a-b' is no name of a setting"),
-        ({"name": "a", "default": None}, "None is no value of a setting"),
+        ({"name": "1st", "default": 1}, "'1st' is not a name of a setting"),
+        ({"name": "a-b", "default": 1}, "'a-b' is not a name of a setting"),
+        ({"name": "a", "default": None}, "None is not a value of a setting"),
         ({"name": "a", "default": 1, "max": 2.5}, "'a' has type int, but max is 2.5"),
         ({"name": "a", "default": "x", "kind": "int"}, "'a' has type int, but default is 'x'"),
         ({"name": "a", "default": True, "kind": "int"}, "'a' has type int, but default is True"),

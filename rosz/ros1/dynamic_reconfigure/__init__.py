@@ -1,8 +1,8 @@
-"""dynamic_reconfigure: ROS 1's names for what `rosz.reconfigure` does.
+"""dynamic_reconfigure: ROS 1's names for `rosz.reconfigure`.
 
-``.cfg`` files run as they are, and what catkin generated from them is importable without a build:
-``from my_pkg.cfg import TutorialsConfig`` (ROS wiki, dynamic_reconfigure). May import what rospy is
-built on, and rospy's own modules.
+``.cfg`` files run unchanged, and the modules that catkin generates from them can be imported
+without a build: ``from my_pkg.cfg import TutorialsConfig`` (ROS wiki, dynamic_reconfigure). May
+import what rospy is built on, and rospy's own modules.
 """
 
 from rosz.ros1.dynamic_reconfigure.exceptions import (

@@ -1,7 +1,7 @@
-"""Runs ``.cfg`` files, and makes of each the module that catkin would have generated from it.
+"""Running ``.cfg`` files, and building the modules that catkin would generate from them.
 
-A file runs in this process, as a main program of its own: what it prints goes to stderr, and its
-``exit`` ends nothing but itself.
+A file runs in this process as a main program of its own: its output goes to stderr, and its
+``exit`` ends only the file.
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import CodeType, ModuleType, TracebackType
-from typing import Any, NoReturn, TextIO
+from typing import NoReturn, TextIO
 
 from rosz.errors import RoszError, SourceError
-from rosz.reconfigure import Description, Group, Setting
-from rosz.ros1.dynamic_reconfigure.encoding import extract_params
+from rosz.reconfigure.messages import extract_params
 from rosz.ros1.dynamic_reconfigure.parameter_generator_catkin import Generated, results
 from rosz.ros1.python2 import explain, hint
 
-__all__ = ("build", "describe", "load", "run")
+__all__ = ("build", "load", "run")
 
 _SUFFIX = "Config"
 
@@ -29,21 +28,21 @@ def run(path: Path) -> list[Generated]:
     """Run a file, and return what it describes.
 
     Args:
-        path: The file.
+        path: Path of the file.
 
     Raises:
-        SourceError: It cannot be read, is no Python 3, fails, or describes nothing; the message
-            names the line.
+        SourceError: The file cannot be read, is not Python 3, fails, or describes nothing; the
+            message names the line.
     """
     code = _compile(path)
     # site's own exit() would close the standard input of this process.
-    tools = vars(builtins) | {"exit": _exit, "quit": _exit, "print": _tell}
+    tools = vars(builtins) | {"exit": _exit, "quit": _exit, "print": _print}
     names = {"__name__": "__main__", "__file__": str(path), "__builtins__": tools}
     found: list[Generated] = []
     token = results.set(found)
     try:
         with _folder_first(path):
-            exec(code, names)  # noqa: S102  # what it is for
+            exec(code, names)  # noqa: S102  # the purpose of this function
     except SystemExit as error:
         if error.code not in {None, 0} or not found:
             reason = f"it exits with {error.code!r} before it has generated anything"
@@ -65,13 +64,13 @@ def load(module: str, files: Sequence[Path]) -> ModuleType:
     """Return the module that catkin would have generated.
 
     Args:
-        module: Its full name, ``my_pkg.cfg.TutorialsConfig``.
-        files: The files of the package. The one called as the module is tried first; what a file
-            passes to ``generate`` is what counts.
+        module: Full name of the module, such as ``my_pkg.cfg.TutorialsConfig``.
+        files: ``.cfg`` files of the package. The one with the name of the module is tried first,
+            but the name that a file passes to ``generate`` decides.
 
     Raises:
-        SourceError: The file of that name fails.
-        ModuleNotFoundError: None of the files is it.
+        SourceError: The file with the name of the module fails.
+        ModuleNotFoundError: No file generates the module.
     """
     wanted = module.rpartition(".")[2].removesuffix(_SUFFIX)
     others: list[str] = []
@@ -91,12 +90,12 @@ def load(module: str, files: Sequence[Path]) -> ModuleType:
 
 
 def build(module: str, path: Path, generated: Generated) -> ModuleType:
-    """Return the module of what a file describes.
+    """Return the module for what a file describes.
 
     Args:
-        module: Its full name.
-        path: The file.
-        generated: What it describes.
+        module: Full name of the module.
+        path: Path of the file.
+        generated: What the file describes.
     """
     made = ModuleType(module, f"Made of {path}.")
     parameters = extract_params(generated.description)
@@ -123,42 +122,6 @@ def build(module: str, path: Path, generated: Generated) -> ModuleType:
     return made
 
 
-def describe(config_description: dict[str, Any]) -> Description:
-    """Return the description that a generated module has.
-
-    Args:
-        config_description: The root group, as generated modules have it.
-
-    Raises:
-        ParamError: It contradicts itself.
-    """
-    return Description(root=_group(config_description))
-
-
-def _group(given: dict[str, Any]) -> Group:
-    return Group(
-        name=given["name"],
-        settings=tuple(_setting(one) for one in given["parameters"]),
-        groups=tuple(_group(one) for one in given["groups"]),
-        type=given["type"],
-        state=bool(given.get("state", True)),
-        id=given["id"],
-    )
-
-
-def _setting(given: dict[str, Any]) -> Setting:
-    return Setting(
-        name=given["name"],
-        default=given["default"],
-        description=given["description"],
-        level=given["level"],
-        min=given["min"],
-        max=given["max"],
-        edit_method=given["edit_method"],
-        kind=given["type"],
-    )
-
-
 def _compile(path: Path) -> CodeType:
     try:
         return compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
@@ -175,7 +138,7 @@ def _compile(path: Path) -> CodeType:
 
 @contextmanager
 def _folder_first(path: Path) -> Iterator[None]:
-    """Let a file import what lies beside it, as a program can; what it adds itself goes with it."""
+    """Let a file import modules beside it, and restore ``sys.path`` afterwards."""
     before = list(sys.path)
     sys.path.insert(0, str(path.resolve().parent))
     try:
@@ -185,7 +148,7 @@ def _folder_first(path: Path) -> Iterator[None]:
 
 
 def _line(trace: TracebackType | None, path: Path) -> int:
-    """Return the innermost line of a file that an exception passed through; 0 if none."""
+    """Return the innermost line of a file in a traceback; 0 if there is none."""
     line = 0
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == str(path):
@@ -198,13 +161,13 @@ def _exit(code: object = None) -> NoReturn:
     raise SystemExit(code)
 
 
-def _tell(
+def _print(
     *words: object,
     sep: str | None = None,
     end: str | None = None,
     file: TextIO | None = None,
     **_flush: object,
 ) -> None:
-    """Stand in for ``print``: what a file says must not get among a program's output."""
+    """Replace ``print``, because the output of a file must not mix with that of the program."""
     text = (" " if sep is None else sep).join(map(str, words))
     (file or sys.stderr).write(text + ("\n" if end is None else end))

@@ -8,16 +8,15 @@ from typing import Any, TypeVar
 
 from rosz import reconfigure
 from rosz.errors import ClosedError, ParamError, ServiceError, WaitTimeout
-from rosz.reconfigure import Description
-from rosz.reconfigure.messages import pack_description
-from rosz.reconfigure.servers import SET
-from rosz.ros1 import state
-from rosz.ros1.dynamic_reconfigure.encoding import (
-    Config,
+from rosz.reconfigure import Config, Description
+from rosz.reconfigure.messages import (
+    SET,
+    config_tree,
     decode_description,
     extract_params,
-    in_groups,
+    pack_description,
 )
+from rosz.ros1 import state
 from rosz.ros1.dynamic_reconfigure.exceptions import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
@@ -28,11 +27,11 @@ from rosz.ros1.rospy.service import wait_for_service
 __all__ = ("Client",)
 
 T = TypeVar("T")
-_SILENT_FOR = 1.0
-"""Seconds after which a wait without a timeout says what it waits for, as in ROS 1."""
+_WARN_AFTER = 1.0
+"""Seconds after which a wait without a timeout prints what it waits for, as in ROS 1."""
 
-_ANSWER_BY = 10.0
-"""Seconds that a server which is there gets to answer, where nobody says how many."""
+_REPLY_TIMEOUT = 10.0
+"""Default time limit in seconds of the wait for a reply of a server that is there."""
 
 _NOW = 0.0
 _TYPES: dict[str, type] = {"bool": bool, "int": int, "str": str, "double": float}
@@ -43,9 +42,9 @@ class Client:
 
     Args:
         name: Name of the server, mostly that of its node.
-        timeout: Seconds to wait for the server; until it is there when not given.
-        config_callback: Gets the configuration that holds, and each one that holds from then on.
-        description_callback: Gets the descriptions of the parameters, as
+        timeout: Time limit in seconds of the wait for the server; none if not given.
+        config_callback: Function called with the current configuration, and with each later one.
+        description_callback: Function called with the descriptions of the parameters, as
             `get_parameter_descriptions` returns them.
 
     Attributes:
@@ -53,7 +52,7 @@ class Client:
 
     Raises:
         ROSInitException: ``init_node`` has not been called.
-        ROSException: The server did not come in time.
+        ROSException: The server did not appear in time.
         ROSInterruptException: The node was shut down meanwhile.
     """
 
@@ -66,26 +65,26 @@ class Client:
     ) -> None:
         self.name = name
         node = state.node()
-        _wait_for(node.resolve(f"{name}/{SET}"), timeout)
+        _wait_for_server(node.resolve(f"{name}/{SET}"), timeout)
         self._config_callback = config_callback
         self._description_callback = description_callback
         self._decoded: tuple[Description, Config] | None = None
         self._client = reconfigure.Client(
             node,
             name,
-            timeout=_ANSWER_BY,
+            timeout=_REPLY_TIMEOUT,
             config_callback=self._on_config,
             description_callback=self._on_description,
         )
 
     @property
     def config(self) -> Config | None:
-        """The configuration that holds, or ``None`` before it is known."""
+        """The current configuration, or ``None`` before it is known."""
         return self._configuration(_NOW)
 
     @property
     def param_description(self) -> list[dict[str, Any]] | None:
-        """What there is to set, or ``None`` before it is known."""
+        """The descriptions of the parameters, or ``None`` before they are known."""
         return self._parameters(_NOW)
 
     @property
@@ -94,39 +93,39 @@ class Client:
         return self._groups(_NOW)
 
     def get_configuration(self, timeout: float | None = None) -> Config | None:
-        """Return the configuration that holds.
+        """Return the current configuration.
 
         Args:
-            timeout: Seconds to wait for the server to tell; 10 when not given.
+            timeout: Time limit in seconds of the wait for the server; 10 by default.
 
         Returns:
-            Name to value, and the groups; ``None`` when the server did not tell.
+            Values by name, and the groups; ``None`` if the server did not send them.
         """
-        return self._patiently(self._configuration, timeout, "configuration")
+        return self._wait_for(self._configuration, timeout, "configuration")
 
     def get_parameter_descriptions(
         self, timeout: float | None = None
     ) -> list[dict[str, Any]] | None:
-        """Return what there is to set; timeout and ``None`` as for `get_configuration`."""
-        return self._patiently(self._parameters, timeout, "descriptions")
+        """Return the descriptions of the parameters; see `get_configuration`."""
+        return self._wait_for(self._parameters, timeout, "descriptions")
 
     def get_group_descriptions(self, timeout: float | None = None) -> Config | None:
-        """Return the root group; timeout and ``None`` as for `get_configuration`."""
-        return self._patiently(self._groups, timeout, "descriptions")
+        """Return the root group; see `get_configuration`."""
+        return self._wait_for(self._groups, timeout, "descriptions")
 
     def update_configuration(self, changes: Mapping[str, Any]) -> Config:
         """Change parameters.
 
         Args:
-            changes: Name to value; ``groups`` holds states of groups by name.
+            changes: New values by name; ``groups`` holds states of groups by name.
 
         Returns:
-            The configuration that holds then.
+            The configuration after the change.
 
         Raises:
             DynamicReconfigureParameterException: There is no such parameter, or a value cannot be
-                one of it.
-            DynamicReconfigureCallbackException: The server refused, is gone, or did not answer
+                converted.
+            DynamicReconfigureCallbackException: The server refused, is gone, or did not reply
                 within 10 seconds.
             ROSInterruptException: The node was shut down meanwhile.
         """
@@ -139,23 +138,23 @@ class Client:
             raise DynamicReconfigureCallbackException(f"service call failed: {error}") from error
         except ClosedError as error:
             raise ROSInterruptException("rospy shutdown") from error
-        return in_groups(found, self._decode(self._client.description()))
+        return config_tree(found, self._decode(self._client.description()))
 
     def update_groups(self, changes: Mapping[str, bool]) -> Config | None:
-        """Change which groups are shown, by name, and return the root group."""
+        """Change whether groups are shown, by name, and return the root group."""
         self.update_configuration({"groups": changes})
         return self.get_group_descriptions()
 
     def close(self) -> None:
-        """Stop listening to the server."""
+        """Stop receiving from the server."""
         self._client.close()
 
     def get_config_callback(self) -> Callable[[Config], object] | None:
-        """Return what is called with configurations."""
+        """Return the function that is called with configurations."""
         return self._config_callback
 
     def set_config_callback(self, value: Callable[[Config], object] | None) -> None:
-        """Have a function called with configurations, with the one that holds right away."""
+        """Call a function with configurations, first with the current one."""
         self._config_callback = value
         known = self.config
         if value is not None and known is not None:
@@ -164,13 +163,13 @@ class Client:
     config_callback = property(get_config_callback, set_config_callback)
 
     def get_description_callback(self) -> Callable[[list[dict[str, Any]]], object] | None:
-        """Return what is called with descriptions."""
+        """Return the function that is called with descriptions."""
         return self._description_callback
 
     def set_description_callback(
         self, value: Callable[[list[dict[str, Any]]], object] | None
     ) -> None:
-        """Have a function called with descriptions, with those that are known right away."""
+        """Call a function with descriptions, first with those that are known."""
         self._description_callback = value
         known = self.param_description
         if value is not None and known is not None:
@@ -178,20 +177,20 @@ class Client:
 
     description_callback = property(get_description_callback, set_description_callback)
 
-    def _patiently(
+    def _wait_for(
         self, ask: Callable[[float], T | None], timeout: float | None, what: str
     ) -> T | None:
-        """Ask, and where there is no timeout say soon that it takes long."""
-        found = ask(timeout or _SILENT_FOR)
+        """Return what ``ask`` returns; without a timeout, print soon what it waits for."""
+        found = ask(timeout or _WARN_AFTER)
         if found is None and not timeout and not state.node().is_shutdown:
             sys.stderr.write(f"Waiting for {what}...\n")
-            found = ask(_ANSWER_BY)
+            found = ask(_REPLY_TIMEOUT)
         return found
 
     def _configuration(self, timeout: float) -> Config | None:
         try:
             config = self._client.config(timeout)
-            return in_groups(config, self._decode(self._client.description(_NOW)))
+            return config_tree(config, self._decode(self._client.description(_NOW)))
         except (WaitTimeout, ClosedError):
             return None
 
@@ -213,20 +212,20 @@ class Client:
 
     def _on_config(self, config: Config) -> None:
         if self._config_callback is not None:
-            self._config_callback(in_groups(config, self._decode(self._client.description())))
+            self._config_callback(config_tree(config, self._decode(self._client.description())))
 
     def _on_description(self, description: Description) -> None:
         if self._description_callback is not None:
             self._description_callback(extract_params(self._decode(description)))
 
 
-def _wait_for(service: str, timeout: float | None) -> None:
-    """Wait for the server; without a timeout until it comes, as launch files count on."""
+def _wait_for_server(service: str, timeout: float | None) -> None:
+    """Wait for the server; without a timeout for ever, which launch files rely on."""
     if timeout:
         wait_for_service(service, timeout)
         return
     try:
-        wait_for_service(service, _SILENT_FOR)
+        wait_for_service(service, _WARN_AFTER)
     except ROSException as error:
         if isinstance(error, ROSInterruptException):
             raise
@@ -235,10 +234,10 @@ def _wait_for(service: str, timeout: float | None) -> None:
 
 
 def _check(description: Description, changes: Mapping[str, Any]) -> None:
-    """Refuse changes in ROS 1's words.
+    """Refuse changes with the messages of ROS 1.
 
     Raises:
-        DynamicReconfigureParameterException: One cannot be made.
+        DynamicReconfigureParameterException: A change is not possible.
     """
     for name, value in changes.items():
         if name == "groups":

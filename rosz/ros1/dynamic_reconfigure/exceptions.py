@@ -1,4 +1,4 @@
-"""What dynamic_reconfigure raises, by ROS 1's names."""
+"""The exceptions of dynamic_reconfigure, by ROS 1's names."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ __all__ = (
 
 
 class DynamicReconfigureException(Exception):
-    """Root of what dynamic_reconfigure raises."""
+    """Base class of the exceptions of dynamic_reconfigure."""
 
 
 class DynamicReconfigureParameterException(DynamicReconfigureException):
-    """There is no such parameter, or a value cannot be one of it."""
+    """There is no such parameter, or it cannot have a value."""
 
 
 class DynamicReconfigureCallbackException(DynamicReconfigureException):
-    """A server's callback returned nothing, or a server refused or did not answer."""
+    """A server's callback returned nothing, or a server refused or did not reply."""

@@ -1,4 +1,4 @@
-"""Where a package has its ``.cfg`` files."""
+"""The ``.cfg`` files of a package; a module of its own, because the importer needs only this."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ _MARK = b"dynamic_reconfigure"
 
 
 def find_files(folder: Path) -> list[Path]:
-    """Return the ``.cfg`` files of a package that describe parameters, sorted.
+    """Return the sorted ``.cfg`` files of a package that describe parameters.
 
     Args:
-        folder: The package's; files named so for other purposes (``setup.cfg``) are left out.
+        folder: Folder of the package; other files with such names (``setup.cfg``) are left out.
     """
-    return [file for file in sorted(folder.rglob("*.cfg")) if _is_ours(file)]
+    return [file for file in sorted(folder.rglob("*.cfg")) if _describes_parameters(file)]
 
 
-def _is_ours(file: Path) -> bool:
+def _describes_parameters(file: Path) -> bool:
     try:
         return _MARK in file.read_bytes()
-    except OSError:  # a folder of such a name, a link to nowhere
+    except OSError:  # a folder, or a broken link
         return False

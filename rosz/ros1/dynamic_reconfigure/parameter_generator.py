@@ -1,8 +1,8 @@
-"""What ``.cfg`` files of before catkin describe parameters with; the same as with catkin."""
+"""The generator that older ``.cfg`` files use; the same as with catkin."""
 
 from __future__ import annotations
 
-import rosz.ros1.roslib as roslib  # noqa: PLR0402  # ROS 1's module offers it under this name
+import rosz.ros1.roslib as roslib  # noqa: PLR0402  # ROS 1's module has this name
 from rosz.ros1.dynamic_reconfigure.parameter_generator_catkin import (
     ParameterGenerator,
     Template,

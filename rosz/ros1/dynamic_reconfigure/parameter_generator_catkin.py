@@ -1,7 +1,7 @@
-"""What ``.cfg`` files describe parameters with (ROS wiki, dynamic_reconfigure/Tutorials).
+"""The generator that ``.cfg`` files use (ROS wiki, dynamic_reconfigure/Tutorials).
 
-In ROS 1 it writes C++ and Python files. Here nothing is written: what a file describes goes to
-whoever runs it, see `rosz.ros1.dynamic_reconfigure.cfgfile`.
+In ROS 1 it writes C++ and Python files. Here it writes nothing: the description goes to the caller
+of `rosz.ros1.dynamic_reconfigure.cfgfile.run`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import msgspec
 from rosz.errors import ParamError
 from rosz.reconfigure.setting import Kind, Scalar, Setting
 
-# ROS 1's module offers its own imports as well, and there are files that live on them.
+# ROS 1's module exports its own imports as well, and some files use them.
 __all__ = (
     "ParameterGenerator",
     "Template",
@@ -56,11 +56,11 @@ class Generated(msgspec.Struct, frozen=True):
     """What a file describes.
 
     Attributes:
-        package: The package that it says it is for.
-        node: The node that it says it is for.
-        name: What the module is called, without ``Config``.
-        description: The root group, in the form that generated modules have.
-        constants: Name to value.
+        package: Package that the file names.
+        node: Node that the file names.
+        name: Name of the module, without ``Config``.
+        description: Root group, in the form of generated modules.
+        constants: Values by name.
     """
 
     package: str
@@ -71,7 +71,7 @@ class Generated(msgspec.Struct, frozen=True):
 
 
 results: ContextVar[list[Generated] | None] = ContextVar("results", default=None)
-"""Where `ParameterGenerator.generate` leaves what a file describes, while one is run."""
+"""List that `ParameterGenerator.generate` appends to while a file runs."""
 
 
 class Group:
@@ -102,7 +102,7 @@ class Group:
         Args:
             name: Spaces become underscores.
             type: How a window shows it: empty, ``collapse``, ``tab``, ``hide`` or ``apply``.
-            state: Whether it is shown at first.
+            state: Whether it is shown by default.
         """
         group = Group(self.gen, name, type, state, self)
         self.groups.append(group)
@@ -124,15 +124,15 @@ class Group:
         Args:
             name: A letter, then letters, digits and underscores.
             paramtype: ``int_t``, ``double_t``, ``str_t`` or ``bool_t``.
-            level: Bits that a server's callback gets when it changes.
-            description: What it is for.
-            default: 0, empty or false when not given.
-            min: Least value, of a number.
-            max: Greatest value, of a number.
-            edit_method: What `ParameterGenerator.enum` returned.
+            level: Bits that a server's callback gets when the parameter changes.
+            description: Purpose, as shown to people.
+            default: Default value: 0, empty or false if not given.
+            min: Least value of a number.
+            max: Greatest value of a number.
+            edit_method: Enumeration, as `ParameterGenerator.enum` returns it.
 
         Raises:
-            ParamError: The name is none or there already, or a value does not fit the type.
+            ParamError: The name is not legal or is taken, or a value does not fit the type.
         """
         kind = _kind(name, paramtype)
         if not isinstance(level, int):
@@ -158,11 +158,11 @@ class Group:
         )
 
     def get_parameters(self) -> list[dict[str, Any]]:
-        """Return its parameters, then those of the groups inside it."""
+        """Return the parameters of the group, then those of the groups in it."""
         return self.parameters + [one for group in self.groups for one in group.get_parameters()]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the group in the form that generated modules have."""
+        """Return the group in the form of generated modules."""
         names = self.path()
         return {
             "name": self.name,
@@ -183,7 +183,7 @@ class Group:
         }
 
     def path(self) -> list[str]:
-        """Return the names of the groups around it, and its own."""
+        """Return the names of the groups around the group, and its own."""
         outer = self._around.path() if self._around is not None else []
         return [*outer, self.name]
 
@@ -200,16 +200,16 @@ class ParameterGenerator:
         self.add = self.group.add
 
     def const(self, name: str, type: str, value: Any, descr: str) -> dict[str, Any]:  # noqa: A002
-        """Return a constant, to be put into an enumeration.
+        """Return a constant for an enumeration.
 
         Args:
-            name: Its name.
+            name: Name of the constant.
             type: ``int_t``, ``double_t``, ``str_t`` or ``bool_t``.
-            value: Its value.
-            descr: What it means.
+            value: Value of the constant.
+            descr: Meaning, as shown to people.
 
         Raises:
-            ParamError: The name is none, or the value does not fit the type.
+            ParamError: The name is not legal, or the value does not fit the type.
         """
         kind = _kind(name, type)
         constant = {
@@ -224,7 +224,7 @@ class ParameterGenerator:
         return constant
 
     def enum(self, constants: Sequence[dict[str, Any]], description: str) -> str:
-        """Return an enumeration, to be given as the ``edit_method`` of a parameter.
+        """Return an enumeration for the ``edit_method`` of a parameter.
 
         Raises:
             ParamError: The constants are not all of one type.
@@ -235,15 +235,15 @@ class ParameterGenerator:
         return repr({"enum": list(constants), "enum_description": description})
 
     def generate(self, pkgname: str, nodename: str, name: str) -> int:
-        """Hand over what was described.
+        """Finish the description.
 
         Args:
-            pkgname: The package.
-            nodename: The node.
-            name: What the module is called, without ``Config``.
+            pkgname: Name of the package.
+            nodename: Name of the node.
+            name: Name of the module, without ``Config``.
 
         Returns:
-            0, to exit with.
+            The exit code 0.
         """
         collected = results.get()
         if collected is not None:
@@ -252,15 +252,15 @@ class ParameterGenerator:
         return 0
 
     def count_group(self) -> int:
-        """Return the number of a new group."""
+        """Return the id of a new group."""
         self._groups += 1
         return self._groups - 1
 
     def take_name(self, name: str) -> None:
-        """Refuse a name that a parameter has already.
+        """Refuse a name that another parameter has.
 
         Raises:
-            ParamError: One has.
+            ParamError: Another parameter has the name.
         """
         if name in self._names:
             raise ParamError(f"there is a parameter '{name}' already, in line {self._names[name]}")
@@ -268,7 +268,7 @@ class ParameterGenerator:
 
 
 def _kind(name: str, given: str) -> Kind:
-    """Return the type that a file gives a parameter.
+    """Return the type that a file gives to a parameter.
 
     Raises:
         ParamError: There is no such type.
@@ -284,7 +284,7 @@ def _c_types(kind: Kind) -> dict[str, str]:
 
 
 def _place() -> dict[str, Any]:
-    """Return the line of the file that calls, as generated modules tell it."""
+    """Return the line of the calling file, in the form of generated modules."""
     frame = inspect.currentframe()
     while frame is not None and frame.f_code.co_filename == __file__:
         frame = frame.f_back

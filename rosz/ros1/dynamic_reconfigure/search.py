@@ -1,4 +1,4 @@
-"""Questions about servers and what they have."""
+"""Finding servers, and the parameters that they have."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ("find_reconfigure_services", "get_parameter_names")
 
 
 def find_reconfigure_services() -> list[str]:
-    """Return the names of all servers there are, sorted; before ``init_node`` as well."""
+    """Return the sorted names of all servers; works before ``init_node`` as well."""
     from rosz.reconfigure import find_servers
     from rosz.ros1 import state
 

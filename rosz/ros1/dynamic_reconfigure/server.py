@@ -1,4 +1,4 @@
-"""``dynamic_reconfigure.server``: what a node lets others set (ROS wiki, dynamic_reconfigure)."""
+"""``dynamic_reconfigure.server``: parameters that others may change (ROS wiki)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 from rosz import reconfigure
 from rosz.errors import ParamError
+from rosz.reconfigure import Config
+from rosz.reconfigure.messages import describe, encode_description
 from rosz.ros1 import state
-from rosz.ros1.dynamic_reconfigure.cfgfile import describe
-from rosz.ros1.dynamic_reconfigure.encoding import Config, encode_description
 from rosz.ros1.dynamic_reconfigure.exceptions import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
@@ -17,30 +17,31 @@ from rosz.ros1.dynamic_reconfigure.exceptions import (
 
 __all__ = ("Server",)
 
-_NOTHING = "Reconfigure callback should return a possibly updated configuration."
+_RETURNED_NOTHING = "Reconfigure callback should return a possibly updated configuration."
 
 
 class Server:
     """Lets others change parameters of this node while it runs; see `rosz.reconfigure.Server`.
 
     Args:
-        type: A generated module, such as ``my_pkg.cfg.TutorialsConfig``.
-        callback: Gets a configuration that is about to hold, and the or-ed levels of what changes
-            (-1 the first time), and returns the one that is to hold.
-        namespace: Where parameters, topics and service are: the node's own when empty, below it
-            when relative.
+        type: Generated module, such as ``my_pkg.cfg.TutorialsConfig``.
+        callback: Function called with a new configuration and the bitwise or of the levels of what
+            changes (-1 the first time). It returns the configuration that takes effect.
+        namespace: Namespace of parameters, topics and service: that of the node if empty, below it
+            if relative.
 
     Attributes:
-        type: The module.
-        callback: The callback; may be replaced.
-        config: The configuration that holds.
-        description: The message that describes the parameters.
-        ns: The namespace, with a slash at its end.
+        type: Generated module.
+        callback: Function called before a change; may be replaced.
+        config: Current configuration.
+        description: Message that describes the parameters.
+        ns: Namespace, with a slash at its end.
 
     Raises:
         ROSInitException: ``init_node`` has not been called.
         DynamicReconfigureCallbackException: The callback returned nothing.
-        DynamicReconfigureParameterException: What it returned cannot be the parameters' values.
+        DynamicReconfigureParameterException: The parameters cannot have the values that the
+            callback returned.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class Server:
         self._node = state.node()
         try:
             self._server = reconfigure.Server(
-                self._node, describe(type.config_description), self._decide, namespace
+                self._node, describe(type.config_description), self._choose, namespace
             )
         except ParamError as error:
             raise DynamicReconfigureParameterException(str(error)) from error
@@ -64,18 +65,18 @@ class Server:
         self.ns = f"{self._server.name}/"
 
     def update_configuration(self, changes: Mapping[str, Any]) -> Config:
-        """Change parameters, as others do by the service.
+        """Change parameters, as clients do by the service.
 
         Args:
-            changes: Name to value.
+            changes: New values by name.
 
         Returns:
-            What holds then.
+            The configuration after the change.
 
         Raises:
             DynamicReconfigureCallbackException: The callback returned nothing.
             DynamicReconfigureParameterException: There is no such parameter, or a value cannot be
-                one of it.
+                converted.
         """
         try:
             self.config = self._server.update(changes)
@@ -83,10 +84,10 @@ class Server:
             raise DynamicReconfigureParameterException(str(error)) from error
         return self.config
 
-    def _decide(self, config: Config, level: int) -> Config:
-        decided = self.callback(config, level)
-        if decided is None:
-            self._node.log.error(_NOTHING)
-            raise DynamicReconfigureCallbackException(_NOTHING)
-        self.config = decided
-        return decided
+    def _choose(self, config: Config, level: int) -> Config:
+        chosen = self.callback(config, level)
+        if chosen is None:
+            self._node.log.error(_RETURNED_NOTHING)
+            raise DynamicReconfigureCallbackException(_RETURNED_NOTHING)
+        self.config = chosen
+        return chosen

@@ -121,7 +121,7 @@ BROKEN: tuple[tuple[str, int, str], ...] = (
     ("gen.add('a', int_t, 0, '', 1, 0.5)", 4, "'a' has type int, but min is 0.5"),
     ("gen.add('a', bool_t, 0, '', 1)", 4, "'a' has type bool, but default is 1"),
     ("gen.add('a', str_t, 0, '', 'x', 'a', 'z')", 4, "'a' is of type 'str', which has no min and"),
-    ("gen.add('1a', int_t, 0, '', 1)", 4, "'1a' is no name of a setting: expected a letter"),
+    ("gen.add('1a', int_t, 0, '', 1)", 4, "'1a' is not a name of a setting: expected a letter"),
     ("gen.add('a', 'float', 0, '', 1)", 4, "'a' has the unknown type 'float'; expected int_t"),
     ("gen.add('a', float, 0, '', 1)", 4, "'a' has the unknown type <class 'float'>; expected"),
     ("gen.add('a', int_t, None, '')", 4, "'a' has the level None; expected a whole number"),

@@ -13,9 +13,9 @@ import pytest
 
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import GroupState
-from rosz.reconfigure.messages import pack_config, pack_description
+from rosz.reconfigure.messages import describe, pack_config, pack_description
 from rosz.ros1.dynamic_reconfigure import encoding, get_parameter_names
-from rosz.ros1.dynamic_reconfigure.cfgfile import describe, load
+from rosz.ros1.dynamic_reconfigure.cfgfile import load
 from rosz.ros1.importer import install, uninstall
 
 from .cfg_samples import BESIDE, SAMPLES

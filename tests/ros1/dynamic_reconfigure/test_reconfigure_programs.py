@@ -263,7 +263,7 @@ def test_a_stopped_server_ends_no_client(network: Network, source: Path) -> None
     server.wait_for("ready")
     script = """
         import dynamic_reconfigure.client
-        dynamic_reconfigure.client._ANSWER_BY = 1.0
+        dynamic_reconfigure.client._REPLY_TIMEOUT = 1.0
         rospy.init_node("asking")
         client = Client("tuned", timeout=15)
         print(client.get_configuration().int_param)

@@ -1,4 +1,4 @@
-"""Settings in files: YAML, plain in what is written here, and as ROS 1's dynparam writes it."""
+"""Settings in YAML files: plain ones, and those that dynparam wrote."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from rosz.params import yaml
 __all__ = ("dump", "load")
 
 _ROS1_TAG: Final = "!!python/object/new:dynamic_reconfigure.encoding.Config"
-"""What stands before each configuration in a file of ROS 1's dynparam, a pickled one in effect."""
+"""Tag of each configuration in a file of dynparam, which is a pickled object."""
 
 _ITEMS: Final = "dictitems"
 _PICKLED: Final = frozenset({_ITEMS, "state"})
 
 
 def dump(config: Mapping[str, Any]) -> str:
-    """Write the values of a configuration, and under ``groups`` which groups are shown."""
+    """Return a configuration as YAML: values, and states of groups under ``groups``."""
     plain = {name: value for name, value in config.items() if name != "groups"}
     states = _states(config.get("groups", {}))
     return yaml.dump(plain | ({"groups": states} if states else {}))
 
 
 def load(text: str, path: str = "<string>") -> dict[str, Any]:
-    """Read what `dump`, or dynparam, wrote: of several documents, later ones win.
+    """Return the settings that `dump` or dynparam wrote; later documents win over earlier ones.
 
     Args:
-        text: YAML.
-        path: Where it is from, for messages.
+        text: YAML text.
+        path: File that the text is from, for error messages.
 
     Returns:
-        Name to value; under ``groups`` states by name.
+        Values by name, and states by name under ``groups``.
 
     Raises:
-        YamlError: It is no YAML, or no dictionary of names to values.
+        YamlError: The text is not YAML, or not a dictionary of names to values.
     """
-    # Where the tag stands the value is a plain mapping; without it nothing is unpickled.
-    ours = _ROS1_TAG in text
+    # Without its tag the value is a plain mapping; nothing is unpickled.
+    is_pickled = _ROS1_TAG in text
     found: dict[str, Any] = {}
     for document in yaml.load_all(text.replace(_ROS1_TAG, ""), path):
-        plain = _unwrapped(document) if ours else document
+        plain = _unwrap(document) if is_pickled else document
         if not isinstance(plain, dict):
             raise YamlError(f"{plain!r:.60}: expected a dictionary of names to values", path)
         found |= plain
@@ -52,7 +52,7 @@ def load(text: str, path: str = "<string>") -> dict[str, Any]:
 
 
 def _states(tree: Mapping[str, Any]) -> dict[str, bool]:
-    """Return the states of all groups in a tree by name, the root's left out."""
+    """Return the states of all groups in a tree by name, except for the root."""
     states: dict[str, bool] = {}
     for name, group in tree.get("groups", {}).items():
         states[name] = bool(group["state"])
@@ -60,9 +60,9 @@ def _states(tree: Mapping[str, Any]) -> dict[str, bool]:
     return states
 
 
-def _unwrapped(value: Any) -> Any:
+def _unwrap(value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     if value.keys() <= _PICKLED and isinstance(value.get("state"), list):
         value = value.get(_ITEMS, {})
-    return {name: _unwrapped(inner) for name, inner in value.items()}
+    return {name: _unwrap(inner) for name, inner in value.items()}
