@@ -75,7 +75,7 @@ def get_command(
 ) -> None:
     """Print all settings of a node as dynparam does, or the value of one setting."""
     from rosz.params.yaml import format_get
-    from rosz.reconfigure.messages import config_tree, decode_description, pack_description
+    from rosz.reconfigure.messages import decode_description, in_groups, pack_description
 
     with _client(call, node, timeout, wait=wait) as client:
         description, config = client.description(), client.config()
@@ -89,7 +89,7 @@ def get_command(
         print_json(config)
     else:
         tree = decode_description(pack_description(description))
-        print_lines([repr(config_tree(config, tree))])
+        print_lines([repr(in_groups(config, tree))])
 
 
 @app.command("set", arrange=values_last(frozenset({"-t", "--timeout"})))

@@ -32,7 +32,6 @@ __all__ = (
     "DESCRIPTIONS",
     "SET",
     "UPDATES",
-    "config_tree",
     "decode_config",
     "decode_description",
     "describe",
@@ -42,6 +41,7 @@ __all__ = (
     "extract_params",
     "get_tree",
     "group_dict",
+    "in_groups",
     "initial_config",
     "pack_config",
     "pack_description",
@@ -388,7 +388,7 @@ def decode_config(msg: ConfigMessage, description: Mapping[str, Any] | None = No
     return config
 
 
-def config_tree(config: Config, description: Mapping[str, Any]) -> Config:
+def in_groups(config: Config, description: Mapping[str, Any]) -> Config:
     """Return a configuration as `decode_config` returns it: each group holds its parameters.
 
     Args:

@@ -11,9 +11,9 @@ from rosz.errors import ClosedError, ParamError, ServiceError, WaitTimeout
 from rosz.reconfigure import Config, Description
 from rosz.reconfigure.messages import (
     SET,
-    config_tree,
     decode_description,
     extract_params,
+    in_groups,
     pack_description,
 )
 from rosz.ros1 import state
@@ -138,7 +138,7 @@ class Client:
             raise DynamicReconfigureCallbackException(f"service call failed: {error}") from error
         except ClosedError as error:
             raise ROSInterruptException("rospy shutdown") from error
-        return config_tree(found, self._decode(self._client.description()))
+        return in_groups(found, self._decode(self._client.description()))
 
     def update_groups(self, changes: Mapping[str, bool]) -> Config | None:
         """Change whether groups are shown, by name, and return the root group."""
@@ -190,7 +190,7 @@ class Client:
     def _configuration(self, timeout: float) -> Config | None:
         try:
             config = self._client.config(timeout)
-            return config_tree(config, self._decode(self._client.description(_NOW)))
+            return in_groups(config, self._decode(self._client.description(_NOW)))
         except (WaitTimeout, ClosedError):
             return None
 
@@ -212,7 +212,7 @@ class Client:
 
     def _on_config(self, config: Config) -> None:
         if self._config_callback is not None:
-            self._config_callback(config_tree(config, self._decode(self._client.description())))
+            self._config_callback(in_groups(config, self._decode(self._client.description())))
 
     def _on_description(self, description: Description) -> None:
         if self._description_callback is not None:

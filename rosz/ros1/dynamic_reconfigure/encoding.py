@@ -12,6 +12,7 @@ from rosz.reconfigure.messages import (
     extract_params,
     get_tree,
     group_dict,
+    in_groups,
     initial_config,
 )
 
@@ -25,5 +26,6 @@ __all__ = (
     "extract_params",
     "get_tree",
     "group_dict",
+    "in_groups",
     "initial_config",
 )
