@@ -1,7 +1,7 @@
 """ROS 1's Python modules: which ones rosz has, and what to use instead of what is missing.
 
-Some submodules of ROS 1 hold names that are defined in another module here. They are not files;
-the importer builds them from `SUBMODULES`.
+Some submodules of ROS 1 and rclpy hold names that are defined in another module here. They are not
+files; the importer builds them from `SUBMODULES`.
 """
 
 from __future__ import annotations
@@ -69,6 +69,31 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.genpy": f"MessageException is_simple {_MESSAGE['ros1.genpy']}",
     },
     "genpy.rostime": {"ros1.genpy": "Duration TVal Time"},
+    "rclpy.callback_groups": {
+        "ros2.rclpy.executors": "CallbackGroup MutuallyExclusiveCallbackGroup"
+        " ReentrantCallbackGroup"
+    },
+    "rclpy.client": {"ros2.rclpy.entities": "Client"},
+    "rclpy.clock": {"ros2.rclpy.time": "Clock ClockType ROSClock"},
+    "rclpy.context": {"ros2.rclpy.context": "Context"},
+    "rclpy.duration": {"ros2.rclpy.time": "Duration Infinite"},
+    "rclpy.executors": {
+        "ros2.rclpy.executors": "Entity Executor ExternalShutdownException MultiThreadedExecutor"
+        " ShutdownException SingleThreadedExecutor TimeoutException"
+    },
+    "rclpy.parameter": {
+        "ros2.rclpy.parameter": "PARAMETER_SEPARATOR_STRING Parameter get_parameter_value"
+    },
+    "rclpy.publisher": {"ros2.rclpy.entities": "Publisher"},
+    "rclpy.service": {"ros2.rclpy.entities": "Service"},
+    "rclpy.subscription": {"ros2.rclpy.entities": "Subscription"},
+    "rclpy.task": {"ros2.rclpy.executors": "Future Task"},
+    "rclpy.time": {"ros2.rclpy.time": "CONVERSION_CONSTANT ClockType Time"},
+    "rclpy.timer": {"ros2.rclpy.entities": "Rate Timer"},
+    "rclpy.utilities": {
+        "ros2.rclpy.program": "get_default_context get_rmw_implementation_identifier ok"
+        " remove_ros_args shutdown try_shutdown"
+    },
     "roslib.launcher": {"ros1.roslib": "load_manifest"},
     "roslib.message": {**_MESSAGE, "time": "TVal=StampValue"},
     "roslib.names": {
@@ -107,7 +132,7 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.rospy.service": "Service ServiceException ServiceProxy wait_for_service"
     },
 }
-"""Submodules of ROS 1: the modules below ``rosz`` that define their names, and the names.
+"""Submodules of ROS 1 and rclpy: the modules below ``rosz`` that define their names, and the names.
 
 ``TVal=StampValue`` is the name ``TVal`` for ``StampValue``.
 """
@@ -141,7 +166,7 @@ def submodule(name: str) -> ModuleType:
     Args:
         name: Full name, such as ``rospy.impl.tcpros``.
     """
-    module = ModuleType(name, f"``{name}``: names that ROS 1's programs import from here.")
+    module = ModuleType(name, f"``{name}``: names that programs import from here.")
     for home, names in SUBMODULES[name].items():
         defined = import_module(f"rosz.{home}")
         for each in names.split():

@@ -1,25 +1,27 @@
-"""A small rclpy: ROS 2's Python interface as far as tutorials and simple nodes use it.
+"""rclpy: the part of ROS 2's Python interface that tutorials and simple nodes use.
 
-Callbacks run while something spins, on the thread that spins. There are no actions, lifecycle
-nodes, guard conditions, waitables or event handlers; whatever is not there is an ``AttributeError``
-or ``ModuleNotFoundError`` with its name.
+Callbacks run while an executor spins, on its thread. Actions, lifecycle nodes, guard conditions,
+waitables and event handlers are missing: using them raises an ``AttributeError`` or
+``ModuleNotFoundError`` with their name. Submodules of rclpy that share a file here
+(``rclpy.publisher``, ``rclpy.duration``, …) are listed in ``rosz.ros1.modules``.
 """
 
 from rosz.ros2.rclpy import (
-    callback_groups,
-    clock,
     context,
-    duration,
     exceptions,
     executors,
     logging,
     node,
     parameter,
     qos,
-    task,
     time,
-    utilities,
 )
+from rosz.ros2.rclpy import executors as callback_groups
+from rosz.ros2.rclpy import executors as task
+from rosz.ros2.rclpy import program as utilities
+from rosz.ros2.rclpy import time as clock
+from rosz.ros2.rclpy import time as duration
+from rosz.ros2.rclpy.executors import Future
 from rosz.ros2.rclpy.program import (
     create_node,
     get_default_context,
@@ -32,7 +34,6 @@ from rosz.ros2.rclpy.program import (
     spin_until_future_complete,
     try_shutdown,
 )
-from rosz.ros2.rclpy.task import Future
 
 __all__ = (
     "Future",

@@ -1,6 +1,6 @@
-"""The command line of a ROS 2 program, ``--ros-args … --``, and what ROS 1 puts there.
+"""The command line of a ROS 2 program: ``--ros-args … --``, and ROS 1's arguments.
 
-See design.ros2.org, ROS Command Line Arguments.
+See "ROS Command Line Arguments" on design.ros2.org.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from rosz.remap import Arguments
 __all__ = ("RosArguments", "parse", "remove_ros_args")
 
 _BEGIN, _END = "--ros-args", "--"
-_ALONE = frozenset({
+_FLAGS = frozenset({
     "--enable-rosout-logs", "--disable-rosout-logs", "--enable-stdout-logs",
     "--disable-stdout-logs", "--enable-external-lib-logs", "--disable-external-lib-logs",
 })  # fmt: skip
 
 
 class RosArguments(msgspec.Struct, frozen=True):
-    """What a command line says.
+    """The ROS arguments of a command line.
 
     Attributes:
-        arguments: In rosz's terms.
-        params: Values of parameters by name, for all nodes under ``""`` and for single ones under
-            their names.
-        level: Least level that is logged; empty where it says none.
-        rest: What belongs to the program.
+        arguments: Remappings and special names, as rosz's own nodes use them.
+        params: Values of parameters by name: under ``""`` those of all nodes, and under the name of
+            a node its own.
+        level: Lowest level that is logged; empty if there is none.
+        rest: Arguments of the program itself.
     """
 
     arguments: Arguments
@@ -43,26 +43,26 @@ class RosArguments(msgspec.Struct, frozen=True):
 
 
 def remove_ros_args(args: Sequence[str]) -> list[str]:
-    """Return a command line without what is ROS's."""
+    """Return a command line without its ROS arguments."""
     kept: list[str] = []
-    ours = False
+    inside = False
     for word in args:
-        if ours:
-            ours = word != _END
+        if inside:
+            inside = word != _END
         elif word == _BEGIN:
-            ours = True
+            inside = True
         else:
             kept.append(word)
     return kept
 
 
 def parse(args: Sequence[str]) -> RosArguments:
-    """Sort a command line without its program name.
+    """Parse a command line without the program name.
 
     Raises:
-        UsageError: Something between ``--ros-args`` and ``--`` means nothing.
-        NotFoundError: A file of parameters is not there.
-        YamlError: A file of parameters is no YAML.
+        UsageError: An argument between ``--ros-args`` and ``--`` is not valid.
+        NotFoundError: A parameter file does not exist.
+        YamlError: A parameter file is not valid YAML.
     """
     classic = remap.parse(remove_ros_args(args))
     remaps, special = dict(classic.remaps), dict(classic.special)
@@ -74,7 +74,7 @@ def parse(args: Sequence[str]) -> RosArguments:
         if option in {"-r", "--remap"}:
             _remap(value, remaps, special)
         elif option in {"-p", "--param"}:
-            node, name, text = _parted(value)
+            node, name, text = _split(value)
             params.setdefault(node, {})[name] = _value(text, value)
         elif option == "--params-file":
             for node, values in _read(value):
@@ -82,38 +82,38 @@ def parse(args: Sequence[str]) -> RosArguments:
         elif option == "--log-level":
             level = value.rpartition(":=")[2]
         elif option not in {"-e", "--enclave", "--log-config-file", "--log-file-name"}:
-            raise UsageError(f"'{option}' is no ROS argument; expected -r, -p or --params-file")
+            raise UsageError(f"'{option}' is not a ROS argument; expected -r, -p or --params-file")
     rest = remap.Arguments(remaps, {}, special, classic.rest)
     return RosArguments(rest, params, level, classic.rest)
 
 
 def _options(args: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield the options between ``--ros-args`` and ``--`` with their values."""
-    ours = False
+    inside = False
     words = iter(args)
     for word in words:
-        if not ours:
-            ours = word == _BEGIN
+        if not inside:
+            inside = word == _BEGIN
         elif word == _END:
-            ours = False
-        elif word not in _ALONE:
+            inside = False
+        elif word not in _FLAGS:
             value = next(words, None)
             if value is None:
-                raise UsageError(f"'{word}' is the last word; expected something behind it")
+                raise UsageError(f"'{word}' is the last argument; expected a value after it")
             yield word, value
 
 
-def _parted(rule: str) -> tuple[str, str, str]:
-    """Part ``node:name:=value``; the node may be missing."""
+def _split(rule: str) -> tuple[str, str, str]:
+    """Split ``node:name:=value``; the node may be missing."""
     left, separator, right = rule.partition(":=")
     node, colon, name = left.partition(":")
     if not separator or not (name if colon else node):
-        raise UsageError(f"'{rule}' means nothing; expected name:=value")
+        raise UsageError(f"'{rule}' is not a rule; expected name:=value")
     return (node, name, right) if colon else ("", node, right)
 
 
 def _remap(rule: str, remaps: dict[str, str], special: dict[str, str]) -> None:
-    _, name, target = _parted(rule)
+    _, name, target = _split(rule)
     if name in {"__node", "__name"}:
         special["__name"] = target
     elif name == "__ns":
@@ -126,17 +126,17 @@ def _value(text: str, rule: str) -> Any:
     try:
         return next(read_plain(text, "<value>"), None)
     except YamlError as error:
-        raise UsageError(f"'{rule}' has no YAML value: {error.reason}") from error
+        raise UsageError(f"the value of '{rule}' is not YAML: {error.reason}") from error
 
 
 def _read(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the nodes of a parameter file with their values; ``/**`` means all."""
+    """Yield the nodes of a parameter file with their values; ``/**`` means all nodes."""
     try:
         text = Path(path).read_text("utf-8")
     except OSError as error:
         raise NotFoundError(f"parameter file '{path}': {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise YamlError("it is not UTF-8", path) from error
+        raise YamlError("the file is not UTF-8", path) from error
     tree = next(read_plain(text, path), None) or {}
     yield from _nodes(tree, "", path)
 
@@ -147,15 +147,15 @@ def _nodes(tree: Any, name: str, path: str) -> Iterator[tuple[str, dict[str, Any
     for key, inner in tree.items():
         if key == "ros__parameters":
             if not isinstance(inner, dict | None):
-                raise YamlError(f"'ros__parameters' of '{name}' is no dictionary", path)
-            yield ("" if name in {"/**", "**"} else name), dict(_flat(inner or {}, ""))
+                raise YamlError(f"'ros__parameters' of '{name}' is not a dictionary", path)
+            yield ("" if name in {"/**", "**"} else name), dict(_flatten(inner or {}, ""))
         else:
             yield from _nodes(inner, f"{name.rstrip('/')}/{key}" if name else str(key), path)
 
 
-def _flat(tree: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+def _flatten(tree: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
     for key, value in tree.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
+            yield from _flatten(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value

@@ -20,31 +20,31 @@ from rosz.ros2.rclpy.exceptions import NotInitializedException
 if TYPE_CHECKING:
     from types import FrameType, TracebackType
 
-__all__ = ("Context",)
+__all__ = ("Context", "get_default_context")
 
 
 class Context:
-    """The part of a program in the network.
+    """The connection of a program to the network.
 
     Attributes:
-        ended_by_signal: Whether SIGTERM ended it.
+        ended_by_signal: Whether SIGTERM shut the context down.
     """
 
     def __init__(self) -> None:
         self._open: RoszContext | None = None
         self._given: arguments.RosArguments | None = None
         self._hooks: list[Callable[[], object]] = []
-        self.ended_by_signal = False
+        self.ended_by_signal: bool = False
 
     def init(self, args: Sequence[str] | None = None, *, domain_id: int | None = None) -> None:
-        """Join the network.
+        """Connect to the network.
 
         Args:
-            args: Command line with the program's name; that of the process when not given.
-            domain_id: The ROS domain; by the environment when not given.
+            args: Command line with the program name; that of the process when not given.
+            domain_id: ROS domain; by the environment when not given.
 
         Raises:
-            UsageError: It is open already, or the command line has something that means nothing.
+            UsageError: The context is open already, or the command line is not valid.
             TransportError: The session cannot be opened.
         """
         if self.ok():
@@ -57,15 +57,15 @@ class Context:
         self.ended_by_signal = False
         self._open = RoszContext(environment)
         self._open.arguments = self._given.arguments
-        self._open.on_shutdown(lambda _: self._ended())
-        self._take_signal()
+        self._open.on_shutdown(lambda _: self._run_hooks())
+        self._handle_sigterm()
 
     @property
     def given(self) -> arguments.RosArguments:
-        """What the command line says.
+        """The arguments of the command line.
 
         Raises:
-            NotInitializedException: There was no `init`.
+            NotInitializedException: `init` was not called.
         """
         if self._given is None:
             raise NotInitializedException
@@ -73,25 +73,25 @@ class Context:
 
     @property
     def opened(self) -> RoszContext:
-        """What it is in rosz.
+        """The context of rosz's own nodes.
 
         Raises:
-            NotInitializedException: There was no `init`, or it is shut down.
+            NotInitializedException: `init` was not called, or the context is shut down.
         """
         if self._open is None or self._open.is_shutdown:
             raise NotInitializedException
         return self._open
 
     def ok(self) -> bool:
-        """Tell whether it is open."""
+        """Return whether the context is open."""
         return self._open is not None and not self._open.is_shutdown
 
     def on_shutdown(self, callback: Callable[[], object]) -> None:
-        """Have a function called when it ends."""
+        """Call a function at each shutdown."""
         self._hooks.append(callback)
 
     def shutdown(self) -> None:
-        """End everything; again is no error."""
+        """Close everything; a second call has no effect."""
         if self._open is not None:
             self._open.shutdown("rclpy.shutdown() was called")
 
@@ -101,18 +101,18 @@ class Context:
         """Return the ROS domain."""
         return self.opened.domain
 
-    def _ended(self) -> None:
+    def _run_hooks(self) -> None:
         for hook in self._hooks:
             hook()
 
-    def _take_signal(self) -> None:
-        """Have SIGTERM end it, where the program has no handler of its own."""
+    def _handle_sigterm(self) -> None:
+        """Shut down on SIGTERM, unless the program has a handler of its own."""
         if threading.current_thread() is not threading.main_thread():
             return
 
         def end(number: int, frame: FrameType | None) -> Any:  # noqa: ARG001  # a handler's
             self.ended_by_signal = True
-            # Not here: closing waits for threads, which may wait for the one that is interrupted.
+            # On a thread: closing waits for threads, which may wait for the interrupted one.
             threading.Thread(target=self.shutdown, name="rosz-rclpy-end").start()
 
         with suppress(ValueError):  # not the main interpreter
@@ -129,3 +129,11 @@ class Context:
         traceback: TracebackType | None,
     ) -> None:
         self.shutdown()
+
+
+_default = Context()
+
+
+def get_default_context() -> Context:
+    """Return the context that is used when none is given."""
+    return _default

@@ -1,4 +1,4 @@
-"""rclpy.exceptions: what goes wrong, under rclpy's names."""
+"""rclpy.exceptions: rclpy's exceptions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class NotInitializedException(RoszError):
 
 
 class InvalidHandle(RoszError):
-    """The thing used has been destroyed."""
+    """The object was used after it was destroyed."""
 
 
 class ROSInterruptException(RoszError):
@@ -39,49 +39,49 @@ class ROSInterruptException(RoszError):
 
 
 class ParameterException(RoszError):
-    """Root of what goes wrong with parameters.
+    """Base class of exceptions about parameters.
 
     Attributes:
-        parameters: The names, or a name.
+        parameters: Name of the parameter, or a list of names.
     """
 
     def __init__(self, reason: str, parameters: str | list[str]) -> None:
-        self.parameters = parameters
+        self.parameters: str | list[str] = parameters
         names = parameters if isinstance(parameters, str) else ", ".join(parameters)
         super().__init__(f"{reason}: {names}")
 
 
 class ParameterNotDeclaredException(ParameterException):
-    """A parameter that the node has not declared."""
+    """The node has not declared the parameter."""
 
     def __init__(self, parameters: str | list[str]) -> None:
         super().__init__("Invalid access to undeclared parameter(s)", parameters)
 
 
 class ParameterAlreadyDeclaredException(ParameterException):
-    """A parameter that the node has declared before."""
+    """The node has already declared the parameter."""
 
     def __init__(self, parameters: str | list[str]) -> None:
         super().__init__("Parameter(s) already declared", parameters)
 
 
 class ParameterUninitializedException(ParameterException):
-    """A parameter that is declared by type, and has no value yet."""
+    """The parameter was declared by type only, and has no value yet."""
 
     def __init__(self, parameters: str | list[str]) -> None:
         super().__init__("The parameter is not initialized", parameters)
 
 
 class InvalidParameterValueException(ParameterException):
-    """A value that a parameter may not have."""
+    """The parameter cannot have the value."""
 
     def __init__(self, parameter: str, value: object, reason: str) -> None:
-        self.value = value
+        self.value: object = value
         super().__init__(f"Invalid parameter value ({value}), {reason}", parameter)
 
 
 class InvalidParameterTypeException(ParameterException):
-    """A value of another type than that of the parameter."""
+    """The value has another type than the parameter."""
 
     def __init__(self, parameter: str, expected: str, found: str) -> None:
         super().__init__(

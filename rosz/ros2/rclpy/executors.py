@@ -1,38 +1,42 @@
-"""rclpy.executors: who calls the callbacks.
+"""rclpy.executors, rclpy.task and rclpy.callback_groups: how and when callbacks run.
 
-What comes from the network waits in its entity (subscription, service, …) and rings a bell. The
-executor then asks its nodes' entities for what is ready, and runs that: all of it, each once,
-before it asks again, so that none is starved.
+A message from the network waits in its entity (subscription, service, …), which wakes the executor.
+The executor then collects what is ready from the entities of its nodes, and runs each callback once
+before it collects again, so that no entity starves.
 """
 
 from __future__ import annotations
 
+import inspect
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Coroutine, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from rosz.errors import RoszError
-from rosz.ros2.rclpy import state
-from rosz.ros2.rclpy.task import Future, Task
+from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.session import clamp_timeout
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from rosz.ros2.rclpy.callback_groups import CallbackGroup
-    from rosz.ros2.rclpy.context import Context
-
 __all__ = (
+    "CallbackGroup",
     "Entity",
     "Executor",
     "ExternalShutdownException",
+    "Future",
     "MultiThreadedExecutor",
+    "MutuallyExclusiveCallbackGroup",
+    "ReentrantCallbackGroup",
     "ShutdownException",
     "SingleThreadedExecutor",
+    "Task",
     "TimeoutException",
+    "get_global_executor",
 )
 
 Job = Callable[[], object]
@@ -57,37 +61,211 @@ class ExternalShutdownException(RoszError):
         super().__init__("the context was shut down by a signal")
 
 
+class CallbackGroup(ABC):
+    """A set of callbacks that says which of them may run at the same time.
+
+    Only executors with several threads look at it.
+    """
+
+    @abstractmethod
+    def enter(self) -> bool:
+        """Begin a callback of the group, and return whether it may run now."""
+
+    @abstractmethod
+    def leave(self) -> None:
+        """End a callback of the group."""
+
+
+class ReentrantCallbackGroup(CallbackGroup):
+    """Callbacks that may all run at the same time."""
+
+    def enter(self) -> bool:
+        """Begin a callback."""
+        return True
+
+    def leave(self) -> None:
+        """Do nothing."""
+
+
+class MutuallyExclusiveCallbackGroup(CallbackGroup):
+    """Callbacks that run one at a time."""
+
+    def __init__(self) -> None:
+        self._running = threading.Lock()
+
+    def enter(self) -> bool:
+        """Begin a callback unless another one runs."""
+        return self._running.acquire(blocking=False)
+
+    def leave(self) -> None:
+        """Allow the next callback."""
+        self._running.release()
+
+
+class Future:
+    """A result that comes later.
+
+    Args:
+        executor: Executor that runs the callbacks of the future; when not given, the thread that
+            sets the result does.
+    """
+
+    def __init__(self, *, executor: Any = None) -> None:
+        self._lock = threading.Lock()
+        self._executor = executor
+        self._done = False
+        self._cancelled = False
+        self._result: Any = None
+        self._exception: BaseException | None = None
+        self._callbacks: list[Callable[[Any], object]] = []
+
+    def done(self) -> bool:
+        """Return whether there is a result, an exception or a cancellation."""
+        return self._done or self._cancelled
+
+    def cancelled(self) -> bool:
+        """Return whether the future was cancelled."""
+        return self._cancelled
+
+    def cancel(self) -> None:
+        """Cancel the future unless it is done."""
+        with self._lock:
+            if self._done:
+                return
+            self._cancelled = True
+        self._run_callbacks()
+
+    def result(self) -> Any:
+        """Return the result; None while there is none.
+
+        Raises:
+            Exception: The exception that was set instead of a result.
+        """
+        if self._exception is not None:
+            raise self._exception
+        return self._result
+
+    def exception(self) -> BaseException | None:
+        """Return the exception that was set; None if there is none."""
+        return self._exception
+
+    def set_result(self, result: Any) -> None:
+        """Set the result, and run the callbacks."""
+        self._set(result, None)
+
+    def set_exception(self, exception: BaseException) -> None:
+        """Set an exception instead of a result, and run the callbacks."""
+        self._set(None, exception)
+
+    def _set(self, result: Any, exception: BaseException | None) -> None:
+        with self._lock:
+            self._result, self._exception = result, exception
+            self._done = True
+        self._run_callbacks()
+
+    def add_done_callback(self, callback: Callable[[Any], object]) -> None:
+        """Call a function with the future when it is done, or soon if it is done already."""
+        with self._lock:
+            if not self.done():
+                self._callbacks.append(callback)
+                return
+        self._call(callback)
+
+    def _run_callbacks(self) -> None:
+        with self._lock:
+            callbacks, self._callbacks = self._callbacks, []
+        for callback in callbacks:
+            self._call(callback)
+
+    def _call(self, callback: Callable[[Any], object]) -> None:
+        if self._executor is None:
+            callback(self)
+        else:
+            self._executor.call_soon(lambda: callback(self))
+
+    def __await__(self) -> Generator[Future, None, Any]:
+        while not self.done():
+            yield self
+        return self.result()
+
+
+class Task(Future):
+    """A function that an executor runs, and that may await futures.
+
+    Args:
+        handler: The function, or a coroutine function.
+        args: Its arguments.
+        kwargs: Its keyword arguments.
+        executor: Executor that runs the task.
+    """
+
+    def __init__(
+        self,
+        handler: Callable[..., Any],
+        args: tuple[Any, ...] = (),
+        kwargs: dict[str, Any] | None = None,
+        *,
+        executor: Any,
+    ) -> None:
+        super().__init__(executor=executor)
+        self._start: Callable[[], Any] = lambda: handler(*args, **(kwargs or {}))
+        self._coroutine: Coroutine[Any, None, Any] | None = None
+
+    def step(self) -> None:
+        """Run the task until it waits or ends; an exception of it is raised as well."""
+        if self.done():
+            return
+        try:
+            if self._coroutine is None:
+                result = self._start()
+                if not inspect.iscoroutine(result):
+                    self.set_result(result)
+                    return
+                self._coroutine = result
+            awaited = self._coroutine.send(None)
+        except StopIteration as stop:
+            self.set_result(stop.value)
+        except BaseException as error:
+            self.set_exception(error)
+            raise
+        else:
+            if isinstance(awaited, Future):
+                awaited.add_done_callback(lambda _: self._executor.call_soon(self.step))
+            else:
+                self._executor.call_soon(self.step)
+
+
 class Entity(Protocol):
-    """What has callbacks.
+    """A subscription, service or timer: something that has callbacks.
 
     Attributes:
-        callback_group: The group that they are of.
+        callback_group: Group of its callbacks.
     """
 
     callback_group: CallbackGroup
 
     def take(self) -> Callable[[], Any] | None:
-        """Return what to call next, if something is ready."""
+        """Return the next function to call; None if nothing is ready."""
 
 
 class Executor:
-    """Calls what is ready; base of those that do it on one or on several threads.
+    """Base class of executors, which run the callbacks of nodes.
 
     Args:
-        context: Whose end ends it; the default one when not given.
+        context: Context whose shutdown ends the executor; the default one when not given.
     """
 
     def __init__(self, *, context: Context | None = None) -> None:
-        self.context = context or state.default_context()
+        self.context: Context = context or get_default_context()
         self._nodes: list[Any] = []
-        self._bell = threading.Event()
+        self._wakeup = threading.Event()
         self._soon: deque[Job] = deque()
         self._ready: deque[tuple[Job, CallbackGroup]] = deque()
         self._is_shutdown = False
         self.context.on_shutdown(self.wake)
 
     def add_node(self, node: Any) -> bool:
-        """Take on the callbacks of a node; tell whether it is a new one."""
+        """Run the callbacks of a node from now on; return whether the node is new."""
         if node in self._nodes:
             return False
         self._nodes = [*self._nodes, node]
@@ -96,32 +274,32 @@ class Executor:
         return True
 
     def remove_node(self, node: Any) -> None:
-        """Leave the callbacks of a node alone from now on."""
+        """Stop running the callbacks of a node."""
         self._nodes = [one for one in self._nodes if one is not node]
         if node.executor is self:
             node.executor = None
 
     def get_nodes(self) -> list[Any]:
-        """Return the nodes whose callbacks it calls."""
+        """Return the nodes whose callbacks the executor runs."""
         return list(self._nodes)
 
     def wake(self) -> None:
-        """Have it look at what is ready; from any thread."""
-        self._bell.set()
+        """Make the executor look for ready callbacks; any thread may call this."""
+        self._wakeup.set()
 
     def call_soon(self, job: Job) -> None:
-        """Have a function called among the callbacks; from any thread."""
+        """Run a function like a callback; any thread may call this."""
         self._soon.append(job)
         self.wake()
 
     def create_task(self, callback: Callable[..., Any], *args: Any, **kwargs: Any) -> Task:
-        """Have a function, or a coroutine function, run among the callbacks."""
+        """Run a function or a coroutine function like a callback."""
         task = Task(callback, args, kwargs, executor=self)
         self.call_soon(task.step)
         return task
 
     def spin(self) -> None:
-        """Call what is ready until the executor or its context is shut down.
+        """Run callbacks until the executor or its context is shut down.
 
         Raises:
             ExternalShutdownException: A signal shut the context down.
@@ -132,10 +310,10 @@ class Executor:
             raise ExternalShutdownException
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Wait until something is ready, and call one callback.
+        """Wait until a callback is ready, and run it.
 
         Args:
-            timeout_sec: Seconds to wait at most; for ever when not given.
+            timeout_sec: Time limit in seconds; none when not given.
 
         Raises:
             ExternalShutdownException: A signal shut the context down.
@@ -143,11 +321,11 @@ class Executor:
         self._once(timeout_sec, lambda: False)
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Call what is ready until a future is done.
+        """Run callbacks until a future is done.
 
         Args:
-            future: It.
-            timeout_sec: Seconds after which to give up; never when not given.
+            future: The future.
+            timeout_sec: Time limit in seconds; none when not given.
         """
         future.add_done_callback(lambda _: self.wake())
         deadline = _deadline(timeout_sec)
@@ -160,7 +338,7 @@ class Executor:
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | None = None
     ) -> None:
-        """Call one callback unless a future is done before; see `spin_once`."""
+        """Run one callback unless a future is done before; see `spin_once`."""
         future.add_done_callback(lambda _: self.wake())
         self._once(timeout_sec, future.done)
 
@@ -170,10 +348,10 @@ class Executor:
         self.wake()
         return True
 
-    def _once(self, timeout: float | None, enough: Callable[[], bool]) -> None:
+    def _once(self, timeout: float | None, finished: Callable[[], bool]) -> None:
         deadline = _deadline(timeout)
-        while self.context.ok() and not self._is_shutdown and not enough():
-            self._bell.clear()
+        while self.context.ok() and not self._is_shutdown and not finished():
+            self._wakeup.clear()
             found = self._next()
             if found is not None:
                 self._run(*found)
@@ -181,46 +359,43 @@ class Executor:
             left = None if deadline is None else deadline - time.monotonic()
             if left is not None and left <= 0:
                 return
-            self._bell.wait(left)
+            self._wakeup.wait(left)
         if self.context.ended_by_signal:
             raise ExternalShutdownException
 
     def _next(self) -> tuple[Job, CallbackGroup | None] | None:
-        """Return what to run next; its group has been entered."""
+        """Return the next job and its group, which has been entered."""
         if self._soon:
             return self._soon.popleft(), None
         if not self._ready:
-            self._ready.extend(self._collect(self._entities()))
+            self._ready.extend(self._collect())
         return self._ready.popleft() if self._ready else None
 
-    def _entities(self) -> Iterable[Entity]:
+    def _collect(self) -> Iterable[tuple[Job, CallbackGroup]]:
         for node in self._nodes:
-            yield from node.rosz_entities()
+            for entity in node.rosz_entities():
+                group = entity.callback_group
+                if not self._enter(group):
+                    continue
+                call = entity.take()
+                if call is None:
+                    self._leave(group)
+                    continue
+                yield Task(call, executor=self).step, group
 
-    def _collect(self, entities: Iterable[Entity]) -> Iterable[tuple[Job, CallbackGroup]]:
-        for entity in entities:
-            group = entity.callback_group
-            if not self._may_enter(group):
-                continue
-            call = entity.take()
-            if call is None:
-                self._left(group)
-                continue
-            yield Task(call, executor=self).step, group
-
-    def _may_enter(self, _group: CallbackGroup) -> bool:
-        """Begin a callback of a group; on one thread callbacks exclude each other anyway."""
+    def _enter(self, _group: CallbackGroup) -> bool:
+        """Begin a callback of a group; with one thread no two run at the same time anyway."""
         return True
 
-    def _left(self, group: CallbackGroup) -> None:
-        """Take note that a callback of a group has ended."""
+    def _leave(self, group: CallbackGroup) -> None:
+        """End a callback of a group."""
 
     def _run(self, job: Job, group: CallbackGroup | None) -> None:
         try:
             job()
         finally:
             if group is not None:
-                self._left(group)
+                self._leave(group)
 
     def __enter__(self) -> Self:
         return self
@@ -235,55 +410,66 @@ class Executor:
 
 
 class SingleThreadedExecutor(Executor):
-    """Calls one callback at a time, on the thread that spins."""
+    """Run one callback at a time, on the thread that spins."""
 
 
 class MultiThreadedExecutor(Executor):
-    """Calls callbacks on several threads, as far as their groups let them.
+    """Run callbacks on several threads, as far as their groups allow.
 
     Args:
-        num_threads: How many.
-        context: Whose end ends it.
+        num_threads: Number of threads; 4 when not given.
+        context: Context whose shutdown ends the executor; the default one when not given.
     """
 
     def __init__(self, num_threads: int | None = None, *, context: Context | None = None) -> None:
         super().__init__(context=context)
+        # Not a `Worker`: the end of the program waits for callbacks that run, as with rclpy.
         self._pool = ThreadPoolExecutor(num_threads or _THREADS, thread_name_prefix="rosz-executor")
         self._failed: deque[BaseException] = deque()
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
-        """End all spinning, and wait for what is running."""
+        """End all spinning, and wait for the callbacks that are running."""
         super().shutdown(timeout_sec)
         self._pool.shutdown(wait=timeout_sec is None, cancel_futures=True)
         return True
 
-    def _may_enter(self, group: CallbackGroup) -> bool:
+    def _enter(self, group: CallbackGroup) -> bool:
         return group.enter()
 
-    def _left(self, group: CallbackGroup) -> None:
+    def _leave(self, group: CallbackGroup) -> None:
         group.leave()
 
     def _run(self, job: Job, group: CallbackGroup | None) -> None:
         def work() -> None:
             try:
                 job()
-            except BaseException as error:  # noqa: BLE001  # raised where it is spun
+            except BaseException as error:  # noqa: BLE001  # raised on the thread that spins
                 self._failed.append(error)
             finally:
                 if group is not None:
-                    self._left(group)
+                    self._leave(group)
                 self.wake()
 
         self._pool.submit(work)
+        self._raise_failure()
+
+    def _next(self) -> tuple[Job, CallbackGroup | None] | None:
+        self._raise_failure()
+        return super()._next()
+
+    def _raise_failure(self) -> None:
         if self._failed:
             raise self._failed.popleft()
 
-    def _next(self) -> tuple[Job, CallbackGroup | None] | None:
-        if self._failed:
-            raise self._failed.popleft()
-        return super()._next()
+
+_global = SingleThreadedExecutor()
+
+
+def get_global_executor() -> Executor:
+    """Return the executor that is used when none is given."""
+    return _global
 
 
 def _deadline(timeout: float | None) -> float | None:
-    """Return when a wait ends; negative and missing timeouts mean never, as in rclpy."""
+    """Return the end of a wait; None for negative and missing timeouts, as in rclpy."""
     return None if timeout is None or timeout < 0 else time.monotonic() + clamp_timeout(timeout)

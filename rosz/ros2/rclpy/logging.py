@@ -1,4 +1,4 @@
-"""rclpy.logging: loggers in rclpy's words, and lines in its format."""
+"""rclpy.logging: loggers with rclpy's methods and line format."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from enum import IntEnum
 from typing import Any
 
 from rosz.errors import UsageError
+from rosz.node.clock import Clock
 from rosz.node.log import NodeLog
 from rosz.node.log_handlers import ConsoleHandler, LogHandler
 from rosz.node.logger import NodeLogger, severity, severity_name
@@ -24,7 +25,7 @@ _OPTIONS = frozenset({"throttle_duration_sec", "throttle_time_source_type", "ski
 
 
 class LoggingSeverity(IntEnum):
-    """How much a message matters."""
+    """Severity of a message."""
 
     UNSET = 0
     DEBUG = 10
@@ -35,20 +36,20 @@ class LoggingSeverity(IntEnum):
 
 
 class RcutilsLogger:
-    """A logger.
+    """A logger with rclpy's methods.
 
     Args:
-        name: Its name, with dots between its parts.
-        logger: What logs.
+        name: Name of the logger, with dots between its parts.
+        logger: Logger of the node.
     """
 
     def __init__(self, name: str, logger: NodeLogger) -> None:
-        self.name = name
+        self.name: str = name
         self._logger = logger
         self._seen: set[tuple[str, int]] = set()
 
     def get_child(self, name: str) -> RcutilsLogger:
-        """Return the logger of a part of this one.
+        """Return a child of the logger.
 
         Raises:
             UsageError: The name is empty.
@@ -58,52 +59,52 @@ class RcutilsLogger:
         return RcutilsLogger(f"{self.name}.{name}", self._logger.child(name))
 
     def set_level(self, level: int) -> None:
-        """Log only what is of this severity or a higher one."""
+        """Log only messages of this severity or a higher one."""
         self._logger.setLevel(int(level))
 
     def get_effective_level(self) -> LoggingSeverity:
-        """Return the least severity that is logged."""
+        """Return the lowest severity that is logged."""
         return LoggingSeverity(severity(self._logger.getEffectiveLevel()))
 
     def is_enabled_for(self, severity: int) -> bool:
-        """Tell whether messages of a severity are logged."""
+        """Return whether messages of a severity are logged."""
         return self._logger.isEnabledFor(int(severity))
 
     def log(self, message: Any, severity: int, **kwargs: Any) -> bool:
         """Log a message.
 
         Args:
-            message: The text, or anything that has one.
-            severity: How much it matters.
-            kwargs: ``once=True``; ``skip_first=True``; ``throttle_duration_sec`` seconds between
-                two messages from the same line of the program.
+            message: The text, or an object to convert to text.
+            severity: Severity of the message.
+            kwargs: ``once=True``, ``skip_first=True``, or ``throttle_duration_sec``, the shortest
+                time in seconds between two messages of the same line of the program.
 
         Returns:
             Whether messages of that severity are logged.
 
         Raises:
-            TypeError: An option is none of these.
+            TypeError: There is no such option.
         """
         return self._log(int(severity), message, kwargs)
 
     def debug(self, message: Any, **kwargs: Any) -> bool:
-        """Log what only developers want to know; see `log`."""
+        """Log a message for developers; see `log`."""
         return self._log(10, message, kwargs)
 
     def info(self, message: Any, **kwargs: Any) -> bool:
-        """Log what goes as it should; see `log`."""
+        """Log an informational message; see `log`."""
         return self._log(20, message, kwargs)
 
     def warning(self, message: Any, **kwargs: Any) -> bool:
-        """Log what was not expected; see `log`."""
+        """Log a warning; see `log`."""
         return self._log(30, message, kwargs)
 
     def error(self, message: Any, **kwargs: Any) -> bool:
-        """Log what failed; see `log`."""
+        """Log an error; see `log`."""
         return self._log(40, message, kwargs)
 
     def fatal(self, message: Any, **kwargs: Any) -> bool:
-        """Log what the node cannot go on after; see `log`."""
+        """Log an error that the node cannot recover from; see `log`."""
         return self._log(50, message, kwargs)
 
     warn = warning
@@ -127,8 +128,8 @@ class RcutilsLogger:
         return True
 
     def _is_first(self) -> bool:
-        """Tell whether the line of the program that logs does so for the first time."""
-        frame = sys._getframe(3)  # noqa: SLF001  # who called the method of the severity
+        """Return whether the calling line of the program logs for the first time."""
+        frame = sys._getframe(3)  # noqa: SLF001  # the caller of `info` and so on
         place = frame.f_code.co_filename, frame.f_lineno
         count = len(self._seen)
         self._seen.add(place)
@@ -136,20 +137,22 @@ class RcutilsLogger:
 
 
 class _Console(LogHandler):
-    """Writes lines as rclpy does: all to stderr, in the format of the environment.
+    """Write lines like rclpy: all to stderr, in the format that the environment sets.
 
     Args:
         name: Name of the node's logger.
         on_problem: See `LogHandler`.
-        text_format: What a line looks like (``RCUTILS_CONSOLE_OUTPUT_FORMAT``).
+        text_format: Format of a line, as in ``RCUTILS_CONSOLE_OUTPUT_FORMAT``.
     """
 
     def __init__(self, name: str, on_problem: Callable[[str], object], text_format: str) -> None:
         super().__init__(on_problem)
         self._name = name
         self._format = text_format
-        wish = os.environ.get("RCUTILS_COLORIZED_OUTPUT", "")
-        self._color = sys.stderr is not None and sys.stderr.isatty() if not wish else wish == "1"
+        setting = os.environ.get("RCUTILS_COLORIZED_OUTPUT", "")
+        self._color = (
+            sys.stderr is not None and sys.stderr.isatty() if not setting else setting == "1"
+        )
 
     def _write(self, record: logging.LogRecord) -> None:
         stream = sys.stderr
@@ -176,11 +179,11 @@ class _Console(LogHandler):
 
 
 def write_as_rclpy(log: NodeLog, name: str) -> None:
-    """Have a node's lines written to the console in rclpy's format.
+    """Write the log of a node to the console in rclpy's format.
 
     Args:
-        log: The node's log.
-        name: Name of its logger.
+        log: Log of the node.
+        name: Name of the logger.
     """
     for handler in list(log.handlers):
         if isinstance(handler, ConsoleHandler):
@@ -190,9 +193,7 @@ def write_as_rclpy(log: NodeLog, name: str) -> None:
 
 
 def get_logger(name: str) -> RcutilsLogger:
-    """Return a logger that belongs to no node, and writes to the console only."""
-    from rosz.node.clock import Clock
-
+    """Return a logger without a node, which writes only to the console."""
     log = NodeLog(name, clock=Clock(), rosout=False)
     write_as_rclpy(log, name)
     return RcutilsLogger(name, log)

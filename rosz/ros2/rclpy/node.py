@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeVar
+from typing import Any, NoReturn, Self, TypeVar
 
+from rosz import names
 from rosz.errors import UsageError
+from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rosz.node import Node as RoszNode
 from rosz.node.standard import simulate
-from rosz.ros2.rclpy import state
-from rosz.ros2.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
-from rosz.ros2.rclpy.client import Client
-from rosz.ros2.rclpy.clock import Clock, Rate, ROSClock
-from rosz.ros2.rclpy.declared import Declared
-from rosz.ros2.rclpy.exceptions import NotInitializedException
+from rosz.ros2.rclpy.context import Context, get_default_context
+from rosz.ros2.rclpy.entities import Client, Publisher, Service, Subscription, Timer
+from rosz.ros2.rclpy.exceptions import NotInitializedException, ParameterNotDeclaredException
+from rosz.ros2.rclpy.executors import (
+    CallbackGroup,
+    Entity,
+    Executor,
+    MutuallyExclusiveCallbackGroup,
+    get_global_executor,
+)
 from rosz.ros2.rclpy.logging import RcutilsLogger, write_as_rclpy
-from rosz.ros2.rclpy.node_graph import NodeGraph
-from rosz.ros2.rclpy.node_parameters import NodeParameters
-from rosz.ros2.rclpy.parameter import Parameter
-from rosz.ros2.rclpy.publisher import Publisher
+from rosz.ros2.rclpy.parameter import NodeParameters, Parameter
 from rosz.ros2.rclpy.qos import QoSProfile, to_qos
-from rosz.ros2.rclpy.service import Service
-from rosz.ros2.rclpy.subscription import Subscription
-from rosz.ros2.rclpy.timer import Timer
-
-if TYPE_CHECKING:
-    from rosz.ros2.rclpy.context import Context
-    from rosz.ros2.rclpy.executors import Entity, Executor
+from rosz.ros2.rclpy.time import Clock, Rate, ROSClock
 
 __all__ = ("Node",)
 
@@ -34,23 +31,23 @@ P = TypeVar("P")
 _SECOND = 1_000_000_000
 
 
-class Node(NodeParameters, NodeGraph):
-    """A node whose callbacks run while it is spun, and only then.
+class Node:
+    """A node whose callbacks run only while an executor spins it.
 
-    Names of rosz's own begin with ``rosz_``, so that classes of users are free to have any others.
+    Names of rosz's own begin with ``rosz_``, so that subclasses are free to use any others.
 
     Args:
         node_name: Base name; ``__node:=`` on the command line overrides it.
-        context: What it shares with others; the default one when not given.
-        namespace: Its namespace.
-        parameter_overrides: Values of parameters, which count more than those declared.
-        options: Of rclpy's other options, ``automatically_declare_parameters_from_overrides``
-            counts; ``cli_args``, ``use_global_arguments``, ``enable_rosout``,
-            ``start_parameter_services``, ``allow_undeclared_parameters`` and
-            ``enable_logger_service`` are taken and do nothing.
+        context: Context of the node; the default one when not given.
+        namespace: Namespace of the node.
+        parameter_overrides: Parameters whose values replace the declared ones.
+        options: Other options of rclpy, of which only
+            ``automatically_declare_parameters_from_overrides`` has an effect. ``cli_args``,
+            ``use_global_arguments``, ``enable_rosout``, ``start_parameter_services``,
+            ``allow_undeclared_parameters`` and ``enable_logger_service`` are ignored.
 
     Raises:
-        NotInitializedException: There was no ``rclpy.init``.
+        NotInitializedException: ``rclpy.init`` was not called.
         InvalidName: The name or namespace is not legal.
     """
 
@@ -64,14 +61,16 @@ class Node(NodeParameters, NodeGraph):
         **options: Any,
     ) -> None:
         self._rosz_parts: list[Any] = []
-        self.context = context or state.default_context()
+        self.context: Context = context or get_default_context()
         if not self.context.ok():
             raise NotInitializedException("cannot create node")
         unknown = options.keys() - _OPTIONS
         if unknown:
             raise UsageError(f"Node takes no '{min(unknown)}' in rosz")
         self.executor: Executor | None = None
-        self.rosz_node = RoszNode(node_name, namespace=namespace, context=self.context.opened)
+        self.rosz_node: RoszNode = RoszNode(
+            node_name, namespace=namespace, context=self.context.opened
+        )
         self._clock = ROSClock(self.rosz_node.clock)
         self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
         write_as_rclpy(self.rosz_node.log, self._rosz_logger_name)
@@ -81,7 +80,7 @@ class Node(NodeParameters, NodeGraph):
             self.rosz_node.log.set_level("", given.level)
         overrides = self._rosz_overrides(given.params)
         overrides |= {one.name: one.value for one in parameter_overrides or ()}
-        self._rosz_declared = Declared(self.rosz_node, overrides, self._rosz_call_soon)
+        self._rosz_parameters = NodeParameters(self.rosz_node, overrides, self._rosz_call_soon)
         self.declare_parameter("use_sim_time", self.rosz_node.clock.simulated)
         if self.get_parameter("use_sim_time").value and not self.rosz_node.clock.simulated:
             simulate(self.rosz_node)
@@ -101,10 +100,8 @@ class Node(NodeParameters, NodeGraph):
             f"'{type(self).__name__}' has no '{name}': rosz's rclpy.node.Node lacks it"
         )
 
-    # What executors ask.
-
     def rosz_entities(self) -> Iterator[Entity]:
-        """Yield what has callbacks, timers first, as they run in rclpy."""
+        """Yield the entities with callbacks, timers first, which is rclpy's order."""
         parts = list(self._rosz_parts)
         yield from (part for part in parts if isinstance(part, Timer))
         yield from (part for part in parts if isinstance(part, Subscription | Service))
@@ -115,31 +112,29 @@ class Node(NodeParameters, NodeGraph):
             executor.wake()
 
     def _rosz_call_soon(self, job: Callable[[], object]) -> None:
-        (self.executor or state.global_executor()).call_soon(job)
-
-    # Who it is.
+        (self.executor or get_global_executor()).call_soon(job)
 
     def get_name(self) -> str:
-        """Return its base name."""
+        """Return the base name of the node."""
         return self.rosz_node.base_name
 
     def get_namespace(self) -> str:
-        """Return its namespace."""
+        """Return the namespace of the node."""
         return self.rosz_node.namespace
 
     def get_fully_qualified_name(self) -> str:
-        """Return its full name."""
+        """Return the full name of the node."""
         return self.rosz_node.name
 
     def get_clock(self) -> Clock:
-        """Return its clock, which tells ROS time."""
+        """Return the clock of the node, which shows ROS time."""
         return self._clock
 
     def get_logger(self) -> RcutilsLogger:
-        """Return its logger."""
+        """Return the logger of the node."""
         return RcutilsLogger(self._rosz_logger_name, self.rosz_node.log)
 
-    # What it has.
+    # Entities
 
     def create_publisher(
         self,
@@ -148,15 +143,15 @@ class Node(NodeParameters, NodeGraph):
         qos_profile: QoSProfile | int = 10,
         **_options: Any,
     ) -> Publisher:
-        """Declare that it publishes on a topic.
+        """Create a publisher.
 
         Args:
-            msg_type: What is published.
+            msg_type: Class of the messages.
             topic: Name of the topic.
-            qos_profile: A profile, or the depth of its queue.
+            qos_profile: Profile, or depth of the queue.
         """
         raw = self.rosz_node.publisher(topic, msg_type, qos=to_qos(qos_profile))
-        return self._rosz_keep(Publisher(raw, qos_profile))
+        return self._rosz_add(Publisher(raw, qos_profile))
 
     def create_subscription(
         self,
@@ -169,17 +164,17 @@ class Node(NodeParameters, NodeGraph):
         raw: bool = False,
         **_options: Any,
     ) -> Subscription:
-        """Declare that it listens to a topic.
+        """Create a subscription.
 
         Args:
-            msg_type: What is expected.
+            msg_type: Class of the messages.
             topic: Name of the topic.
-            callback: Gets each message, or its bytes if ``raw``.
-            qos_profile: A profile, or the depth of its queue.
-            callback_group: The group of the callback; the node's own when not given.
-            raw: Whether to pass the encoded bytes on.
+            callback: Function called with each message, or with its bytes if ``raw``.
+            qos_profile: Profile, or depth of the queue.
+            callback_group: Group of the callback; the node's default group when not given.
+            raw: Whether to pass encoded messages.
         """
-        return self._rosz_keep(
+        return self._rosz_add(
             Subscription(
                 self.rosz_node,
                 topic,
@@ -200,16 +195,16 @@ class Node(NodeParameters, NodeGraph):
         clock: Clock | None = None,
         autostart: bool = True,
     ) -> Timer:
-        """Have a function called every so often.
+        """Create a timer, which calls a function periodically.
 
         Args:
-            timer_period_sec: Seconds.
-            callback: What to call.
-            callback_group: The group of the callback; the node's own when not given.
-            clock: Whose time to go by; the node's when not given.
-            autostart: Whether it begins at once, or with ``reset``.
+            timer_period_sec: Period in seconds.
+            callback: Function to call.
+            callback_group: Group of the callback; the node's default group when not given.
+            clock: Clock to follow; the node's when not given.
+            autostart: Whether the timer starts at once; otherwise ``reset`` starts it.
         """
-        return self._rosz_keep(
+        return self._rosz_add(
             Timer(
                 round(timer_period_sec * _SECOND),
                 callback,
@@ -231,15 +226,15 @@ class Node(NodeParameters, NodeGraph):
         callback_group: CallbackGroup | None = None,
         **_options: Any,
     ) -> Service:
-        """Serve a service.
+        """Create a service.
 
         Args:
-            srv_type: Its type.
-            srv_name: Its name.
-            callback: Gets a request and an empty response, and returns the response.
-            callback_group: The group of the callback; the node's own when not given.
+            srv_type: Type of the service.
+            srv_name: Name of the service.
+            callback: Function called with a request and an empty response; returns the response.
+            callback_group: Group of the callback; the node's default group when not given.
         """
-        return self._rosz_keep(
+        return self._rosz_add(
             Service(
                 self.rosz_node,
                 srv_name,
@@ -251,22 +246,22 @@ class Node(NodeParameters, NodeGraph):
         )
 
     def create_client(self, srv_type: type[Any], srv_name: str, **_options: Any) -> Client:
-        """Make a caller of a service.
+        """Create a client of a service.
 
         Args:
-            srv_type: Its type.
-            srv_name: Its name.
+            srv_type: Type of the service.
+            srv_name: Name of the service.
         """
-        return self._rosz_keep(
+        return self._rosz_add(
             Client(self.rosz_node, srv_name, srv_type, call_soon=self._rosz_call_soon)
         )
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:  # noqa: ARG002
-        """Return a pace-maker for a loop.
+        """Create a rate, which paces a loop.
 
         Args:
-            frequency: Times per second.
-            clock: Not used: it goes by the node's clock.
+            frequency: Frequency in Hz.
+            clock: Not used; the rate follows the node's clock.
 
         Raises:
             UsageError: The frequency is not above 0.
@@ -275,7 +270,7 @@ class Node(NodeParameters, NodeGraph):
             raise UsageError(f"a rate is '{frequency}' Hz; expected above 0")
         return Rate(int(_SECOND / frequency), self.rosz_node.clock)
 
-    def _rosz_keep(self, part: P) -> P:
+    def _rosz_add(self, part: P) -> P:
         self._rosz_parts.append(part)
         self._rosz_wake()
         return part
@@ -288,32 +283,32 @@ class Node(NodeParameters, NodeGraph):
         return True
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
-        """End a publisher; tell whether it was one of the node."""
+        """Close a publisher; return whether it belonged to the node."""
         return self._rosz_destroy(publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
-        """End a subscription; tell whether it was one of the node."""
+        """Close a subscription; return whether it belonged to the node."""
         return self._rosz_destroy(subscription)
 
     def destroy_timer(self, timer: Timer) -> bool:
-        """End a timer; tell whether it was one of the node."""
+        """Close a timer; return whether it belonged to the node."""
         return self._rosz_destroy(timer)
 
     def destroy_service(self, service: Service) -> bool:
-        """End a service; tell whether it was one of the node."""
+        """Close a service; return whether it belonged to the node."""
         return self._rosz_destroy(service)
 
     def destroy_client(self, client: Client) -> bool:
-        """End a client; tell whether it was one of the node."""
+        """Close a client; return whether it belonged to the node."""
         return self._rosz_destroy(client)
 
     def destroy_rate(self, rate: Rate) -> bool:
-        """End a rate."""
+        """Close a rate."""
         rate.destroy()
         return True
 
     def destroy_node(self) -> None:
-        """End the node with all it has; again is no error."""
+        """Close the node and its entities; a second call has no effect."""
         if self.executor is not None:
             self.executor.remove_node(self)
         while self._rosz_parts:
@@ -322,17 +317,17 @@ class Node(NodeParameters, NodeGraph):
 
     @property
     def publishers(self) -> Iterator[Publisher]:
-        """Its publishers."""
+        """The publishers of the node."""
         return (part for part in self._rosz_parts if isinstance(part, Publisher))
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
-        """Its subscriptions."""
+        """The subscriptions of the node."""
         return (part for part in self._rosz_parts if isinstance(part, Subscription))
 
     @property
     def timers(self) -> Iterator[Timer]:
-        """Its timers."""
+        """The timers of the node."""
         return (part for part in self._rosz_parts if isinstance(part, Timer))
 
     def __enter__(self) -> Self:
@@ -340,6 +335,145 @@ class Node(NodeParameters, NodeGraph):
 
     def __exit__(self, *_details: object) -> None:
         self.destroy_node()
+
+    # Parameters
+
+    def declare_parameter(
+        self,
+        name: str,
+        value: Any = None,
+        descriptor: ParameterDescriptor | None = None,
+        ignore_override: bool = False,
+    ) -> Parameter:
+        """Declare a parameter; the command line and launch files override its default value.
+
+        Args:
+            name: Name of the parameter.
+            value: Default value, or a ``Parameter.Type`` for a parameter without a value.
+            descriptor: Description of the parameter.
+            ignore_override: Whether to use the default value in any case.
+
+        Raises:
+            ParameterAlreadyDeclaredException: The parameter is declared already.
+            InvalidParameterTypeException: The overriding value is of another type.
+        """
+        return self._rosz_parameters.declare(name, value, descriptor, ignore_override)
+
+    def declare_parameters(
+        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
+    ) -> list[Parameter]:
+        """Declare several parameters: tuples of the arguments of `declare_parameter`.
+
+        Args:
+            namespace: Prefix of the names, without the dot; may be empty.
+            parameters: Name, and optionally default value and descriptor, of each parameter.
+            ignore_override: Whether to use the default values in any case.
+        """
+        start = f"{namespace}." if namespace else ""
+        declared: list[Parameter] = []
+        for name, *rest in parameters:
+            value, descriptor = (*rest, None, None)[:2]
+            declared.append(
+                self._rosz_parameters.declare(start + name, value, descriptor, ignore_override)
+            )
+        return declared
+
+    def undeclare_parameter(self, name: str) -> None:
+        """Remove the declaration of a parameter."""
+        self._rosz_parameters.undeclare(name)
+
+    def has_parameter(self, name: str) -> bool:
+        """Return whether a parameter is declared."""
+        return self._rosz_parameters.has(name)
+
+    def get_parameter(self, name: str) -> Parameter:
+        """Return a parameter.
+
+        Raises:
+            ParameterNotDeclaredException: The parameter is not declared.
+            ParameterUninitializedException: It was declared by type only, and has no value.
+        """
+        return self._rosz_parameters.get(name)
+
+    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
+        """Return several parameters."""
+        return [self._rosz_parameters.get(name) for name in names]
+
+    def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
+        """Return a parameter, or an alternative value if it is not declared."""
+        try:
+            return self._rosz_parameters.get(name)
+        except ParameterNotDeclaredException:
+            return alternative_value
+
+    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
+        """Return the parameters below a prefix, by the rest of their names."""
+        return self._rosz_parameters.below(prefix)
+
+    def describe_parameter(self, name: str) -> ParameterDescriptor:
+        """Return the descriptor of a parameter."""
+        return self._rosz_parameters.descriptor(name)
+
+    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
+        """Set parameters one by one, and return one result for each."""
+        return self._rosz_parameters.set(parameter_list)
+
+    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
+        """Set all parameters or none."""
+        return self._rosz_parameters.set_atomically(parameter_list)
+
+    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+        """Call a function that may refuse parameters before they are set."""
+        self._rosz_parameters.add_check(callback)
+
+    def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+        """Remove a function of `add_on_set_parameters_callback`."""
+        self._rosz_parameters.remove_check(callback)
+
+    # Names and other nodes
+
+    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
+        """Return the global name of a topic.
+
+        Args:
+            topic: Any legal name.
+            only_expand: Whether to ignore remappings.
+        """
+        if only_expand:
+            return names.resolve(topic, self.rosz_node.name)
+        return self.rosz_node.resolve(topic)
+
+    resolve_service_name = resolve_topic_name
+
+    def get_node_names(self) -> list[str]:
+        """Return the base names of all nodes."""
+        return [names.basename(name) for name in self._rosz_view().nodes()]
+
+    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
+        """Return the base names and namespaces of all nodes."""
+        return [
+            (names.basename(name), names.namespace(name).rstrip("/") or "/")
+            for name in self._rosz_view().nodes()
+        ]
+
+    def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:  # noqa: ARG002
+        """Return all topics with their types."""
+        return list(self._rosz_view().topics().items())
+
+    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """Return all services with their types."""
+        return list(self._rosz_view().services().items())
+
+    def count_publishers(self, topic_name: str) -> int:
+        """Return the number of publishers of a topic."""
+        return len(self._rosz_view().publishers(self.resolve_topic_name(topic_name)))
+
+    def count_subscribers(self, topic_name: str) -> int:
+        """Return the number of subscriptions of a topic."""
+        return len(self._rosz_view().subscriptions(self.resolve_topic_name(topic_name)))
+
+    def _rosz_view(self) -> Any:
+        return self.rosz_node.context.graph.view()
 
 
 _OPTIONS = frozenset({

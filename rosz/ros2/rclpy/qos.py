@@ -1,4 +1,4 @@
-"""rclpy.qos: quality of service in rclpy's words."""
+"""rclpy.qos: quality of service profiles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from rosz.errors import UsageError
 from rosz.qos import FOREVER, QoS
-from rosz.ros2.rclpy.duration import Duration, Infinite
+from rosz.ros2.rclpy.time import Duration, Infinite
 
 __all__ = (
     "DurabilityPolicy",
@@ -31,7 +31,7 @@ __all__ = (
 
 
 class HistoryPolicy(IntEnum):
-    """How many samples are kept."""
+    """Number of samples that are kept."""
 
     SYSTEM_DEFAULT = 0
     KEEP_LAST = 1
@@ -50,7 +50,7 @@ class ReliabilityPolicy(IntEnum):
 
 
 class DurabilityPolicy(IntEnum):
-    """Whether late joiners get what was sent before."""
+    """Whether late subscriptions get earlier samples."""
 
     SYSTEM_DEFAULT = 0
     TRANSIENT_LOCAL = 1
@@ -60,7 +60,7 @@ class DurabilityPolicy(IntEnum):
 
 
 class LivelinessPolicy(IntEnum):
-    """Who says that a publisher is alive; information only."""
+    """How a publisher shows that it is alive; for information only."""
 
     SYSTEM_DEFAULT = 0
     AUTOMATIC = 1
@@ -84,18 +84,25 @@ _SPANS = ("lifespan", "deadline", "liveliness_lease_duration")
 
 
 class QoSProfile:
-    """What an endpoint promises or asks for; see REP 2003.
+    """The quality of service that an entity offers or requests; see REP 2003.
 
     Args:
-        policies: ``history``, ``depth``, ``reliability``, ``durability``, ``lifespan``,
-            ``deadline``, ``liveliness`` and ``liveliness_lease_duration``, as far as they are not
-            the default.
+        policies: Any of ``history``, ``depth``, ``reliability``, ``durability``, ``lifespan``,
+            ``deadline``, ``liveliness`` and ``liveliness_lease_duration``; the others keep their
+            defaults.
 
     Raises:
-        UsageError: A policy is none, or neither history nor depth is given.
+        UsageError: There is no such policy, or neither history nor depth is profile.
     """
 
     depth: int
+    history: HistoryPolicy
+    reliability: ReliabilityPolicy
+    durability: DurabilityPolicy
+    liveliness: LivelinessPolicy
+    lifespan: Duration
+    deadline: Duration
+    liveliness_lease_duration: Duration
 
     def __init__(self, **policies: Any) -> None:
         if "history" not in policies and "depth" not in policies:
@@ -126,10 +133,10 @@ class QoSProfile:
 
 
 def to_qos(profile: QoSProfile | int) -> QoS:
-    """Return a profile, or the depth of a queue, in rosz's terms.
+    """Convert a profile, or the depth of a queue, to rosz's QoS.
 
     Raises:
-        UsageError: It is neither.
+        UsageError: The argument is neither.
     """
     if isinstance(profile, int):
         if profile < 0:
@@ -137,22 +144,21 @@ def to_qos(profile: QoSProfile | int) -> QoS:
         return QoS(depth=profile)
     if not isinstance(profile, QoSProfile):
         raise UsageError(f"expected a QoSProfile or a depth, got {type(profile).__name__}")
-    given: Any = profile
     return QoS(
-        depth=given.depth,
+        depth=profile.depth,
         reliability="best_effort"
-        if given.reliability is ReliabilityPolicy.BEST_EFFORT
+        if profile.reliability is ReliabilityPolicy.BEST_EFFORT
         else "reliable",
         durability="transient_local"
-        if given.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        if profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
         else "volatile",
-        history="keep_all" if given.history is HistoryPolicy.KEEP_ALL else "keep_last",
-        deadline=_span(given.deadline),
-        lifespan=_span(given.lifespan),
+        history="keep_all" if profile.history is HistoryPolicy.KEEP_ALL else "keep_last",
+        deadline=_span(profile.deadline),
+        lifespan=_span(profile.lifespan),
         liveliness="manual_by_topic"
-        if given.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+        if profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
         else "automatic",
-        lease=_span(given.liveliness_lease_duration),
+        lease=_span(profile.liveliness_lease_duration),
     )
 
 
@@ -175,7 +181,7 @@ qos_profile_action_status_default = QoSProfile(
 
 
 class QoSPresetProfiles(Enum):
-    """The profiles that ROS 2 has names for; ``.value`` is the profile."""
+    """The named profiles of ROS 2; ``.value`` is the profile."""
 
     SYSTEM_DEFAULT = qos_profile_system_default
     SENSOR_DATA = qos_profile_sensor_data

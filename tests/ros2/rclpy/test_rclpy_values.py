@@ -12,9 +12,8 @@ from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.qos import QoS
 from rosz.ros2.rclpy import qos
 from rosz.ros2.rclpy.arguments import parse, remove_ros_args
-from rosz.ros2.rclpy.duration import Duration, Infinite
 from rosz.ros2.rclpy.parameter import Parameter, get_parameter_value
-from rosz.ros2.rclpy.time import ClockType, Time
+from rosz.ros2.rclpy.time import ClockType, Duration, Infinite, Time
 
 Type = Parameter.Type
 
@@ -122,11 +121,11 @@ def test_classic_parameters_count_too() -> None:
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ("--ros-args -x a", "'-x' is no ROS argument"),
+        ("--ros-args -x a", "'-x' is not a ROS argument"),
         ("--ros-args -p a", "expected name:=value"),
-        ("--ros-args -p", "is the last word"),
-        ("--ros-args -p a:=[", "no YAML value"),
-        ("--ros-args -p a:=2020-13-45", "no YAML value: '2020-13-45' is not a !!timestamp"),
+        ("--ros-args -p", "is the last argument"),
+        ("--ros-args -p a:=[", "is not YAML"),
+        ("--ros-args -p a:=2020-13-45", "is not YAML: '2020-13-45' is not a !!timestamp"),
         (f"--ros-args -p a:={'[' * 20_000}", "nested more than 100 deep"),
     ],
 )

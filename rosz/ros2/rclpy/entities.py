@@ -1,0 +1,381 @@
+"""rclpy.publisher, .subscription, .service, .client and .timer: the entities of a node."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rosz.errors import RoszError, ServiceError, WaitTimeout
+from rosz.node import Node as RoszNode
+from rosz.node import Publisher as RoszPublisher
+from rosz.node import Subscription as RoszSubscription
+from rosz.node import Timer as RoszTimer
+from rosz.node.clock import Clock as RoszClock
+from rosz.qos import QoS
+from rosz.ros2.rclpy.executors import CallbackGroup, Future
+from rosz.ros2.rclpy.time import Clock, Rate
+
+if TYPE_CHECKING:
+    from rosz.message import Message
+    from rosz.message import Service as ServiceType
+
+__all__ = ("Client", "Publisher", "Rate", "Service", "Subscription", "Timer")
+
+_FOREVER = threading.TIMEOUT_MAX / 2
+_CHECK_PERIOD = 0.5
+"""Seconds after which a waiting service call checks whether the node has ended."""
+
+
+class Publisher:
+    """Publish messages on a topic; made by ``Node.create_publisher``."""
+
+    def __init__(self, publisher: RoszPublisher[Any], qos_profile: Any) -> None:
+        self._publisher = publisher
+        self.msg_type: type[Any] = publisher.message_type
+        self.qos_profile: Any = qos_profile
+
+    def publish(self, msg: Any) -> None:
+        """Publish a message, or the bytes of an encoded one.
+
+        Raises:
+            EncodeError: A field has a value that does not fit.
+            ClosedError: The publisher is destroyed, or its context is shut down.
+        """
+        if isinstance(msg, bytes):
+            self._publisher.publish_raw(msg)
+        else:
+            self._publisher.publish(msg)
+
+    @property
+    def topic(self) -> str:
+        """Full name of the topic."""
+        return self._publisher.name
+
+    topic_name = topic
+
+    def get_subscription_count(self) -> int:
+        """Return the number of subscriptions that receive the messages."""
+        return len(self._publisher.subscribers())
+
+    def destroy(self) -> None:
+        """Close the publisher."""
+        self._publisher.close()
+
+
+class Subscription:
+    """Receive messages of a topic; made by ``Node.create_subscription``.
+
+    Messages wait in a queue of the profile's depth until an executor spins; when it is full, a new
+    message replaces the oldest one.
+    """
+
+    def __init__(
+        self,
+        node: RoszNode,
+        topic: str,
+        msg_type: type[Message],
+        callback: Callable[[Any], Any],
+        qos: QoS,
+        *,
+        raw: bool,
+        group: CallbackGroup,
+        wake: Callable[[], None],
+    ) -> None:
+        self.msg_type: type[Any] = msg_type
+        self.callback: Callable[[Any], Any] = callback
+        self.callback_group: CallbackGroup = group
+        self._wake = wake
+        depth = None if qos.history == "keep_all" else max(qos.depth, 1)
+        self._queue: deque[Any] = deque(maxlen=depth)
+        self._subscription: RoszSubscription[Any] = node.subscription(
+            topic, msg_type, self._receive, qos=qos, raw=raw
+        )
+
+    def _receive(self, message: Any) -> None:
+        self._queue.append(message)
+        self._wake()
+
+    def take(self) -> Callable[[], Any] | None:
+        """Return a function that handles the oldest message; None if there is none."""
+        try:
+            message = self._queue.popleft()
+        except IndexError:
+            return None
+        return lambda: self.callback(message)
+
+    @property
+    def topic_name(self) -> str:
+        """Full name of the topic."""
+        return self._subscription.name
+
+    def get_publisher_count(self) -> int:
+        """Return the number of publishers that the subscription receives from."""
+        return len(self._subscription.publishers())
+
+    def destroy(self) -> None:
+        """Close the subscription."""
+        self._subscription.close()
+        self._queue.clear()
+
+
+class _Call:
+    """A service call that waits for an executor."""
+
+    def __init__(self, request: Any) -> None:
+        self.request = request
+        self.finished = threading.Event()
+        self.response: Any = None
+        self.error: BaseException | None = None
+
+
+class Service:
+    """Serve a service; made by ``Node.create_service``."""
+
+    def __init__(
+        self,
+        node: RoszNode,
+        srv_name: str,
+        srv_type: type[ServiceType],
+        callback: Callable[[Any, Any], Any],
+        *,
+        group: CallbackGroup,
+        wake: Callable[[], None],
+    ) -> None:
+        self.srv_type: type[Any] = srv_type
+        self.callback: Callable[[Any, Any], Any] = callback
+        self.callback_group: CallbackGroup = group
+        self._wake = wake
+        self._calls: deque[_Call] = deque()
+        self._service = node.service(srv_name, srv_type, self._serve)
+        self._node = node
+
+    @property
+    def srv_name(self) -> str:
+        """Full name of the service."""
+        return self._service.name
+
+    service_name = srv_name
+
+    def _serve(self, request: Any) -> Any:
+        """Queue a call for the executor, and wait for the response."""
+        call = _Call(request)
+        self._calls.append(call)
+        self._wake()
+        while not call.finished.wait(_CHECK_PERIOD):
+            if self._service.closed or self._node.is_shutdown:
+                raise ServiceError("the server ended before it answered")
+        if call.error is not None:
+            raise ServiceError(f"{type(call.error).__name__}: {call.error}") from call.error
+        return call.response
+
+    def take(self) -> Callable[[], Any] | None:
+        """Return a function that responds to the oldest call; None if there is none."""
+        try:
+            call = self._calls.popleft()
+        except IndexError:
+            return None
+        return lambda: self._respond(call)
+
+    async def _respond(self, call: _Call) -> None:
+        try:
+            result = self.callback(call.request, self.srv_type.Response())
+            call.response = await result if hasattr(result, "__await__") else result
+        except BaseException as error:
+            call.error = error
+            raise
+        finally:
+            call.finished.set()
+
+    def destroy(self) -> None:
+        """Close the service."""
+        self._service.close()
+
+
+class Client:
+    """Call a service; made by ``Node.create_client``.
+
+    Args:
+        node: Node that the client belongs to.
+        srv_name: Name of the service.
+        srv_type: Type of the service.
+        call_soon: Function that passes a function to the executor that spins the node.
+    """
+
+    def __init__(
+        self,
+        node: RoszNode,
+        srv_name: str,
+        srv_type: type[ServiceType],
+        *,
+        call_soon: Callable[[Callable[[], object]], None],
+    ) -> None:
+        self.srv_type: type[Any] = srv_type
+        self._client = node.client(srv_name, srv_type, timeout=_FOREVER)
+        self._call_soon = call_soon
+
+    @property
+    def srv_name(self) -> str:
+        """Full name of the service."""
+        return self._client.name
+
+    service_name = srv_name
+
+    def call(self, request: Any, timeout_sec: float | None = None) -> Any:
+        """Call the service, and wait for the response.
+
+        A callback must not call a service whose server is spun by the same executor.
+
+        Args:
+            request: Instance of the request type of the service.
+            timeout_sec: Time limit in seconds; none when not given.
+
+        Raises:
+            ServiceError: No node serves the service, or the server responded with an error.
+            WaitTimeout: No response came in time.
+        """
+        return self._client.call(request, timeout_sec)
+
+    def call_async(self, request: Any) -> Future:
+        """Call the service without waiting; a call waits for a server that is not there yet.
+
+        Args:
+            request: Instance of the request type of the service.
+
+        Returns:
+            A future that is done, while the node is spun, when the response has come.
+        """
+        future = Future()
+
+        def call() -> None:
+            try:
+                self._client.wait_for_service(_FOREVER)
+                response = self._client.call(request)
+            except RoszError as error:
+                failure = error
+                self._call_soon(lambda: future.set_exception(failure))
+            else:
+                self._call_soon(lambda: future.set_result(response))
+
+        # Not a `Worker`, which is bounded: any number of calls may wait, each without a limit.
+        threading.Thread(target=call, name=f"rosz-call{self.srv_name}", daemon=True).start()
+        return future
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Cancel a call; a response that comes later is ignored."""
+        future.cancel()
+
+    def service_is_ready(self) -> bool:
+        """Return whether a node serves the service."""
+        return self.wait_for_service(0.0)
+
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Wait until a node serves the service.
+
+        Args:
+            timeout_sec: Time limit in seconds; none when not given.
+
+        Returns:
+            Whether a node serves it.
+        """
+        try:
+            self._client.wait_for_service(_FOREVER if timeout_sec is None else timeout_sec)
+        except WaitTimeout:
+            return False
+        return True
+
+    def destroy(self) -> None:
+        """Close the client."""
+        self._client.close()
+
+
+class Timer:
+    """Call a function periodically; made by ``Node.create_timer``.
+
+    Periods that pass while no executor spins are skipped: one call follows, not many.
+    """
+
+    def __init__(
+        self,
+        period_ns: int,
+        callback: Callable[[], Any] | None,
+        source: RoszClock,
+        *,
+        clock: Clock,
+        group: CallbackGroup,
+        wake: Callable[[], None],
+        report: Callable[[str, BaseException], None],
+        autostart: bool = True,
+    ) -> None:
+        self.callback: Callable[[], Any] | None = callback
+        self.callback_group: CallbackGroup = group
+        self.clock: Clock = clock
+        self._source = source.branch()
+        self._period = period_ns
+        self._wake = wake
+        self._report = report
+        self._due = False
+        self._last = self._source.steady()
+        self._timer: RoszTimer | None = None
+        if autostart:
+            self.reset()
+
+    @property
+    def timer_period_ns(self) -> int:
+        """Period in nanoseconds."""
+        return self._period
+
+    @timer_period_ns.setter
+    def timer_period_ns(self, value: int) -> None:
+        self._period = int(value)
+        if self._timer is not None:
+            self.reset()
+
+    def reset(self) -> None:
+        """Start the period anew; this also restarts a cancelled timer."""
+        self.cancel()
+        self._last = self._source.steady()
+        self._timer = RoszTimer(
+            self._period, lambda _: self._tick(), self._source, on_error=self._report, reset=True
+        )
+
+    def cancel(self) -> None:
+        """Stop the timer until `reset`."""
+        self._due = False
+        if self._timer is not None:
+            self._timer.close()
+            self._timer = None
+
+    def is_canceled(self) -> bool:
+        """Return whether the timer is cancelled."""
+        return self._timer is None
+
+    def is_ready(self) -> bool:
+        """Return whether a call is due."""
+        return self._due
+
+    def time_since_last_call(self) -> int:
+        """Return the nanoseconds since the last call, or since the timer was started."""
+        return self._source.steady() - self._last
+
+    def time_until_next_call(self) -> int | None:
+        """Return the nanoseconds until the next call is due; None when cancelled."""
+        return None if self._timer is None else self._period - self.time_since_last_call()
+
+    def _tick(self) -> None:
+        self._due = True
+        self._wake()
+
+    def take(self) -> Callable[[], Any] | None:
+        """Return the callback if it is due."""
+        if not self._due:
+            return None
+        self._due = False
+        self._last = self._source.steady()
+        return self.callback
+
+    def destroy(self) -> None:
+        """Close the timer."""
+        self.cancel()
+        self._source.close()
