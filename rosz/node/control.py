@@ -1,8 +1,4 @@
-"""What a node responds about itself, and how a newer node of the same name takes over.
-
-Names of nodes are unique in a domain. When a second node of a name appears, the older one shuts
-down, as in ROS 1.
-"""
+"""Requests to a node about itself: information, shutdown, levels of loggers."""
 
 from __future__ import annotations
 
@@ -15,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.errors import RoszError
-from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
-from rosz.wire import ProcessToken, own_key
+from rosz.wire import own_key
 from rosz.worker import Worker, start_thread
 
 if TYPE_CHECKING:
@@ -27,10 +22,6 @@ __all__ = ("NodeInfo", "Request", "control_key", "serve_control")
 
 _log = logging.getLogger("rosz.control")
 
-_REPLACED = "new node registered with same name"
-_REPLY_TIMEOUT = 1.0
-_TOGETHER = 0.2
-"""Seconds; of two nodes that start within this time, their own clocks tell which one is newer."""
 _THREADS = 4
 
 
@@ -80,14 +71,13 @@ def control_key(domain: int, zid: str, node_id: int | str) -> str:
 
 
 def serve_control(node: NodeCore) -> None:
-    """Make a node respond to requests about itself, and give way to a newer one of its name."""
+    """Make a node respond to requests about itself."""
     context = node.context
     key = control_key(context.domain, context.session.zid, node.node_id)
-    began = time.monotonic()
     ending = threading.Lock()
 
     def serve(query: Query) -> None:
-        reason = _serve(node, key, query, began)
+        reason = _serve(node, key, query)
         if reason and ending.acquire(blocking=False):
             # Hooks of the program may take their time, and more requests may come meanwhile.
             name = f"rosz-shutdown{node.name}"
@@ -95,57 +85,17 @@ def serve_control(node: NodeCore) -> None:
                 threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True)
             )
 
-    duplicates = Worker[ProcessToken](
-        f"rosz-takeover{node.name}",
-        lambda other: _give_way(node, other, began),
-        threads=_THREADS,
-    )
-
-    def appeared(other: ProcessToken, alive: bool) -> None:
-        if alive and other.node == node.name and other != node.process:
-            duplicates.submit(other)
-
     queryable = node.keep(context.session.pull_queryable(key))
     Worker(f"rosz-control{node.name}", serve, receive=queryable.receive, threads=_THREADS)
-    node.keep(Registration(lambda: duplicates.close(0)))
-    node.keep(Registration(context.graph.listen_to_processes(appeared)))
 
 
-def _give_way(node: NodeCore, other: ProcessToken, began: float) -> None:
-    """Shut a node down if another one of its name is newer."""
-    if not node.is_shutdown and _is_newer(node, other, began):
-        node.log.warning(
-            "shutdown request: %s (process %d on %s)", _REPLACED, other.pid, other.host
-        )
-        node.shutdown(_REPLACED)
-
-
-def _is_newer(node: NodeCore, other: ProcessToken, began: float) -> bool:
-    """Return whether another node is newer, whatever the clocks of the two machines show."""
-    key = control_key(other.domain, other.zid, other.node_id)
-    request = msgspec.msgpack.encode(Request("info"))
-    asked = time.monotonic()
-    try:
-        replies = node.context.session.get(key, payload=request, timeout=_REPLY_TIMEOUT)
-        infos = [msgspec.msgpack.decode(r.payload, type=NodeInfo) for r in replies if r.ok]
-    except (RoszError, msgspec.DecodeError):
-        infos = []
-    if infos:
-        journey = time.monotonic() - asked
-        lead = asked + journey / 2 - began - infos[0].age
-        if abs(lead) > max(_TOGETHER, journey):
-            return lead > 0
-    # Two that start together, or one that does not respond: the times they gave themselves decide.
-    return other.newer_than(node.process)
-
-
-def _serve(node: NodeCore, key: str, query: Query, began: float) -> str:
+def _serve(node: NodeCore, key: str, query: Query) -> str:
     """Respond to a request; return the reason of the shutdown that is to follow, if any."""
     with query:
         try:
             try:
                 request = msgspec.msgpack.decode(query.payload or b"\x80", type=Request)
-                response, shut_down = _respond(node, request, time.monotonic() - began)
+                response, shut_down = _respond(node, request)
             except (msgspec.MsgspecError, RoszError, ValueError) as error:
                 query.reply_error(str(error))
                 return ""
@@ -156,11 +106,11 @@ def _serve(node: NodeCore, key: str, query: Query, began: float) -> str:
     return shut_down
 
 
-def _respond(node: NodeCore, request: Request, age: float) -> tuple[Any, str]:
+def _respond(node: NodeCore, request: Request) -> tuple[Any, str]:
     """Return the response, and the reason of a shutdown to carry out after it."""
     match request.action:
         case "info":
-            return _info(node, age), ""
+            return _info(node), ""
         case "shutdown":
             return True, request.reason or "requested"
         case "levels":
@@ -172,7 +122,7 @@ def _respond(node: NodeCore, request: Request, age: float) -> tuple[Any, str]:
             raise ValueError(f"a node has no action '{other}'")
 
 
-def _info(node: NodeCore, age: float) -> NodeInfo:
+def _info(node: NodeCore) -> NodeInfo:
     process = node.process
     return NodeInfo(
         node.name,
@@ -180,7 +130,7 @@ def _info(node: NodeCore, age: float) -> NodeInfo:
         process.host,
         [_utf8(word) for word in (sys.executable, *sys.argv)],
         process.started,
-        age,
+        time.monotonic() - node.began,
         time.time_ns(),
         sorted({token.zid for token in node.context.graph.view().tokens}),
     )

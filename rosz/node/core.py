@@ -41,6 +41,7 @@ class NodeCore:
         context: The context.
         remaps: Remappings of the command line, resolved for this node.
         node_id: Number of the node within its session.
+        began: Time of the start by the monotonic clock, in seconds.
         clock: Clock of the node, closed with it.
         log: Log of the node.
         process: What the graph tells about the process of the node.
@@ -78,6 +79,7 @@ class NodeCore:
         self.base_name = names.basename(self.name)
         self.remaps = arguments.resolved_remaps(self.name)
         self.node_id = context.next_id()
+        self.began = time.monotonic()
         self.process = ProcessToken(
             context.domain,
             context.session.zid,

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from rosz.node import control, signals, standard
+from rosz.node import control, signals, standard, takeover
 from rosz.node.client import Client
 from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
@@ -69,6 +69,7 @@ class Node(NodeCore):
     def _begin(self) -> None:
         standard.set_initial_params(self)
         control.serve_control(self)
+        takeover.yield_to_newer(self)
         self._announce()
         if not self.context.passing:
             standard.follow_clock(self)

@@ -14,7 +14,6 @@ from network import PATIENCE, Network
 from rosz.node import Node, control
 from rosz.node.control import NodeInfo, Request, control_key
 from rosz.session import Reply, Session
-from rosz.wire import ProcessToken, format_process
 
 _INFO = msgspec.msgpack.encode(Request("info"))
 
@@ -87,34 +86,3 @@ def test_what_means_nothing_is_refused_and_the_next_is_answered(network: Network
         assert not refused.ok
         assert b"a node has no action 'dance'" in refused.payload
     assert ask("info")[0].ok
-
-
-def test_many_rivals_take_few_threads(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    go_on = threading.Event()
-    asked: SimpleQueue[int] = SimpleQueue()
-
-    def slowly(_node: Node, other: ProcessToken, _began: float) -> bool:
-        asked.put(other.node_id)
-        assert go_on.wait(PATIENCE)
-        return False
-
-    monkeypatch.setattr(control, "_is_newer", slowly)
-    king = network.node("king")
-    elsewhere = network.context()
-    before = threading.active_count()
-    rivals = [
-        ProcessToken(king.context.domain, elsewhere.session.zid, number, 1, 7, "afar", "/king")
-        for number in range(50)
-    ]
-    tokens = [elsewhere.session.token(format_process(rival)) for rival in rivals]
-    seen = [asked.get(timeout=PATIENCE) for _ in range(control._THREADS)]
-    network.node("last")
-    king.context.graph.wait_for_node("/last", PATIENCE)
-    assert threading.active_count() - before < len(rivals)
-    assert len(threads("rosz-takeover/king")) == control._THREADS
-    go_on.set()
-    seen += [asked.get(timeout=PATIENCE) for _ in range(len(rivals) - len(seen))]
-    assert sorted(seen) == list(range(len(rivals)))
-    assert not king.is_shutdown
-    for token in tokens:
-        token.close()

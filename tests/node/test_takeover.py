@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import threading
 import time
+from queue import SimpleQueue
 from types import SimpleNamespace
 
 import pytest
 from network import PATIENCE, Network, eventually
 
 from rosz.msgs.std_msgs.msg import String
-from rosz.node import Node, control
+from rosz.node import Node, core, takeover
+from rosz.wire import ProcessToken, format_process
 
 LOSER = """
     import rosz
@@ -22,6 +24,11 @@ LOSER = """
         print("ready", flush=True)
         node.spin()
 """
+
+
+def takeovers() -> set[threading.Thread]:
+    """Return the threads that compare nodes with others of their names."""
+    return {t for t in threading.enumerate() if t.name.startswith("rosz-takeover")}
 
 
 def test_older_process_ends(network: Network) -> None:
@@ -58,6 +65,7 @@ def test_in_one_context(network: Network) -> None:
 
 
 def test_same_base_name_elsewhere_is_another_node(network: Network) -> None:
+    before = takeovers()
     nodes = [
         network.node("king"),
         network.node("king", namespace="/north"),
@@ -69,8 +77,7 @@ def test_same_base_name_elsewhere_is_another_node(network: Network) -> None:
     )
     network.node("last")
     assert seen.wait(PATIENCE)  # listeners are called in order: the king has seen all the others
-    takeovers = [t for t in threading.enumerate() if t.name.startswith("rosz-takeover")]
-    assert not takeovers
+    assert not takeovers() - before
     assert not any(node.is_shutdown for node in nodes)
 
 
@@ -78,7 +85,7 @@ def test_age_counts_and_not_the_clock(network: Network, monkeypatch: pytest.Monk
     """A newer node takes over, though the clock of its machine is behind."""
     with monkeypatch.context() as earlier:
         clock = SimpleNamespace(monotonic=lambda: time.monotonic() - 10, time_ns=time.time_ns)
-        earlier.setattr(control, "time", clock)
+        earlier.setattr(core, "time", clock)
         old = network.node("king")
     real = time.time_ns
     monkeypatch.setattr(time, "time_ns", lambda: real() - 3600 * 10**9)
@@ -95,3 +102,34 @@ def test_a_chain_of_successors(network: Network) -> None:
 def test_anonymous_nodes_do_not_collide(network: Network) -> None:
     nodes = [network.node("king", anonymous=True) for _ in range(3)]
     assert len({node.name for node in nodes}) == 3
+
+
+def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    go_on = threading.Event()
+    asked: SimpleQueue[int] = SimpleQueue()
+
+    def slowly(_node: Node, other: ProcessToken) -> bool:
+        asked.put(other.node_id)
+        assert go_on.wait(PATIENCE)
+        return False
+
+    monkeypatch.setattr(takeover, "_is_newer", slowly)
+    king = network.node("king")
+    elsewhere = network.context()
+    before, ended = threading.active_count(), takeovers()
+    duplicates = [
+        ProcessToken(king.context.domain, elsewhere.session.zid, number, 1, 7, "afar", "/king")
+        for number in range(50)
+    ]
+    tokens = [elsewhere.session.token(format_process(duplicate)) for duplicate in duplicates]
+    seen = [asked.get(timeout=PATIENCE) for _ in range(takeover._THREADS)]
+    network.node("last")
+    king.context.graph.wait_for_node("/last", PATIENCE)
+    assert threading.active_count() - before < len(duplicates)
+    assert len(takeovers() - ended) == takeover._THREADS
+    go_on.set()
+    seen += [asked.get(timeout=PATIENCE) for _ in range(len(duplicates) - len(seen))]
+    assert sorted(seen) == list(range(len(duplicates)))
+    assert not king.is_shutdown
+    for token in tokens:
+        token.close()
