@@ -19,6 +19,7 @@ import re
 import string
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from rosz.errors import near_miss
@@ -201,10 +202,11 @@ class _Evaluation(string.Formatter):
                 self._charge(len(sequence) * max(times, 0) // unit)
             case "Mult", (int(times), (str() | list() | tuple()) as sequence):
                 self._check_size("Mult", sequence, times)
-            case "Mod", (str(pattern), _):
+            case "Mod", (str(pattern), values):
                 _check_width(_MAX_WIDTH + 1 if _WIDE_PERCENT.search(pattern) else 0)
                 if _STAR_PERCENT.search(pattern):
                     raise _Refused("a field width from a value ('*') is not available")
+                self._charge(pattern.count("%") * _size(values, self._left + 1))
             case "format", (str(spec),):
                 _check_width(_MAX_WIDTH + 1 if _WIDE.search(spec) else 0)
             case "center" | "ljust" | "rjust" | "zfill", (_, int(width), *_):
@@ -217,7 +219,7 @@ class _Evaluation(string.Formatter):
                 self._check_bits(number * math.log2(max(number, 2)))
             case "lcm", numbers:
                 self._check_bits(sum(number.bit_length() for number in numbers))
-            case "round", (_, int(digits)):
+            case "round", (int(digits),):
                 if abs(digits) > _MAX_DIGITS:
                     raise _Refused(f"it rounds to more than {_MAX_DIGITS} digits")
             case "range", (range() as numbers,):
@@ -292,14 +294,16 @@ class _Evaluation(string.Formatter):
         raise _Refused(f"{_describe(node)} is not available in expressions")
 
     def _name(self, name: str) -> Any:
-        for names in (*reversed(self._locals), self._functions, _MATH):
+        for names in (*reversed(self._locals), self._functions):
             if name in names:
                 return names[name]
-        value = self._arg(name)
+        value = _MATH[name] if name in _MATH else self._arg(name)
+        if value is None:
+            value = _BUILTINS.get(name)
+        if callable(value) and not isinstance(value, type):
+            return partial(self._run, value)  # checked also when Python calls it, as in map
         if value is not None:
             return value
-        if name in _BUILTINS:
-            return _BUILTINS[name]
         known = [*_MATH, *self._functions, *_BUILTINS]
         hint = near_miss(name, self._args) or near_miss(name, known)
         if name == "math":
@@ -363,7 +367,8 @@ class _Evaluation(string.Formatter):
         if name not in allowed:
             self.column = column or 0
             known = f"; it has {', '.join(sorted(allowed))}" if allowed else ""
-            raise _Refused(f"'.{name}' of a {type(owner).__name__} is not available{known}")
+            kind = "function" if callable(owner) else type(owner).__name__
+            raise _Refused(f"'.{name}' of a {kind} is not available{known}")
 
         def call(*args: Any, **kwargs: Any) -> Any:
             self._settle((owner, args))
@@ -385,17 +390,27 @@ class _Evaluation(string.Formatter):
         if not callable(function):
             raise _Refused(f"{function!r} is not a function")
         self._settle(args)
+        result = function(*args, **kwargs)
+        if isinstance(result, range):
+            self._check_size("range", result)
+        return list(result) if function in _ITERATORS else result
+
+    def _run(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        """Call a function of Python or `math` within the limits."""
         if function is sum:
             return self._fold(ast.Add, 0, *args, **kwargs)
         if function is math.prod:
             return self._fold(ast.Mult, 1, *args, **kwargs)
         if function is format:
             return self.format_field(*args, **kwargs)
-        self._check_size(getattr(function, "__name__", ""), *args)
-        result = function(*args, **kwargs)
-        if isinstance(result, range):
-            self._check_size("range", result)
-        return list(result) if function in _ITERATORS else result
+        if function is round:
+            return self._round(*args, **kwargs)
+        self._check_size(function.__name__, *args)
+        return function(*args, **kwargs)
+
+    def _round(self, number: Any, ndigits: Any = None) -> Any:
+        self._check_size("round", ndigits)
+        return round(number, ndigits)
 
     def _fold(
         self, kind: type[ast.operator], neutral: Any, items: Iterable[Any], start: Any = None
@@ -496,6 +511,8 @@ def _size(value: Any, limit: int) -> int:
         item = stack.pop()
         if isinstance(item, str):
             total += len(item) // _CHARACTERS_PER_UNIT
+        elif isinstance(item, int) and item.bit_length() > _MAX_BITS:
+            total += _BUDGET
         elif isinstance(item, range):
             total += len(item)
         elif isinstance(item, dict):
