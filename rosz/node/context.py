@@ -230,8 +230,6 @@ class Context:
     def _forked(self) -> None:
         atexit.unregister(self.close)
         self._making = threading.RLock()
-        if self._params is not None:
-            self._params.disown()
 
     def wait_for_shutdown(self, timeout: float | None = None) -> bool:
         """Wait until the end has begun; any number of threads may.

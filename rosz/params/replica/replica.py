@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Final, Self
 import msgspec
 
 from rosz.errors import ClosedError, DecodeError, NoReplica, ParamError
-from rosz.lifecycle import Closable
+from rosz.lifecycle import Closable, Lifecycle
 from rosz.params.paths import Path, to_path
 from rosz.params.replica.broadcast import WriteBroadcaster
 from rosz.params.replica.members import Members
@@ -158,7 +158,7 @@ class Replica(_Copy):
         self.label = label or process_label()
         self.zid = session.zid
         self._own = Member(session.stamp().time, session.zid, self.label)
-        self._closed = False
+        self._lifecycle = Lifecycle("the parameter store of this process", log=_log)
         self._storage = storage
         if storage is not None:
             if self._state.restore(storage.load()):
@@ -253,8 +253,8 @@ class Replica(_Copy):
             UsageError: The timeout is not a number; nothing is changed then.
         """
         timeout = clamp_timeout(timeout)
-        if self._closed:
-            raise ClosedError("the parameter store of this process is closed")
+        if self._lifecycle.closing:
+            self._lifecycle.check_open("write parameters")
         batch = list(changes)
         if not batch:
             return Outcome(0)
@@ -293,18 +293,14 @@ class Replica(_Copy):
 
     @property
     def closed(self) -> bool:
-        """Whether the replica is closed."""
-        return self._closed
-
-    def disown(self) -> None:
-        """Refuse all writes from now on, without touching threads and links; for a forked child."""
-        self._closed = True
+        """Whether the replica is closed, or being closed."""
+        return self._lifecycle.closing
 
     def close(self) -> None:
         """Leave the other replicas; a second call has no effect."""
-        if self._closed:
-            return
-        self._closed = True
+        self._lifecycle.close(self._leave)
+
+    def _leave(self) -> None:
         self._token.close()
         for declared in self._declared:
             declared.close()
@@ -315,7 +311,7 @@ class Replica(_Copy):
             self._storage.close()
 
     def __repr__(self) -> str:
-        state = "closed" if self._closed else f"{len(self._members.zids)} others"
+        state = "closed" if self.closed else f"{len(self._members.zids)} others"
         return f"<Replica of {len(self._state)} writes, {state}>"
 
     def _join(self) -> None:
