@@ -1,13 +1,12 @@
-"""A network of sessions for one test, apart from all others."""
+"""The network of a test, with replicas of the parameter store on it."""
 
 from __future__ import annotations
 
-import tempfile
 import threading
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
+
+import network
 
 from rosz.lifecycle import Closable
 from rosz.params.replica import Replica
@@ -16,63 +15,47 @@ from rosz.session import MeshReadiness, Session, SessionConfig, serve_links
 PATIENCE = 10.0
 
 
-class Network:
-    """Opens sessions that meet at a socket of their own, and closes all in the end."""
+class Network(network.Network):
+    """A network whose sessions are linked to all before them, with replicas of domain 0."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="rosz")
-        self.rendezvous = f"unixsock-stream/{Path(self._folder.name) / 'z'}"
-        self.sessions: list[Session] = []
-        self._open: list[Closable] = []
+        super().__init__(domain=0)
+        self._linked = 0
 
-    def session(self) -> Session:
-        """Open a session, linked to all before it."""
-        session = Session.open(SessionConfig(rendezvous=self.rendezvous))
-        self._open += [session, serve_links(session)]
-        if self.sessions:
+    def session(self, config: SessionConfig | None = None) -> Session:
+        """Return a session that is linked to all before it."""
+        session = super().session(config or SessionConfig(rendezvous=self.rendezvous))
+        self._keep(serve_links(session))
+        if self._linked:
             assert MeshReadiness(session, PATIENCE, threading.Event()).ready.wait(PATIENCE)
-        self.sessions.append(session)
+        self._linked += 1
         return session
 
     def command(self) -> Session:
-        """Open a session as commands do: a client of whoever is at the rendezvous."""
-        session = Session.open(
+        """Return a session as commands have it: a client of whoever is at the rendezvous."""
+        return super().session(
             SessionConfig(mode="client", rendezvous=self.rendezvous, must_connect=True)
         )
-        self._open.append(session)
-        return session
 
     def replica(self, domain: int = 0, **settings: Any) -> Replica:
-        """Open a session and join the store on it."""
+        """Return a replica on a session of its own."""
         return self.join(self.session(), domain, **settings)
 
     def join(self, session: Session, domain: int = 0, **settings: Any) -> Replica:
-        """Join the store on a session."""
-        replica = Replica(session, domain, **settings)
-        self._open.append(replica)
-        return replica
+        """Return a replica on a session."""
+        return self._keep(Replica(session, domain, **settings))
 
     def replicas(self, count: int) -> list[Replica]:
-        """Open replicas that all know each other."""
+        """Return replicas that all know each other."""
         found = [self.replica(label=f"r{index}") for index in range(count)]
         until(lambda: all(len(replica.members()) == count - 1 for replica in found))
         return found
 
     def keep(self, thing: Closable) -> None:
-        """Have something closed in the end."""
-        self._open.append(thing)
-
-    def close(self) -> None:
-        """Close everything, the latest first."""
-        for thing in reversed(self._open):
-            thing.close()
-        self._folder.cleanup()
+        """Close something at the end of the test."""
+        self._keep(thing)
 
 
-def until(condition: Callable[[], bool], seconds: float = PATIENCE) -> None:
-    """Wait for what has no event of its own."""
-    deadline = time.monotonic() + seconds
-    pause = threading.Event()
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to be in time"
-        pause.wait(0.002)
+def until(condition: Callable[[], bool]) -> None:
+    """Wait until a condition holds that has no event of its own."""
+    network.eventually(condition, "the condition of a test of parameters")
