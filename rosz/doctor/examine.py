@@ -86,7 +86,7 @@ def examine(examination: Examination) -> Iterator[Finding]:
     except TransportError as fault:
         yield warning(
             "nobody-there",
-            "nobody is on this network: there are no nodes to look at",
+            "no process is on this network: there are no nodes to examine",
             [str(fault)],
             "nothing, if nothing is meant to run; else start a launch, a node or 'rosz core'",
         )

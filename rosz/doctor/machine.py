@@ -118,7 +118,7 @@ def check_stopped(environment: Environment) -> Iterator[Finding]:
     ids = " ".join(map(str, stopped))
     yield error(
         "stopped-process",
-        "what is stopped, as by Ctrl-Z, hears nothing and answers nobody",
+        "stopped processes (Ctrl-Z) receive nothing and do not answer",
         (
             f"{describe_process(pid)}{held if pid == peers.stopped_holder else ''}"
             for pid in stopped

@@ -111,9 +111,9 @@ def check_unreadable(survey: Survey) -> Iterator[Finding]:
     if survey.damaged:
         yield error(
             "unreadable-tokens",
-            "something makes itself known in a form that is not rmw_zenoh's",
+            "liveliness tokens have a form that is not rmw_zenoh's",
             survey.damaged,
-            "update the rmw_zenoh of whoever does, or keep it off this network",
+            "update rmw_zenoh where they come from, or keep that off this network",
         )
 
 
@@ -148,14 +148,14 @@ def check_one_sided(survey: Survey) -> Iterator[Finding]:
     if unsaid:
         yield warning(
             "no-publisher",
-            "nodes wait for what nobody publishes or serves",
+            "nodes wait for topics or services that no node publishes or serves",
             _alone(survey, unsaid, unheard),
             "start who is missing, or correct the name or the remapping",
         )
     if unheard:
         yield warning(
             "no-subscriber",
-            "nodes publish what nobody subscribes to",
+            "nodes publish topics that no node subscribes to",
             _alone(survey, unheard, unsaid),
             "nothing, if that is meant; else start who is missing, or correct the name",
         )
@@ -167,7 +167,7 @@ def check_clock(survey: Survey) -> Iterator[Finding]:
     if ends and all(end.kind is Kind.SUBSCRIPTION for end in ends):
         yield error(
             "no-clock",
-            "nodes live in simulated time and nobody publishes /clock: their time stands still",
+            "nodes use simulated time and no node publishes /clock: their time stands still",
             sorted(_end(survey, end) for end in ends),
             "start the simulator; or, to live in real time, run"
             " 'rosz param set /use_sim_time false' and start them again",
@@ -249,7 +249,7 @@ def check_domains(session: Session, survey: Survey) -> Iterator[Finding]:
     if not survey.view.tokens:
         yield error(
             "wrong-domain",
-            f"nobody is in domain {survey.domain}, but there are nodes in others",
+            f"no node is in domain {survey.domain}, but there are nodes in others",
             _by_domain(others),
             remedy,
         )

@@ -96,7 +96,7 @@ class Echo:
         return self._yaml(value)
 
     def _yaml(self, value: Any) -> str:
-        from rosz.message.convert import strify_message
+        from rosz.message.text import strify_message
 
         offset = None
         if self._options.offset:

@@ -195,15 +195,17 @@ def query_node(
     key = control_key(node.domain, node.zid, node.node_id)
     replies = session.get(key, payload=msgspec.msgpack.encode(request), timeout=timeout)
     if not replies:
-        raise NotFoundError(f"node '{node.node_name}' takes no questions: it is no rosz node")
+        raise NotFoundError(
+            f"node '{node.node_name}' does not take requests: it is not a rosz node"
+        )
     reply = replies[0]
     if reply.ok:
         try:
             return msgspec.msgpack.decode(reply.payload, type=reply_type)
         except msgspec.MsgspecError as error:
             raise RoszError(
-                f"node '{node.node_name}' answers what makes no sense: {error}; is it of another"
-                " version of rosz?"
+                f"node '{node.node_name}' sends a reply that cannot be decoded: {error}; is it of"
+                " another version of rosz?"
             ) from error
     text = reply.payload.decode(errors="replace")
     if text == "Timeout":
@@ -213,7 +215,7 @@ def query_node(
 
 
 def get_info(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> NodeInfo:
-    """Return what a node tells about itself; errors as those of `query_node`."""
+    """Return the information that a node gives of itself; errors as those of `query_node`."""
     from rosz.node.control import NodeInfo, Request
 
     return query_node(session, node, Request("info"), NodeInfo, timeout)
@@ -269,7 +271,9 @@ def kill(session: Session, node: Token, reason: str) -> None:
         query_node(session, node, Request("shutdown", reason=reason), bool)
         if not gone.wait(_KILL_TIMEOUT):
             raise WaitTimeout(
-                f"end of node '{node.node_name}'", _KILL_TIMEOUT, "it was told, and goes on"
+                f"end of node '{node.node_name}'",
+                _KILL_TIMEOUT,
+                "it accepted the request, and goes on",
             )
     finally:
         watch.close()

@@ -312,7 +312,7 @@ class Message(msgspec.Struct, gc=False):
         return self._slot_types
 
     def __str__(self) -> str:
-        from rosz.message.convert import strify_message
+        from rosz.message.text import strify_message
 
         return strify_message(self)
 

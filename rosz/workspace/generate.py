@@ -17,13 +17,13 @@ _Sources = dict[Path, dict[str, str]]
 
 
 class Generator:
-    """Writes modules ``<package>/msg.py`` and ``<package>/srv.py``, or tells which are stale.
+    """Writes modules ``<package>/msg.py`` and ``<package>/srv.py``, or finds stale ones.
 
     Args:
-        index: Where packages are.
-        output: Folder to write below, dependencies included; when not given, each package's own
-            modules go to its ``src``.
-        cwd: The working folder.
+        index: Index of packages.
+        output: Folder to write to, dependencies included; None to write each package's own modules
+            to its ``src``.
+        cwd: Working folder.
     """
 
     def __init__(self, index: PackageIndex, output: Path | None, cwd: Path) -> None:
@@ -32,30 +32,30 @@ class Generator:
         self._cwd = cwd
 
     def stale(self, words: list[str]) -> list[str]:
-        """Return what differs between the modules there are and what they should be.
+        """Return the differences between the modules on disk and what they should be.
 
         Args:
-            words: Names or folders of packages. With none, the package around the working folder;
-                in rosz's own source tree, the modules that it ships.
+            words: Names or folders of packages. If empty, the package around the working folder,
+                or, in rosz's own source tree, the modules that it ships.
 
         Raises:
             DefinitionError: A definition is not well-formed.
-            NotFoundError: There is no such package, or it has no definitions.
+            NotFoundError: A package does not exist, or has no definitions.
             UsageError: No package is given, and the working folder is in none.
         """
         found = self._sources(words)
         return [line for folder, files in found.items() for line in stale(files, folder)]
 
     def write(self, words: list[str]) -> list[Path]:
-        """Write the modules, and return the files; the arguments and errors are those of `stale`.
+        """Write the modules, and return their files; arguments and errors as those of `stale`.
 
         Raises:
-            UsageError: Also when a file that a person wrote is in the way.
+            UsageError: Also if a file that was not generated is in the way.
         """
         found = self._sources(words)
         for folder, files in found.items():
             for name in files:
-                _check_ours(folder / name)
+                _check_generated(folder / name)
         for folder, files in found.items():
             write(files, folder)
         return [folder / name for folder, files in found.items() for name in sorted(files)]
@@ -87,19 +87,19 @@ class Generator:
 
 
 def _find(index: PackageIndex, name: str, folder: Path) -> Package:
-    """Return a package by its name; a folder or file of that name may have been meant."""
+    """Return a package by its name, with a better error where a folder has that name."""
     try:
         return index.find(name)
     except PackageNotFound as error:
         if not folder.exists():
             raise
         raise NotFoundError(
-            f"'{folder}' is no package: it has no {MANIFEST}; 'rosz pkg create NAME' makes one"
+            f"'{folder}' is not a package: it has no {MANIFEST}; 'rosz pkg create NAME' makes one"
         ) from error
 
 
 def _sources(index: PackageIndex, name: str) -> dict[str, dict[str, str]]:
-    """Return the sources of a package and of what it depends on."""
+    """Return the sources of a package and of the packages that it depends on."""
     try:
         return TypeStore(index).sources([name])
     except TypeNotFound as error:
@@ -108,6 +108,8 @@ def _sources(index: PackageIndex, name: str) -> dict[str, dict[str, str]]:
         raise NotFoundError(text) from error
 
 
-def _check_ours(file: Path) -> None:
+def _check_generated(file: Path) -> None:
     if file.is_file() and not file.read_text("utf-8").startswith(MARKER):
-        raise UsageError(f"'{file}' was not generated: it stays; choose a folder with -o")
+        raise UsageError(
+            f"'{file}' was not generated, and is not overwritten; choose a folder with -o"
+        )

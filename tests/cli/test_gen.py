@@ -80,7 +80,7 @@ def test_files_written_by_hand_stay(shell: Shell, package: Path) -> None:
     (folder / "msg.py").write_text("mine = 2\n")
     result = shell("gen", "counting")
     assert result.code == 2
-    assert f"'{folder / 'msg.py'}' was not generated: it stays" in result.err
+    assert f"'{folder / 'msg.py'}' was not generated, and is not overwritten" in result.err
     assert (folder / "msg.py").read_text() == "mine = 2\n"
 
 
@@ -125,4 +125,4 @@ def test_a_folder_or_file_that_is_no_package(shell: Shell, name: str) -> None:
     (shell.network.folder / "file").touch()
     done = shell("gen", str(shell.network.folder / name))
     assert done.code == 1
-    assert f"'{shell.network.folder / name}' is no package: it has no package.xml; " in done.err
+    assert f"'{shell.network.folder / name}' is not a package: it has no package.xml; " in done.err

@@ -98,7 +98,7 @@ def test_quiet_info_asks_nobody(shell: Shell, foreign: str) -> None:
 
 @pytest.mark.usefixtures("talker")
 def test_info_of_what_takes_no_questions(shell: Shell, foreign: str) -> None:
-    assert "node '/foreign' takes no questions: it is no rosz node" in (
+    assert "node '/foreign' does not take requests: it is not a rosz node" in (
         shell("node", "info", foreign).out
     )
 
@@ -200,7 +200,9 @@ def test_kill_all(shell: Shell, network: Network) -> None:
 def test_kill_of_what_takes_no_wishes(shell: Shell, foreign: str) -> None:
     result = shell("node", "kill", foreign)
     assert result.code == 1
-    assert "ERROR: Failed to kill:\n * /foreign: node '/foreign' takes no questions" in result.err
+    assert (
+        "ERROR: Failed to kill:\n * /foreign: node '/foreign' does not take requests" in result.err
+    )
 
 
 @pytest.mark.usefixtures("talker")

@@ -1,4 +1,4 @@
-"""Nodes that answer what makes no sense are told by name."""
+"""A reply that cannot be decoded is an error that names the node."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rosz.wire import Kind, Token
 NUMBER = 99
 
 
-def test_an_answer_that_makes_no_sense(network: Network) -> None:
+def test_a_reply_that_cannot_be_decoded(network: Network) -> None:
     session = network.context().session
     key = control_key(network.domain, session.zid, NUMBER)
 
@@ -27,6 +27,6 @@ def test_an_answer_that_makes_no_sense(network: Network) -> None:
     token = Token(network.domain, session.zid, NUMBER, NUMBER, Kind.NODE, "/", "odd")
     with (
         closing(session.queryable(key, answer)),
-        pytest.raises(RoszError, match=r"node '/odd' answers what makes no sense: .*version"),
+        pytest.raises(RoszError, match=r"'/odd' sends a reply that cannot be decoded: .*version"),
     ):
         get_info(network.context().session, token)

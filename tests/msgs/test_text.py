@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from rosz.errors import EncodeError
 from rosz.message import Message
-from rosz.message.convert import fill_message_args, strify_message
+from rosz.message.convert import fill_message_args
+from rosz.message.text import strify_message
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import PoseStamped, Twist
 from rosz.msgs.std_msgs.msg import Char, Header, String, UInt8MultiArray

@@ -1,0 +1,121 @@
+"""Messages as the YAML text that ``rostopic echo`` and ``print`` show.
+
+It is line for line the text of genpy's ``strify_message``, so that scripts which read it keep
+working.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import yaml
+
+__all__ = ("FieldFilter", "strify_message")
+
+FieldFilter = Callable[[Any], Iterable[str]]
+"""Function that returns the names of the fields of a message to show."""
+
+_PLAIN = re.compile(r"[ !#-\[\]-~]{1,60}")
+_TIME = "builtin_interfaces/Time"
+_STAMPS = frozenset({_TIME, "builtin_interfaces/Duration"})
+
+
+def strify_message(
+    val: Any,
+    indent: str = "",
+    time_offset: Any = None,
+    current_time: Any = None,  # noqa: ARG001  # genpy ignores it too
+    field_filter: FieldFilter | None = None,
+    fixed_numeric_width: int | None = None,
+) -> str:
+    """Return a message, or a value of a field, as text.
+
+    Args:
+        val: The value.
+        indent: Indentation of the lines.
+        time_offset: A Time that times are shown relative to.
+        current_time: Not used.
+        field_filter: Function that returns the names of the fields of a message to show.
+        fixed_numeric_width: Width of numbers in characters; their own when not given.
+    """
+    return _Writer(time_offset, field_filter, fixed_numeric_width).value(val, indent)
+
+
+class _Writer:
+    def __init__(
+        self, time_offset: Any, field_filter: FieldFilter | None, width: int | None
+    ) -> None:
+        self._offset = time_offset
+        self._filter = field_filter
+        self._width = width
+
+    def value(self, value: Any, indent: str) -> str:  # noqa: PLR0911  # one per kind of value
+        if isinstance(value, bool):
+            return str(value)
+        if isinstance(value, int | float):
+            return self._number(value)
+        if isinstance(value, str):
+            return _quoted(value)
+        if getattr(value, "_type", None) in _STAMPS:
+            return self._stamp(value, indent)
+        if hasattr(value, "_schema"):
+            return self._message(value, indent)
+        if isinstance(value, bytes | bytearray | array | list | tuple) or hasattr(value, "tolist"):
+            return self._list(_plain_list(value), indent)
+        return str(value)
+
+    def _number(self, value: float) -> str:
+        if self._width is None:
+            return str(value)
+        if isinstance(value, float):
+            text = f"{value:.{self._width}f}"
+            return text[: max(text.find("."), self._width)]
+        return f"{value:{self._width}d}"
+
+    def _stamp(self, value: Any, indent: str) -> str:
+        if self._offset is not None and value._type == _TIME:
+            value = value - self._offset
+        width = self._width
+        secs = str(value.sec) if width is None else f"{value.sec:{width}d}"
+        nsecs = f"{value.nanosec:{9 if width is None else width}d}"
+        return f"\n{indent}secs: {secs}\n{indent}nsecs: {nsecs}"
+
+    def _list(self, values: list[Any], indent: str) -> str:
+        if not values:
+            return "[]"
+        first = values[0]
+        if isinstance(first, str):
+            text = yaml.dump(values).rstrip("\n")
+            return "\n" + "\n".join(indent + line for line in text.splitlines())
+        if self._width is not None and type(first) in (int, float):
+            return f"[{', '.join(self._number(number) for number in values)}]"
+        if isinstance(first, int | float):
+            return str(values)
+        return "\n" + "\n".join(f"{indent}- {self.value(one, indent + '  ')}" for one in values)
+
+    def _message(self, value: Any, indent: str) -> str:
+        names = type(value).__slots__
+        if self._filter is not None:
+            wanted = set(self._filter(value))
+            names = tuple(name for name in names if name in wanted)
+        lines = (
+            f"{indent}{name}: {self.value(getattr(value, name), '  ' + indent)}" for name in names
+        )
+        return ("\n" if indent else "") + "\n".join(lines)
+
+
+def _plain_list(value: Any) -> list[Any]:
+    plain: list[Any] = value.tolist() if hasattr(value, "tolist") else list(value)
+    return plain
+
+
+def _quoted(value: str) -> str:
+    if not value:
+        return "''"
+    if _PLAIN.fullmatch(value):
+        return f'"{value}"'
+    text: str = yaml.dump(value, default_style='"')
+    return text.rstrip("\n")
