@@ -77,7 +77,7 @@ def open_context(
     context = Context(environment, argv)
     try:
         _wait_for_peers(context.session, environment)
-        context.settled.wait(_READY_TIMEOUT)
+        context.mesh.ready.wait(_READY_TIMEOUT)
     except BaseException:
         context.close()
         raise

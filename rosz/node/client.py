@@ -166,7 +166,7 @@ class Client(Entity):
         """Make sure that the service is served, waiting while the process is still joining."""
         self.check_open("call")
         context = self.node.context
-        context.settled.wait(min(limit, _GRACE))
+        context.mesh.ready.wait(min(limit, _GRACE))
         if self._is_served():
             return
         view = context.graph.refresh(min(limit, _GRACE))

@@ -49,8 +49,7 @@ class Context:
         session: The session.
         graph: The graph of the domain.
         clock: ROS time.
-        settled: Event, set when the process is linked to all its neighbours.
-        when_settled: Function that calls another one when that is so, or at once if it is already.
+        mesh: Whether the process is linked to all its neighbours yet.
         direct_delivery: Samples for single subscriptions of this process.
         incompatible: Warnings about entities that cannot reach each other.
         passing: Whether this is a command, which holds no parameters, rather than a node.
@@ -62,7 +61,7 @@ class Context:
         UsageError: A variable of the environment has an invalid value.
     """
 
-    SETTLED_BY = 2.0
+    MESH_TIMEOUT = 2.0
     """Seconds after which a new session counts as linked to all its neighbours in any case."""
 
     def __init__(
@@ -101,15 +100,13 @@ class Context:
         self.graph = Graph(self.session, self.domain)
         self.incompatible = IncompatibleEntities(self.graph, self.session.zid)
         self.direct_delivery = DirectDelivery(self.session, self.domain)
-        mesh = MeshReadiness(
+        self.mesh = MeshReadiness(
             self.session,
-            0 if alone or self.passing else self.SETTLED_BY,
+            0 if alone or self.passing else self.MESH_TIMEOUT,
             self._flushed,
             mesh=config.mode == "peer",
             everywhere=config.multicast,
         )
-        self.settled = mesh.ready
-        self.when_settled = mesh.when_ready
         if config.mode == "peer":
             self._links = serve_links(self.session)
 
@@ -151,7 +148,7 @@ class Context:
         from rosz.params.replica import Replica
 
         self.check_open()
-        self._params = replica = Replica(self.session, self.domain, settled=self.settled)
+        self._params = replica = Replica(self.session, self.domain, settled=self.mesh.ready)
         if self._lifecycle.closing:  # perhaps too late for the thread that closes the context
             self._params = None
             replica.close()

@@ -79,10 +79,12 @@ class Publisher(Entity, Generic[M]):
             cache=qos.depth if qos.latched else 0,
         )
         self._put = self._raw.put
-        self._held: list[tuple[bytes, bytes]] | None = None if node.context.settled.is_set() else []
+        self._held: list[tuple[bytes, bytes]] | None = (
+            None if node.context.mesh.ready.is_set() else []
+        )
         self.announce()
         if self._held is not None:
-            node.context.when_settled(self._release)
+            node.context.mesh.when_ready(self._release)
 
     def publish(self, *args: Any, **fields: Any) -> None:
         """Send a message: one of the topic's type, or the values of its fields.
@@ -168,7 +170,7 @@ class Publisher(Entity, Generic[M]):
     def _finish(self) -> None:
         context = self.node.context
         if self._held:
-            context.settled.wait(context.SETTLED_BY)
+            context.mesh.ready.wait(context.MESH_TIMEOUT)
         if self._held is not None:
             self._release()
         # Zenoh's handle refuses to be undeclared while another thread is inside its put.

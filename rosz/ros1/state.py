@@ -193,7 +193,7 @@ def ready_context() -> Context:
         TransportError: The session cannot be opened.
     """
     opened = context()
-    opened.settled.wait(_READY_SECONDS)
+    opened.mesh.ready.wait(_READY_SECONDS)
     return opened
 
 

@@ -33,7 +33,7 @@ def node(network: Network) -> Node:
 
 @pytest.fixture
 def plain(network: Network, node: Node) -> Iterator[Plain]:
-    assert node.context.settled.is_set()
+    assert node.context.mesh.ready.is_set()
     with plain_session(network.rendezvous) as session:
         yield session
 
@@ -227,7 +227,7 @@ def test_answers_about_links(network: Network, plain: Plain) -> None:
 
     network.thread(lie)
     newcomer = network.node("newcomer")
-    assert newcomer.context.settled.wait(PATIENCE)
+    assert newcomer.context.mesh.ready.wait(PATIENCE)
     lies.put(None)  # type: ignore[arg-type]  # the end
 
 

@@ -181,7 +181,7 @@ def test_latched_cache(network: Network, plain: Plain) -> None:
     publisher = node.publisher("map", String, qos=QoS(depth=2, durability="transient_local"))
     for text in ("one", "two", "three"):
         publisher.publish(text)
-    node.context.settled.wait(PATIENCE)
+    node.context.mesh.ready.wait(PATIENCE)
     zid = node.context.session.zid
 
     def ask() -> list[zenoh.Reply]:

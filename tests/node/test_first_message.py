@@ -40,7 +40,7 @@ def test_published_once_by_a_program_that_ends(network: Network, kind: str) -> N
     got: SimpleQueue[str] = SimpleQueue()
     listener = network.node("listener")
     listener.subscription("chatter", String, lambda m: got.put(m.data))
-    listener.context.settled.wait(PATIENCE)
+    listener.context.mesh.ready.wait(PATIENCE)
     lost = []
     for number in range(repeats(10, 1000)):
         program = network.program(ONE_SHOT, str(number), kind)
@@ -77,7 +77,7 @@ def test_order_of_what_is_held(network: Network, monkeypatch: pytest.MonkeyPatch
     publisher = talker.publisher("chatter", String)
     for number in range(500):
         publisher.publish(str(number))
-    assert talker.context.settled.wait(PATIENCE)
+    assert talker.context.mesh.ready.wait(PATIENCE)
     publisher.publish("500")
     assert [got.get(timeout=PATIENCE) for _ in range(501)] == [(str(n), n + 1) for n in range(501)]
 
@@ -92,7 +92,7 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(
         MeshReadiness, "_neighbours", lambda *_: set() if linked.is_set() else strangers
     )
-    monkeypatch.setattr(Context, "SETTLED_BY", PATIENCE)
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", PATIENCE)
     publisher = network.node("talker").publisher("chatter", String)
     for number in range(1500):
         publisher.publish(str(number))
@@ -106,7 +106,7 @@ def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.Monkey
     subscription = network.node("listener").subscription("chatter", String)
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)
     monkeypatch.setattr(MeshReadiness, "_neighbours", lambda *_: {"somebody who is never linked"})
-    monkeypatch.setattr(Context, "SETTLED_BY", 1.0)
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", 1.0)
     began = time.monotonic()
     network.node("talker").publisher("chatter", String).publish("hello")
     assert subscription.get().data == "hello"
@@ -116,4 +116,4 @@ def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.Monkey
 def test_nobody_else_no_wait(network: Network) -> None:
     """The first process has no peer to wait for."""
     talker = network.node("talker")
-    assert talker.context.settled.is_set()
+    assert talker.context.mesh.ready.is_set()
