@@ -1,4 +1,4 @@
-"""The classes of an action, and when a goal is over."""
+"""The message classes of an action, and the kinds of goal states."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import msgspec
 from rosz.errors import UsageError
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 
-__all__ = ("TERMINAL", "ActionTypes", "seconds_of")
+__all__ = ("RUNNING", "TERMINAL", "ActionTypes")
+
+RUNNING = frozenset({GoalStatus.ACTIVE, GoalStatus.PREEMPTING})
+"""States of a goal that the server is executing."""
 
 TERMINAL = frozenset({
     GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED,
@@ -19,13 +22,13 @@ TERMINAL = frozenset({
 
 
 class ActionTypes(msgspec.Struct, frozen=True):
-    """Classes of the messages of an action.
+    """The message classes of an action.
 
     Attributes:
-        action_goal: What carries a goal.
-        action_result: What carries a result.
-        action_feedback: What carries feedback.
-        result: The result itself.
+        action_goal: Class of the messages on ``goal``.
+        action_result: Class of the messages on ``result``.
+        action_feedback: Class of the messages on ``feedback``.
+        result: Class of the result itself.
     """
 
     action_goal: type[Any]
@@ -34,16 +37,16 @@ class ActionTypes(msgspec.Struct, frozen=True):
     result: type[Any]
 
     @classmethod
-    def of(cls, spec: type[Any]) -> ActionTypes:
-        """Return the classes of an action.
+    def of(cls, action_type: type[Any]) -> ActionTypes:
+        """Return the message classes of an action.
 
         Args:
-            spec: Its class, ``DoAction``.
+            action_type: Class of the action, such as ``FibonacciAction``.
 
         Raises:
-            UsageError: It is no such class.
+            UsageError: The class is not that of an action.
         """
-        whole = spec()
+        whole = action_type()
         try:
             goal, result, feedback = (
                 whole.action_goal, whole.action_result, whole.action_feedback
@@ -51,12 +54,5 @@ class ActionTypes(msgspec.Struct, frozen=True):
             return cls(type(goal), type(result), type(feedback), type(result.result))
         except AttributeError as error:
             raise UsageError(
-                f"{spec.__name__} is no action; expected a class such as FibonacciAction"
+                f"{action_type.__name__} is not an action; expected a class such as FibonacciAction"
             ) from error
-
-
-def seconds_of(duration: Any) -> float:
-    """Return a duration, or a number of seconds, as seconds; 0 for None."""
-    if duration is None:
-        return 0.0
-    return float(duration.to_sec()) if hasattr(duration, "to_sec") else float(duration)

@@ -1,0 +1,21 @@
+"""Actions: goals that take time, give feedback, can be cancelled and end with a result.
+
+The protocol is that of actionlib: five topics below the name of the action (``goal``, ``cancel``,
+``status``, ``feedback``, ``result``) and the goal states of ``actionlib_msgs/GoalStatus``. `types`
+holds the message classes of an action and the kinds of states, `client` sends goals, `server`
+executes them one at a time. May import nodes and everything below them.
+"""
+
+from rosz.actions.client import ActionClient, ClientGoal
+from rosz.actions.server import ActionServer, ServerGoal
+from rosz.actions.types import RUNNING, TERMINAL, ActionTypes
+
+__all__ = (
+    "RUNNING",
+    "TERMINAL",
+    "ActionClient",
+    "ActionServer",
+    "ActionTypes",
+    "ClientGoal",
+    "ServerGoal",
+)

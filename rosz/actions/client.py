@@ -1,0 +1,249 @@
+"""Action clients, which send goals and follow their states."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rosz.actions.types import RUNNING, TERMINAL, ActionTypes
+from rosz.errors import WaitTimeout
+from rosz.graph import View
+from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.std_msgs.msg import Header
+from rosz.node import Node
+
+__all__ = ("ActionClient", "ClientGoal")
+
+_FOREVER = threading.TIMEOUT_MAX / 2
+_CHECK_PERIOD = 0.1
+"""Seconds after which a wait looks at the node's clock, which may be simulated."""
+
+_EXECUTED = frozenset({GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.PREEMPTED})
+"""Terminal states of goals that were executed."""
+
+_numbers = itertools.count(1)
+
+
+class ClientGoal:
+    """A goal that was sent; see `ActionClient.send`.
+
+    Attributes:
+        id: Identification of the goal in messages.
+        status: Last known state, with the text of the server.
+        result: Result of the goal; None while there is none.
+        started: Whether the server has begun to execute the goal.
+    """
+
+    def __init__(
+        self,
+        client: ActionClient,
+        goal_id: GoalID,
+        on_done: Callable[[ClientGoal], object] | None,
+        on_active: Callable[[], object] | None,
+        on_feedback: Callable[[Any], object] | None,
+    ) -> None:
+        self.id: GoalID = goal_id
+        self.status: GoalStatus = GoalStatus(goal_id, GoalStatus.PENDING)
+        self.result: Any = None
+        self.started: bool = False
+        self._client = client
+        self._on_done = on_done
+        self._on_active = on_active
+        self._on_feedback = on_feedback
+        self._lock = threading.Lock()
+        self._listed = False
+        self._done = threading.Event()
+
+    @property
+    def done(self) -> bool:
+        """Whether the goal has ended."""
+        return self._done.is_set()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the goal has ended or the node is shut down.
+
+        Args:
+            timeout: Time limit in seconds of the node's clock; none when not given or 0.
+
+        Returns:
+            Whether the goal has ended.
+        """
+        node = self._client.node
+        limit = round((timeout or _FOREVER) * 1e9)
+        began = node.now()
+        while not self._done.wait(_CHECK_PERIOD):
+            if node.is_shutdown or node.now() - began >= limit:
+                return self.done
+        return True
+
+    def cancel(self) -> None:
+        """Ask the server to cancel the goal."""
+        self._client.publish_cancel(GoalID(Time(), self.id.id))
+
+    def forget(self) -> None:
+        """Stop following the goal; the server continues with it."""
+        self._client.forget(self)
+
+    def update(self, statuses: list[GoalStatus]) -> None:
+        """Take the state of the goal from a status message."""
+        if self.done:
+            return
+        for status in statuses:
+            if status.goal_id.id == self.id.id:
+                self._listed = True
+                self._advance(status)
+                return
+        if self._listed:  # a server that no longer knows the goal was restarted
+            text = "the server does not know the goal any more"
+            self.finish(GoalStatus(self.id, GoalStatus.LOST, text), None)
+
+    def _advance(self, status: GoalStatus) -> None:
+        with self._lock:
+            if self.done or status.status in TERMINAL:
+                return  # the end comes with the result message
+            self.status = status
+            starts = not self.started and status.status in RUNNING
+            self.started = self.started or starts
+        if starts:
+            self._call(self._on_active)
+
+    def receive_feedback(self, feedback: Any) -> None:
+        """Pass feedback on."""
+        if not self.done:
+            self._call(self._on_feedback, feedback)
+
+    def finish(self, status: GoalStatus, result: Any) -> None:
+        """End the goal with a terminal state and a result."""
+        with self._lock:
+            if self.done:
+                return
+            starts = not self.started and status.status in _EXECUTED
+            self.started = self.started or starts
+            self.status, self.result = status, result
+        if starts:
+            self._call(self._on_active)
+        self._call(self._on_done, self)
+        self._done.set()
+        self.forget()
+
+    def _call(self, callback: Callable[..., object] | None, *arguments: Any) -> None:
+        if callback is None:
+            return
+        try:
+            callback(*arguments)
+        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+            client = self._client
+            client.node.log.report(f"callback of action '{client.name}' failed", error)
+
+
+class ActionClient:
+    """Send goals to an action server.
+
+    Args:
+        node: Node that the client belongs to.
+        name: Name of the action; resolved and remapped.
+        action_type: Class of the action, such as ``FibonacciAction``.
+
+    Attributes:
+        node: As given.
+        name: Full name of the action.
+
+    Raises:
+        UsageError: The class is not that of an action.
+    """
+
+    def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
+        self._types = types = ActionTypes.of(action_type)
+        self.node: Node = node
+        self.name: str = node.resolve(name)
+        self._goals: dict[str, ClientGoal] = {}
+        self._goal_publisher = node.publisher(f"{self.name}/goal", types.action_goal)
+        self._cancel_publisher = node.publisher(f"{self.name}/cancel", GoalID)
+        self._subscriptions = [
+            node.subscription(f"{self.name}/status", GoalStatusArray, self._receive_status),
+            node.subscription(
+                f"{self.name}/feedback", types.action_feedback, self._receive_feedback
+            ),
+            node.subscription(f"{self.name}/result", types.action_result, self._receive_result),
+        ]
+
+    def wait_for_server(self, timeout: float | None = None) -> bool:
+        """Wait until a server of the action is connected.
+
+        Args:
+            timeout: Time limit in seconds; none when not given or 0.
+
+        Returns:
+            Whether one is.
+        """
+        topics = [f"{self.name}/{topic}" for topic in ("status", "feedback", "result")]
+
+        def is_connected(view: View) -> bool:
+            return all(view.publishers(topic) for topic in topics) and all(
+                publisher.subscribers()
+                for publisher in (self._goal_publisher, self._cancel_publisher)
+            )
+
+        graph = self.node.context.graph
+        try:
+            graph.wait_for(is_connected, timeout or _FOREVER, f"action server '{self.name}'")
+        except WaitTimeout:
+            return False
+        return True
+
+    def send(
+        self,
+        goal: Any,
+        *,
+        on_done: Callable[[ClientGoal], object] | None = None,
+        on_active: Callable[[], object] | None = None,
+        on_feedback: Callable[[Any], object] | None = None,
+    ) -> ClientGoal:
+        """Send a goal.
+
+        Args:
+            goal: The goal message, such as a ``FibonacciGoal``.
+            on_done: Function called with the goal when it has ended.
+            on_active: Function called when the server begins to execute the goal.
+            on_feedback: Function called with each feedback message.
+
+        Returns:
+            The goal, which is followed until it has ended or is forgotten.
+        """
+        now = Time(*divmod(self.node.now(), 10**9))
+        number = next(_numbers)
+        goal_id = GoalID(now, f"{self.node.name}-{number}-{now.sec}.{now.nanosec:09d}")
+        sent = ClientGoal(self, goal_id, on_done, on_active, on_feedback)
+        self._goals[goal_id.id] = sent
+        self._goal_publisher.publish(self._types.action_goal(Header(stamp=now), goal_id, goal))
+        return sent
+
+    def publish_cancel(self, goal_id: GoalID) -> None:
+        """Ask the server to cancel goals.
+
+        Args:
+            goal_id: Identification of a goal; a time instead cancels all goals sent until then,
+                and an empty one cancels all goals, including those of other clients.
+        """
+        self._cancel_publisher.publish(goal_id)
+
+    def forget(self, goal: ClientGoal) -> None:
+        """Stop following a goal; see `ClientGoal.forget`."""
+        self._goals.pop(goal.id.id, None)
+
+    def _receive_status(self, message: GoalStatusArray) -> None:
+        for goal in list(self._goals.values()):
+            goal.update(message.status_list)
+
+    def _receive_feedback(self, message: Any) -> None:
+        goal = self._goals.get(message.status.goal_id.id)
+        if goal is not None:
+            goal.receive_feedback(message.feedback)
+
+    def _receive_result(self, message: Any) -> None:
+        goal = self._goals.get(message.status.goal_id.id)
+        if goal is not None:
+            goal.finish(message.status, message.result)

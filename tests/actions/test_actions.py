@@ -1,0 +1,195 @@
+"""Actions through the native API: goals, their states and callbacks, over a network."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from network import Network
+
+from rosz.actions import ActionClient, ActionServer, ActionTypes, ClientGoal
+from rosz.errors import UsageError
+from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
+from rosz.msgs.std_msgs.msg import String
+from rosz.packages import PackageIndex
+from rosz.typestore import TypeStore
+
+TIMEOUT = 15.0
+
+
+class Count:
+    """The classes of an action that is compiled from its definition."""
+
+    def __init__(self, folder: Path) -> None:
+        package = folder / "counting"
+        (package / "action").mkdir(parents=True)
+        (package / "action" / "Count.action").write_text(
+            "int32 top\n---\nint32 sum\n---\nint32 now\n"
+        )
+        (package / "package.xml").write_text("<package><name>counting</name></package>")
+        store = TypeStore(PackageIndex([folder]))
+        self.action: Any = store.message("counting/CountAction")
+        self.goal: Any = store.message("counting/CountGoal")
+        self.result: Any = store.message("counting/CountResult")
+        self.feedback: Any = store.message("counting/CountFeedback")
+
+
+class World:
+    """A server that is driven by the test, and a client."""
+
+    def __init__(self, network: Network) -> None:
+        self.count = Count(network.folder / "src")
+        self.server_node, self.client_node = network.node("server"), network.node("client")
+
+    def server(self, execute: Any = None) -> ActionServer:
+        server = ActionServer(self.server_node, "count", self.count.action, execute)
+        server.start()
+        return server
+
+    def client(self) -> ActionClient:
+        client = ActionClient(self.client_node, "count", self.count.action)
+        assert client.wait_for_server(TIMEOUT)
+        return client
+
+
+@pytest.fixture
+def world(network: Network) -> World:
+    return World(network)
+
+
+def test_a_goal_from_start_to_end(world: World) -> None:
+    count = world.count
+    events: list[Any] = []
+
+    def execute(goal: Any) -> None:
+        server.publish_feedback(count.feedback(goal.top))
+        server.set_succeeded(count.result(goal.top + 1), "counted")
+
+    server = world.server(execute)
+
+    def on_done(goal: ClientGoal) -> None:
+        events.append(("done", goal.status.status, goal.result.sum))
+
+    goal = world.client().send(
+        count.goal(4),
+        on_done=on_done,
+        on_active=lambda: events.append("active"),
+        on_feedback=lambda feedback: events.append(feedback.now),
+    )
+    assert goal.wait(TIMEOUT)
+    assert (goal.done, goal.started, goal.status.text) == (True, True, "counted")
+    assert sorted(events, key=str) == [("done", GoalStatus.SUCCEEDED, 5), 4, "active"]
+    assert not server.is_active()
+
+
+def test_a_client_follows_several_goals(world: World) -> None:
+    server = world.server()
+    server.on_goal = server.accept_new_goal
+    client = world.client()
+    first = client.send(world.count.goal(1))
+    second = client.send(world.count.goal(2))
+    assert first.wait(TIMEOUT)
+    assert first.status.status == GoalStatus.PREEMPTED
+    assert not second.done
+    server.set_aborted(text="enough")
+    assert second.wait(TIMEOUT)
+    assert (second.status.status, second.status.text) == (GoalStatus.ABORTED, "enough")
+    assert second.result == world.count.result()
+
+
+def test_a_goal_that_waits_is_recalled_by_a_newer_one(world: World) -> None:
+    server = world.server()
+    client = world.client()
+    first, second = client.send(world.count.goal(1)), client.send(world.count.goal(2))
+    assert first.wait(TIMEOUT)
+    assert (first.status.status, first.started) == (GoalStatus.RECALLED, False)
+    assert server.next_goal.goal.top == 2
+    assert not second.done
+
+
+@pytest.mark.parametrize("everything", [False, True])
+def test_cancelling(world: World, everything: bool) -> None:
+    server = world.server()
+    server.on_goal = server.accept_new_goal
+    server.on_preempt = lambda: server.set_preempted(world.count.result(7), "stopped")
+    client = world.client()
+    active = threading.Event()
+    goal = client.send(world.count.goal(1), on_active=active.set)
+    assert active.wait(TIMEOUT)
+    if everything:
+        client.publish_cancel(GoalID())
+    else:
+        goal.cancel()
+    assert goal.wait(TIMEOUT)
+    assert (goal.status.status, goal.result.sum) == (GoalStatus.PREEMPTED, 7)
+    assert server.is_preempt_requested()
+
+
+def test_a_forgotten_goal_is_not_followed(world: World) -> None:
+    server = world.server()
+    accepted = threading.Event()
+    calls: list[ClientGoal] = []
+
+    def accept() -> None:
+        server.accept_new_goal()
+        accepted.set()
+
+    server.on_goal = accept
+    client = world.client()
+    forgotten = client.send(world.count.goal(1), on_done=calls.append)
+    forgotten.forget()
+    assert accepted.wait(TIMEOUT)
+    server.set_succeeded()
+    accepted.clear()
+    followed = client.send(world.count.goal(2))
+    assert accepted.wait(TIMEOUT)
+    server.set_succeeded()
+    assert followed.wait(TIMEOUT)
+    assert (calls, forgotten.done) == ([], False)
+
+
+def test_a_goal_unknown_to_a_restarted_server_is_lost(world: World) -> None:
+    server = world.server()
+    active = threading.Event()
+    server.on_goal = server.accept_new_goal
+    goal = world.client().send(world.count.goal(1), on_active=active.set)
+    assert active.wait(TIMEOUT)
+    world.server()  # publishes a status without goals
+    assert goal.wait(TIMEOUT)
+    assert goal.status.status == GoalStatus.LOST
+    assert "does not know" in goal.status.text
+
+
+def test_callbacks_that_fail_do_not_stop_a_goal(world: World) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("no")
+
+    server = world.server(fail)
+    server.on_goal = fail
+    goal = world.client().send(world.count.goal(1), on_done=fail, on_active=fail)
+    assert goal.wait(TIMEOUT)
+    assert goal.status.status == GoalStatus.ABORTED
+    assert goal.status.text == "Exception in execute callback: no"
+
+
+def test_an_execution_without_a_final_state_is_aborted(world: World) -> None:
+    world.server(lambda _: None)
+    goal = world.client().send(world.count.goal(1))
+    assert goal.wait(TIMEOUT)
+    assert (goal.status.status, goal.status.text) == (
+        GoalStatus.ABORTED,
+        "No terminal state was set.",
+    )
+
+
+def test_waiting_has_limits(world: World) -> None:
+    client = ActionClient(world.client_node, "count", world.count.action)
+    assert not client.wait_for_server(0.01)
+    assert not client.send(world.count.goal(1)).wait(0.01)
+
+
+def test_only_actions_are_accepted() -> None:
+    with pytest.raises(UsageError, match="String is not an action"):
+        ActionTypes.of(String)
