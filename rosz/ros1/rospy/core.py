@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any
 from urllib.parse import urlparse
 
 from rosz.node.signals import of_program
@@ -294,16 +294,6 @@ _BASE = "rosout"
 _CALLER = 3
 
 
-class _Log(Protocol):
-    def __call__(self, msg: object, *args: object, **kwargs: Any) -> None:
-        """Log a message."""
-
-
-class _ThrottledLog(Protocol):
-    def __call__(self, period: float, msg: object, *args: object, **kwargs: Any) -> None:
-        """Log a message at most once in a period of seconds."""
-
-
 def _write(level: int, msg: object, args: tuple[object, ...], options: dict[str, Any]) -> None:
     """Log on behalf of the caller of the calling function."""
     child = options.pop("logger_name", None)
@@ -326,14 +316,14 @@ def _apply_python_level() -> None:
         state.node.log.setLevel(level)
 
 
-def _log(level: int, **fixed: bool) -> _Log:
+def _log(level: int, **fixed: bool) -> Callable[..., None]:
     def log(msg: object, *args: object, **kwargs: Any) -> None:
         _write(level, msg, args, {**kwargs, **fixed})
 
     return log
 
 
-def _throttled(level: int, option: str) -> _ThrottledLog:
+def _throttled(level: int, option: str) -> Callable[..., None]:
     def log(period: float, msg: object, *args: object, **kwargs: Any) -> None:
         _write(level, msg, args, {**kwargs, option: float(period)})
 
