@@ -26,8 +26,6 @@ from rosz.reconfigure.messages import (
 )
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rosz.graph import View
     from rosz.node import Node
 
@@ -279,12 +277,7 @@ class Client:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:

@@ -23,8 +23,6 @@ from rosz.reconfigure.messages import (
 )
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rosz.node import Node
     from rosz.params.replica import Changed
 
@@ -201,12 +199,7 @@ class Server:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:

@@ -18,7 +18,7 @@ from rosz.ros2.rclpy import arguments
 from rosz.ros2.rclpy.exceptions import NotInitializedException
 
 if TYPE_CHECKING:
-    from types import FrameType, TracebackType
+    from types import FrameType
 
 __all__ = ("Context", "get_default_context")
 
@@ -122,12 +122,7 @@ class Context:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.shutdown()
 
 

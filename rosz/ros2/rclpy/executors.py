@@ -14,14 +14,11 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 from rosz.errors import RoszError
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.session import clamp_timeout
-
-if TYPE_CHECKING:
-    from types import TracebackType
 
 __all__ = (
     "CallbackGroup",
@@ -400,12 +397,7 @@ class Executor:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.shutdown()
 
 
