@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -21,7 +22,7 @@ from rosz.environment import Environment
 from rosz.node import Context, Node
 from rosz.session import Session, SessionConfig
 
-__all__ = ("PATIENCE", "WHOLE_LINES", "Network", "Program", "eventually", "repeats")
+__all__ = ("PATIENCE", "WHOLE_LINES", "Network", "Program", "eventually", "free_port", "repeats")
 
 PATIENCE = 15.0
 """Seconds after which something that should happen at once counts as never happening."""
@@ -39,6 +40,13 @@ def repeats(usual: int, full: int) -> int:
     """Return how often to try something that may go wrong rarely: ``ROSZ_TEST_FULL=1`` asks for
     the full count."""
     return full if os.environ.get("ROSZ_TEST_FULL", "") not in {"", "0"} else usual
+
+
+def free_port() -> int:
+    """Return a loopback port that nobody listens at."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def eventually(condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> None:

@@ -6,12 +6,14 @@ durations as ``seconds,nanoseconds``; a value that is the default is left empty.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, TypeVar
 
 from rosz.errors import DecodeError
 from rosz.qos import FOREVER, QoS
 
 __all__ = ("format_qos", "parse_qos")
+
+T = TypeVar("T")
 
 _DEFAULT_DEPTH = 42
 _SECOND = 1_000_000_000
@@ -69,34 +71,23 @@ def parse_qos(chunk: str) -> QoS:
         ) from error
 
 
+def _codes(default: T, codes: tuple[int, ...], others: dict[int, T]) -> dict[int, T]:
+    return dict.fromkeys(codes, default) | others
+
+
 # 0 is the system's default, 3 unknown, 4 and 5 best available: all of them mean the default.
-_RELIABILITY: dict[int, Literal["reliable", "best_effort"]] = {
-    0: "reliable",
-    _RELIABLE: "reliable",
-    _BEST_EFFORT: "best_effort",
-    3: "reliable",
-    4: "reliable",
-}
-_DURABILITY: dict[int, Literal["volatile", "transient_local"]] = {
-    0: "volatile",
-    _TRANSIENT_LOCAL: "transient_local",
-    _VOLATILE: "volatile",
-    3: "volatile",
-    4: "volatile",
-}
-_HISTORY: dict[int, Literal["keep_last", "keep_all"]] = {
-    0: "keep_last",
-    _KEEP_LAST: "keep_last",
-    _KEEP_ALL: "keep_all",
-    3: "keep_last",
-}
-_LIVELINESS: dict[int, Literal["automatic", "manual_by_topic"]] = {
-    0: "automatic",
-    _AUTOMATIC: "automatic",
-    _MANUAL_BY_TOPIC: "manual_by_topic",
-    4: "automatic",
-    5: "automatic",
-}
+_RELIABILITY: dict[int, Literal["reliable", "best_effort"]] = _codes(
+    "reliable", (0, _RELIABLE, 3, 4), {_BEST_EFFORT: "best_effort"}
+)
+_DURABILITY: dict[int, Literal["volatile", "transient_local"]] = _codes(
+    "volatile", (0, _VOLATILE, 3, 4), {_TRANSIENT_LOCAL: "transient_local"}
+)
+_HISTORY: dict[int, Literal["keep_last", "keep_all"]] = _codes(
+    "keep_last", (0, _KEEP_LAST, 3), {_KEEP_ALL: "keep_all"}
+)
+_LIVELINESS: dict[int, Literal["automatic", "manual_by_topic"]] = _codes(
+    "automatic", (0, _AUTOMATIC, 4, 5), {_MANUAL_BY_TOPIC: "manual_by_topic"}
+)
 
 
 def _number(text: str, default: int) -> int:

@@ -36,7 +36,7 @@ def graph(network: Network) -> Iterator[Graph]:
     made.close()
 
 
-def test_nodes_and_endpoints(network: Network, graph: Graph) -> None:
+def test_nodes_and_entities(network: Network, graph: Graph) -> None:
     node = network.node("robot", namespace="/lab")
     node.publisher("scan", String)
     node.subscription("cmd", Int32)
@@ -60,7 +60,7 @@ def test_nodes_and_endpoints(network: Network, graph: Graph) -> None:
     assert process == node.process
 
 
-def test_come_and_go(network: Network, graph: Graph) -> None:
+def test_nodes_come_and_go(network: Network, graph: Graph) -> None:
     events: SimpleQueue[tuple[str, bool]] = SimpleQueue()
     graph.listen(lambda token, alive: events.put((token.name or token.node_name, alive)))
     node = network.node("robot")
@@ -77,7 +77,7 @@ def test_come_and_go(network: Network, graph: Graph) -> None:
     }
 
 
-def test_history_comes_first_and_ends_with_withdrawal(network: Network, graph: Graph) -> None:
+def test_a_listener_gets_history_first_until_unregistered(network: Network, graph: Graph) -> None:
     network.node("robot")
     graph.wait_for_topic("/rosout", PATIENCE)
     told: SimpleQueue[str] = SimpleQueue()
@@ -94,7 +94,7 @@ def test_history_comes_first_and_ends_with_withdrawal(network: Network, graph: G
 
 
 @pytest.mark.parametrize("kind", [ValueError, SystemExit])
-def test_a_failing_listener_harms_nobody(
+def test_a_failing_listener_does_not_stop_others(
     network: Network,
     graph: Graph,
     caplog: pytest.LogCaptureFixture,
@@ -167,7 +167,7 @@ def test_killed_process_is_gone_at_once(network: Network, graph: Graph) -> None:
 
 
 def test_stopped_process_is_not_gone(network: Network, graph: Graph) -> None:
-    """It may go on: only a link that ends, or a lease that runs out, is an end."""
+    """It may resume: a node ends only with its link or its lease."""
     visitor = network.program(VISITOR)
     graph.wait_for_service("/leave", PATIENCE)
     visitor.send(signal.SIGSTOP)
@@ -227,7 +227,7 @@ class TestWaiting:
 
 
 def test_refresh(network: Network) -> None:
-    """A graph that has heard of nobody yet can ask; what ended meanwhile does not stay."""
+    """A graph that has received no token yet can query; ended nodes do not stay in it."""
     node = network.node("robot")
     scan = node.publisher("scan", String)
     graph = network.context().graph
@@ -240,7 +240,7 @@ def test_refresh(network: Network) -> None:
     graph.close()
 
 
-def test_domains_do_not_meet(network: Network, graph: Graph) -> None:
+def test_domains_are_separate(network: Network, graph: Graph) -> None:
     context = network.context(domain=7)
     network.node("elsewhere", context=context)
     network.node("here")
@@ -263,7 +263,7 @@ def test_domains_do_not_meet(network: Network, graph: Graph) -> None:
 def test_damaged_tokens(
     network: Network, graph: Graph, caplog: pytest.LogCaptureFixture, keys: list[str], kind: str
 ) -> None:
-    """They are told of, once per kind of damage, and the rest goes on."""
+    """Each kind of damage is logged once, and other tokens are handled."""
     session = network.session()
     with caplog.at_level(logging.WARNING, "rosz.graph"):
         for key in keys:
@@ -292,8 +292,8 @@ def test_processes_are_in_the_order_of_their_start() -> None:
     assert [process.started for process in View([], processes).processes("/n")] == [3, 9]
 
 
-def test_what_was_there_first_is_known_at_once(network: Network) -> None:
-    """Neither the first view nor an asked-for one is behind what the network has told."""
+def test_the_first_view_is_complete(network: Network) -> None:
+    """Neither the first view nor a refreshed one lacks a token."""
     host = network.context()
     nodes = [network.node(f"n{number}", context=host) for number in range(100)]
     names = {node.name for node in nodes}

@@ -1,4 +1,4 @@
-"""What tests of keys share."""
+"""Fixtures for tests of keys."""
 
 from __future__ import annotations
 

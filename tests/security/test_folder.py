@@ -16,7 +16,7 @@ from rosz.security.review import review
 from rosz.wire import Endpoint
 
 
-def test_files_are_for_their_owner_alone(authority: Authority) -> None:
+def test_only_their_owner_may_read_the_files(authority: Authority) -> None:
     home = authority.add("robot")
     for name in ("key", "certificate", "authority"):
         assert (home / f"{name}.pem").stat().st_mode & 0o777 == 0o600
@@ -24,8 +24,8 @@ def test_files_are_for_their_owner_alone(authority: Authority) -> None:
     assert (authority.folder / "authority" / "key.pem").stat().st_mode & 0o777 == 0o600
 
 
-def test_the_strictest_take_them(authority: Authority) -> None:
-    """As Python's own clients are, from 3.13 on (RFC 5280, 4.2.1)."""
+def test_strict_tls_clients_accept_the_keys(authority: Authority) -> None:
+    """Python's own clients are strict from 3.13 on (RFC 5280, 4.2.1)."""
     keys = KeyFolder.find(authority.add("robot"), "robot")
     here = ssl.create_default_context(cafile=keys.authority)
     here.verify_flags |= ssl.VERIFY_X509_STRICT
@@ -57,8 +57,8 @@ def test_a_key_that_others_can_read_is_refused(authority: Authority) -> None:
 
 
 @pytest.mark.parametrize("name", ["authority.pem", "rules.yaml"])
-def test_what_anybody_could_have_written_is_not_believed(authority: Authority, name: str) -> None:
-    """Who may write it says who is let in, and what each may do."""
+def test_files_that_anybody_may_write_are_refused(authority: Authority, name: str) -> None:
+    """Whoever may write these files decides who is trusted, and what each may do."""
     home = authority.add("robot")
     (home / "rules.yaml").write_text("a: all\n")
     assert KeyFolder.find(home, "robot").rules is not None
@@ -85,7 +85,7 @@ def test_rules_that_cannot_be_read(authority: Authority, kind: str) -> None:
     assert any("rules.yaml" in line for line in review(authority.folder).wrong)
 
 
-def test_days_that_are_none(authority: Authority) -> None:
+def test_impossible_lifetimes(authority: Authority) -> None:
     with pytest.raises(UsageError, match=r"1e\+07 days from now is no date"):
         authority.add("robot", days=1e7)
     assert not (authority.folder / "robot").exists()
@@ -115,7 +115,7 @@ def test_half_a_copy(authority: Authority) -> None:
         KeyFolder.find(home, "robot")
 
 
-def test_rules_that_are_none_let_nobody_start(authority: Authority) -> None:
+def test_invalid_rules_prevent_the_start(authority: Authority) -> None:
     home = authority.add("robot")
     (home / "rules.yaml").write_text("a: {drive: true}\n")
     with pytest.raises(YamlError, match=r"rules.yaml:1:5: 'drive' is no permission"):
@@ -137,7 +137,7 @@ def test_names_of_holders(authority: Authority, name: str) -> None:
         authority.add(name)
 
 
-def test_review_of_what_is_right(authority: Authority) -> None:
+def test_review_of_a_good_folder(authority: Authority) -> None:
     authority.add("robot", ["10.0.0.5"])
     (authority.folder / "rules.yaml").write_text("robot: {publish: [/a], set: [/b]}\n")
     found = review(authority.folder)
@@ -146,7 +146,7 @@ def test_review_of_what_is_right(authority: Authority) -> None:
     assert found.wrong == []
 
 
-def test_review_of_what_is_wrong(authority: Authority, tmp_path: Path) -> None:
+def test_review_of_mistakes(authority: Authority, tmp_path: Path) -> None:
     authority.add("late", days=10)
     authority.add("gone", days=-1)
     (authority.add("open") / "key.pem").chmod(0o644)
@@ -184,11 +184,11 @@ def test_review_takes_its_date_from_the_caller(authority: Authority) -> None:
         ("tls/robot:7447", "tls/robot:7447"),
     ],
 )
-def test_endpoints(given: str, expected: str) -> None:
+def test_secured_endpoints(given: str, expected: str) -> None:
     assert str(Endpoint(given).secured()) == expected
 
 
 @pytest.mark.parametrize("endpoint", ["udp/robot:7447", "ws/robot:80", "quic/robot:7447"])
-def test_no_way_around(endpoint: str) -> None:
+def test_endpoints_that_cannot_be_secured(endpoint: str) -> None:
     with pytest.raises(UsageError, match="links beyond this machine are tls"):
         Endpoint(endpoint).secured()

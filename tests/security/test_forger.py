@@ -1,4 +1,4 @@
-"""Who has a key and few rights, and a plain Zenoh client in place of rosz, to get at the rest."""
+"""An attacker with a key, few permissions, and a plain Zenoh client instead of rosz."""
 
 from __future__ import annotations
 
@@ -116,10 +116,10 @@ def test_a_plain_client_gets_no_further(pair: tuple[Host, Host], authority: Auth
 
 
 @pytest.mark.parametrize("control", [True, False])
-def test_who_may_take_the_place_of_a_node(
+def test_taking_over_a_node_needs_control(
     pair: tuple[Host, Host], authority: Authority, control: bool
 ) -> None:
-    """A newer node of a name ends the older one, which is for those to do who may end nodes."""
+    """A newer node of the same name ends the older one, so that needs permission to end nodes."""
     robot, laptop = pair
     rules = f"laptop: {{subscribe: ['/**'], control: {str(control).lower()}}}\n"
     victim = start(robot, authority, rules)

@@ -1,4 +1,4 @@
-"""Files and names that want to reach further than they may; each is refused by name."""
+"""Files and names that try to reach forbidden files; each is refused by name."""
 
 from __future__ import annotations
 

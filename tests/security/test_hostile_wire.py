@@ -1,4 +1,4 @@
-"""A plain Zenoh client that sends nothing but damage: no crash, no growth, few words about it."""
+"""A plain Zenoh client that sends only damaged data: no crash, no growth, a short log."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ MOST_GROWTH_MB = 40
 
 
 class Attacker:
-    """Makes damage out of what is right, the same for the same seed."""
+    """Damages valid data, in the same way for the same seed."""
 
     def __init__(self, plain: Plain, zid: str, node_id: str) -> None:
         self._plain = plain
@@ -69,7 +69,7 @@ class Attacker:
         self._random.choice(self._acts)()
 
     def _damaged(self, data: bytes) -> bytes:
-        """Return bytes with some of them changed, cut out, repeated, or put in."""
+        """Return data with some bytes changed, removed, repeated or inserted."""
         changed = bytearray(data)
         for _ in range(self._random.randrange(1, 4)):
             place = self._random.randrange(len(changed) + 1)
@@ -135,7 +135,7 @@ class Attacker:
 
 
 def memory(victim: Program) -> int:
-    """Return the megabytes that the victim takes up; it must still have what it set."""
+    """Return the memory of the victim in megabytes; it must still have its parameter."""
     before = victim.output.count("memory ")
     victim.say("")
     eventually(lambda: victim.output.count("memory ") > before, "the victim's answer", 60)
@@ -146,7 +146,7 @@ def memory(victim: Program) -> int:
 
 
 @pytest.mark.timeout(300)
-def test_nothing_but_damage(network: Network) -> None:
+def test_only_damaged_data(network: Network) -> None:
     victim = network.program(VICTIM)
     _, zid, node_id = victim.wait_for("up").split()
     with plain_session(network.rendezvous) as plain:

@@ -1,4 +1,4 @@
-"""Who has no key, another authority's or an expired one: sees nothing, and nothing gets in."""
+"""Machines without a key, or with a wrong or expired one, see nothing and send nothing."""
 
 from __future__ import annotations
 
@@ -59,17 +59,17 @@ with rosz.Node("intruder") as node:
 
 
 def no_key(_authority: Authority, _folder: Path, host: Host) -> None:
-    """Have no key at all."""
+    """Use no key at all."""
     host.variables["ROSZ_KEYS"] = ""
 
 
 def another_authority(_authority: Authority, folder: Path, host: Host) -> None:
-    """Have a key that another authority of the same name gave."""
+    """Use a key that another authority of the same name signed."""
     host.variables["ROSZ_KEYS"] = str(Authority.create(folder / "other").add(host.name))
 
 
 def expired(authority: Authority, _folder: Path, host: Host) -> None:
-    """Have a key that was good until yesterday."""
+    """Use a key that expired yesterday."""
     host.variables["ROSZ_KEYS"] = str(authority.add(host.name, days=-1))
 
 
@@ -92,7 +92,7 @@ def hosts(world: World, authority: Authority) -> tuple[Host, Host]:
 
 
 def assert_apart(robot: Host, laptop: Host) -> None:
-    """See that nodes of both machines know nothing of each other."""
+    """Check that the nodes of the two machines do not see each other."""
     victim = robot.program(VICTIM)
     victim.wait_for("up")
     intruder = laptop.program(INTRUDER)
@@ -106,7 +106,7 @@ def assert_apart(robot: Host, laptop: Host) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_who_dials_in(
+def test_an_intruder_that_connects(
     hosts: tuple[Host, Host], authority: Authority, tmp_path: Path, kind: Kind
 ) -> None:
     robot, laptop = hosts
@@ -118,10 +118,10 @@ def test_who_dials_in(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_who_is_dialled(
+def test_an_intruder_that_is_connected_to(
     hosts: tuple[Host, Host], authority: Authority, tmp_path: Path, kind: Kind
 ) -> None:
-    """One that says it is the laptop, to a robot that wants to be linked to the laptop."""
+    """The robot connects to the laptop, and the intruder listens at its address."""
     robot, laptop = hosts
     kind(authority, tmp_path, laptop)
     core(laptop, "--listen", "tcp/0.0.0.0:7447")

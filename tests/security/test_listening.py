@@ -40,7 +40,7 @@ def started(host: Host, *options: str) -> HostProgram:
 
 
 def assert_tls_beyond_and_plain_within(robot: Host, laptop: Host) -> None:
-    """See that a talker on the robot is heard by whom it should be."""
+    """Check that the right machines hear a talker on the robot."""
     handshake = laptop.program(HANDSHAKE, laptop.variables["ROSZ_KEYS"])
     assert handshake.exit_code() == 0, handshake.output
     assert handshake.output == "TLSv1.3 robot"
@@ -100,7 +100,7 @@ def test_an_address_that_comes_later(world: World, authority: Authority) -> None
 
 
 def test_an_interface_that_comes_later(world: World, authority: Authority) -> None:
-    """A VPN comes up, or a stick is plugged in, and out and in again."""
+    """A VPN comes up, or an adapter is plugged in, out, and in again."""
     robot = world.host("robot")
     laptop = world.host("laptop", "later")
     for host in (robot, laptop):
@@ -130,7 +130,7 @@ def test_a_core_on_each_machine(world: World, authority: Authority) -> None:
     eventually(lambda: "/listener" in robot.ask("node", "list"), "the graph on the other side")
 
 
-def test_another_port_is_shared_with_nobody() -> None:
+def test_another_port_needs_no_sharing() -> None:
     places = listen_endpoints("tcp/127.0.0.1:7447", ["tcp/0.0.0.0:9000"], keys=True)
     assert places == ("tcp/127.0.0.1:7447", "tls/0.0.0.0:9000")
     socket = "unixsock-stream//run/z.sock"
@@ -138,6 +138,6 @@ def test_another_port_is_shared_with_nobody() -> None:
 
 
 @pytest.mark.parametrize("own", ["127.0.1.1", "localhost"])
-def test_a_machine_that_dials_itself_stays_at_home(own: str) -> None:
+def test_a_machine_that_connects_to_itself_uses_the_loopback(own: str) -> None:
     assert connect_endpoint(f"tls/{own}:7447") == "tcp/localhost:7447"
     assert connect_endpoint("tcp/192.0.2.1:7447") == "tls/192.0.2.1:7447"

@@ -76,7 +76,7 @@ def test_what_is_allowed(kind: Kind, name: str, allowed: bool) -> None:
     assert found.objection(kind, name) == ""  # told once
 
 
-def test_whose_rules_they_are() -> None:
+def test_which_rules_apply() -> None:
     assert permissions(RULES, "robot") is None  # rules for others
     assert permissions(RULES, "desk", "laptop") is not None  # keys of a person, on some host
     assert permissions("{}") is None
@@ -87,7 +87,7 @@ def test_whose_rules_they_are() -> None:
     assert everything.objection(Kind.SERVICE, "/a/b") == ""
 
 
-def test_who_declares_what_rules_forbid_is_told_why(world: World, authority: Authority) -> None:
+def test_forbidden_declarations_are_logged(world: World, authority: Authority) -> None:
     robot, laptop = world.hosts("robot", "laptop")
     (authority.folder / "rules.yaml").write_text(f"{RULES}robot: all\n")
     for host in (robot, laptop):

@@ -1,4 +1,4 @@
-"""What rules say of serving and controlling, between hosts."""
+"""Rules about serving and control, between hosts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def start(pair: tuple[Host, Host], rules: str) -> HostProgram:
     return robot.rosz("run", "rosz_tutorials", "publisher.py", "__name:=publisher")
 
 
-def test_who_may_serve(pair: tuple[Host, Host]) -> None:
+def test_permission_to_serve(pair: tuple[Host, Host]) -> None:
     robot, laptop = pair
     start(pair, "laptop: {serve: [/lamp]}\n")
     laptop.program(SERVER).wait_for("up")
@@ -47,7 +47,7 @@ def test_who_may_serve(pair: tuple[Host, Host]) -> None:
 
 
 @pytest.mark.parametrize("control", [True, False])
-def test_who_may_end_nodes(pair: tuple[Host, Host], control: bool) -> None:
+def test_permission_to_end_nodes(pair: tuple[Host, Host], control: bool) -> None:
     robot, laptop = pair
     node = start(pair, f"laptop: {{subscribe: ['/**'], control: {str(control).lower()}}}\n")
     eventually(lambda: laptop.ask("node", "list") == "/publisher", "the node")

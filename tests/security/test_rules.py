@@ -28,7 +28,7 @@ operator: all
     assert rules.permits == {"laptop": laptop, "operator": Permit.all(), "*": Permit()}
 
 
-def test_nothing_written_is_nothing_allowed() -> None:
+def test_an_empty_file_allows_nothing() -> None:
     assert read_rules("# later\n", "rules.yaml").permits == {}
 
 
@@ -51,14 +51,14 @@ def test_nothing_written_is_nothing_allowed() -> None:
         ("? [a]\n: all", "r:1:3: expected a name"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:
+def test_errors_name_line_and_column(text: str, message: str) -> None:
     with pytest.raises(YamlError) as caught:
         read_rules(text, "r")
     assert str(caught.value).startswith(message)
 
 
 def allowed(rules: str, flow: str, message: str) -> set[str]:
-    """Return the keys on which somebody called ``a`` may send or get a kind of message."""
+    """Return the keys on which the holder ``a`` may send or receive a kind of message."""
     control = access_control(read_rules(rules, "r"), ["lo"])
     mine = [p["rules"] for p in control["policies"] if "holder a" in p["subjects"]]
     names = {name for part in mine for name in part}
@@ -70,7 +70,7 @@ def allowed(rules: str, flow: str, message: str) -> set[str]:
     return {key for keys in found for key in keys}
 
 
-def test_what_rules_become() -> None:
+def test_access_control_of_rules() -> None:
     one = "a: {publish: [/arm/x], subscribe: ['/arm*/**'], call: [/go], set: ['/gains/**']}"
     assert "*/arm/x/*/*" in allowed(one, "ingress", "put")
     assert "*/arm/x/*/*" not in allowed(one, "egress", "put")
@@ -82,7 +82,7 @@ def test_what_rules_become() -> None:
     assert "@ros2_lv/*/*/*/*/MP/*/*/*/%arm%x/**" in allowed(one, "ingress", "liveliness_token")
 
 
-def test_who_may_set_but_a_part_cannot_tell_others_what_they_missed() -> None:
+def test_missed_writes_are_taken_only_from_who_may_set_everything() -> None:
     sync = "@rosz/*/store/*/sync"
     assert sync not in allowed("a: {set: ['/gains/**']}", "ingress", "reply")
     assert sync in allowed("a: {set: ['/**']}", "ingress", "reply")
@@ -92,7 +92,7 @@ def test_who_may_set_but_a_part_cannot_tell_others_what_they_missed() -> None:
     assert not any(tell in key for key in allowed("a: {get: true}", "ingress", "query"))
 
 
-def test_whose_process_shows_may_take_the_place_of_a_node() -> None:
+def test_process_tokens_need_control() -> None:
     process = "@rosz/*/node/**"
     everybody = "a: {subscribe: ['/**'], publish: ['/**'], set: ['/**']}"
     assert process in allowed(everybody, "egress", "liveliness_token")
@@ -109,7 +109,7 @@ def test_whose_process_shows_may_take_the_place_of_a_node() -> None:
         max_size=3,
     )
 )
-def test_zenoh_takes_whatever_rules_become(names: list[str]) -> None:
+def test_zenoh_accepts_all_key_expressions(names: list[str]) -> None:
     verbs = ", ".join(f"{verb}: {json.dumps(names)}" for verb in NAME_VERBS)
     control = access_control(read_rules(f"a: {{{verbs}}}", "r"), ["lo"])
     for rule in control["rules"]:
@@ -131,13 +131,13 @@ def test_zenoh_takes_whatever_rules_become(names: list[str]) -> None:
         ("/arm*/**", "leg/joints", False),
     ],
 )
-def test_what_a_pattern_covers(pattern: str, topic: str, within: bool) -> None:
+def test_patterns(pattern: str, topic: str, within: bool) -> None:
     key = zenoh.KeyExpr(f"0/{topic}/std_msgs::msg::dds_::String_/RIHS01_00")
     keys = allowed(f"a: {{publish: ['{pattern}']}}", "ingress", "put")
     assert any(zenoh.KeyExpr(one).includes(key) for one in keys) == within
 
 
-def test_default_is_no() -> None:
+def test_the_default_is_to_refuse() -> None:
     control = access_control(read_rules("", "r"), ["lo"])
     assert control["default_permission"] == "deny"
     assert [policy["subjects"] for policy in control["policies"]] == [

@@ -1,4 +1,4 @@
-"""What a callback raises: told, and no end of what comes after."""
+"""Callbacks that raise are logged, and called again; finished ones are freed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from network import PATIENCE, Network, eventually
 from rosz.session import MeshReadiness, Sample
 
 
-def test_callback_that_raises_hears_what_comes_next(
+def test_a_callback_that_raises_gets_the_next_sample(
     network: Network, caplog: pytest.LogCaptureFixture
 ) -> None:
     heard: SimpleQueue[bytes] = SimpleQueue()
@@ -34,7 +34,7 @@ def test_callback_that_raises_hears_what_comes_next(
     assert "ValueError: no good" in caplog.text
 
 
-def test_who_waited_for_neighbours_is_not_kept(network: Network) -> None:
+def test_a_callback_of_mesh_readiness_is_freed(network: Network) -> None:
     class Waiting:
         called = False
 
@@ -49,5 +49,5 @@ def test_who_waited_for_neighbours_is_not_kept(network: Network) -> None:
     mesh.when_ready(waiting.call)
     del waiting
     assert mesh.ready.wait(PATIENCE)
-    eventually(lambda: kept() is None, "it is let go")
+    eventually(lambda: kept() is None, "the callback is freed")
     assert Waiting.called

@@ -1,4 +1,4 @@
-"""After its end a session refuses everything with one kind of error, and says what was refused."""
+"""A closed session refuses everything with one kind of error, which says what was refused."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ CALLS: dict[str, Callable[[Session], object]] = {
     "publisher with a cache": lambda session: session.publisher("a", cache=1),
     "subscriber": lambda session: session.subscriber("a", print),
     "subscriber with history": lambda session: session.subscriber("a", print, history=1),
-    "ring": lambda session: session.pull_subscriber("a", 1),
-    "ring with history": lambda session: session.pull_subscriber("a", 1, history=1, recover=True),
+    "pull_subscriber": lambda session: session.pull_subscriber("a", 1),
+    "pull_subscriber with history": lambda session: session.pull_subscriber(
+        "a", 1, history=1, recover=True
+    ),
     "queryable": lambda session: session.queryable("a", print),
     "get": lambda session: session.get("a", timeout=1),
     "get_async": lambda session: session.get_async("a", print, print, timeout=1),
@@ -30,7 +32,7 @@ CALLS: dict[str, Callable[[Session], object]] = {
 
 
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-def test_nothing_works_after_the_end(network: Network, call: Callable[[Session], object]) -> None:
+def test_nothing_works_after_close(network: Network, call: Callable[[Session], object]) -> None:
     session = network.session()
     assert not session.closed
     session.close()

@@ -1,4 +1,4 @@
-"""Who is first holds the meeting point, also of two that come at the same moment."""
+"""The first process holds the rendezvous, even if two start at the same moment."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import socket
 
 import pytest
 import zenoh
-from network import Network, eventually, repeats
+from network import Network, eventually, free_port, repeats
 
 from rosz.session import Session, SessionConfig, is_listening
 from rosz.session.config import new_id
@@ -29,12 +29,6 @@ PEER = """
 """
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.mark.timeout(600)
 def test_two_at_the_same_moment(network: Network) -> None:
     for _ in range(repeats(15, 300)):
@@ -53,7 +47,7 @@ def test_two_at_the_same_moment(network: Network) -> None:
 
 
 def test_refused_at_first(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What Linux does to two that begin to listen together, without a second one."""
+    """The port is refused as Linux refuses it to two processes that listen at the same moment."""
     port = free_port()
     network.rendezvous = f"tcp/127.0.0.1:{port}"
     opened = []
@@ -74,14 +68,14 @@ def test_refused_at_first(network: Network, monkeypatch: pytest.MonkeyPatch) -> 
         assert is_listening(network.rendezvous)
 
 
-def test_who_is_told_not_to_listen_there(network: Network) -> None:
+def test_a_configuration_that_does_not_listen_there(network: Network) -> None:
     environment = network.environment(zenoh_override='listen/endpoints=["tcp/127.0.0.1:0"]')
     with Session.open(SessionConfig.node(environment)):
         assert not is_listening(network.rendezvous)
 
 
-def test_who_was_there_first_connects_to_who_comes(network: Network) -> None:
-    """Of two peers that hear of each other that with the greater id does; its end counts most."""
+def test_an_older_session_connects_to_a_newer_one(network: Network) -> None:
+    """Of two peers, the one with the greater id connects; Zenoh compares the last byte first."""
     here = SessionConfig.node(network.environment())
     first = new_id(here)
     eventually(lambda: bytes.fromhex(new_id(here))[::-1] < bytes.fromhex(first)[::-1], "a later id")
@@ -95,7 +89,7 @@ def test_who_was_there_first_connects_to_who_comes(network: Network) -> None:
         eventually(lambda: one.peers() == [other.zid], "a link")
 
 
-def test_the_id_that_somebody_asks_for(network: Network) -> None:
+def test_the_id_of_a_configuration(network: Network) -> None:
     environment = network.environment(zenoh_override='id="1234abcd"')
     with Session.open(SessionConfig.node(environment)) as session:
         assert session.zid == "1234abcd"

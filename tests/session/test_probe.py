@@ -1,4 +1,4 @@
-"""Who answers first of those that are wanted."""
+"""Probing ports, and choosing among several endpoints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rosz.errors import TransportError
 from rosz.session import Session, SessionConfig, first_listening
 
 NOWHERE = "tcp/192.0.2.1:9"
-"""An address that nobody has: no answer at all, or none but a router's."""
+"""An address that no machine has: connections fail or time out."""
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def refused() -> str:
         return f"tcp/127.0.0.1:{server.getsockname()[1]}"
 
 
-def test_the_most_wanted_that_answers(served: str, refused: str) -> None:
+def test_the_most_preferred_that_answers(served: str, refused: str) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         other = f"tcp/127.0.0.1:{server.getsockname()[1]}"
         assert first_listening([served, other], 5) == served
@@ -37,7 +37,7 @@ def test_the_most_wanted_that_answers(served: str, refused: str) -> None:
         assert first_listening([refused, other], 5) == other
 
 
-def test_one_out_of_reach_holds_up_nobody_for_long(served: str) -> None:
+def test_an_unreachable_endpoint_does_not_delay_the_others(served: str) -> None:
     began = time.monotonic()
     assert first_listening([NOWHERE, served], 10) == served
     assert time.monotonic() - began < 5

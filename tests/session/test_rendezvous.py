@@ -1,15 +1,14 @@
-"""Where sessions of one machine meet, and what happens when the first of them dies."""
+"""The rendezvous of the sessions of one machine, also after the death of the first session."""
 
 from __future__ import annotations
 
 import signal
-import socket
 import threading
 import time
 from collections.abc import Iterator
 
 import pytest
-from network import PATIENCE, Network, Program, eventually
+from network import PATIENCE, Network, Program, eventually, free_port
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
@@ -37,12 +36,6 @@ PEER = """
 """
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture(params=["unixsock", "tcp"])
 def place(request: pytest.FixtureRequest) -> Iterator[Network]:
     made = Network()
@@ -66,7 +59,7 @@ def test_two_scripts_find_each_other(place: Network) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "ended"])
 def test_the_first_dies(place: Network, number: signal.Signals) -> None:
-    """The others keep their links, the next newcomer is found, and finds them."""
+    """The others keep their links, and find newcomers."""
     first, second, third = (peer(place, name) for name in ("first", "second", "third"))
     third.wait_for("heard second")
     second.wait_for("heard third")
@@ -81,7 +74,7 @@ def test_the_first_dies(place: Network, number: signal.Signals) -> None:
 
 
 def test_many_at_once(place: Network) -> None:
-    """Whoever is first, all meet."""
+    """All meet, whichever is first."""
     names = [f"n{number}" for number in range(4)]
     programs = [place.program(PEER, name) for name in names]
     for name, program in zip(names, programs, strict=True):
@@ -91,7 +84,7 @@ def test_many_at_once(place: Network) -> None:
 
 
 def test_a_router_takes_the_place(place: Network) -> None:
-    """Peers and clients find each other by way of it; so does who comes after its death."""
+    """Peers and clients find each other through it."""
     router = Session.open(SessionConfig(mode="router", rendezvous=place.rendezvous))
     with router:
         nodes = [
@@ -104,7 +97,7 @@ def test_a_router_takes_the_place(place: Network) -> None:
 
 
 def test_client_waits_for_its_router(place: Network) -> None:
-    """Whoever starts both cannot tell which of them is up first."""
+    """A user who starts both cannot know which of them is up first."""
     program = place.program(PEER, "early", ROSZ_MODE="client")
     with Session.open(SessionConfig(mode="router", rendezvous=place.rendezvous)):
         program.wait_for("ready")
@@ -129,7 +122,7 @@ def test_command_finds_nobody(place: Network) -> None:
 
 
 def test_command_sees_all_at_once(place: Network) -> None:
-    """What a command asks when it has just come is complete."""
+    """The first query of a new session gets all tokens."""
     for name in ("one", "two", "three"):
         place.node(name)
     for _ in range(5):
@@ -154,7 +147,7 @@ def test_domain_and_rendezvous_of_the_environment() -> None:
 
 
 def test_several_contexts_of_one_process(network: Network) -> None:
-    """Each has a session of its own; those of one domain meet, the others do not."""
+    """Each has a session of its own; those of one domain see each other."""
     one, two, other = network.context(), network.context(), network.context(domain=7)
     nodes = [
         Node(name, context=context) for name, context in zip("abc", (one, two, other), strict=True)
@@ -177,7 +170,7 @@ def test_stop_and_go(network: Network) -> None:
             for _ in range(3):
                 with Context(network.environment()) as context:
                     Node("n", context=context, anonymous=True)
-        except BaseException as error:  # noqa: BLE001  # whatever it is, it is wrong
+        except BaseException as error:  # noqa: BLE001  # any exception is a failure
             errors.append(error)
 
     threads = [threading.Thread(target=work) for _ in range(4)]

@@ -1,4 +1,4 @@
-"""Large samples by shared memory: used where it can be, and never missed where it cannot."""
+"""Large samples by shared memory, and without it where there is none."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LISTENER = """
         assert image.data == bytes([number]) * 300_000, "damaged"
     print("shared:", ".zenoh" in pathlib.Path("/proc/self/maps").read_text(), flush=True)
 """
-# A /dev/shm of that size, for this process alone.
+# Mounts a /dev/shm of a given size for this process only.
 SMALL = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs -o size=$0 none /dev/shm && exec "$@"')
 
 
@@ -49,7 +49,7 @@ def can_unshare() -> bool:
 
 
 def exchanged(network: Network, threshold: str, *wrapper: str) -> str:
-    """Send images from a program to another one, and return what that says of the way."""
+    """Send images from one program to another, and return what the receiver prints."""
     variables = network.variables(ROSZ_SHM=threshold)
     listener = network.program(LISTENER, ROSZ_SHM=threshold)
     listener.wait_for("ready")
@@ -72,5 +72,5 @@ def test_switch(network: Network, threshold: str, shared: bool) -> None:
 @pytest.mark.skipif(not can_unshare(), reason="needs Linux and the privilege to mount")
 @pytest.mark.parametrize("size", ["64k", "1m", "64k,ro"], ids=["full", "nearly full", "read-only"])
 def test_no_room(network: Network, size: str) -> None:
-    """Where /dev/shm has no room, or takes nothing, everything arrives on the ordinary way."""
+    """Where /dev/shm is full or read-only, everything arrives by links."""
     assert exchanged(network, "100000", *SMALL, size)

@@ -1,4 +1,4 @@
-"""Endpoints: what their text says, and what is wrong with it."""
+"""Endpoints: the parts of their text, and errors about it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_local(text: str, local: bool) -> None:
     assert Endpoint(text).is_local == local
 
 
-def test_made_of_parts() -> None:
+def test_from_parts() -> None:
     assert str(Endpoint.of("tcp", "::1", 7447)) == "tcp/[::1]:7447"
     assert str(Endpoint.of("tcp", "robot1", 7447).on_interface("eth0")) == (
         "tcp/robot1:7447#iface=eth0"
@@ -56,11 +56,11 @@ def test_made_of_parts() -> None:
 
 
 @pytest.mark.parametrize("text", ["serial//dev/ttyUSB0", "udp/[::1]:9", "unixpipe/x"])
-def test_good_ones_parse(text: str) -> None:
+def test_valid_endpoints(text: str) -> None:
     assert Endpoint.parse(text, "ROSZ_CONNECT") == Endpoint(text)
 
 
 @pytest.mark.parametrize("text", ["", "tcp", "tcp/", "tcp/a", "tcp/a:b", "tcp/a:65536", "http/a:1"])
-def test_bad_ones_are_refused(text: str) -> None:
+def test_invalid_endpoints(text: str) -> None:
     with pytest.raises(UsageError, match=r"ROSZ_CONNECT is .*expected PROTOCOL/ADDRESS"):
         Endpoint.parse(text, "ROSZ_CONNECT")

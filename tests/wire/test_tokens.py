@@ -171,7 +171,7 @@ def test_process_tokens() -> None:
     assert parse_process(key) == token
 
 
-def test_the_newer_process_is_the_same_seen_from_both() -> None:
+def test_which_process_is_newer() -> None:
     a = ProcessToken(0, "ab", 0, 100, 1, "h", "/n")
     b = ProcessToken(0, "aa", 0, 101, 1, "h", "/n")
     c = ProcessToken(0, "ac", 0, 100, 1, "h", "/n")

@@ -85,14 +85,7 @@ class _StoppedPeers(msgspec.Struct, frozen=True):
 
 
 def close_links_at_once(raw: Any) -> Closable:
-    """Make a session close its TCP links at once, those that are open and those to come.
-
-    Args:
-        raw: The open session of Zenoh.
-
-    Returns:
-        The watch that does it, until it is closed.
-    """
+    """Return a watch that makes a session close its TCP links at once, now and in the future."""
     listener = raw.info.declare_link_events_listener(open_channel(), history=True)
     return CallbackThread("watch of links", listener, _set_no_wait)
 
@@ -110,12 +103,7 @@ def _set_no_wait(event: Any) -> None:
 
 
 def close_links(raw: Any, rendezvous: str) -> AbstractContextManager[None]:
-    """Return a context in which links to stopped processes are closed if they delay its end.
-
-    Args:
-        raw: The open session of Zenoh.
-        rendezvous: The endpoint where the sessions of this machine meet.
-    """
+    """Return a context in which links to stopped processes are closed if they delay its end."""
     peers = LocalPeers.read(rendezvous)
     return _cut_if_late(_stopped_peers(raw, peers)) if peers.stopped else nullcontext()
 

@@ -59,9 +59,6 @@ def prepare_process(mode: str) -> Iterator[None]:
     of 1 MB, two and a half times as many per second come through when memory is kept. glibc keeps
     twice the size of the largest block that was ever mapped on its own and freed, so that is 62 MB;
     no page of this block is touched. Other C libraries ignore it.
-
-    Args:
-        mode: The mode of the session that is about to open.
     """
     bytes(_KEPT_BYTES)
     given = _RUNTIME in os.environ
@@ -81,12 +78,8 @@ def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig 
     A command prefers the endpoints that it was given to this machine. A node is a client of the
     router of this machine first.
 
-    Args:
-        config: The configuration; one that is not of a client is returned as it is.
-        peers: The sessions of this machine.
-
     Returns:
-        The configuration; ``None`` if nobody answers anywhere.
+        The configuration, unchanged if it is not of a client; ``None`` if nobody answers anywhere.
 
     Raises:
         TransportError: The process at the rendezvous is stopped, and there is no other endpoint.
@@ -115,10 +108,6 @@ def connect_to_running(settings: zenoh.Config, peers: LocalPeers) -> None:
     """Connect a peer to all running sessions directly if the rendezvous is held by a stopped one.
 
     They are tried ever more rarely, because nobody knows who will listen there in an hour.
-
-    Args:
-        settings: The configuration to change.
-        peers: The other sessions of this machine.
     """
     pid = peers.stopped_holder
     if pid is None:

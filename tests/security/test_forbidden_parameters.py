@@ -1,4 +1,4 @@
-"""Parameters that a machine has written and another may not take, among many that it may."""
+"""Parameters that one machine has written and another may not receive, among others."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ WRITER = """
 
 
 @pytest.mark.parametrize("permitted", [True, False])
-def test_what_rules_forbid_holds_up_nothing_and_is_told_once(
+def test_forbidden_parameters_delay_nothing_and_are_logged_once(
     pair: tuple[Host, Host], authority: Authority, permitted: bool
 ) -> None:
     robot, laptop = pair
