@@ -7,7 +7,8 @@ for. The session uses only the names exported here, so that the folder can be de
 - `reachable_config` and `connect_to_running` change where a session connects to;
 - `open_and_listen` opens a session that should hold the rendezvous;
 - `close_links_at_once` and `close_links` deal with links whose other end does not answer;
-- `remove_abandoned_segments` frees shared memory of killed processes, kept in `SEGMENTS`.
+- `remove_abandoned_segments` frees shared memory of killed processes, kept in `SEGMENTS`;
+- `new_interfaces.NewInterfaces`, which only the router needs, follows network interfaces.
 """
 
 from rosz.session.zenoh_workarounds.links import close_links, close_links_at_once
