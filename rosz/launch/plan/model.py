@@ -17,7 +17,7 @@ from rosz.errors import LaunchFileError, NotFoundError, ParamError, near_miss
 from rosz.launch.plan.context import LaunchContext
 from rosz.launch.plan.document import TextError
 from rosz.launch.plan.scope import join
-from rosz.params.values import normalise
+from rosz.params import normalise
 
 __all__ = (
     "ArgDoc",

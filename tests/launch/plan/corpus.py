@@ -1,4 +1,4 @@
-"""The launch files to hold against roslaunch, and what they are to be read with.
+"""The launch files to compare with roslaunch, and the settings to read them with.
 
 Comments in a file say how: ``argv`` has the command line, ``environ`` a variable beyond the usual
 ones, ``skip`` a report that is not compared. ``expected.txt`` has the message for each file that is
@@ -33,12 +33,12 @@ class Case(msgspec.Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """Its name without the suffix."""
+        """Name of the file without its suffix."""
         return self.path.stem
 
 
 def read(path: Path) -> Case:
-    """Read what a file says about itself."""
+    """Return the case that the comments of a file describe."""
     found = dict(_HEADER.findall(path.read_text("latin-1")))
     return Case(
         path,
@@ -60,7 +60,7 @@ def expected() -> dict[str, str]:
 
 
 def plain(message: str) -> str:
-    """Take out of a message where this checkout lies."""
+    """Return a message without the path of this checkout."""
     for folder, name in ((FILES / "invalid" / "..", ""), (FILES, ""), (FILES.parent, "")):
         message = message.replace(f"{folder}/", name)
     return message

@@ -1,4 +1,4 @@
-"""Launch files at random: groups, includes, args, params, nodes in all combinations."""
+"""Random launch files: groups, includes, args, params and nodes in all combinations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Questions to the real roslaunch, where the machine has one, and the same questions to rosz."""
+"""The same questions to real roslaunch, if it is installed, and to rosz."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class Rosz:
         self._environ = environ
 
     def context(self, cwd: Path, environ: Mapping[str, str] | None = None) -> SystemContext:
-        """Return an outside that numbers anonymous names."""
+        """Return a context that numbers anonymous names."""
         counts: Counter[str] = Counter()
 
         def anonymous(base: str) -> str:
@@ -239,7 +239,7 @@ def _setup(action: str, file: str, name: str) -> list[str]:
 
 
 def differences(ours: Mapping[str, Any], real: Mapping[str, Any]) -> list[str]:
-    """List where rosz and roslaunch differ, in words."""
+    """Return the differences between rosz and roslaunch, in words."""
     if ours["error"] is not None or real["error"] is not None:
         if ours["error"] is not None and real["error"] is not None:
             return []

@@ -13,7 +13,7 @@ from typing import Any
 
 
 def module(name: str) -> Any:
-    """Import a module of ROS, of which type checkers elsewhere know nothing."""
+    """Import a module of ROS, which type checkers do not find."""
     return importlib.import_module(name)
 
 
@@ -36,7 +36,7 @@ counts: dict[str, int] = {}
 
 
 def anonymous(base: str) -> str:
-    """Number anonymous names, so that both sides make the same ones."""
+    """Return a numbered name, so that both sides have the same ones."""
     counts[base] = counts.get(base, 0) + 1
     return f"{base}_anonymous_{counts[base]}"
 
@@ -45,7 +45,7 @@ graph_names.anonymous_name = anonymous
 
 
 def printed(function: Any, *args: Any) -> str | None:
-    """Return what a reporting function prints, None where it gives up."""
+    """Return the output of a reporting function, or None if it fails."""
     counts.clear()
     out = io.StringIO()
     try:
@@ -64,7 +64,7 @@ def value(item: Any) -> str:
 
 
 def process(node: Any) -> dict[str, Any]:
-    """Return all that roslaunch knows of a node or test."""
+    """Return all properties of a node or test in roslaunch."""
     return {
         "package": node.package,
         "type": node.type,
@@ -99,7 +99,7 @@ def start(config: Any) -> None:
 
 
 def answer(question: Any) -> dict[str, Any]:
-    """Load what is asked for and report on it."""
+    """Load the requested files and report on them."""
     os.chdir(question["cwd"])
     for name in question["unset"]:
         os.environ.pop(name, None)

@@ -7,14 +7,14 @@ import pytest
 from rosz.launch.plan import LaunchArguments, parse_arguments
 
 
-def test_values_and_files_are_told_apart() -> None:
+def test_args_and_files_are_separated() -> None:
     found = parse_arguments(["pkg", "a.launch", "x:=1", "b-c.launch", "y:= a b ", "~z/é:=2"])
     assert found == LaunchArguments(
         {"x": "1", "y": "a b", "~z/é": "2"}, "", ("pkg", "a.launch", "b-c.launch")
     )
 
 
-def test_the_namespace_is_no_arg() -> None:
+def test_the_namespace_is_not_an_arg() -> None:
     assert parse_arguments(["__ns:=/a", "__ns:=/b", "__name:=x"]) == LaunchArguments({}, "/a")
 
 
@@ -34,7 +34,7 @@ def test_the_last_value_of_a_name_wins() -> None:
         ("x:=one\ntwo", "'x' is not the name of an arg"),
     ],
 )
-def test_what_roslaunch_drops_is_dropped_aloud(argument: str, reason: str) -> None:
+def test_words_that_roslaunch_ignores_are_warned_about(argument: str, reason: str) -> None:
     found = parse_arguments([argument])
     assert (found.args, found.rest) == ({}, ())
     assert found.warnings == (f"'{argument}' is ignored: {reason}",)

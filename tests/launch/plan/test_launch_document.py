@@ -1,4 +1,4 @@
-"""XML with places."""
+"""The XML of launch files, with positions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_attributes_know_line_and_column(
     assert node.locate(attribute, index) == place
 
 
-def test_values_are_normalised_as_xml_wants() -> None:
+def test_values_are_normalised_as_in_xml() -> None:
     node = parse("f", TEXT.encode()).launch.children[0]
     assert node.attributes == {
         "name": "a&b$(arg x)",
@@ -82,7 +82,7 @@ def test_columns_count_characters_not_bytes() -> None:
     assert launch.children[0].locate("z") == (1, 33)
 
 
-def test_prefixes_stay_part_of_names() -> None:
+def test_prefixes_are_part_of_names() -> None:
     text = b'<launch xmlns="urn:d" xmlns:x="urn:x"><x:a x:b="1" c="2"/><d/></launch>'
     children = parse("f", text).launch.children
     assert [child.tag for child in children] == ["x:a", "d"]

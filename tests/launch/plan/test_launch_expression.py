@@ -1,4 +1,4 @@
-"""Expressions: what they may, what they may not, and that they always come to an end."""
+"""Expressions: what is allowed, what is refused, and that evaluation always ends."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def run(text: str) -> str:
         ("'x' not in name", "True"),
     ],
 )  # fmt: skip
-def test_values_are_those_of_python(text: str, result: str) -> None:
+def test_values_equal_those_of_python(text: str, result: str) -> None:
     assert run(text) == result
 
 
@@ -121,7 +121,7 @@ def test_values_are_those_of_python(text: str, result: str) -> None:
         ("n" * 10_001, "longer than 10000", 0),
     ],
 )
-def test_what_is_no_value_is_refused(text: str, reason: str, index: int | None) -> None:
+def test_other_expressions_are_refused(text: str, reason: str, index: int | None) -> None:
     with pytest.raises(TextError) as caught:
         run(text)
     assert reason in caught.value.reason
@@ -184,7 +184,7 @@ def test_what_is_no_value_is_refused(text: str, reason: str, index: int | None) 
         "not " * 2000 + "1",
     ],
 )
-def test_what_would_take_too_much_is_refused_at_once(text: str) -> None:
+def test_expensive_expressions_are_refused_at_once(text: str) -> None:
     start = time.process_time()
     with pytest.raises(TextError):
         run(text)
@@ -214,11 +214,11 @@ def test_random_expressions_agree_with_python(text: str) -> None:
         with warnings.catch_warnings(action="ignore"):  # of calls that cannot work
             wanted = str(eval(text, {}, names))
     except Exception:  # noqa: BLE001  # Python's errors are of every kind
-        wanted = "fault"
+        wanted = "error"
     try:
         found = evaluate(text, OWN, names.get)
-    except TextError as fault:
-        found = wanted if " than " in fault.reason else "fault"  # the bounds are not Python's
+    except TextError as error:
+        found = wanted if " than " in error.reason else "error"  # the bounds are not Python's
     assert found == wanted
 
 
@@ -226,9 +226,9 @@ def test_random_expressions_agree_with_python(text: str) -> None:
     text=st.text(max_size=60) | st.lists(st.sampled_from([*_ATOMS, *"()[]{}.,:+*'"])).map("".join)
 )
 @settings(max_examples=300, deadline=None)
-def test_any_text_is_a_value_or_a_fault(text: str) -> None:
+def test_any_text_is_a_value_or_an_error(text: str) -> None:
     try:
         index = len(run(text)) * 0
-    except TextError as fault:
-        index = fault.index
+    except TextError as error:
+        index = error.index
     assert 0 <= index <= len(text) + 1

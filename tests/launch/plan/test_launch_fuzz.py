@@ -1,4 +1,4 @@
-"""Any bytes are a plan or a refusal with a place, and nothing else."""
+"""Any bytes give a plan, or an error with a place."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosz.errors import LaunchFileError
 from rosz.launch.plan import LaunchText, Plan, describe_args, plan
 
 from .corpus import FILES, VALID
-from .fake_outside import Outside
+from .fake_context import FakeContext
 
 SEEDS = [case.path.read_bytes() for case in VALID if "pass_all" not in case.name]
 PIECES = [
@@ -23,7 +23,7 @@ PIECES = [
 
 
 def read(data: bytes) -> Plan | LaunchFileError:
-    outside = Outside({str(path): path.read_text() for path in FILES.rglob("*.yaml")})
+    outside = FakeContext({str(path): path.read_text() for path in FILES.rglob("*.yaml")})
     try:
         found = plan([LaunchText(data)], {"foo": "1"}, outside)
     except LaunchFileError as error:

@@ -1,4 +1,4 @@
-"""Plans: what is beyond roslaunch, what it is silent about, and the plan as a value."""
+"""Plans: additions to roslaunch, warnings that it does not give, and the plan as a value."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from rosz.errors import LaunchFileError, NotFoundError
 from rosz.launch.plan import Condition, LaunchText, Place, Plan, plan
 
-from .fake_outside import Outside, plan_of
+from .fake_context import FakeContext, plan_of
 
 NODE = '<node pkg="p" type="t" name="n" {}/>'
 
@@ -74,7 +74,7 @@ def test_a_group_has_no_private_names_to_wait_for() -> None:
         plan_of('<group wait_for="topic ~x"/>')
 
 
-def test_a_timeout_without_a_wait_is_pointed_out() -> None:
+def test_a_timeout_without_a_wait_is_a_warning() -> None:
     found = plan_of(NODE.format('wait_timeout="3"'))
     assert [str(warning) for warning in found.warnings] == [
         "f:1:55: 'wait_timeout' does nothing without 'wait_for'"
@@ -117,13 +117,13 @@ def test_push_ros_namespace_ends_with_its_group(tag: str) -> None:
     found = plan_of(
         f'<group><{tag} namespace="a"/><{tag} namespace="b"/><param name="p" value="1"/></group>'
         f'<{tag} namespace="/c"/><include file="inc"/>{NODE.format("")}',
-        Outside({"inc": f'<launch><{tag} namespace="d"/><param name="p" value="1"/></launch>'}),
+        FakeContext({"inc": f'<launch><{tag} namespace="d"/><param name="p" value="1"/></launch>'}),
     )
     assert [param.name for param in found.params] == ["/a/b/p", "/c/d/p"]
     assert found.nodes[0].full_name == "/c/n"
 
 
-def test_find_pkg_share_leaves_alone_what_follows() -> None:
+def test_find_pkg_share_keeps_the_text_that_follows() -> None:
     found = plan_of(
         '<param name="a" value="$(find-pkg-share robot)x y"/>'
         '<param name="b" value="$(find robot)x y"/>'
@@ -131,12 +131,12 @@ def test_find_pkg_share_leaves_alone_what_follows() -> None:
     assert [param.value for param in found.params] == ["/src/robotx y", "/src/robot/x y"]
 
 
-def test_find_prefers_what_was_built() -> None:
+def test_find_prefers_built_programs() -> None:
     found = plan_of('<param name="a" value="$(find robot)/src/driver -v"/>')
     assert found.params[0].value == "/devel/lib/robot/driver -v"
 
 
-def test_executables_are_no_nodes() -> None:
+def test_executables_are_not_nodes() -> None:
     found = plan_of(
         '<group ns="g"><env name="A" value="1"/>'
         '<executable cmd="echo \'a b\'" args="c" cwd="/tmp" output="screen" respawn="true">'
@@ -176,8 +176,8 @@ def test_wrong_ros2_tags_are_refused(body: str, message: str) -> None:
     assert message in str(caught.value)
 
 
-def test_warnings_stand_where_the_cause_does() -> None:
-    outside = Outside(
+def test_warnings_have_the_place_of_their_cause() -> None:
+    outside = FakeContext(
         {"inc": '<launch>\n<nod/>\n  <node pkg="p" type="t" name="n" respwan="1"/></launch>'}
     )
     found = plan_of(
@@ -210,7 +210,7 @@ def test_warnings_stand_where_the_cause_does() -> None:
     assert found.params[-1].target == "/roslaunch/x"
 
 
-def test_a_value_that_hides_others_is_pointed_out() -> None:
+def test_a_value_that_hides_others_is_a_warning() -> None:
     found = plan_of('<param name="a/b" value="1"/><param name="a" value="2"/>')
     assert [warning.text for warning in found.warnings] == [
         "parameter '/a' and '/a/b' below it are both set"
@@ -218,7 +218,7 @@ def test_a_value_that_hides_others_is_pointed_out() -> None:
 
 
 def test_errors_carry_the_chain_of_includes() -> None:
-    outside = Outside(
+    outside = FakeContext(
         {
             "/a": '<launch><group>\n <include file="/b"/></group></launch>',
             "/b": '<launch>\n\n<param name="x" value="é$(arg y)"/></launch>',
@@ -236,7 +236,7 @@ def test_errors_carry_the_chain_of_includes() -> None:
 
 
 def test_long_chains_of_includes_are_shortened() -> None:
-    outside = Outside({"/x": '<launch><include file="/x"/></launch>'})
+    outside = FakeContext({"/x": '<launch><include file="/x"/></launch>'})
     with pytest.raises(
         LaunchFileError, match="nest deeper than 300; '/x' includes itself"
     ) as caught:
@@ -257,12 +257,12 @@ def test_long_chains_of_includes_are_shortened() -> None:
 )
 def test_other_kinds_of_launch_files_are_named(files: dict[str, str], message: str) -> None:
     with pytest.raises(LaunchFileError) as caught:
-        plan_of('<include file="/x.py"/>', Outside(files))
+        plan_of('<include file="/x.py"/>', FakeContext(files))
     assert message in str(caught.value)
 
 
 def test_commands_run_only_where_wanted() -> None:
-    outside = Outside()
+    outside = FakeContext()
     found = plan_of(
         '<param name="a" command="echo 1 2"/><param if="0" name="b" command="echo no"/>', outside
     )
@@ -283,7 +283,7 @@ def test_failed_commands_are_refused() -> None:
         ('name="none" type="yaml" value="~"', "null"),
     ],
 )
-def test_values_that_no_store_takes_are_refused(param: str, reason: str) -> None:
+def test_values_that_are_not_parameters_are_refused(param: str, reason: str) -> None:
     with pytest.raises(LaunchFileError) as caught:
         plan_of(f"<param {param}/>")
     assert reason in caught.value.reason
@@ -295,7 +295,7 @@ def test_the_log_collector_keeps_its_name() -> None:
 
 
 def test_several_files_make_one_plan() -> None:
-    outside = Outside(
+    outside = FakeContext(
         {
             "a.launch": '<launch><arg name="x"/><machine name="m" address="h" default="true"/>'
             '<param name="p" value="$(arg x)"/></launch>',
@@ -316,13 +316,13 @@ def test_several_files_make_one_plan() -> None:
 
 def test_files_that_cannot_be_read_are_named() -> None:
     with pytest.raises(LaunchFileError, match=r"nope\.launch: cannot be read: No such file"):
-        plan(["nope.launch"], {}, Outside())
+        plan(["nope.launch"], {}, FakeContext())
 
 
 def test_the_same_name_in_two_files_is_refused() -> None:
     text = '<launch><node pkg="p" type="t" name="n"/></launch>'
     with pytest.raises(LaunchFileError, match="two nodes are named '/n', the other at a:1:9"):
-        plan([LaunchText(text, "a"), LaunchText(text, "b")], {}, Outside())
+        plan([LaunchText(text, "a"), LaunchText(text, "b")], {}, FakeContext())
 
 
 def test_a_plan_is_json() -> None:

@@ -1,4 +1,4 @@
-"""Reports on plans, word for word."""
+"""The exact text of reports on plans."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from rosz.errors import LaunchError, NotFoundError
 from rosz.launch.plan import ArgDoc, LaunchText, describe_args, report
 
-from .fake_outside import Outside, plan_of
+from .fake_context import FakeContext, plan_of
 
 NODES = (
     '<group ns="g"><env name="A" value="1 2"/><remap from="x" to="y"/>'
@@ -29,7 +29,7 @@ def test_params_are_written_as_yaml() -> None:
 
 
 def test_binary_values_are_written_too() -> None:
-    found = plan_of('<param name="b" binfile="/f"/>', Outside({"/f": "hi"}))
+    found = plan_of('<param name="b" binfile="/f"/>', FakeContext({"/f": "hi"}))
     assert report.dump_params(found) == "/b: !!binary |\n  aGk=\n"
 
 
@@ -38,7 +38,7 @@ def test_unnamed_nodes_are_not_listed() -> None:
 
 
 def test_files_are_listed_once() -> None:
-    outside = Outside({"inc": "<launch/>", "./inc": "<launch/>"})
+    outside = FakeContext({"inc": "<launch/>", "./inc": "<launch/>"})
     found = plan_of('<include file="inc"/><include file="./inc"/>', outside)
     assert report.list_files(found) == "/work/inc"
 
@@ -81,7 +81,7 @@ def test_args_are_described() -> None:
       <group><arg name="inner" default="1"/></group>
       <include file="/not/read"/><param name="x" value="$(arg b)"/>
     </launch>"""
-    docs = describe_args([LaunchText(text)], {}, Outside())
+    docs = describe_args([LaunchText(text)], {}, FakeContext())
     assert docs[0] == ArgDoc("port", "where it is", "tty")
     assert report.describe(docs) == (
         "Required Arguments:\n  a: needed\n  b: undocumented\n  empty: undocumented\n"

@@ -17,9 +17,7 @@ def ids(case: Case) -> str:
 
 
 @pytest.mark.parametrize("case", VALID, ids=ids)
-def test_what_roslaunch_reads_rosz_reads_alike(
-    case: Case, roslaunch: Roslaunch, rosz: Rosz
-) -> None:
+def test_rosz_reads_files_as_roslaunch_does(case: Case, roslaunch: Roslaunch, rosz: Rosz) -> None:
     question = ([case.path.name], case.path.parent, case.argv, case.environ)
     real = roslaunch.ask(*question)
     assert real["error"] is None
@@ -28,13 +26,13 @@ def test_what_roslaunch_reads_rosz_reads_alike(
 
 
 @pytest.mark.parametrize("case", INVALID, ids=ids)
-def test_what_roslaunch_refuses_rosz_refuses(case: Case, roslaunch: Roslaunch) -> None:
+def test_roslaunch_refuses_the_files_that_rosz_refuses(case: Case, roslaunch: Roslaunch) -> None:
     real = roslaunch.ask([case.path.name], case.path.parent, case.argv, case.environ)
     assert real["error"] is not None
 
 
 @pytest.mark.parametrize("case", INVALID, ids=ids)
-def test_refusals_say_where_and_why(case: Case, rosz: Rosz) -> None:
+def test_errors_have_a_place_and_a_reason(case: Case, rosz: Rosz) -> None:
     ours = rosz.ask([case.path.name], case.path.parent, case.argv, case.environ)
     message, wanted = plain(ours["error"]), EXPECTED[case.name]
     open_end = re.escape(wanted).replace(re.escape("..."), ".*")

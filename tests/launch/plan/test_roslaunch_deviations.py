@@ -1,4 +1,4 @@
-"""Where rosz deviates from roslaunch on purpose, held on both sides so that the list stays true."""
+"""The intended differences from roslaunch, tested on both sides."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, event, given, settings
 
 from .launch_trees import Tree, launch_trees
@@ -13,13 +14,14 @@ from .roslaunch_oracle import Roslaunch, Rosz, differences
 EXAMPLES = int(os.environ.get("ROSZ_LAUNCH_EXAMPLES", "150"))
 
 
+@pytest.mark.timeout(300)  # many examples, of which each asks another process
 @settings(
     max_examples=EXAMPLES,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(tree=launch_trees())
-def test_random_files_are_read_alike(
+def test_random_files_are_read_as_by_roslaunch(
     tree: Tree, tmp_path: Path, roslaunch: Roslaunch, rosz: Rosz
 ) -> None:
     file = tree.write(tmp_path)

@@ -1,4 +1,4 @@
-"""From nodes to what the system executes."""
+"""The commands that run nodes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def node(type_name: str, **settings: Any) -> NodePlan:
     return NodePlan(type=type_name, **{**defaults, **settings})
 
 
-def test_arguments_stand_in_roslaunch_order(workplace: Workplace, tmp_path: Path) -> None:
+def test_arguments_are_in_roslaunch_order(workplace: Workplace, tmp_path: Path) -> None:
     plan = node("tool", args=("a", "b c"), remaps=(("x", "/y"), ("u", "v")))
     command = workplace.command(plan, log_file=Path("/log/n-1.log"), tag="t:1")
     program = str(tmp_path / "ws/src/demo/scripts/tool")
@@ -55,7 +55,7 @@ def test_arguments_stand_in_roslaunch_order(workplace: Workplace, tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["talker.py", "listener"])
-def test_scripts_run_under_the_interpreter_of_rosz(workplace: Workplace, name: str) -> None:
+def test_scripts_run_with_the_interpreter_of_rosz(workplace: Workplace, name: str) -> None:
     command = workplace.command(node(name), log_file=None, tag="t:1")
     program = workplace.find("demo", name)
     assert command.argv == (*SCRIPT, program, "__name:=n")
@@ -63,7 +63,7 @@ def test_scripts_run_under_the_interpreter_of_rosz(workplace: Workplace, name: s
     assert command.python
 
 
-def test_a_prefix_stands_first(workplace: Workplace) -> None:
+def test_a_prefix_comes_first(workplace: Workplace) -> None:
     plan = node("talker.py", launch_prefix=("nice", "-n", "5"), output="screen")
     command = workplace.command(plan, log_file=None, tag="t:1")
     assert command.argv[:3] == ("nice", "-n", "5")
@@ -109,7 +109,7 @@ def test_folder_of_an_executable(workplace: Workplace, cwd: str, expected: str) 
     assert command.argv == ("sh", "-c", "exit 0")
 
 
-def test_errors_name_what_is_near(workplace: Workplace) -> None:
+def test_errors_suggest_similar_names(workplace: Workplace) -> None:
     with pytest.raises(ExecutableNotFound, match=r"no executable 'talkr\.py'.*'talker\.py'\?"):
         workplace.command(node("talkr.py"), log_file=None, tag="t")
     with pytest.raises(ExecutableNotFound, match=r"is not executable; run: chmod \+x /.*/plain"):

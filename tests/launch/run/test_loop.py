@@ -1,4 +1,4 @@
-"""The loop calls back in order, and hears of everything it waits for."""
+"""The loop calls functions in order, and reports every event."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_a_watch_ended_in_the_same_round_is_not_called(loop: Loop) -> None:
 
 
 @pytest.mark.parametrize("pidfd", [True, False])
-def test_the_end_of_a_child_is_heard(
+def test_the_end_of_a_child_is_reported(
     loop: Loop, monkeypatch: pytest.MonkeyPatch, *, pidfd: bool
 ) -> None:
     if not pidfd:

@@ -1,4 +1,4 @@
-"""What nodes write reaches the screen whole and in order, with or without their names."""
+"""The output of nodes is shown whole and in order, with or without their names."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_log_goes_to_a_file_and_errors_to_the_screen(tmp_path: Path) -> None:
     assert (tmp_path / "log/latest/ns-a-b-1-stdout.log").read_text() == "one\n"
 
 
-def test_a_respawned_node_goes_on_with_its_file(tmp_path: Path) -> None:
+def test_a_respawned_node_appends_to_its_file(tmp_path: Path) -> None:
     with launch_process(tmp_path, shell("n", "echo one", respawn=True, respawn_max=2)) as run:
         assert run.finish() == 0
     assert (tmp_path / "log/latest/n-1-stdout.log").read_text() == "one\none\none\n"
@@ -168,7 +168,7 @@ def test_a_relay_is_found_while_it_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("terminal", [False, True])
-def test_another_relay_takes_the_place_of_one_that_died(tmp_path: Path, *, terminal: bool) -> None:
+def test_a_relay_that_dies_is_restarted(tmp_path: Path, *, terminal: bool) -> None:
     script = "while :; do echo tick || exit 3; sleep 0.05; done"
     node = shell("n", script, output="screen", respawn=True)
     with launch_process(tmp_path, node, shell("m", "exec sleep 600"), terminal=terminal) as run:
@@ -208,11 +208,11 @@ def _relay_below(pid: int) -> int:
 
 
 def _age(pid: int) -> float:
-    """Return for how many seconds a process has been there."""
+    """Return the age of a process in seconds."""
     return time.time() - Path(f"/proc/{pid}").stat().st_ctime
 
 
-def test_a_relay_whose_screen_is_gone_lets_nodes_go_on(tmp_path: Path) -> None:
+def test_nodes_run_on_when_the_screen_is_closed(tmp_path: Path) -> None:
     count = tmp_path / "count"
     script = f"while :; do echo tick; echo >> {count}; done"
     with launch_process(tmp_path, shell("n", script, output="screen"), terminal=True) as run:
@@ -227,7 +227,7 @@ def test_a_relay_whose_screen_is_gone_lets_nodes_go_on(tmp_path: Path) -> None:
 
 
 def test_many_nodes_and_few_descriptors(tmp_path: Path) -> None:
-    """What brings output to the screen holds more of them than the launch."""
+    """The relay has more descriptors than the launch."""
     nodes = [shell(f"n{i}", f"echo up{i}; exec sleep 600", output="screen") for i in range(40)]
     limit = ("sh", "-c", 'ulimit -S -n 64; exec "$@"', "sh")
     with launch_process(tmp_path, *nodes, prefix=limit, separate=True) as run:
@@ -237,7 +237,7 @@ def test_many_nodes_and_few_descriptors(tmp_path: Path) -> None:
 
 
 def test_no_descriptors_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who cannot be started for want of them is named, and the rest goes on."""
+    """A node that cannot be started for this reason is named, and the others run on."""
 
     def refuse(*_: object) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
@@ -254,8 +254,8 @@ STALLING = shell("n", "while :; do echo ticking along; done", output="screen")
 
 
 @pytest.mark.parametrize("terminal", [False, True])
-def test_a_screen_that_takes_nothing_holds_up_no_launch(tmp_path: Path, *, terminal: bool) -> None:
-    """A pager, or a terminal behind a link that hangs: nodes start anew, and end, all the same."""
+def test_a_blocked_screen_does_not_block_a_launch(tmp_path: Path, *, terminal: bool) -> None:
+    """Nodes restart and end also while a pager or a lost connection blocks the screen."""
     count = tmp_path / "count"
     loud = f"echo >> {count}; seq 100; exit 3"
     nodes = STALLING, shell("m", loud, output="screen", respawn=True)

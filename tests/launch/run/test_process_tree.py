@@ -128,8 +128,8 @@ input()
 """
 
 
-def test_a_group_of_zombies_does_not_live() -> None:
-    """As where whoever adopts orphans is slow to reap them, or never does."""
+def test_a_group_of_zombies_is_not_alive() -> None:
+    """The new parent of orphans may reap them late, or never."""
     with subprocess.Popen(
         [sys.executable, "-S", "-c", HOLDS_A_ZOMBIE],
         stdin=subprocess.PIPE,

@@ -29,7 +29,7 @@ def router(network: Net) -> Iterator[RouterProcess]:
         yield started
 
 
-def test_when_a_core_is_started(network: Net) -> None:
+def test_when_a_router_is_needed(network: Net) -> None:
     environment = network.environment()
     assert needs_router(MANY, environment, {})
     assert not needs_router(MESH_LIMIT, environment, {})
@@ -44,9 +44,7 @@ def test_when_a_core_is_started(network: Net) -> None:
     assert not needs_router(1, dialling, {})
 
 
-def test_it_is_up_when_it_is_there_and_gone_when_closed(
-    router: RouterProcess, network: Net
-) -> None:
+def test_a_router_listens_until_closed(router: RouterProcess, network: Net) -> None:
     assert is_listening(network.rendezvous)
     assert alive(router.pid)
     assert (router.environment.mode, router.environ["ROSZ_MODE"]) == ("client", "client")
@@ -58,7 +56,7 @@ def test_it_is_up_when_it_is_there_and_gone_when_closed(
     assert not is_listening(network.rendezvous)
 
 
-def test_a_launch_keeps_it_up(router: RouterProcess, tmp_path: Path) -> None:
+def test_a_launch_restarts_its_router(router: RouterProcess, tmp_path: Path) -> None:
     with Context(router.environment) as context:
         nodes = [shell("n", "exec sleep 600")]
         with launch(tmp_path, *nodes, network=Network(context, router)) as run:
@@ -76,7 +74,7 @@ def test_a_launch_keeps_it_up(router: RouterProcess, tmp_path: Path) -> None:
         assert alive(router.pid)
 
 
-def test_a_core_that_cannot_be_started_again_ends_nothing(
+def test_a_router_that_cannot_restart_ends_no_node(
     router: RouterProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     start = RouterProcess._start
@@ -99,7 +97,7 @@ def test_a_core_that_cannot_be_started_again_ends_nothing(
             assert run.stop() == 0
 
 
-def test_a_core_that_does_not_start_is_explained(
+def test_a_router_that_does_not_start_is_explained(
     network: Net, capfd: pytest.CaptureFixture[str]
 ) -> None:
     from rosz.errors import LaunchError

@@ -1,4 +1,4 @@
-"""Before processes come parameters, a folder, and a few words."""
+"""The steps before the first process: parameters, the log folder, the summary."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_what_a_core_sets_is_set_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("run_id", [7, "../evil", ""])
-def test_a_run_id_that_is_no_folder_is_replaced(tmp_path: Path, run_id: object) -> None:
+def test_a_run_id_that_is_not_a_folder_name_is_replaced(tmp_path: Path, run_id: object) -> None:
     network = MemoryNetwork(run_id=run_id)
     with launch(tmp_path, shell("n", "exit 0"), network=network) as run:
         run.join()
@@ -82,7 +82,7 @@ def test_the_folder_of_a_run(tmp_path: Path) -> None:
     assert run.out.getvalue().startswith(f"... logging to {folder}/roslaunch-")
 
 
-def test_without_logs_it_goes_on(tmp_path: Path) -> None:
+def test_a_launch_runs_without_logs(tmp_path: Path) -> None:
     (tmp_path / "log").write_text("in the way")
     with launch(tmp_path, shell("n", "exit 0")) as run:
         assert run.join() == 0
@@ -94,7 +94,7 @@ def test_without_logs_it_goes_on(tmp_path: Path) -> None:
     assert "[n-1] process has finished cleanly\n[" not in run.out.getvalue()
 
 
-def test_set_up_comes_first(tmp_path: Path) -> None:
+def test_setup_steps_come_first(tmp_path: Path) -> None:
     target = tmp_path / "dump.yaml"
     network = MemoryNetwork(a=1, b=2)
     steps = (
@@ -125,7 +125,7 @@ def test_a_dump_that_cannot_be_written_stops_the_launch(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["link", "pipe", "folder"])
-def test_a_dump_goes_to_files_alone(tmp_path: Path, kind: str) -> None:
+def test_a_dump_needs_a_regular_file(tmp_path: Path, kind: str) -> None:
     target, precious = tmp_path / "dump.yaml", tmp_path / "precious"
     precious.write_text("mine\n")
     if kind == "link":
@@ -145,8 +145,8 @@ def test_a_dump_goes_to_files_alone(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("found", ["../../up", "", "a" * 70_000, "-", "a/b", 7, "ä"])
-def test_a_run_id_that_is_none(tmp_path: Path, found: object) -> None:
-    """Anybody on the network may have set it."""
+def test_a_run_id_of_another_type_is_replaced(tmp_path: Path, found: object) -> None:
+    """Any process on the network may have set it."""
     network = MemoryNetwork(run_id=found)
     with launch(tmp_path, shell("n", "exit 0"), network=network) as run:
         assert run.join() == 0

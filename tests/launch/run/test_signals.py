@@ -1,4 +1,4 @@
-"""Whatever ends a launch from outside, its nodes end with it; but not when it is killed."""
+"""Signals that end a launch end its nodes too, except SIGKILL."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STUBBORN = program(
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_ends_all(tmp_path: Path, number: int) -> None:
+def test_a_signal_ends_all_nodes(tmp_path: Path, number: int) -> None:
     with launch_process(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
         run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
@@ -58,7 +58,7 @@ def test_a_second_signal_kills(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("asked_before", [False, True])
-def test_quitting_kills_at_once(tmp_path: Path, *, asked_before: bool) -> None:
+def test_sigquit_kills_at_once(tmp_path: Path, *, asked_before: bool) -> None:
     with launch_process(tmp_path, STUBBORN, *SLEEPERS) as run:
         run.expect(r"c-4\]: started with pid")
         run.expect("up\n")
@@ -112,7 +112,7 @@ def test_a_killed_launch_leaves_its_nodes_running(tmp_path: Path) -> None:
         assert all(map(alive, run.pids()))
 
 
-def test_a_killed_node_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_a_killed_node_is_reported_and_others_run_on(tmp_path: Path) -> None:
     with launch_process(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
         run.expect(r"c-3\]: started with pid")
         run.expect(r"(up\n(.*\n)*){3}")
@@ -124,7 +124,7 @@ def test_a_killed_node_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
         assert run.finish() == 0
 
 
-def test_stubborn_nodes_are_gone_within_the_time_outs(tmp_path: Path) -> None:
+def test_stubborn_nodes_end_within_the_timeouts(tmp_path: Path) -> None:
     options = '{"timeouts": {"sigint": 0.5, "sigterm": 0.3}}'
     with launch_process(tmp_path, STUBBORN, options=options) as run:
         run.expect("up\n")
@@ -136,7 +136,7 @@ def test_stubborn_nodes_are_gone_within_the_time_outs(tmp_path: Path) -> None:
 
 
 def test_an_ignored_sigint_of_the_shell_does_not_reach_nodes(tmp_path: Path) -> None:
-    """A launch in the background of a script starts with SIGINT ignored; its nodes must not."""
+    """A launch in the background of a script starts with SIGINT ignored, but its nodes do not."""
     script = 'trap "" INT; exec "$@"'
     node = shell("n", "echo up; exec sleep 600", output="screen")
     with launch_process(tmp_path, node, prefix=("sh", "-c", script, "sh")) as run:

@@ -1,4 +1,4 @@
-"""Processes start, end, start again and are ended, as roslaunch has it and better."""
+"""Processes start, end and restart, as in roslaunch."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STUBBORN = (
 )
 
 
-def test_a_clean_end_is_said_and_ends_the_launch(tmp_path: Path) -> None:
+def test_a_clean_end_is_reported_and_ends_the_launch(tmp_path: Path) -> None:
     with launch(tmp_path, shell("good", "exit 0", namespace="/a")) as run:
         assert run.join() == 0
     out = run.out.getvalue()
@@ -40,7 +40,7 @@ def test_a_clean_end_is_said_and_ends_the_launch(tmp_path: Path) -> None:
     assert run.err.getvalue() == ""
 
 
-def test_a_death_is_said_with_pid_code_and_command(tmp_path: Path) -> None:
+def test_a_death_is_reported_with_pid_code_and_command(tmp_path: Path) -> None:
     with launch(tmp_path, shell("bad", "echo last words >&2; exit 3")) as run:
         assert run.join() == 0
     err = run.err.getvalue()
@@ -78,7 +78,7 @@ def test_required_ends_the_launch(tmp_path: Path) -> None:
     assert not alive(run.pid("other-1"))
 
 
-def test_required_that_ends_well_is_no_failure(tmp_path: Path) -> None:
+def test_a_clean_end_of_a_required_node_is_not_a_failure(tmp_path: Path) -> None:
     with launch(tmp_path, shell("vital", "exit 0", required=True)) as run:
         assert run.join() == 0
     assert "process has finished cleanly\n" in run.err.getvalue()
@@ -117,7 +117,7 @@ def test_respawn_max_gives_up(tmp_path: Path) -> None:
     assert run.out.getvalue().count("process[p-1]: started") == 3
 
 
-def test_all_are_ended_at_once_in_reverse_order(tmp_path: Path) -> None:
+def test_all_nodes_are_ended_at_once_in_reverse_order(tmp_path: Path) -> None:
     with launch(tmp_path, *(shell(f"n{i}", "exec sleep 600") for i in range(5))) as run:
         pids = [run.pid(f"n{i}-{i + 1}") for i in range(5)]
         assert run.stop() == 0
@@ -172,7 +172,7 @@ def test_grandchildren_end_with_their_node(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("start", ["", "setsid "], ids=["in its group", "in a session of its own"])
-def test_what_a_dead_node_leaves_behind_is_ended(tmp_path: Path, start: str) -> None:
+def test_descendants_of_a_dead_node_are_ended(tmp_path: Path, start: str) -> None:
     noted = tmp_path / "pid"
     inner = f"echo $$ > {noted}.new; mv {noted}.new {noted}; exec sleep 600"
     script = f"{start}sh -c '{inner}' & until test -e {noted}; do :; done; exit 1"
@@ -215,7 +215,7 @@ def test_a_bad_launch_prefix_is_explained(tmp_path: Path) -> None:
     assert "is 'nicee' of its launch-prefix installed?" in run.err.getvalue()
 
 
-def test_wait_for_holds_a_node_back(tmp_path: Path) -> None:
+def test_wait_for_delays_a_node(tmp_path: Path) -> None:
     wait = Wait((Condition("topic", "/scan"), Condition("param", "/go")), 30.0, HERE)
     network = MemoryNetwork()
     nodes = [shell("late", "exit 0", wait_for=(wait,)), shell("early", "exit 0")]
@@ -297,7 +297,7 @@ def test_local_leaves_remote_nodes_out(tmp_path: Path) -> None:
         assert run.join() == 0
 
 
-def test_the_wait_of_a_child_works_without_pidfd(
+def test_children_are_watched_without_pidfd(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(os, "pidfd_open")

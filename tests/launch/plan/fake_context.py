@@ -1,4 +1,4 @@
-"""An outside for launch files that is all in memory."""
+"""A context for launch files that is in memory."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from rosz.errors import LaunchError, PackageNotFound
 from rosz.launch.plan import LaunchText, Plan, plan
 
 
-class Outside:
-    """Files, packages and commands that a test makes up.
+class FakeContext:
+    """Files, packages and commands that exist only in a test.
 
     Args:
         files: Contents by path.
@@ -50,6 +50,6 @@ class Outside:
         return " ".join(command[1:]).encode()
 
 
-def plan_of(body: str, outside: Outside | None = None, **args: str) -> Plan:
+def plan_of(body: str, outside: FakeContext | None = None, **args: str) -> Plan:
     """Return the plan of ``<launch>`` around some tags, which begin in line 1, column 9."""
-    return plan([LaunchText(f"<launch>{body}</launch>", "f")], args, outside or Outside())
+    return plan([LaunchText(f"<launch>{body}</launch>", "f")], args, outside or FakeContext())

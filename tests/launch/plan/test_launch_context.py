@@ -1,4 +1,4 @@
-"""The outside of this machine, as launch files see it."""
+"""The files, packages and commands of this machine, as launch files see them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def outside(folder: Path, root: Path | None = None) -> SystemContext:
     return SystemContext(index, {"A": "1", "PATH": "/usr/bin:/bin"}, folder, "{}_1".format)
 
 
-def test_relative_paths_start_from_the_folder_given(tmp_path: Path) -> None:
+def test_relative_paths_start_from_the_given_folder(tmp_path: Path) -> None:
     (tmp_path / "a.launch").write_text('<launch><param name="d" value="$(dirname)"/></launch>')
     found = plan(["a.launch"], {}, outside(tmp_path))
     assert found.files == (str(tmp_path / "a.launch"),)
@@ -47,7 +47,7 @@ def test_packages_are_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("space", ["devel", "install"])
-def test_what_was_built_is_found_beside_the_sources(tmp_path: Path, space: str) -> None:
+def test_built_programs_are_found_beside_the_sources(tmp_path: Path, space: str) -> None:
     package(tmp_path / "src" / "stack", "robot")
     driver = executable(tmp_path / space / "lib" / "robot" / "driver")
     (tmp_path / space / "lib" / "robot" / "notes").write_text("")
@@ -57,13 +57,13 @@ def test_what_was_built_is_found_beside_the_sources(tmp_path: Path, space: str) 
     assert context.built("robot", "none") is None
 
 
-def test_what_was_installed_is_found(tmp_path: Path) -> None:
+def test_installed_programs_are_found(tmp_path: Path) -> None:
     package(tmp_path / "share", "robot")
     driver = executable(tmp_path / "lib" / "robot" / "driver")
     assert outside(tmp_path, tmp_path / "share").built("robot", "driver") == str(driver)
 
 
-def test_commands_run_with_the_environment_given(tmp_path: Path) -> None:
+def test_commands_run_in_the_given_environment(tmp_path: Path) -> None:
     context = outside(tmp_path)
     assert context.run(["sh", "-c", "echo $A; pwd"]) == f"1\n{tmp_path}\n".encode()
     with pytest.raises(LaunchError, match="command 'sh -c exit 3' ended with code 3"):
@@ -89,7 +89,7 @@ READING = [
 @pytest.mark.timeout(20)
 @pytest.mark.parametrize("text", READING)
 @pytest.mark.parametrize("name", ["pipe", "/dev/zero"])
-def test_what_is_no_regular_file_is_refused(tmp_path: Path, text: str, name: str) -> None:
+def test_files_that_are_not_regular_are_refused(tmp_path: Path, text: str, name: str) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "a.launch").write_text(f"<launch>{text.format(name)}</launch>")
     where = rf"a\.launch:1:\d+: '{name}' cannot be read: it is not a regular file"
@@ -97,7 +97,7 @@ def test_what_is_no_regular_file_is_refused(tmp_path: Path, text: str, name: str
         plan(["a.launch"], {}, outside(tmp_path))
 
 
-def test_nothing_can_be_read(tmp_path: Path) -> None:
+def test_an_empty_device_can_be_read(tmp_path: Path) -> None:
     (tmp_path / "a.launch").write_text('<launch><rosparam file="/dev/null"/></launch>')
     assert plan(["a.launch"], {}, outside(tmp_path)).params == ()
 
@@ -115,7 +115,7 @@ def test_names_are_made_by_the_caller(tmp_path: Path) -> None:
     assert outside(tmp_path).anonymous("a") == "a_1"
 
 
-def test_reading_a_launch_file_brings_in_nothing_needless() -> None:
+def test_reading_a_launch_file_imports_only_what_it_needs() -> None:
     import subprocess
 
     code = "import sys, rosz.launch.plan, rosz.launch.plan.report; print(*sys.modules)"

@@ -1,4 +1,4 @@
-"""Side by side with real roslaunch: the same launch file, the same words."""
+"""The messages of a launch equal those of real roslaunch on the same file."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def theirs(folder: Path, *options: str) -> list[str]:
 
 
 def plain(text: str, folder: Path) -> list[str]:
-    """Return what was said without what differs from run to run, sorted."""
+    """Return the sorted messages without the parts that differ from run to run."""
     text = re.sub(r"\x1b\[\d*m|\x1b\]2;.*?\x07", "", text.partition("\nDIED\n")[0])
     # roslaunch's threads and its nodes print into each other's lines.
     text = re.sub(r"(?=\[[\w/]+-\d+\] (?:killing|escalating|process has))", "\n", text)
@@ -187,7 +187,7 @@ def plain(text: str, folder: Path) -> list[str]:
     return sorted(line for line in lines if line and not THEIRS.match(line))
 
 
-def test_all_fates(tmp_path: Path, packages: Path) -> None:
+def test_all_ends_of_a_node(tmp_path: Path, packages: Path) -> None:
     (tmp_path / "test.launch").write_text(ALL_FATES)
     timeouts = ("--sigint-timeout=0.3", "--sigterm-timeout=0.2")
     options = '{"timeouts": {"sigint": 0.3, "sigterm": 0.2}}'
