@@ -53,7 +53,7 @@ class Context:
         direct_delivery: Samples for single subscriptions of this process.
         incompatible: Warnings about entities that cannot reach each other.
         passing: Whether this is a command, which holds no parameters, rather than a node.
-        leave: What the rules let this machine do elsewhere, if it has any.
+        permissions: What the rules let this machine do elsewhere, if it has any.
         cooperative: Whether the program has shown that it asks whether it is to end.
 
     Raises:
@@ -75,7 +75,7 @@ class Context:
         self.domain = self.environment.domain
         config = config or SessionConfig.node(self.environment)
         self.passing = config.must_connect
-        self.leave = _leave(config)
+        self.permissions = _permissions(config)
         peers = LocalPeers.read(config.rendezvous)
         alone = config.mode == "peer" and not (
             config.connect or config.listen or config.multicast or peers.is_anybody_there
@@ -254,7 +254,7 @@ class Context:
         self.close()
 
 
-def _leave(config: SessionConfig) -> LocalPermissions | None:
+def _permissions(config: SessionConfig) -> LocalPermissions | None:
     """Return what the rules say of this machine, if others receive what it declares."""
     if config.keys is None or not (config.reaches_beyond or config.must_connect):
         return None

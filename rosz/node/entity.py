@@ -95,7 +95,8 @@ class Entity:
             ClosedError: The session is closed.
         """
         context, node = self.node.context, self.node
-        if context.leave and (objection := context.leave.objection(self.token.kind, self.name)):
+        rules = context.permissions
+        if rules and (objection := rules.objection(self.token.kind, self.name)):
             node.log.warning("%s", objection)
         if watch:
             context.incompatible.watch(self.token, node.log)
