@@ -34,13 +34,7 @@ from rosz.idl import (
     split_definitions,
 )
 from rosz.idl.cache import SourceCache
-from rosz.idl.generate import (
-    MARKER,
-    generate,
-    message_module,
-    service_module,
-    shipped_module,
-)
+from rosz.idl.generate import MARKER, generate, message_module, service_module, shipped_module
 from rosz.message import Message, Service
 from rosz.packages import PackageIndex
 

@@ -15,10 +15,7 @@ from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec
 from rosz.message import ARRAY_CODES, OCTETS
 from rosz.names import short_type
 
-__all__ = (
-    "message_class",
-    "service_class",
-)
+__all__ = ("message_class", "service_class")
 
 _TIME = "builtin_interfaces/msg/Time"
 _DURATION = "builtin_interfaces/msg/Duration"

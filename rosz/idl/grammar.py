@@ -25,11 +25,7 @@ from rosz.idl.spec import (
     Value,
 )
 
-__all__ = (
-    "parse_action",
-    "parse_message",
-    "parse_service",
-)
+__all__ = ("parse_action", "parse_message", "parse_service")
 
 _TYPE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)

@@ -6,6 +6,8 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
+from rosz.message import SCALAR_CODES
+
 __all__ = (
     "PRIMITIVES",
     "ActionSpec",
@@ -24,25 +26,8 @@ Shape: TypeAlias = Literal["one", "fixed", "bounded", "sequence"]
 Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | tuple[Scalar, ...]
 
-PRIMITIVES = frozenset(
-    {
-        "bool",
-        "byte",
-        "char",
-        "float32",
-        "float64",
-        "int8",
-        "uint8",
-        "int16",
-        "uint16",
-        "int32",
-        "uint32",
-        "int64",
-        "uint64",
-        "string",
-        "wstring",
-    }
-)
+PRIMITIVES = frozenset({*SCALAR_CODES, "string", "wstring"})
+"""Names of the primitive types."""
 
 
 class FieldType(msgspec.Struct, frozen=True):

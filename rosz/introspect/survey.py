@@ -10,14 +10,7 @@ import msgspec
 from rosz.errors import DecodeError
 from rosz.graph import View
 from rosz.session import Session
-from rosz.wire import (
-    ProcessToken,
-    Token,
-    parse_process,
-    parse_token,
-    processes_key,
-    tokens_key,
-)
+from rosz.wire import ProcessToken, Token, parse_process, parse_token, processes_key, tokens_key
 
 __all__ = ("Survey", "process_address", "take_survey")
 

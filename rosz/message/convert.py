@@ -18,15 +18,7 @@ from typing import Any, NoReturn, TypeAlias, TypeVar
 import yaml
 
 from rosz.errors import EncodeError, near_miss
-from rosz.message.base import (
-    ARRAY_CODES,
-    OCTETS,
-    SCALAR_SIZES,
-    Message,
-    Sequenced,
-    Slot,
-    slots,
-)
+from rosz.message.base import ARRAY_CODES, OCTETS, SCALAR_SIZES, Message, Sequenced, Slot, slots
 from rosz.message.sequences import numbers
 from rosz.message.text import strify_message
 from rosz.time import DurationValue, TimeValue, normal

@@ -14,15 +14,7 @@ from struct import Struct
 from typing import Any, TypeVar
 
 from rosz.message.schema_codec import decode_plainly, encode_plainly
-from rosz.message.sequences import (
-    StringList,
-    Texts,
-    flags,
-    numbers,
-    octets,
-    pack_wide,
-    read_wide,
-)
+from rosz.message.sequences import StringList, Texts, flags, numbers, octets, pack_wide, read_wide
 
 __all__ = (
     "FAULTS",
