@@ -131,6 +131,16 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "rospy.impl.tcpros_service": {
         "ros1.rospy.service": "Service ServiceException ServiceProxy wait_for_service"
     },
+    "tf.broadcaster": {"ros1.tf.frames": "TransformBroadcaster"},
+    "tf.listener": {
+        "ros1.tf.frames": "ConnectivityException Exception ExtrapolationException LookupException"
+        " TransformListener Transformer TransformerROS"
+    },
+    "tf2_ros.buffer": {
+        "ros1.tf2_ros": "Buffer BufferInterface ConnectivityException ExtrapolationException"
+        " InvalidArgumentException LookupException StaticTransformBroadcaster TimeoutException"
+        " TransformBroadcaster TransformException TransformListener TypeException"
+    },
 }
 """Submodules of ROS 1 and rclpy: the modules below ``rosz`` that define their names, and the names.
 

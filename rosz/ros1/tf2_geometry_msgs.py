@@ -1,6 +1,6 @@
-"""tf2_geometry_msgs: points, poses, vectors and wrenches in other frames (ROS wiki).
+"""tf2_geometry_msgs: transformed points, poses, vectors and wrenches (ROS wiki).
 
-PyKDL's types are not there.
+The types of PyKDL are missing.
 """
 
 from __future__ import annotations
@@ -20,9 +20,7 @@ from rosz.msgs.geometry_msgs.msg import (
     WrenchStamped,
 )
 from rosz.transforms import Pose as Plain
-from rosz.transforms import compose
-from rosz.transforms.listener import pose_of
-from rosz.transforms.poses import rotate
+from rosz.transforms import compose, pose_of, rotate
 
 __all__ = (
     "do_transform_point",
@@ -34,14 +32,14 @@ __all__ = (
 
 
 def do_transform_point(point: PointStamped, transform: Any) -> PointStamped:
-    """Return a point in the frame that a TransformStamped leads to."""
+    """Transform a point by a TransformStamped."""
     p = point.point
     moved = compose(pose_of(transform.transform), Plain((p.x, p.y, p.z), (0.0, 0.0, 0.0, 1.0)))
     return PointStamped(transform.header, Point(*moved.translation))
 
 
 def do_transform_pose(pose: PoseStamped, transform: Any) -> PoseStamped:
-    """Return a pose in the frame that a TransformStamped leads to."""
+    """Transform a pose by a TransformStamped."""
     p, q = pose.pose.position, pose.pose.orientation
     moved = compose(pose_of(transform.transform), Plain((p.x, p.y, p.z), (q.x, q.y, q.z, q.w)))
     return PoseStamped(
@@ -50,18 +48,18 @@ def do_transform_pose(pose: PoseStamped, transform: Any) -> PoseStamped:
 
 
 def do_transform_vector3(vector3: Vector3Stamped, transform: Any) -> Vector3Stamped:
-    """Return a vector, which only turns, in the frame that a TransformStamped leads to."""
-    return Vector3Stamped(transform.header, _turned(vector3.vector, transform))
+    """Rotate a vector by a TransformStamped."""
+    return Vector3Stamped(transform.header, _rotate(vector3.vector, transform))
 
 
 def do_transform_wrench(wrench: WrenchStamped, transform: Any) -> WrenchStamped:
-    """Return a wrench, which only turns, in the frame that a TransformStamped leads to."""
+    """Rotate a wrench by a TransformStamped."""
     parts = wrench.wrench
-    turned = Wrench(_turned(parts.force, transform), _turned(parts.torque, transform))
-    return WrenchStamped(transform.header, turned)
+    rotated = Wrench(_rotate(parts.force, transform), _rotate(parts.torque, transform))
+    return WrenchStamped(transform.header, rotated)
 
 
-def _turned(vector: Vector3, transform: Any) -> Vector3:
+def _rotate(vector: Vector3, transform: Any) -> Vector3:
     rotation = pose_of(transform.transform).rotation
     return Vector3(*rotate(rotation, (vector.x, vector.y, vector.z)))
 
@@ -75,5 +73,5 @@ _KINDS: dict[type[Any], Callable[..., Any]] = {
 
 
 def transformation_of(message: Any) -> Callable[..., Any] | None:
-    """Return what brings a message into another frame; None if there is nothing."""
+    """Return the function that transforms a message; None for other types."""
     return _KINDS.get(type(message))

@@ -1,4 +1,4 @@
-"""tf_conversions: what of it needs no PyKDL, the arithmetic of rotations (ROS wiki)."""
+"""tf_conversions: the part that does not need PyKDL, `transformations` (ROS wiki)."""
 
 from rosz.ros1.tf import transformations
 

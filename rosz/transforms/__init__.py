@@ -1,14 +1,17 @@
-"""Transforms between coordinate frames, as they are told on ``/tf`` and ``/tf_static`` (REP 105).
+"""Transforms between coordinate frames, from ``/tf`` and ``/tf_static`` (REP 105).
 
-``poses`` is the arithmetic, ``history`` what is known of one frame, ``buffer`` the tree of frames
-and the questions that people ask of it; these three are pure. ``broadcast`` and ``listener`` join
-them to a node.
+`poses` is the arithmetic and `buffer` the tree of frames over time; both are pure. `topics`
+connects them to a node. May import nodes and everything below them.
 """
 
-from rosz.transforms.broadcast import StaticTransformBroadcaster, TransformBroadcaster
 from rosz.transforms.buffer import Buffer
-from rosz.transforms.listener import TransformListener
-from rosz.transforms.poses import IDENTITY, Pose, compose, invert
+from rosz.transforms.poses import IDENTITY, Pose, compose, invert, rotate
+from rosz.transforms.topics import (
+    StaticTransformBroadcaster,
+    TransformBroadcaster,
+    TransformListener,
+    pose_of,
+)
 
 __all__ = (
     "IDENTITY",
@@ -19,4 +22,6 @@ __all__ = (
     "TransformListener",
     "compose",
     "invert",
+    "pose_of",
+    "rotate",
 )

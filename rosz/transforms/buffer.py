@@ -1,10 +1,12 @@
-"""The tree of frames, over the last seconds."""
+"""The tree of coordinate frames over the last seconds. Pure: no clock, no network."""
 
 from __future__ import annotations
 
 import math
 import threading
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 from rosz.errors import (
     ExtrapolationNeeded,
@@ -13,24 +15,128 @@ from rosz.errors import (
     TransformArgument,
     TransformError,
 )
-from rosz.transforms.history import History, Place
-from rosz.transforms.poses import IDENTITY, Pose, compose, invert
+from rosz.transforms.poses import IDENTITY, Pose, compose, interpolate, invert
 
-__all__ = ("Buffer",)
+__all__ = ("Buffer", "History", "Place")
 
 _SECOND = 1_000_000_000
-_DEEPEST = 1000
-"""Frames on the way up to the root beyond which there must be a ring."""
+_MAX_DEPTH = 1000
+"""Largest depth of the tree; a deeper one must contain a loop."""
 
-_UNIT_WITHIN = 1e-3
-_LOOK_SECONDS = 0.05
+_UNIT_TOLERANCE = 1e-3
+_CHECK_PERIOD = 0.05
+
+
+class Place(NamedTuple):
+    """The pose of a frame in its parent."""
+
+    parent: str
+    pose: Pose
+
+
+class History:
+    """The places of a frame over time.
+
+    Args:
+        length_ns: Age in nanoseconds, relative to the newest place, up to which places are kept.
+        static: Whether one place is valid at all times.
+
+    Attributes:
+        static: As given.
+        authority: Source of the last place.
+    """
+
+    def __init__(self, length_ns: int, *, static: bool) -> None:
+        self.static: bool = static
+        self.authority: str = ""
+        self._length = length_ns
+        self._stamps: list[int] = []
+        self._places: list[Place] = []
+
+    def add(self, stamp: int, place: Place) -> bool:
+        """Add a place; return whether it is new and not too old."""
+        if self.static:
+            self._stamps, self._places = [stamp], [place]
+            return True
+        if self._stamps and stamp < self._stamps[-1] - self._length:
+            return False
+        index = bisect_left(self._stamps, stamp)
+        if index < len(self._stamps) and self._stamps[index] == stamp:
+            return False
+        self._stamps.insert(index, stamp)
+        self._places.insert(index, place)
+        old = bisect_left(self._stamps, self._stamps[-1] - self._length)
+        del self._stamps[:old], self._places[:old]
+        return True
+
+    @property
+    def latest(self) -> int:
+        """Time of the newest place in nanoseconds; 0 for a static frame."""
+        return 0 if self.static else self._stamps[-1]
+
+    @property
+    def oldest(self) -> int:
+        """Time of the oldest place in nanoseconds; 0 for a static frame."""
+        return 0 if self.static else self._stamps[0]
+
+    @property
+    def rate(self) -> float:
+        """Places per second, as tf2 calculates it."""
+        return len(self._stamps) / max((self.latest - self.oldest) / 1e9, 1e-4)
+
+    @property
+    def newest(self) -> Place:
+        """The newest place."""
+        return self._places[-1]
+
+    def at(self, stamp: int) -> Place:
+        """Return the place at a time, interpolated if necessary.
+
+        Raises:
+            ExtrapolationNeeded: The time is before or after all known places.
+        """
+        if self.static:
+            return self._places[0]
+        after = bisect_right(self._stamps, stamp)
+        if after and self._stamps[after - 1] == stamp:
+            return self._places[after - 1]
+        if after in {0, len(self._stamps)}:
+            raise ExtrapolationNeeded(self._beyond(stamp))
+        before = after - 1
+        one, two = self._places[before], self._places[after]
+        if one.parent != two.parent:
+            return one
+        began, ended = self._stamps[before], self._stamps[after]
+        return Place(one.parent, interpolate(one.pose, two.pose, (stamp - began) / (ended - began)))
+
+    def _beyond(self, stamp: int) -> str:
+        first, last = self._stamps[0], self._stamps[-1]
+        if first == last:
+            return (
+                f"Lookup would require extrapolation at time {_seconds(stamp)}, but only time"
+                f" {_seconds(first)} is in the buffer"
+            )
+        if stamp > last:
+            return (
+                f"Lookup would require extrapolation {_seconds(stamp - last)}s into the future. "
+                f" Requested time {_seconds(stamp)} but the latest data is at time {_seconds(last)}"
+            )
+        return (
+            f"Lookup would require extrapolation {_seconds(first - stamp)}s into the past. "
+            f" Requested time {_seconds(stamp)} but the earliest data is at time {_seconds(first)}"
+        )
+
+
+def _seconds(nanoseconds: int) -> str:
+    """Format nanoseconds as seconds with all digits."""
+    return f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09d}"
 
 
 class Buffer:
-    """Transforms that were told, and those that follow from them. Safe for threads.
+    """A buffer of transforms, which calculates transforms between any frames. Thread-safe.
 
     Args:
-        length_ns: Nanoseconds for which transforms are kept.
+        length_ns: Age in nanoseconds up to which transforms are kept.
     """
 
     def __init__(self, length_ns: int = 10 * _SECOND) -> None:
@@ -49,21 +155,21 @@ class Buffer:
         static: bool = False,
         authority: str = "",
     ) -> bool:
-        """Take note of where a frame is in its parent.
+        """Add the pose of a frame in its parent.
 
         Args:
-            parent: Name of the parent; a slash in front does not count.
-            child: Name of the frame; a slash in front does not count.
-            stamp: When, in nanoseconds.
-            pose: Where: what brings coordinates of the frame into the parent.
-            static: Whether it holds for all times.
-            authority: Who tells.
+            parent: Name of the parent; a leading slash is ignored.
+            child: Name of the frame; a leading slash is ignored.
+            stamp: Time in nanoseconds.
+            pose: Pose of the frame, which transforms its coordinates into those of the parent.
+            static: Whether the pose is valid at all times.
+            authority: Source of the transform.
 
         Returns:
-            Whether it was news, and not too old.
+            Whether the transform is new and not too old.
 
         Raises:
-            TransformArgument: A name is missing, both are one, or the pose is none.
+            TransformArgument: A name is missing, both are the same, or the pose is not valid.
         """
         parent, child = parent.removeprefix("/"), child.removeprefix("/")
         _check(parent, child, pose)
@@ -71,15 +177,15 @@ class Buffer:
             history = self._frames.get(child)
             if history is None or history.static != static:
                 history = self._frames[child] = History(self._length, static=static)
-            news = history.add(stamp, Place(parent, pose))
-            if news:
+            added = history.add(stamp, Place(parent, pose))
+            if added:
                 history.authority = authority
                 self._parents.add(parent)
                 self._changed.notify_all()
-            return news
+            return added
 
     def clear(self) -> None:
-        """Forget everything but what holds for all times."""
+        """Remove all transforms but the static ones."""
         with self._changed:
             self._frames = {name: one for name, one in self._frames.items() if one.static}
             self._parents = {one.newest.parent for one in self._frames.values()}
@@ -90,30 +196,30 @@ class Buffer:
             return sorted(self._parents | self._frames.keys())
 
     def histories(self) -> dict[str, History]:
-        """Return what is known of each frame that has a parent, in the order they were told."""
+        """Return the history of each frame that has a parent, in the order of arrival."""
         with self._changed:
             return dict(self._frames)
 
     def has(self, frame: str) -> bool:
-        """Tell whether there is a frame of that name."""
+        """Return whether there is a frame of a name."""
         return frame in self._frames or frame in self._parents
 
     def lookup(self, target: str, source: str, stamp: int = 0) -> tuple[Pose, int]:
-        """Return what brings coordinates of one frame into another.
+        """Return the transform from one frame to another.
 
         Args:
-            target: The frame that coordinates are wanted in.
-            source: The frame that they are in.
-            stamp: When, in nanoseconds; 0 for the latest time at which all is known.
+            target: Frame to transform coordinates to.
+            source: Frame of the coordinates.
+            stamp: Time in nanoseconds; 0 for the latest time at which all transforms are known.
 
         Returns:
-            The pose of the source in the target, and when that is.
+            The pose of the source in the target, and its time.
 
         Raises:
-            TransformArgument: A name is none.
-            FrameNotFound: There is no such frame.
-            FramesNotConnected: They belong to separate trees.
-            ExtrapolationNeeded: The time is before or after what is known.
+            TransformArgument: A name is not valid.
+            FrameNotFound: A frame does not exist.
+            FramesNotConnected: The frames belong to separate trees.
+            ExtrapolationNeeded: The time is before or after all known transforms.
         """
         with self._changed:
             for name, role in ((target, "target_frame"), (source, "source_frame")):
@@ -127,17 +233,17 @@ class Buffer:
     def lookup_full(
         self, target: str, target_stamp: int, source: str, source_stamp: int, fixed: str
     ) -> tuple[Pose, int]:
-        """Return what brings coordinates of one time into another frame at another time.
+        """Return the transform from a frame at one time to a frame at another time.
 
         Args:
-            target: The frame that coordinates are wanted in.
-            target_stamp: When, in nanoseconds.
-            source: The frame that they are in.
-            source_stamp: When they were there.
-            fixed: A frame that does not move meanwhile.
+            target: Frame to transform coordinates to.
+            target_stamp: Time of the target in nanoseconds.
+            source: Frame of the coordinates.
+            source_stamp: Time of the source in nanoseconds.
+            fixed: Frame that does not move meanwhile.
 
         Raises:
-            TransformError: As `lookup`.
+            TransformError: As for `lookup`.
         """
         with self._changed:
             inner, _ = self.lookup(fixed, source, source_stamp)
@@ -145,11 +251,11 @@ class Buffer:
             return compose(outer, inner), stamp
 
     def latest_common(self, target: str, source: str) -> int:
-        """Return the latest time at which a transform is known; 0 if it holds for all times.
+        """Return the latest time at which a transform is known; 0 for a static one.
 
         Raises:
-            FrameNotFound: There is no such frame.
-            FramesNotConnected: They belong to separate trees.
+            FrameNotFound: A frame does not exist.
+            FramesNotConnected: The frames belong to separate trees.
         """
         with self._changed:
             for name, role in ((target, "target_frame"), (source, "source_frame")):
@@ -179,15 +285,15 @@ class Buffer:
         return ""
 
     def wait(self, known: Callable[[], bool], timeout_ns: int, now: Callable[[], int]) -> bool:
-        """Wait until something is known.
+        """Wait for a condition, which is checked whenever a transform is added.
 
         Args:
-            known: Tells whether it is.
-            timeout_ns: Nanoseconds to wait at most, by the clock given.
-            now: Tells the time in nanoseconds.
+            known: Condition.
+            timeout_ns: Time limit in nanoseconds of the given clock.
+            now: Function that returns the time of that clock in nanoseconds.
 
         Returns:
-            Whether it is known.
+            Whether the condition was met.
         """
         began = now()
         with self._changed:
@@ -196,7 +302,7 @@ class Buffer:
                 if passed >= timeout_ns or passed < 0:
                     return False
                 left = (timeout_ns - passed) / _SECOND
-                self._changed.wait(min(left, _LOOK_SECONDS))
+                self._changed.wait(min(left, _CHECK_PERIOD))
         return True
 
     def _check_frame(self, name: str, role: str) -> None:
@@ -216,23 +322,23 @@ class Buffer:
             )
 
     def _upwards(self, frame: str) -> Iterator[tuple[str, int]]:
-        """Yield the frames from one to the root, each with its latest time; the root with 0."""
-        for _ in range(_DEEPEST):
+        """Yield the frames from a frame up to the root with their latest times; 0 for the root."""
+        for _ in range(_MAX_DEPTH):
             history = self._frames.get(frame)
             if history is None:
                 yield frame, 0
                 return
             yield frame, history.latest
             frame = history.newest.parent
-        raise self._ring()
+        raise self._loop()
 
     def _walk(self, target: str, source: str, stamp: int) -> Pose:
-        """Go up from both frames to where their ways meet."""
+        """Go up from both frames to their common ancestor."""
         below: dict[str, Pose] = {}
         beyond = ""
         for way, start, end in ((0, source, target), (1, target, source)):
             frame, pose = start, IDENTITY
-            for _ in range(_DEEPEST):
+            for _ in range(_MAX_DEPTH):
                 if way and frame in below:
                     return compose(invert(pose), below[frame])
                 if not way:
@@ -250,7 +356,7 @@ class Buffer:
                 pose = compose(place.pose, pose)
                 frame = place.parent
             else:
-                raise self._ring()
+                raise self._loop()
         if beyond:
             raise ExtrapolationNeeded(
                 f"{beyond}, when looking up transform from frame [{source}] to frame [{target}]"
@@ -263,7 +369,7 @@ class Buffer:
             " part of the same tree.Tf has two or more unconnected trees."
         )
 
-    def _ring(self) -> TransformError:
+    def _loop(self) -> TransformError:
         return TransformError("The tf tree is invalid because it contains a loop.")
 
 
@@ -276,9 +382,11 @@ def _check(parent: str, child: str, pose: Pose) -> None:
         raise TransformArgument(f"the transform of '{child}' to itself is ignored")
     numbers = (*pose.translation, *pose.rotation)
     if not all(math.isfinite(number) for number in numbers):
-        raise TransformArgument(f"the transform of '{child}' has a number that is none: {numbers}")
+        raise TransformArgument(
+            f"the transform of '{child}' has a number that is not finite: {numbers}"
+        )
     square = sum(part * part for part in pose.rotation)
-    if abs(square - 1.0) > _UNIT_WITHIN * 2:
+    if abs(square - 1.0) > _UNIT_TOLERANCE * 2:
         raise TransformArgument(
             f"the transform of '{child}' has a rotation of length {math.sqrt(square):g}; expected 1"
         )

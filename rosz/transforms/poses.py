@@ -15,7 +15,7 @@ _NEARLY_ONE = 1.0 - 1e-9
 
 
 class Pose(NamedTuple):
-    """A translation in metres, and the rotation before it."""
+    """A rotation, followed by a translation in metres."""
 
     translation: Vector
     rotation: Quaternion
@@ -36,10 +36,10 @@ def _multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def rotate(rotation: Quaternion, vector: Vector) -> Vector:
-    """Return a vector, turned."""
+    """Rotate a vector."""
     x, y, z, w = rotation
     vx, vy, vz = vector
-    # With t = 2 q x v it is v + w t + q x t: half the products of two quaternions.
+    # With t = 2 q x v the result is v + w t + q x t: half the products of two quaternions.
     tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
     return (
         vx + w * tx + y * tz - z * ty,
@@ -49,14 +49,14 @@ def rotate(rotation: Quaternion, vector: Vector) -> Vector:
 
 
 def compose(outer: Pose, inner: Pose) -> Pose:
-    """Return the pose that does the inner one first, then the outer one."""
+    """Return the pose that applies the inner one first, then the outer one."""
     ox, oy, oz = outer.translation
     ix, iy, iz = rotate(outer.rotation, inner.translation)
     return Pose((ox + ix, oy + iy, oz + iz), _multiply(outer.rotation, inner.rotation))
 
 
 def invert(pose: Pose) -> Pose:
-    """Return the pose that undoes one."""
+    """Return the inverse of a pose."""
     x, y, z, w = pose.rotation
     back = (-x, -y, -z, w)
     tx, ty, tz = rotate(back, pose.translation)
@@ -64,12 +64,12 @@ def invert(pose: Pose) -> Pose:
 
 
 def interpolate(before: Pose, after: Pose, fraction: float) -> Pose:
-    """Return a pose on the way from one to another, by the shorter turn.
+    """Interpolate between two poses, by the smaller of the two rotations.
 
     Args:
-        before: The pose at fraction 0.
-        after: The pose at fraction 1.
-        fraction: How far along the way.
+        before: Pose at fraction 0.
+        after: Pose at fraction 1.
+        fraction: Position between the two.
     """
     (ax, ay, az), (bx, by, bz) = before.translation, after.translation
     middle = (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)

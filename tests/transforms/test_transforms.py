@@ -158,7 +158,7 @@ def test_a_frame_may_get_another_parent() -> None:
         buffer.lookup("shelf", "cup")
 
 
-def test_rings_are_told() -> None:
+def test_loops_are_reported() -> None:
     buffer = Buffer()
     for parent, child in (("a", "b"), ("b", "c"), ("c", "a"), ("d", "e")):
         buffer.set(parent, child, S, IDENTITY)
@@ -174,16 +174,21 @@ def test_rings_are_told() -> None:
         ("", "b", IDENTITY, "no frame_id"),
         ("a", "", IDENTITY, "without a child_frame_id"),
         ("a", "/a", IDENTITY, "to itself"),
-        ("a", "b", Pose((float("nan"), 0.0, 0.0), IDENTITY.rotation), "a number that is none"),
+        (
+            "a",
+            "b",
+            Pose((float("nan"), 0.0, 0.0), IDENTITY.rotation),
+            "a number that is not finite",
+        ),
         ("a", "b", Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "of length 0; expected 1"),
     ],
 )
-def test_what_is_no_transform(parent: str, child: str, pose: Pose, text: str) -> None:
+def test_invalid_transforms(parent: str, child: str, pose: Pose, text: str) -> None:
     with pytest.raises(TransformArgument, match=text):
         Buffer().set(parent, child, 0, pose)
 
 
-def test_undoing() -> None:
+def test_inverse() -> None:
     chance = random.Random(3)
     for _ in range(50):
         x, y, z, *rotation = numbers(chance)
@@ -223,7 +228,7 @@ def test_over_the_network(network: Network) -> None:
     listener.close()
 
 
-def test_a_static_transform_filled_anew_leaves_those_told_before(network: Network) -> None:
+def test_static_transforms_are_copied(network: Network) -> None:
     static = StaticTransformBroadcaster(network.node("robot"))
     reused = transform("base", "laser", 1.0)
     static.send(reused)

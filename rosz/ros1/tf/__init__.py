@@ -1,15 +1,15 @@
-"""tf: coordinate frames, and the arithmetic of rotations (ROS wiki, tf).
+"""tf: transforms between coordinate frames, and the arithmetic of rotations (ROS wiki, tf).
 
-Point clouds and twists are not transformed here, and there are no tf prefixes.
+Point clouds, twists and tf prefixes are not supported.
 """
 
 from rosz.ros1.tf import transformations
-from rosz.ros1.tf.broadcaster import TransformBroadcaster
-from rosz.ros1.tf.listener import (
+from rosz.ros1.tf.frames import (
     ConnectivityException,
     Exception,  # noqa: A004  # ROS 1's
     ExtrapolationException,
     LookupException,
+    TransformBroadcaster,
     Transformer,
     TransformerROS,
     TransformListener,

@@ -29,10 +29,7 @@ def callback(*found):
 
 @pytest.fixture(autouse=True)
 def time_without_a_node(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("filters", "synchronizers"):
-        monkeypatch.setattr(
-            f"rosz.ros1.message_filters.{module}.now", lambda: Time.from_sec(time.time())
-        )
+    monkeypatch.setattr("rosz.ros1.message_filters._now", lambda: Time.from_sec(time.time()))
 
 
 def events(seed: int, spread: float) -> list[tuple[int, float]]:

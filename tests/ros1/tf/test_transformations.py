@@ -76,8 +76,8 @@ def test_orders_as_numbers() -> None:
 
 
 @pytest.mark.parametrize("axes", ["", "xyz", "sxxy", "sxyw", "qxyz"])
-def test_what_is_no_order(axes: str) -> None:
-    with pytest.raises(UsageError, match="no order of axes"):
+def test_invalid_orders_of_axes(axes: str) -> None:
+    with pytest.raises(UsageError, match="not an order of axes"):
         t.euler_matrix(0, 0, 0, axes)
 
 

@@ -1,4 +1,7 @@
-"""tf2_ros's classes over `rosz.transforms`."""
+"""tf2_ros: transforms between coordinate frames (ROS wiki, tf2_ros).
+
+``BufferClient`` and ``BufferServer`` are not there.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +20,10 @@ from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
 from rosz.ros1 import state, tf2_geometry_msgs
 from rosz.transforms import Buffer as Frames
-from rosz.transforms import Pose
+from rosz.transforms import Pose, pose_of
 from rosz.transforms import StaticTransformBroadcaster as _StaticBroadcaster
 from rosz.transforms import TransformBroadcaster as _Broadcaster
 from rosz.transforms import TransformListener as _Listener
-from rosz.transforms.history import History
-from rosz.transforms.listener import pose_of
 
 __all__ = (
     "Buffer",
@@ -43,11 +44,11 @@ _TEN_SECONDS = 10 * 10**9
 
 
 class TimeoutException(TransformException):
-    """A transform that did not become known in time."""
+    """A transform did not become known in time."""
 
 
 class TypeException(TransformException):
-    """A type that nobody knows how to transform."""
+    """Messages of the type cannot be transformed."""
 
 
 def _ns(value: Any) -> int:
@@ -58,43 +59,43 @@ def _ns(value: Any) -> int:
 
 
 def _node_of(node: Any) -> Node:
-    """Return the node that is meant: one of rclpy, or that of the process."""
+    """Return rosz's node of an rclpy node, or the node of the process."""
     given: Node | None = getattr(node, "rosz_node", None)
     return state.node() if given is None else given
 
 
 class BufferInterface:
-    """What can be asked for transforms."""
+    """Base class of objects that look up transforms."""
 
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = None
     ) -> TransformStamped:
-        """Return what brings coordinates of the source frame into the target frame.
+        """Return the transform from the source frame to the target frame.
 
         Args:
-            target_frame: The frame that coordinates are wanted in.
-            source_frame: The frame that they are in.
-            time: When; 0 for the latest.
-            timeout: How long to wait for it to be known; not at all when not given.
+            target_frame: Frame to transform coordinates to.
+            source_frame: Frame of the coordinates.
+            time: Time of the transform; 0 for the latest.
+            timeout: Longest time to wait for the transform; no wait when not given.
 
         Raises:
-            TransformException: It is not known; the class says why.
+            TransformException: The transform is not known; the subclass tells the reason.
         """
         raise NotImplementedError
 
     def transform(
         self, object_stamped: Any, target_frame: str, timeout: Any = None, new_type: Any = None
     ) -> Any:
-        """Return a stamped point, pose, vector or wrench in another frame.
+        """Transform a stamped point, pose, vector or wrench to another frame.
 
         Args:
-            object_stamped: It.
-            target_frame: The frame.
-            timeout: How long to wait for the transform to be known.
-            new_type: Not taken: results are of the type that was given.
+            object_stamped: Message to transform.
+            target_frame: Frame to transform the message to.
+            timeout: Longest time to wait for the transform.
+            new_type: Not supported; results have the type of the message.
 
         Raises:
-            TypeException: It is none of these.
+            TypeException: Messages of the type cannot be transformed.
             TransformException: The transform is not known.
         """
         act = tf2_geometry_msgs.transformation_of(object_stamped)
@@ -109,23 +110,23 @@ class BufferInterface:
 
 
 class Buffer(BufferInterface):
-    """Transforms of the last seconds.
+    """A buffer of the transforms of the last seconds.
 
     Args:
-        cache_time: How long transforms are kept; ten seconds when not given.
-        debug: Not used: the service ``tf2_frames`` is not there.
+        cache_time: Age up to which transforms are kept; ten seconds when not given.
+        debug: Not used; the service ``tf2_frames`` is missing.
     """
 
     def __init__(self, cache_time: Any = None, debug: bool = True) -> None:  # noqa: ARG002
-        self.frames = Frames(_TEN_SECONDS if cache_time is None else _ns(cache_time))
+        self.frames: Frames = Frames(_TEN_SECONDS if cache_time is None else _ns(cache_time))
         self.now: Callable[[], int] = time.time_ns
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
-        """Take note of a transform."""
+        """Add a transform."""
         self._set(transform, authority, static=False)
 
     def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
-        """Take note of a transform that holds for all times."""
+        """Add a static transform."""
         self._set(transform, authority, static=True)
 
     def _set(self, transform: TransformStamped, authority: str, *, static: bool) -> None:
@@ -139,20 +140,20 @@ class Buffer(BufferInterface):
         )
 
     def clear(self) -> None:
-        """Forget what is not static."""
+        """Remove all transforms but the static ones."""
         self.frames.clear()
 
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = None
     ) -> TransformStamped:
-        """Return what brings coordinates of the source frame into the target frame."""
+        """Return the transform from the source frame to the target frame."""
         self.can_transform(target_frame, source_frame, time, timeout)
         return self.lookup_transform_core(target_frame, source_frame, time)
 
     def lookup_transform_core(
         self, target_frame: str, source_frame: str, time: Any
     ) -> TransformStamped:
-        """Return the same without waiting."""
+        """Return the transform from the source to the target frame without waiting."""
         pose, stamp = self.frames.lookup(target_frame, source_frame, _ns(time))
         return _stamped(target_frame, source_frame, pose, stamp)
 
@@ -165,18 +166,18 @@ class Buffer(BufferInterface):
         fixed_frame: str,
         *waiting: Any,
     ) -> TransformStamped:
-        """Return what brings coordinates of one time into a frame at another time.
+        """Return the transform from a frame at one time to a frame at another time.
 
         Args:
-            target_frame: The frame that coordinates are wanted in.
-            target_time: When.
-            source_frame: The frame that they are in.
-            source_time: When they were there.
-            fixed_frame: A frame that does not move meanwhile.
-            waiting: How long to wait for it to be known.
+            target_frame: Frame to transform coordinates to.
+            target_time: Time of the target frame.
+            source_frame: Frame of the coordinates.
+            source_time: Time of the source frame.
+            fixed_frame: Frame that does not move meanwhile.
+            waiting: Longest time to wait for the transform.
 
         Raises:
-            TransformException: It is not known; the class says why.
+            TransformException: The transform is not known; the subclass tells the reason.
         """
         call = target_frame, _ns(target_time), source_frame, _ns(source_time), fixed_frame
         self._wait(lambda: not self._why_not_full(*call), *waiting)
@@ -191,14 +192,14 @@ class Buffer(BufferInterface):
         timeout: Any = None,
         return_debug_tuple: bool = False,
     ) -> Any:
-        """Tell whether a transform is known.
+        """Return whether a transform is known.
 
         Args:
-            target_frame: The frame that coordinates are wanted in.
-            source_frame: The frame that they are in.
-            time: When; 0 for the latest.
-            timeout: How long to wait for it.
-            return_debug_tuple: Whether to return why not, too.
+            target_frame: Frame to transform coordinates to.
+            source_frame: Frame of the coordinates.
+            time: Time of the transform; 0 for the latest.
+            timeout: Longest time to wait for the transform.
+            return_debug_tuple: Whether to return a tuple with the reason as well.
         """
         stamp = _ns(time)
         self._wait(lambda: not self.frames.why_not(target_frame, source_frame, stamp), timeout)
@@ -214,7 +215,7 @@ class Buffer(BufferInterface):
         fixed_frame: str,
         *waiting: Any,
     ) -> bool:
-        """Tell whether a transform between two times is known; see `lookup_transform_full`."""
+        """Return whether a transform between two times is known; see `lookup_transform_full`."""
         call = target_frame, _ns(target_time), source_frame, _ns(source_time), fixed_frame
         self._wait(lambda: not self._why_not_full(*call), *waiting)
         return not self._why_not_full(*call)
@@ -235,26 +236,21 @@ class Buffer(BufferInterface):
         return Time.from_nsec(self.frames.latest_common(target_frame, source_frame))
 
     def all_frames_as_string(self) -> str:
-        """Return who is whose parent, a line each."""
+        """Return the parent of each frame, one per line."""
         return "".join(
             f"Frame {name} exists with parent {one.newest.parent}.\n"
             for name, one in self.frames.histories().items()
         )
 
     def all_frames_as_yaml(self) -> str:
-        """Return what is known of each frame, as YAML."""
+        """Return the state of each frame as YAML."""
         return "".join(
             f"{name}: \n  parent: '{one.newest.parent}'\n  broadcaster: '{one.authority}'\n"
-            f"  rate: {_rate(one):.3f}\n  most_recent_transform: {one.latest / 1e9:.3f}\n"
+            f"  rate: {one.rate:.3f}\n  most_recent_transform: {one.latest / 1e9:.3f}\n"
             f"  oldest_transform: {one.oldest / 1e9:.3f}\n"
             f"  buffer_length: {(one.latest - one.oldest) / 1e9:.3f}\n"
             for name, one in self.frames.histories().items()
         )
-
-
-def _rate(history: History) -> float:
-    """Return transforms per second, as tf2 counts them."""
-    return len(history) / max((history.latest - history.oldest) / 1e9, 1e-4)
 
 
 def _stamped(target: str, source: str, pose: Pose, stamp: int) -> TransformStamped:
@@ -264,49 +260,50 @@ def _stamped(target: str, source: str, pose: Pose, stamp: int) -> TransformStamp
 
 
 class TransformListener:
-    """Puts what others tell into a buffer.
+    """Receive transforms and put them into a buffer.
 
     Args:
-        buffer: Where to put it.
-        node: A node of rclpy; not used otherwise, as rospy's options.
+        buffer: Buffer to fill.
+        node: An rclpy node; the node of the process when not given. The options of rospy are
+            ignored.
     """
 
     def __init__(self, buffer: Buffer, node: Any = None, **_options: Any) -> None:
-        self.buffer = buffer
+        self.buffer: Buffer = buffer
         listening = _node_of(node)
         buffer.now = listening.now
         self._listener = _Listener(buffer.frames, listening)
 
     def unregister(self) -> None:
-        """Listen no more."""
+        """Close the subscriptions."""
         self._listener.close()
 
 
 class TransformBroadcaster:
-    """Tells of frames that move.
+    """Publish transforms of moving frames.
 
     Args:
-        node: A node of rclpy; the process's own when not given.
+        node: An rclpy node; the node of the process when not given.
     """
 
     def __init__(self, node: Any = None) -> None:
         self._broadcaster = _Broadcaster(_node_of(node))
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
-        """Tell of a TransformStamped, or of several."""
+        """Publish one TransformStamped or several."""
         self._broadcaster.send(transform)
 
 
 class StaticTransformBroadcaster:
-    """Tells of frames that do not move, whoever comes later, too.
+    """Publish transforms of static frames, also to late subscriptions.
 
     Args:
-        node: A node of rclpy; the process's own when not given.
+        node: An rclpy node; the node of the process when not given.
     """
 
     def __init__(self, node: Any = None) -> None:
         self._broadcaster = _StaticBroadcaster(_node_of(node))
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
-        """Tell of a TransformStamped, or of several."""
+        """Publish one TransformStamped or several."""
         self._broadcaster.send(transform)

@@ -1,21 +1,33 @@
-"""tf.listener: asking where frames are."""
+"""tf.listener and tf.broadcaster: looking up and publishing transforms."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rosz.errors import ExtrapolationNeeded as ExtrapolationException
 from rosz.errors import FrameNotFound as LookupException
 from rosz.errors import FramesNotConnected as ConnectivityException
 from rosz.errors import TransformError as Exception  # noqa: A004  # ROS 1's
-from rosz.msgs.geometry_msgs.msg import Pose, PoseStamped, QuaternionStamped, TransformStamped
+from rosz.msgs.geometry_msgs.msg import (
+    Pose,
+    PoseStamped,
+    Quaternion,
+    QuaternionStamped,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
+from rosz.msgs.std_msgs.msg import Header
 from rosz.ros1 import tf2_geometry_msgs, tf2_ros
+from rosz.ros1.tf.transformations import quaternion_matrix
 
 __all__ = (
     "ConnectivityException",
     "Exception",
     "ExtrapolationException",
     "LookupException",
+    "TransformBroadcaster",
     "TransformListener",
     "Transformer",
     "TransformerROS",
@@ -25,7 +37,7 @@ Parts = tuple[list[float], list[float]]
 """Translation ``x, y, z`` and rotation ``x, y, z, w``."""
 
 
-def _bare(frame: str) -> str:
+def _strip(frame: str) -> str:
     return frame.removeprefix("/")
 
 
@@ -35,23 +47,23 @@ def _parts(found: TransformStamped) -> Parts:
 
 
 class Transformer:
-    """Transforms of the last seconds; a slash in front of the name of a frame does not count.
+    """A buffer of the transforms of the last seconds; ignores leading slashes of frame names.
 
     Args:
-        interpolate: Not used: it always does.
-        cache_time: How long transforms are kept; ten seconds when not given.
+        interpolate: Not used; transforms are always interpolated.
+        cache_time: Age up to which transforms are kept; ten seconds when not given.
     """
 
     def __init__(self, interpolate: bool = True, cache_time: Any = None) -> None:  # noqa: ARG002
         self._buffer = tf2_ros.Buffer(cache_time)
 
     def setTransform(self, transform: Any, authority: str = "default_authority") -> None:  # noqa: N802
-        """Take note of a TransformStamped."""
+        """Add a TransformStamped."""
         self._buffer.set_transform(transform, authority)
 
     def canTransform(self, target_frame: str, source_frame: str, time: Any) -> bool:  # noqa: N802
-        """Tell whether a transform is known."""
-        return bool(self._buffer.can_transform(_bare(target_frame), _bare(source_frame), time))
+        """Return whether a transform is known."""
+        return bool(self._buffer.can_transform(_strip(target_frame), _strip(source_frame), time))
 
     def waitForTransform(  # noqa: N802  # ROS 1's
         self,
@@ -64,30 +76,36 @@ class Transformer:
         """Wait until a transform is known.
 
         Args:
-            target_frame: The frame that coordinates are wanted in.
-            source_frame: The frame that they are in.
-            time: When; 0 for the latest.
-            timeout: How long to wait.
+            target_frame: Frame to transform coordinates to.
+            source_frame: Frame of the coordinates.
+            time: Time of the transform; 0 for the latest.
+            timeout: Longest time to wait.
             polling_sleep_duration: Not used.
 
         Raises:
-            Exception: It is not known in time; the text says why.
+            Exception: The transform is not known in time; the text tells the reason.
         """
         known, reason = self._buffer.can_transform(
-            _bare(target_frame), _bare(source_frame), time, timeout, return_debug_tuple=True
+            _strip(target_frame),
+            _strip(source_frame),
+            time,
+            timeout,
+            return_debug_tuple=True,
         )
         if not known:
             raise Exception(reason)  # tf's own
 
     def lookupTransform(self, target_frame: str, source_frame: str, time: Any) -> Parts:  # noqa: N802
-        """Return what brings coordinates of the source frame into the target frame.
+        """Return the transform from the source frame to the target frame.
 
         Raises:
-            LookupException: There is no such frame.
-            ConnectivityException: They belong to separate trees.
-            ExtrapolationException: The time is before or after what is known.
+            LookupException: A frame does not exist.
+            ConnectivityException: The frames belong to separate trees.
+            ExtrapolationException: The time is before or after all known transforms.
         """
-        return _parts(self._buffer.lookup_transform(_bare(target_frame), _bare(source_frame), time))
+        return _parts(
+            self._buffer.lookup_transform(_strip(target_frame), _strip(source_frame), time)
+        )
 
     def lookupTransformFull(  # noqa: N802  # ROS 1's
         self,
@@ -97,90 +115,129 @@ class Transformer:
         source_time: Any,
         fixed_frame: str,
     ) -> Parts:
-        """Return what brings coordinates of one time into a frame at another time.
+        """Return the transform from a frame at one time to a frame at another time.
 
         Raises:
-            Exception: It is not known; the class says why.
+            Exception: The transform is not known; the subclass tells the reason.
         """
         return _parts(
             self._buffer.lookup_transform_full(
-                _bare(target_frame),
+                _strip(target_frame),
                 target_time,
-                _bare(source_frame),
+                _strip(source_frame),
                 source_time,
-                _bare(fixed_frame),
+                _strip(fixed_frame),
             )
         )
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> Any:  # noqa: N802  # ROS 1's
         """Return the latest time at which a transform is known."""
-        return self._buffer.get_latest_common_time(_bare(source_frame), _bare(dest_frame))
+        return self._buffer.get_latest_common_time(_strip(source_frame), _strip(dest_frame))
 
     def frameExists(self, frame_id: str) -> bool:  # noqa: N802  # ROS 1's
-        """Tell whether there is a frame of that name."""
-        return self._buffer.frames.has(_bare(frame_id))
+        """Return whether there is a frame of a name."""
+        return self._buffer.frames.has(_strip(frame_id))
 
     def getFrameStrings(self) -> list[str]:  # noqa: N802  # ROS 1's
         """Return the names of all frames."""
         return self._buffer.frames.frames()
 
     def allFramesAsString(self) -> str:  # noqa: N802  # ROS 1's
-        """Return who is whose parent, a line each."""
+        """Return the parent of each frame, one per line."""
         return self._buffer.all_frames_as_string()
 
     def clear(self) -> None:
-        """Forget what is not static."""
+        """Remove all transforms but the static ones."""
         self._buffer.clear()
 
 
 class TransformerROS(Transformer):
-    """Brings messages into other frames."""
+    """Transform messages to other frames."""
 
     def asMatrix(self, target_frame: str, hdr: Any) -> Any:  # noqa: N802  # ROS 1's
-        """Return the 4x4 matrix that brings what has a header into a frame."""
+        """Return the 4x4 matrix of the transform from the frame of a header to another frame."""
         found = self.lookupTransform(target_frame, hdr.frame_id, hdr.stamp)
         return self.fromTranslationRotation(*found)
 
     def fromTranslationRotation(self, translation: Any, rotation: Any) -> Any:  # noqa: N802
         """Return the 4x4 matrix of a translation and a rotation."""
-        from rosz.ros1.tf.transformations import quaternion_matrix
-
         matrix = quaternion_matrix(rotation)
         matrix[:3, 3] = translation
         return matrix
 
-    def _found(self, target: str, header: Any) -> TransformStamped:
-        return self._buffer.lookup_transform(_bare(target), _bare(header.frame_id), header.stamp)
+    def _lookup(self, target: str, header: Any) -> TransformStamped:
+        return self._buffer.lookup_transform(_strip(target), _strip(header.frame_id), header.stamp)
 
     def transformPoint(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
-        """Return a PointStamped in another frame."""
-        found = self._found(target_frame, ps.header)
+        """Transform a PointStamped to another frame."""
+        found = self._lookup(target_frame, ps.header)
         return tf2_geometry_msgs.do_transform_point(ps, found)
 
     def transformVector3(self, target_frame: str, v3s: Any) -> Any:  # noqa: N802  # ROS 1's
-        """Return a Vector3Stamped, which only turns, in another frame."""
-        found = self._found(target_frame, v3s.header)
+        """Rotate a Vector3Stamped to another frame."""
+        found = self._lookup(target_frame, v3s.header)
         return tf2_geometry_msgs.do_transform_vector3(v3s, found)
 
     def transformPose(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
-        """Return a PoseStamped in another frame."""
-        found = self._found(target_frame, ps.header)
+        """Transform a PoseStamped to another frame."""
+        found = self._lookup(target_frame, ps.header)
         return tf2_geometry_msgs.do_transform_pose(ps, found)
 
     def transformQuaternion(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
-        """Return a QuaternionStamped in another frame."""
+        """Transform a QuaternionStamped to another frame."""
         pose = PoseStamped(ps.header, Pose(orientation=ps.quaternion))
         moved = self.transformPose(target_frame, pose)
         return QuaternionStamped(moved.header, moved.pose.orientation)
 
 
 class TransformListener(TransformerROS):
-    """Hears of transforms.
+    """Receive transforms, and look them up.
 
     Args:
-        options: What `Transformer` takes.
+        options: Arguments of `Transformer`.
+        named: Keyword arguments of `Transformer`.
     """
 
     def __init__(self, *options: Any, **named: Any) -> None:
         super().__init__(*options, **named)
         self._listener = tf2_ros.TransformListener(self._buffer)
+
+
+class TransformBroadcaster:
+    """Publish transforms of moving frames.
+
+    Args:
+        queue_size: Not used.
+    """
+
+    def __init__(self, queue_size: int = 100) -> None:  # noqa: ARG002  # ROS 1's
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+
+    def sendTransform(  # noqa: N802  # ROS 1's
+        self,
+        translation: Sequence[float],
+        rotation: Sequence[float],
+        time: Any,
+        child: str,
+        parent: str,
+    ) -> None:
+        """Publish the pose of a frame in its parent.
+
+        Args:
+            translation: ``x, y, z`` in metres.
+            rotation: ``x, y, z, w``.
+            time: Time of the transform.
+            child: Name of the frame.
+            parent: Name of the parent.
+        """
+        transform = Transform(
+            Vector3(*(float(part) for part in translation)),
+            Quaternion(*(float(part) for part in rotation)),
+        )
+        self.sendTransformMessage(
+            TransformStamped(Header(stamp=time, frame_id=parent), child, transform)
+        )
+
+    def sendTransformMessage(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
+        """Publish one TransformStamped or several."""
+        self._broadcaster.sendTransform(transform)
