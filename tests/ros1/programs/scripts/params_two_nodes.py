@@ -20,8 +20,12 @@ else:
     rospy.set_param("/answer", len(question["of"]))
     if rospy.has_param("/answer"):
         print("answered")
+    rospy.set_param("/checked", True)
     while rospy.get_param("/answer", None) is not None and not rospy.is_shutdown():
         rospy.sleep(0.02)
     sys.exit(4)
 if role == "asker":
+    while not rospy.has_param("/checked"):
+        rospy.sleep(0.02)
+    rospy.delete_param("/checked")
     rospy.delete_param("/answer")
