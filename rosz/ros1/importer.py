@@ -48,28 +48,30 @@ def install(store: TypeStore | None = None, packages: PackageIndex | None = None
         store: Store of message classes; by the environment of the process when not given.
         packages: Packages to search; by the environment of the process when not given.
     """
-    if any(isinstance(finder, _First) for finder in sys.meta_path):
+    if any(isinstance(finder, _FrontFinder) for finder in sys.meta_path):
         return
     types = _Types(store, packages)
-    sys.meta_path.insert(0, _First(types))
-    sys.meta_path.append(_Last(types))
+    sys.meta_path.insert(0, _FrontFinder(types))
+    sys.meta_path.append(_EndFinder(types))
 
 
 def uninstall() -> None:
     """Remove the finders; modules that are imported stay."""
-    sys.meta_path[:] = [one for one in sys.meta_path if not isinstance(one, _First | _Last)]
+    sys.meta_path[:] = [
+        one for one in sys.meta_path if not isinstance(one, _FrontFinder | _EndFinder)
+    ]
 
 
 def type_store() -> TypeStore:
     """Return the store of the message classes that imports return."""
     install()
-    return next(one.types.store for one in sys.meta_path if isinstance(one, _First))
+    return next(one.types.store for one in sys.meta_path if isinstance(one, _FrontFinder))
 
 
 def package_path() -> PackageIndex:
     """Return the packages that imports search."""
     install()
-    return next(one.types.packages for one in sys.meta_path if isinstance(one, _First))
+    return next(one.types.packages for one in sys.meta_path if isinstance(one, _FrontFinder))
 
 
 class _Types:
@@ -157,7 +159,7 @@ def _alias(name: str, load: Callable[[], ModuleType]) -> ModuleSpec:
     return ModuleSpec(name, _AliasLoader(load), is_package=True)
 
 
-class _First(MetaPathFinder):
+class _FrontFinder(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self.types = types
         self._shipped = shipped_packages()
@@ -247,7 +249,7 @@ class _First(MetaPathFinder):
         return spec
 
 
-class _Last(MetaPathFinder):
+class _EndFinder(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self._types = types
 
