@@ -18,6 +18,7 @@ __all__ = (
     "print_json",
     "print_json_line",
     "print_lines",
+    "print_result",
     "takes_escapes",
     "until_stopped",
     "warn",
@@ -48,6 +49,14 @@ def print_json_line(value: Any) -> None:
     import msgspec
 
     print_lines([msgspec.json.encode(value).decode()])
+
+
+def print_result(lines: Iterable[str], value: Any, *, as_json: bool) -> None:
+    """Print lines, or the value that they show as JSON."""
+    if as_json:
+        print_json(value)
+    else:
+        print_lines(lines)
 
 
 def print_error(text: str) -> None:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 from rosz.cli import suggest
 from rosz.cli.call import Call
 from rosz.cli.console import (
-    print_json,
     print_json_line,
     print_lines,
+    print_result,
     takes_escapes,
     until_stopped,
     warn,
@@ -115,11 +115,8 @@ def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
         for node in nodes:
             for token in find_nodes(survey, call.resolve(node, _TOOL)):
                 found[token.node_name] = get_levels(session, token)
-    if as_json:
-        print_json(found)
-        return
-    for levels in found.values():
-        print_lines(f"{logger} {level}" for logger, level in levels.items())
+    lines = (f"{one} {level}" for levels in found.values() for one, level in levels.items())
+    print_result(lines, found, as_json=as_json)
 
 
 def _follow(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
-from rosz.cli.console import print_error, print_json, print_lines, until_stopped
+from rosz.cli.console import print_error, print_json, print_lines, print_result, until_stopped
 from rosz.cli.declare import Argument, Option
 from rosz.cli.limits import at_least
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
@@ -49,12 +49,11 @@ def list_command(
     space = call.resolve(namespace, _TOOL) if namespace else "/"
     survey = call.survey(processes=everything or places or json)
     nodes = [node for node in list_nodes(survey) if in_namespace(node.name, space)]
-    if json:
-        print_json(nodes)
-    elif everything:
-        print_lines(f"{node.address} \t{node.name}" for node in nodes)
+    if everything:
+        lines = [f"{node.address} \t{node.name}" for node in nodes]
     else:
-        print_lines(node.address if places else node.name for node in nodes)
+        lines = [node.address if places else node.name for node in nodes]
+    print_result(lines, nodes, as_json=json)
 
 
 @app.command("info")
@@ -138,10 +137,7 @@ def machine_command(
 
     nodes = list_nodes(call.survey(processes=True))
     found = nodes_on_machine(nodes, machine) if machine else machines(nodes)
-    if json:
-        print_json(found)
-    else:
-        print_lines(found)
+    print_result(found, found, as_json=json)
 
 
 @app.command("ping")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
-from rosz.cli.console import count, paint, print_json, takes_escapes, warn
+from rosz.cli.console import count, paint, print_json, print_result, takes_escapes, warn
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import NotFoundError
 
@@ -40,11 +40,8 @@ def list_packages(
     packages = index.packages()
     for fault in index.broken:
         warn(str(fault))
-    if json:
-        print_json({package.name: str(package.path) for package in packages})
-        return
-    for package in packages:
-        sys.stdout.write(f"{package.name}\n" if names else f"{package.name} {package.path}\n")
+    lines = (one.name if names else f"{one.name} {one.path}" for one in packages)
+    print_result(lines, {one.name: str(one.path) for one in packages}, as_json=json)
 
 
 @app.command("find")
@@ -58,10 +55,8 @@ def find_package(
 ) -> None:
     """Print the folder of a package."""
     package = _index().find(name) if name else _workspace()
-    if json:
-        print_json({"name": package.name, "path": str(package.path)})
-    else:
-        sys.stdout.write(f"{package.path}\n")
+    path = str(package.path)
+    print_result([path], {"name": package.name, "path": path}, as_json=json)
 
 
 @app.command("create")

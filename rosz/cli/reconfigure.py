@@ -14,6 +14,7 @@ from rosz.cli.console import (
     print_json,
     print_json_line,
     print_lines,
+    print_result,
     until_stopped,
     warn,
     write_file,
@@ -57,10 +58,7 @@ def list_command(call: Call, *, json: _Json = False) -> None:
     from rosz.reconfigure import find_servers
 
     found = find_servers(call.survey().view)
-    if json:
-        print_json(found)
-    else:
-        print_lines(found)
+    print_result(found, found, as_json=json)
 
 
 @app.command("get")
@@ -298,10 +296,8 @@ def _print_description(
     """
     if only:
         setting = description.setting(only)
-        if as_json:
-            print_json(_setting_row(setting, config))
-        else:
-            print_lines(_describe(setting, config, ""))
+        lines = _describe(setting, config, "")
+        print_result(lines, _setting_row(setting, config), as_json=as_json)
     elif as_json:
         rows = [_setting_row(setting, config) for setting in description.settings.values()]
         print_json({"settings": rows, "groups": _group_rows(description)})

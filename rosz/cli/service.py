@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
-from rosz.cli.console import print_json, print_lines, until_stopped, warn
+from rosz.cli.console import print_json, print_lines, print_result, until_stopped, warn
 from rosz.cli.declare import Argument, Option, values_last
 from rosz.cli.limits import seconds
 from rosz.errors import EncodeError, UsageError
@@ -44,12 +44,13 @@ def list_command(
 
     space = call.resolve(namespace, _TOOL) if namespace else "/"
     found = [one for one in list_services(call.survey().view) if in_namespace(one.name, space)]
-    if json:
-        print_json(found)
-        return
-    for one in found:
-        kind = f" [{', '.join(one.types)}]" if types else ""
-        print_lines([one.name + kind + (f" {','.join(one.nodes)}" if nodes else "")])
+    lines = (
+        one.name
+        + (f" [{', '.join(one.types)}]" if types else "")
+        + (f" {','.join(one.nodes)}" if nodes else "")
+        for one in found
+    )
+    print_result(lines, found, as_json=json)
 
 
 @app.command("info")
@@ -61,17 +62,12 @@ def info_command(call: Call, service: _ServiceName, *, json: _Json = False) -> N
     token = _server(call, service)
     arguments = _arguments(call, token)
     type_name = short_type(token.type_name)
-    if json:
-        row = {"name": token.name, "node": token.node_name, "uri": service_key(token)}
-        print_json(row | {"type": type_name, "args": arguments.split()})
-        return
-    print_lines(
-        [
-            f"Node: {token.node_name}",
-            f"URI: {service_key(token)}",
-            f"Type: {type_name}",
-            f"Args: {arguments}",
-        ]
+    key = service_key(token)
+    row = {"name": token.name, "node": token.node_name, "uri": key, "type": type_name}
+    print_result(
+        [f"Node: {token.node_name}", f"URI: {key}", f"Type: {type_name}", f"Args: {arguments}"],
+        row | {"args": arguments.split()},
+        as_json=json,
     )
 
 
@@ -80,7 +76,8 @@ def type_command(call: Call, service: _ServiceName, *, json: _Json = False) -> N
     """Print the type of a service."""
     from rosz.names import short_type
 
-    _print_one("type", short_type(_server(call, service).type_name), as_json=json)
+    name = short_type(_server(call, service).type_name)
+    print_result([name], {"type": name}, as_json=json)
 
 
 @app.command("find")
@@ -94,26 +91,21 @@ def find_command(
     from rosz.introspect.services import services_of_type
 
     found = services_of_type(call.survey().view, type_name)
-    if json:
-        print_json(found)
-    else:
-        print_lines(found)
+    print_result(found, found, as_json=json)
 
 
 @app.command("args")
 def args_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the arguments of a service."""
     names = _arguments(call, _server(call, service))
-    if json:
-        print_json({"args": names.split()})
-    else:
-        print_lines([names])
+    print_result([names], {"args": names.split()}, as_json=json)
 
 
 @app.command("node")
 def node_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
     """Print the node that provides a service."""
-    _print_one("node", _server(call, service).node_name, as_json=json)
+    name = _server(call, service).node_name
+    print_result([name], {"node": name}, as_json=json)
 
 
 @app.command("uri")
@@ -121,7 +113,8 @@ def uri_command(call: Call, service: _ServiceName, *, json: _Json = False) -> No
     """Print the Zenoh key of a service."""
     from rosz.introspect.services import service_key
 
-    _print_one("uri", service_key(_server(call, service)), as_json=json)
+    key = service_key(_server(call, service))
+    print_result([key], {"uri": key}, as_json=json)
 
 
 def _server(call: Call, service: str) -> Token:
@@ -134,13 +127,6 @@ def _arguments(call: Call, token: Token) -> str:
     from rosz.introspect.arguments import list_arguments
 
     return list_arguments(call.types.service(token.type_name).Request)
-
-
-def _print_one(title: str, value: str, *, as_json: bool) -> None:
-    if as_json:
-        print_json({title: value})
-    else:
-        print_lines([value])
 
 
 @app.command("call", arrange=values_last(frozenset({"--timeout"})))

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
-from rosz.cli.console import print_json, print_json_line, print_lines, until_stopped, warn
+from rosz.cli.console import (
+    print_json,
+    print_json_line,
+    print_lines,
+    print_result,
+    until_stopped,
+    warn,
+)
 from rosz.cli.declare import Argument, Option
 from rosz.cli.limits import at_least, per_second
 from rosz.errors import ClosedError, EncodeError, NotFoundError, UsageError
@@ -137,10 +144,8 @@ def type_command(call: Call, topic: _TopicOrField, *, json: _Json = False) -> No
     view = call.survey().view
     load = call.types.message
     text = find_target(name, topic_types(view), load).type_text(load)
-    if json:
-        print_json(dict(zip(("type", "field", "field_type"), text.split(" "), strict=False)))
-    else:
-        print_lines([text])
+    row = dict(zip(("type", "field", "field_type"), text.split(" "), strict=False))
+    print_result([text], row, as_json=json)
 
 
 @app.command("find")
@@ -154,10 +159,7 @@ def find_command(
     from rosz.introspect import topics as library
 
     found = library.topics_of_type(library.list_topics(call.survey().view.tokens), type_name)
-    if json:
-        print_json(found)
-    else:
-        print_lines(found)
+    print_result(found, found, as_json=json)
 
 
 @app.command("echo")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
-from rosz.cli.console import print_json, print_lines
+from rosz.cli.console import print_json, print_lines, print_result
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import UsageError
 
@@ -70,7 +70,8 @@ class _Types:
             print_lines([definitions.text(one) if raw else definitions.show(one)])
 
     def list(self, call: Call, *, json: _Json = False) -> None:
-        _print(call.types.names(self._kind), as_json=json)
+        names = call.types.names(self._kind)
+        print_result(names, names, as_json=json)
 
     def md5(self, call: Call, name: _TypeName = "", *, json: _Json = False) -> None:
         definitions = self._definitions(call)
@@ -84,10 +85,11 @@ class _Types:
         self, call: Call, package: _Package = "", *, single: _Single = False, json: _Json = False
     ) -> None:
         names = call.types.names(self._kind, _given(package, "package"))
-        _print(names, single=single, as_json=json)
+        print_result([" ".join(names)] if single else names, names, as_json=json)
 
     def packages(self, call: Call, *, single: _Single = False, json: _Json = False) -> None:
-        _print(call.types.packages(self._kind), single=single, as_json=json)
+        names = call.types.packages(self._kind)
+        print_result([" ".join(names)] if single else names, names, as_json=json)
 
     def _definitions(self, call: Call) -> Definitions:
         from rosz.introspect.definitions import Definitions
@@ -100,18 +102,8 @@ def _print_hashes(
 ) -> None:
     wanted = _given(name)
     hashes = {one: compute(one) for one in definitions.find(wanted)}
-    if as_json:
-        print_json({_short(one): value for one, value in hashes.items()})
-        return
-    for one, value in hashes.items():
-        print_lines([value if "/" in wanted else f"[{_short(one)}]: {value}"])
-
-
-def _print(names: list[str], *, single: bool = False, as_json: bool) -> None:
-    if as_json:
-        print_json(names)
-    else:
-        print_lines([" ".join(names)] if single else names)
+    lines = (v if "/" in wanted else f"[{_short(one)}]: {v}" for one, v in hashes.items())
+    print_result(lines, {_short(one): v for one, v in hashes.items()}, as_json=as_json)
 
 
 def _short(name: str) -> str:

@@ -117,7 +117,7 @@ def test_wrong_usage(
     assert not written.out
 
 
-def test_a_meaningless_setting_is_one_line(
+def test_an_invalid_setting_is_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "many")
@@ -127,7 +127,7 @@ def test_a_meaningless_setting_is_one_line(
     )
 
 
-def test_a_deleted_working_folder_is_told(network: Network) -> None:
+def test_a_deleted_working_folder_is_reported(network: Network) -> None:
     (network.folder / "gone").mkdir()
     line = f'cd gone && rmdir ../gone && "{sys.executable}" -P -m rosz pkg check'
     done = subprocess.run(
@@ -142,7 +142,7 @@ def test_a_deleted_working_folder_is_told(network: Network) -> None:
     assert (done.returncode, done.stderr) == (1, expected)
 
 
-def test_a_full_disk_is_told_of_the_file(network: Network) -> None:
+def test_a_full_disk_is_reported_with_the_file(network: Network) -> None:
     node = network.node()
     node.params.set("/a", 1)
     line = [sys.executable, "-P", "-m", "rosz", "param", "dump"]
@@ -154,7 +154,7 @@ def test_a_full_disk_is_told_of_the_file(network: Network) -> None:
 
 @pytest.mark.parametrize("unbuffered", ["", "1"], ids=["buffered", "unbuffered"])
 @pytest.mark.parametrize("size", [1, 100_000], ids=["little", "much"])
-def test_a_full_disk_is_told_of_standard_output(
+def test_a_full_disk_is_reported_with_standard_output(
     network: Network, unbuffered: str, size: int
 ) -> None:
     network.node().params.set("/a", "x" * size)
@@ -194,7 +194,7 @@ print("stopped", flush=True)
     ("seconds", "code", "out"),
     [("-1", -signal.SIGINT, "stopping\n"), ("60", 0, "stopping\nstopped\n")],
 )
-def test_a_second_signal_is_the_same_wish_or_ends_at_once(
+def test_a_second_signal_is_ignored_for_a_second_and_then_ends_at_once(
     seconds: str, code: int, out: str
 ) -> None:
     done = subprocess.run(
@@ -218,7 +218,7 @@ def test_a_second_signal_is_the_same_wish_or_ends_at_once(
         ),
     ],
 )
-def test_a_refused_setting_is_told_beside_a_live_node(
+def test_a_refused_setting_is_reported_beside_a_live_node(
     network: Network, variable: str, value: str, code: int, reason: str
 ) -> None:
     network.node()

@@ -157,7 +157,7 @@ def test_a_network_that_hangs_gives_nothing_soon(network: Network) -> None:
         assert program.output == ""
 
 
-def test_a_person_does_not_wait(system: Network) -> None:
+def test_completion_takes_little_processor_time(system: Network) -> None:
     line = "rostopic echo /"
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
@@ -187,11 +187,11 @@ def test_a_person_does_not_wait(system: Network) -> None:
         ("a |", None),
     ],
 )
-def test_the_words_of_a_line(line: str, words: list[str] | None) -> None:
+def test_split_line(line: str, words: list[str] | None) -> None:
     assert split_line(line) == words
 
 
-def test_what_a_line_stands_for() -> None:
+def test_expand() -> None:
     assert expand(["/opt/bin/rostopic", "echo"]) == ["rosz", "topic", "echo"]
     assert expand(["catkin_create_pkg"]) == ["rosz", "pkg", "create", "--bare"]
     assert expand(["A=1", "B=2", "rosz", "topic"]) == ["rosz", "topic"]
@@ -256,7 +256,7 @@ def terminal(system: Network, request: pytest.FixtureRequest) -> Iterator[Termin
     made.close()
 
 
-def test_a_person_presses_tab(terminal: Terminal) -> None:
+def test_the_tab_key_completes_in_a_terminal(terminal: Terminal) -> None:
     # What is completed is what the command then gets.
     terminal.type("rostopic type /tur\t\n")
     terminal.wait_for("geometry_msgs/Twist\r\n")
@@ -288,7 +288,7 @@ def test_fish_completes(system: Network) -> None:
     assert not done.stderr
 
 
-def test_a_folder_begun_with_a_tilde(ask: Ask, network: Network) -> None:
+def test_a_path_that_begins_with_a_tilde(ask: Ask, network: Network) -> None:
     (network.folder / "values.yaml").touch()
     assert ask("rosparam load ~/val") == ["~/values.yaml"]
     assert Path("~").expanduser() == network.folder

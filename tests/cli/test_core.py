@@ -16,7 +16,7 @@ def core(shell: Shell) -> Program:
     return started
 
 
-def test_it_says_where_it_listens(core: Program, network: Network) -> None:
+def test_core_prints_where_it_listens(core: Program, network: Network) -> None:
     assert core.lines == [
         f"listening on {network.rendezvous}",
         "parameters of domain 42 are kept in memory",
@@ -25,14 +25,14 @@ def test_it_says_where_it_listens(core: Program, network: Network) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_at_once(core: Program, number: signal.Signals) -> None:
+def test_core_ends_at_once(core: Program, number: signal.Signals) -> None:
     core.send(number)
     assert core.exit_code(timeout=3) == 0
     assert len(core.lines) == 3
 
 
 @pytest.mark.usefixtures("core")
-def test_others_meet_there(shell: Shell, network: Network) -> None:
+def test_nodes_meet_at_a_core(shell: Shell, network: Network) -> None:
     assert shell("node", "list").lines == []
     network.node("one")
     network.node("two")
@@ -40,17 +40,17 @@ def test_others_meet_there(shell: Shell, network: Network) -> None:
 
 
 @pytest.mark.usefixtures("core")
-def test_it_holds_the_parameters(shell: Shell) -> None:
+def test_core_holds_the_parameters(shell: Shell) -> None:
     assert shell("param", "set", "/speed", "3").code == 0
     assert shell("param", "get", "/speed").out == "3\n"
 
 
 @pytest.mark.usefixtures("core")
-def test_it_sets_what_roscore_sets(shell: Shell) -> None:
+def test_core_sets_the_parameters_that_roscore_sets(shell: Shell) -> None:
     assert shell("param", "list").lines == ["/rosdistro", "/rosversion", "/run_id"]
 
 
-def test_what_is_set_already_stays(shell: Shell, tmp_path: Path) -> None:
+def test_core_keeps_parameters_that_are_set(shell: Shell, tmp_path: Path) -> None:
     store = tmp_path / "params.db"
     runs = set()
     for _ in range(2):
@@ -88,7 +88,7 @@ def test_a_malformed_endpoint(shell: Shell) -> None:
     assert result.err.count("\n") == 1
 
 
-def test_a_file_outlives_it(shell: Shell, tmp_path: Path) -> None:
+def test_a_store_outlives_its_core(shell: Shell, tmp_path: Path) -> None:
     store = tmp_path / "params.db"
     for expected in ("", "left\n"):
         core = shell.start("core", "--store", str(store))
@@ -99,7 +99,7 @@ def test_a_file_outlives_it(shell: Shell, tmp_path: Path) -> None:
         core.kill()
 
 
-def test_a_file_that_is_something_else(shell: Shell, tmp_path: Path) -> None:
+def test_a_store_that_is_another_file(shell: Shell, tmp_path: Path) -> None:
     store = tmp_path / "params.db"
     store.write_text("a letter to my aunt, which is long enough to be looked at\n" * 20)
     result = shell("core", "--store", str(store))

@@ -15,13 +15,13 @@ def test_a_healthy_system(shell: Shell, network: Network) -> None:
     assert shell("doctor", "--json").json == []
 
 
-def test_an_empty_system_is_no_error(shell: Shell) -> None:
+def test_an_empty_system_is_not_an_error(shell: Shell) -> None:
     result = shell("doctor")
     assert result.lines[0].startswith("WARNING nobody-there: ")
     assert result.lines[-1] == "looked at 0 nodes: 0 errors, 1 warning"
 
 
-def test_an_error_is_told_with_evidence_and_remedy(shell: Shell, network: Network) -> None:
+def test_an_error_is_printed_with_evidence_and_remedy(shell: Shell, network: Network) -> None:
     network.node("talker").publisher("/chatter", String)
     network.node("listener").subscription("/chatter", Int32, lambda _: None)
     result = shell("doctor")
@@ -47,7 +47,7 @@ def test_much_evidence_is_counted(shell: Shell, network: Network) -> None:
     assert len(shell("doctor", "--json").json[0]["evidence"]) == 12
 
 
-def test_a_wait_that_means_nothing(shell: Shell) -> None:
+def test_an_invalid_wait(shell: Shell) -> None:
     result = shell("doctor", "--wait", "-1")
     assert result.code == 2
     assert "--wait is -1; expected seconds above 0" in result.err

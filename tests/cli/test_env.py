@@ -97,7 +97,7 @@ def test_other_scripts_load_nothing_of_rosz(network: Network) -> None:
 
 
 @pytest.mark.parametrize("name", ["platform", "subprocess", "msgspec"])
-def test_what_the_parts_of_rosz_can_do_without_loads_nothing(network: Network, name: str) -> None:
+def test_modules_that_rosz_provides_optionally_load_nothing(network: Network, name: str) -> None:
     folder = network.folder / "odd"
     folder.mkdir()
     source = "try:\n    import of_another_system\nexcept ImportError:\n    half = True\n"
@@ -107,7 +107,7 @@ def test_what_the_parts_of_rosz_can_do_without_loads_nothing(network: Network, n
     assert (done.stdout, done.stderr) == ("True False\n", "")
 
 
-def test_a_module_that_nobody_has(network: Network) -> None:
+def test_a_missing_module(network: Network) -> None:
     done = evaluate(network, "bash", '"$ROSZ_PYTHON" -c "import nothing_of_the_kind"')
     assert done.stderr.endswith("ModuleNotFoundError: No module named 'nothing_of_the_kind'\n")
 
@@ -131,7 +131,7 @@ def test_a_sitecustomize_of_the_user_runs_as_well(network: Network) -> None:
         "rosed std_msgs",
     ],
 )
-def test_what_goes_wrong_is_told(network: Network, line: str) -> None:
+def test_errors_are_reported(network: Network, line: str) -> None:
     done = evaluate(network, "bash", line)
     assert done.returncode in {1, 2}
     assert not done.stdout
@@ -181,7 +181,7 @@ def test_the_settings(shell: Shell) -> None:
     assert shell("env", "--json").json["domain"] == 42
 
 
-def test_modules_of_the_working_folder_are_in_nobodys_way(network: Network) -> None:
+def test_modules_of_the_working_folder_do_not_shadow_others(network: Network) -> None:
     (network.folder / "typing.py").write_text("raise SystemExit('the wrong module')")
     done = evaluate(network, "bash", "rosmsg show std_msgs/Bool")
     assert (done.stdout, done.stderr) == ("bool data\n\n", "")

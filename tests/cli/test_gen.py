@@ -64,7 +64,7 @@ def test_the_package_around_the_working_folder(
     assert shell("gen").code == 2
 
 
-def test_a_folder_for_it(shell: Shell, package: Path, tmp_path: Path) -> None:
+def test_an_output_folder(shell: Shell, package: Path, tmp_path: Path) -> None:
     assert shell("gen", "-o", str(tmp_path), str(package)).lines[0] == str(
         tmp_path / "counting" / "__init__.py"
     )
@@ -84,7 +84,7 @@ def test_files_written_by_hand_stay(shell: Shell, package: Path) -> None:
     assert (folder / "msg.py").read_text() == "mine = 2\n"
 
 
-def test_what_is_generated_goes_when_its_definitions_go(shell: Shell, package: Path) -> None:
+def test_generated_modules_are_removed_with_their_definitions(shell: Shell, package: Path) -> None:
     shell("gen", "counting")
     (package / "srv" / "Add.srv").unlink()
     result = shell("gen", "--check", "counting")
@@ -112,7 +112,7 @@ def test_an_unknown_package_names_the_near_miss(shell: Shell) -> None:
     assert "did you mean 'counting'?" in result.err
 
 
-def test_a_definition_that_is_wrong_is_told_with_its_place(shell: Shell, package: Path) -> None:
+def test_a_wrong_definition_is_reported_with_its_place(shell: Shell, package: Path) -> None:
     (package / "msg" / "Num.msg").write_text("int65 num\n")
     result = shell("gen", "counting")
     assert result.code == 1
@@ -120,7 +120,7 @@ def test_a_definition_that_is_wrong_is_told_with_its_place(shell: Shell, package
 
 
 @pytest.mark.parametrize("name", ["empty", "file"])
-def test_a_folder_or_file_that_is_no_package(shell: Shell, name: str) -> None:
+def test_a_folder_or_file_that_is_not_a_package(shell: Shell, name: str) -> None:
     (shell.network.folder / "empty").mkdir()
     (shell.network.folder / "file").touch()
     done = shell("gen", str(shell.network.folder / name))

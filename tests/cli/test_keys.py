@@ -8,7 +8,7 @@ from pathlib import Path
 from .command import rosz
 
 
-def test_the_way_to_keys(tmp_path: Path) -> None:
+def test_keys_are_made_and_checked(tmp_path: Path) -> None:
     keys = str(tmp_path / "keys")
     assert rosz(tmp_path, "keys", "init", keys).stdout.startswith("made the authority in ")
     added = rosz(tmp_path, "keys", "add", "robot", "--address", "10.0.0.5", "--dir", keys)
@@ -24,7 +24,7 @@ def test_the_way_to_keys(tmp_path: Path) -> None:
     assert [holder["name"] for holder in as_json["holders"]] == ["anna", "laptop", "robot"]
 
 
-def test_what_is_wrong(tmp_path: Path) -> None:
+def test_check_reports_what_is_wrong(tmp_path: Path) -> None:
     keys = tmp_path / "keys"
     rosz(tmp_path, "keys", "init", str(keys))
     rosz(tmp_path, "keys", "add", "robot", "--dir", str(keys))
@@ -51,7 +51,7 @@ def test_mistakes(tmp_path: Path) -> None:
     assert "--address is of one host" in two.stderr
 
 
-def test_keys_in_a_folder_beside_are_proposed(tmp_path: Path) -> None:
+def test_keys_in_the_folder_keys_are_suggested(tmp_path: Path) -> None:
     rosz(tmp_path, "keys", "init", "keys")
     for words, meant in (
         (["list"], "rosz keys list --dir keys"),

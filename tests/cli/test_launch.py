@@ -116,7 +116,7 @@ def test_a_node_can_be_restarted_from_another_terminal(launch: Start, network: N
     assert refused.returncode == 1
 
 
-def test_what_goes_on_when_a_launch_is_killed(launch: Start, network: Network) -> None:
+def test_nodes_go_on_when_their_launch_is_killed(launch: Start, network: Network) -> None:
     first = launch(EXAMPLE, "rate:=20")
     hears(first)
     first.send(signal.SIGKILL)
@@ -163,7 +163,7 @@ def test_wait_for_on_the_live_graph(launch: Start, network: Network) -> None:
     assert run.exit_code() == 0
 
 
-def test_wait_waits_for_somebody(launch: Start, network: Network) -> None:
+def test_wait_waits_for_another_process(launch: Start, network: Network) -> None:
     run = launch("--wait", EXAMPLE)
     run.wait_for("nobody else is there yet; waiting for a core or another launch")
     with network.node("somebody") as node:
@@ -183,7 +183,7 @@ def test_errors_of_nodes_are_lines(launch: Start, network: Network) -> None:
     assert run.wait_for("[rosz_tutorial/publisher.py]: ").endswith("did you mean 'rosz_tutorials'?")
 
 
-def test_a_home_that_cannot_be_made_is_told(launch: Start, network: Network) -> None:
+def test_a_home_that_cannot_be_created_is_reported(launch: Start, network: Network) -> None:
     (network.folder / "file").touch()
     run = launch(EXAMPLE, ROS_HOME=str(network.folder / "file" / "ros"))
     assert run.exit_code() == 1

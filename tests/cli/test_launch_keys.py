@@ -16,7 +16,7 @@ def workspace(folder: Path) -> None:
     (folder / "show.launch").write_text(SHOW)
 
 
-def test_nodes_get_them_in_place_of_those_of_the_shell(tmp_path: Path) -> None:
+def test_nodes_get_the_keys_of_the_option(tmp_path: Path) -> None:
     workspace(tmp_path)
     home = Authority.create(tmp_path / "keys").add("robot")
     variables = {"ROSZ_RENDEZVOUS": free_endpoint(), "ROSZ_KEYS": "/nowhere"}

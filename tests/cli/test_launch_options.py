@@ -67,7 +67,7 @@ def test_required_for_all(launch: Start, demo: Path) -> None:
     assert "\n     last words\n" in died
 
 
-def test_time_outs_of_the_command_line(launch: Start, demo: Path) -> None:
+def test_timeouts_of_the_command_line(launch: Start, demo: Path) -> None:
     body = '<node pkg="demo" type="stubborn" name="mule" output="screen"/>'
     run = launch("--sigint-timeout", "0.4", "--sigterm-timeout", "0.3", write(demo, body))
     run.wait_for("up")
@@ -112,7 +112,7 @@ def test_several_files_share_nothing_but_the_plan(network: Network, demo: Path) 
     )
 
 
-def test_an_arg_that_no_file_declares_is_warned_of(network: Network, demo: Path) -> None:
+def test_an_undeclared_arg_is_a_warning(network: Network, demo: Path) -> None:
     file = write(demo, '<arg name="rate" default="1"/><node pkg="demo" type="done" name="a"/>')
     done = rosz(network, "launch", file, "raet:=2")
     assert done.returncode == 0
@@ -144,7 +144,7 @@ def test_an_unknown_tag_is_a_warning(network: Network, demo: Path) -> None:
     assert done.stdout.count("started with pid") == 1
 
 
-def test_a_group_waits_and_gives_up(launch: Start, demo: Path) -> None:
+def test_a_group_waits_until_its_timeout(launch: Start, demo: Path) -> None:
     body = (
         '<group wait_for="service /nobody" wait_timeout="0.3">'
         '<node pkg="demo" type="talks" name="late"/></group>'

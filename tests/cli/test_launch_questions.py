@@ -108,7 +108,7 @@ def test_errors_are_one_line(workspace: Path, words: tuple[str, ...]) -> None:
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (code, "", 1)
 
 
-def test_assignments_without_effect_are_warned_of(workspace: Path) -> None:
+def test_assignments_without_effect_are_warnings(workspace: Path) -> None:
     done = rosz(workspace, "launch", "--nodes", "demo", "demo.launch", "topic:=a", "_x:=1")
     assert done.returncode == 0
     assert done.stderr == "WARNING: '_x:=1' is ignored: it is for a node, not for a launch\n"

@@ -80,7 +80,7 @@ def test_json(shell: Shell) -> None:
     assert (line["level"], line["node"], line["text"]) == ("WARN", "/ns/busy.arm", "it hurts")
 
 
-def test_it_ends_when_told(shell: Shell) -> None:
+def test_it_ends_when_stopped(shell: Shell) -> None:
     log = follow(shell)
     log.wait_for("all is well")
     log.send(signal.SIGINT)

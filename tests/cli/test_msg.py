@@ -85,7 +85,7 @@ def test_show_by_the_name_alone(shell: Shell) -> None:
 
 
 @pytest.mark.usefixtures("package")
-def test_show_asks_where_no_type_is_given(shell: Shell) -> None:
+def test_show_reads_a_missing_type_from_standard_input(shell: Shell) -> None:
     assert shell("msg", "show", stdin="\ncounting/Pair\n").out == "int8 a\nduration b\n\n"
     assert shell("msg", "show").code == 2
 
@@ -144,7 +144,7 @@ def test_errors(shell: Shell, words: list[str], code: int, text: str) -> None:
     assert result.err.count("\n") == 1
 
 
-def test_a_definition_that_is_wrong_is_told_with_its_place(shell: Shell, package: Path) -> None:
+def test_a_wrong_definition_is_reported_with_its_place(shell: Shell, package: Path) -> None:
     file = package / "msg" / "Bad.msg"
     file.write_text("int8 a\nPear b\n")
     result = shell("msg", "show", "counting/Bad")

@@ -88,7 +88,7 @@ def test_info(shell: Shell, talker: Node, network: Network) -> None:
 
 
 @pytest.mark.usefixtures("talker")
-def test_quiet_info_asks_nobody(shell: Shell, foreign: str) -> None:
+def test_quiet_info_sends_no_request(shell: Shell, foreign: str) -> None:
     assert "contacting" not in shell("node", "info", "-q", "/talker").out
     assert shell("node", "info", "-q", foreign).out == (
         f"{'-' * 80}\nNode [/foreign]\nPublications: None\n\nSubscriptions: None\n\n"
@@ -97,7 +97,7 @@ def test_quiet_info_asks_nobody(shell: Shell, foreign: str) -> None:
 
 
 @pytest.mark.usefixtures("talker")
-def test_info_of_what_takes_no_questions(shell: Shell, foreign: str) -> None:
+def test_info_of_a_node_that_takes_no_requests(shell: Shell, foreign: str) -> None:
     assert "node '/foreign' does not take requests: it is not a rosz node" in (
         shell("node", "info", foreign).out
     )
@@ -132,7 +132,7 @@ def test_ping(shell: Shell, talker: Node) -> None:
 
 
 @pytest.mark.usefixtures("talker")
-def test_ping_goes_on_until_told(shell: Shell) -> None:
+def test_ping_goes_on_until_stopped(shell: Shell) -> None:
     ping = shell.start("node", "ping", "/talker")
     ping.wait_for("reply from")
     ping.send(signal.SIGINT)
@@ -149,7 +149,7 @@ def test_ping_everybody(shell: Shell, foreign: str) -> None:
 
 @pytest.mark.usefixtures("talker")
 @pytest.mark.parametrize("words", [["-a", "/talker"], ["-a", "-c", "2"], ["-c", "0", "/x"], []])
-def test_wrong_ways_to_ping(shell: Shell, words: list[str]) -> None:
+def test_wrong_usage_of_ping(shell: Shell, words: list[str]) -> None:
     assert shell("node", "ping", *words).code == 2
 
 
@@ -197,7 +197,7 @@ def test_kill_all(shell: Shell, network: Network) -> None:
 
 
 @pytest.mark.usefixtures("talker")
-def test_kill_of_what_takes_no_wishes(shell: Shell, foreign: str) -> None:
+def test_kill_of_a_node_that_takes_no_requests(shell: Shell, foreign: str) -> None:
     result = shell("node", "kill", foreign)
     assert result.code == 1
     assert (

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from params.network import Network, until
 from params.ros1 import Ros1, available
@@ -280,7 +280,7 @@ def test_names_are_those_of_the_namespace(
     assert replica.get("/robot/x") == 1
 
 
-def test_verbose_talk_goes_to_stderr(replica: Replica, param: Command, tmp_path: Path) -> None:
+def test_verbose_messages_go_to_stderr(replica: Replica, param: Command, tmp_path: Path) -> None:
     (tmp_path / "f.yaml").write_text("a: {b: 1}")
     assert replica.root == {}
     assert param("load", "-v", "f.yaml", "/n")[1:] == (
@@ -325,7 +325,7 @@ def test_loading_is_all_or_nothing(replica: Replica, param: Command, tmp_path: P
     assert replica.root == {"a": 1}
 
 
-def test_a_dry_run_tells_what_it_would_replace(
+def test_a_dry_run_prints_what_it_would_replace(
     replica: Replica, param: Command, tmp_path: Path
 ) -> None:
     replica.set("/", {"same": 1, "a": {"b": 1}, "leaf": "x", "text": "old"})
@@ -342,7 +342,7 @@ def test_a_dry_run_tells_what_it_would_replace(
     assert param("load", "f.yaml", "--json")[0] == 2
 
 
-def test_nobody_there_is_one_line_and_exit_code_1(network: Network, param: Command) -> None:
+def test_an_empty_network_is_one_line_and_exit_code_1(network: Network, param: Command) -> None:
     code, out, err = param("list")
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert "start 'rosz core'" in err
@@ -353,7 +353,7 @@ def test_nobody_there_is_one_line_and_exit_code_1(network: Network, param: Comma
     assert "'rosz core'" in err
 
 
-def test_a_missing_name_suggests_the_near_one(replica: Replica, param: Command) -> None:
+def test_a_missing_name_suggests_a_near_miss(replica: Replica, param: Command) -> None:
     replica.set("/robot/speed", 1)
     assert param("get", "/robot/sped") == (
         1,
@@ -427,7 +427,7 @@ def test_the_command_is_light(tmp_path: Path) -> None:
     assert done.stdout == "[]\n"
 
 
-def test_a_writer_is_told_who_did_not_hear(
+def test_a_writer_is_warned_of_silent_replicas(
     network: Network, param: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from params.test_replica import Mute
@@ -451,7 +451,7 @@ def test_a_writer_is_told_who_did_not_hear(
     [True, False, 0, -7, 1 << 62, "c3", "_x", "Hello", "yes", "No", "null", "y", "", "a b", "1",
      "é", "a: b", "1e5", "e1", "nan", "inf", "NaN", 1.5, [1], {}],
 )  # fmt: skip
-def test_what_is_printed_without_yaml_is_as_with_it(value: Any) -> None:
+def test_scalars_are_printed_as_with_yaml(value: Any) -> None:
     assert _format_scalar(value) in {"", format_get(value)}
     assert _format_scalar(value) in {"", pretty(value)}
 
@@ -459,7 +459,7 @@ def test_what_is_printed_without_yaml_is_as_with_it(value: Any) -> None:
 @pytest.mark.parametrize(
     ("word", "value"), [("3", 3), ("-12", -12), ("0.50", 0.5), ("true", True), ("c3_po", "c3_po")]
 )
-def test_what_is_read_without_yaml(word: str, value: Any) -> None:
+def test_scalars_are_read_without_yaml(word: str, value: Any) -> None:
     assert _parse_scalar(word) == value
     assert type(_parse_scalar(word)) is type(value)
 
@@ -469,10 +469,11 @@ def test_what_is_read_without_yaml(word: str, value: Any) -> None:
     ["", "010", "1_000", "1:30", "0x1f", "1e5", ".inf", ".5", "5.", "+1", "-0", "True", "null", "~",
      "y", "No", "9" * 30, "deg(3)", "a b", "a:", "[1]", "é", "1.0.0", "3\n"],
 )  # fmt: skip
-def test_what_needs_yaml_is_left_to_it(word: str) -> None:
+def test_other_words_are_left_to_yaml(word: str) -> None:
     assert _parse_scalar(word) is None
 
 
+@settings(deadline=None)
 @given(st.from_regex(r"[-0-9a-zA-Z_.]{1,8}", fullmatch=True))
 def test_no_word_means_something_else_in_yaml(word: str) -> None:
     found = _parse_scalar(word)

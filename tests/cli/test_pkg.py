@@ -27,7 +27,7 @@ def test_list_and_find(tmp_path: Path) -> None:
     assert rosz(tmp_path, "pkg", "find", "demo").stdout == f"{path}\n"
 
 
-def test_what_is_not_there(tmp_path: Path) -> None:
+def test_missing_things(tmp_path: Path) -> None:
     package(tmp_path / "src", "demo")
     done = rosz(tmp_path, "pkg", "find", "dmo")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
@@ -53,7 +53,7 @@ def test_create(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["My_pkg", "9a", "a-b", "a/b", "", "ünder"])
-def test_names_that_are_none(tmp_path: Path, name: str) -> None:
+def test_invalid_names(tmp_path: Path, name: str) -> None:
     done = rosz(tmp_path, "pkg", "create", name)
     assert done.returncode == 2
     assert done.stderr == (

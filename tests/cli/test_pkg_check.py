@@ -15,7 +15,7 @@ from .command import ROSZ, environ, rosz
 from .test_env import evaluate
 
 
-def test_a_workspace_that_is_well(tmp_path: Path) -> None:
+def test_a_sound_workspace(tmp_path: Path) -> None:
     (tmp_path / "src").mkdir()
     rosz(tmp_path / "src", "pkg", "create", "demo")
     done = rosz(tmp_path, "pkg", "check")
@@ -23,7 +23,7 @@ def test_a_workspace_that_is_well(tmp_path: Path) -> None:
     assert done.stdout == "checked 1 package: 0 errors, 0 warnings; nothing needs building\n"
 
 
-def test_what_is_wrong_is_said_with_its_place(tmp_path: Path) -> None:
+def test_problems_are_reported_with_their_place(tmp_path: Path) -> None:
     (tmp_path / "src").mkdir()
     rosz(tmp_path / "src", "pkg", "create", "demo")
     (tmp_path / "src/demo/msg/Odd.msg").write_text("int3 x\n")
@@ -46,7 +46,7 @@ def test_no_workspace(tmp_path: Path) -> None:
 
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_course_of_a_course(network: Network, shell: str) -> None:
+def test_the_steps_of_a_course(network: Network, shell: str) -> None:
     done = evaluate(
         network,
         shell,

@@ -140,7 +140,7 @@ def test_a_lone_command() -> None:
     assert read(lone, ["a", "b"]) is None
 
 
-def test_what_begins_as_an_option_may_be_a_value() -> None:
+def test_a_value_may_begin_like_an_option() -> None:
     arrange = values_last(frozenset({"-t"}))
     line = "a -t file -1 b -v -- -x"
     assert " ".join(arrange(line.split())) == "-t file -v -- a -1 b -x"

@@ -97,7 +97,7 @@ def test_set(shell: Shell, robot: Robot, words: list[str], changed: dict[str, ob
     assert (result.code, result.out, result.err) == (0, "", "")
 
 
-def test_set_says_what_became_of_a_value(shell: Shell) -> None:
+def test_set_warns_of_a_changed_value(shell: Shell) -> None:
     result = shell("reconfigure", "set", "robot", "gain", "-3")
     assert result.code == 0
     assert result.err == "WARNING: gain is 0.0 and not -3.0: the node decided so\n"
@@ -131,14 +131,14 @@ def test_groups_are_set_by_name(shell: Shell, robot: Robot) -> None:
         (["watch", "robot", "-n", "0"], 2, "-n is 0; expected 1 or more"),
     ],
 )
-def test_what_goes_wrong(shell: Shell, words: list[str], code: int, text: str) -> None:
+def test_errors(shell: Shell, words: list[str], code: int, text: str) -> None:
     result = shell("reconfigure", *words)
     assert (result.code, result.out) == (code, "")
     assert result.err.startswith(f"rosz: {text}")
     assert result.err.count("\n") == 1
 
 
-def test_the_nodes_refusal_arrives(shell: Shell, robot: Robot) -> None:
+def test_the_refusal_of_a_node_is_reported(shell: Shell, robot: Robot) -> None:
     robot.answer = {"gain": "nonsense"}
     result = shell("reconfigure", "set", "robot", "steps", "1")
     assert result.code == 1
@@ -309,7 +309,7 @@ def test_a_stopped_node_does_not_block(shell: Shell, network: Network) -> None:
         program.send(signal.SIGCONT)
 
 
-def test_rqt_reconfigure_says_what_there_is_instead(shell: Shell) -> None:
+def test_rqt_reconfigure_names_its_replacement(shell: Shell) -> None:
     program = shell.start("run", "rqt_reconfigure", "rqt_reconfigure")
     assert program.exit_code() == 1
     assert "use 'rosz reconfigure list', 'describe NODE'" in program.output

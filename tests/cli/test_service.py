@@ -96,7 +96,7 @@ def test_call_without_arguments(shell: Shell) -> None:
     assert shell("service", "call", "/robot/trigger").lines == ["success: True", 'message: "done"']
 
 
-def test_call_tells_the_request(shell: Shell) -> None:
+def test_verbose_call_prints_the_request(shell: Shell) -> None:
     assert shell("service", "call", "-v", "/add", "1", "2").out == "a: 1\nb: 2\n---\nsum: 3\n"
 
 
@@ -111,7 +111,7 @@ def test_calls_from_standard_input(shell: Shell) -> None:
     assert result.lines == ["sum: 1", "sum: 5"]
 
 
-def test_call_of_what_fails(shell: Shell) -> None:
+def test_call_of_a_failing_service(shell: Shell) -> None:
     result = shell("service", "call", "/robot/fail", "true")
     assert result.code == 1
     assert "service [/robot/fail] responded with an error" in result.err
@@ -130,7 +130,7 @@ def test_call_of_what_fails(shell: Shell) -> None:
         (["--timeout", "inf", "1", "2"], 2, "--timeout is inf; expected seconds above 0"),
     ],
 )
-def test_call_with_what_does_not_fit(shell: Shell, values: list[str], code: int, text: str) -> None:
+def test_call_with_wrong_values(shell: Shell, values: list[str], code: int, text: str) -> None:
     result = shell("service", "call", "/add", *values)
     assert result.code == code
     assert text in result.err
@@ -150,7 +150,7 @@ def test_call_waits_for_a_service(shell: Shell, server: Node) -> None:
     assert call.lines[-1] == 'message: "at last"'
 
 
-def test_call_gives_up_in_time(shell: Shell, server: Node) -> None:
+def test_call_ends_at_its_timeout(shell: Shell, server: Node) -> None:
     server.service("/slow", Trigger, lambda _: server.sleep(60))
     result = shell("service", "call", "--timeout", "0.2", "/slow")
     assert result.code == 1
@@ -160,5 +160,5 @@ def test_call_gives_up_in_time(shell: Shell, server: Node) -> None:
 @pytest.mark.parametrize(
     "words", [["-1", "-2"], ["--", "-1", "-2"], ["-1", "-2", "--timeout", "9"]]
 )
-def test_negative_values_are_no_options(shell: Shell, words: list[str]) -> None:
+def test_negative_values_are_not_options(shell: Shell, words: list[str]) -> None:
     assert shell("service", "call", "/add", *words).lines == ["sum: -3"]

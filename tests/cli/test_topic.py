@@ -70,7 +70,7 @@ def test_both_sides_at_once_is_wrong_usage(shell: Shell) -> None:
     assert shell("topic", "list", "-p", "-s").code == 2
 
 
-def test_who_just_ended_is_gone(shell: Shell, network: Network) -> None:
+def test_a_node_that_has_just_ended_is_gone(shell: Shell, network: Network) -> None:
     other = network.node("other")
     latch(other, "/other", Bool(True))
     assert "/other" in shell("topic", "list").lines
@@ -86,7 +86,7 @@ def test_info(shell: Shell, talker: Node) -> None:
     assert "Publishers: None\n" in shell("topic", "info", "cmd_vel").out
 
 
-def test_info_tells_types_apart_where_they_differ(shell: Shell, network: Network) -> None:
+def test_info_lists_types_that_differ(shell: Shell, network: Network) -> None:
     network.node("other").subscription("/robot/text", Bool, lambda _: None)
     text = shell("topic", "info", "/robot/text").out
     assert text.startswith("Type: std_msgs/Bool, std_msgs/String\n")
@@ -123,7 +123,7 @@ def test_type(shell: Shell, name: str, text: str) -> None:
     assert shell("topic", "type", name).out == f"{text}\n"
 
 
-def test_type_of_a_field_that_is_not_there(shell: Shell) -> None:
+def test_type_of_a_missing_field(shell: Shell) -> None:
     result = shell("topic", "type", "/robot/pose/pose/positon")
     assert result.code == 1
     assert "'/robot/pose' is there, but 'geometry_msgs/Pose' has no field 'positon'" in result.err

@@ -109,7 +109,7 @@ def test_names_are_remapped(shell: Shell) -> None:
     assert result.out == 'data: "hello"\n---\n'
 
 
-def test_another_definition_is_told(shell: Shell, talker: Node) -> None:
+def test_another_definition_is_reported(shell: Shell, talker: Node) -> None:
     other = type("String", (String,), {"_type_hash": "RIHS01_" + "0" * 64})
     latch(talker, "/strange", other("x"))
     result = shell("topic", "echo", "-n", "1", "/strange")
@@ -137,7 +137,7 @@ def test_wrong_usage(shell: Shell, words: list[str]) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_told(shell: Shell, number: signal.Signals) -> None:
+def test_it_ends_when_stopped(shell: Shell, number: signal.Signals) -> None:
     echo = shell.start("topic", "echo", "/robot/text")
     echo.wait_for("---")
     echo.send(number)
@@ -145,7 +145,7 @@ def test_it_ends_when_told(shell: Shell, number: signal.Signals) -> None:
     assert echo.lines == ['data: "hello"', "---"]
 
 
-def test_it_outlives_the_meeting_point(shell: Shell, network: Network) -> None:
+def test_echo_outlives_the_meeting_point(shell: Shell, network: Network) -> None:
     first = network.node("first")
     publisher = network.node("second").publisher("/count", String)
     echo = shell.start("topic", "echo", "/count")
@@ -155,7 +155,7 @@ def test_it_outlives_the_meeting_point(shell: Shell, network: Network) -> None:
     echo.wait_for("still here")
 
 
-def test_a_pipe_that_nobody_reads_ends_it_quietly(network: Network) -> None:
+def test_a_closed_pipe_ends_echo_quietly(network: Network) -> None:
     node = network.node("talker")
     publisher = node.publisher("/count", String)
     node.timer(0.02, lambda _: publisher.publish(data="more"))

@@ -80,7 +80,7 @@ def test_a_window_of_one_measures_nothing(shell: Shell) -> None:
 
 
 @pytest.mark.parametrize("tool", ["hz", "bw", "delay"])
-def test_a_window_beyond_all_bounds(shell: Shell, tool: str) -> None:
+def test_a_window_that_is_too_large(shell: Shell, tool: str) -> None:
     result = shell("topic", tool, "-w", "9" * 20, "/tick")
     assert (result.code, result.out) == (2, "")
     assert "expected at most 1000000000 messages" in result.err

@@ -44,7 +44,7 @@ def test_a_rate(shell: Shell, heard: list[Twist]) -> None:
     assert pub.lines[:2] == ["publishing linear: ", "  x: 0.0"]
 
 
-def test_a_latched_message_waits_for_who_comes_late(shell: Shell, talker: Node) -> None:
+def test_a_latched_message_waits_for_late_subscribers(shell: Shell, talker: Node) -> None:
     pub = shell.start("topic", "pub", "/late", "std_msgs/String", "hello")
     pub.wait_for("latching")
     assert talker.subscription("/late", String).get(PATIENCE) == String("hello")
@@ -140,7 +140,7 @@ def test_a_negative_value_without_two_dashes(shell: Shell) -> None:
     assert result.err.startswith(expected)
 
 
-def test_an_unfinished_document_is_told(shell: Shell) -> None:
+def test_an_unfinished_document_is_reported(shell: Shell) -> None:
     result = shell("topic", "pub", "/x", "std_msgs/Float64", stdin="data: 1\n")
     assert (result.code, result.out) == (0, "")
     assert result.err.startswith("WARNING: standard input ends without a line '---': ")

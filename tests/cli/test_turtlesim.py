@@ -35,7 +35,7 @@ def test_snapshot_to_stdout(network: Network, sim: Simulator) -> None:
 
 
 @pytest.mark.usefixtures("sim")
-def test_what_cannot_be(shell: Shell) -> None:
+def test_errors(shell: Shell) -> None:
     wrong = shell("turtlesim", "snapshot", "field.jpg")
     assert (wrong.code, wrong.out) == (2, "")
     assert "'field.jpg' does not end in .png" in wrong.err
@@ -47,7 +47,7 @@ def test_what_cannot_be(shell: Shell) -> None:
     assert lost.err == "rosz: nowhere/field.png: No such file or directory\n"
 
 
-def test_nobody_to_take_a_picture_of(shell: Shell, network: Network) -> None:
+def test_no_turtlesim_runs(shell: Shell, network: Network) -> None:
     network.node("somebody")
     result = shell("turtlesim", "snapshot", "field.png")
     assert result.code == 1

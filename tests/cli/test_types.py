@@ -60,7 +60,7 @@ def test_outputs(argv: list[str], text: str, capsys: pytest.CaptureFixture[str])
         (["srv", "md5", "std_srvs/Nothing"], "'std_srvs/Nothing'"),
     ],
 )
-def test_what_is_not_there(argv: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_things(argv: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(argv) == 1
     written = capsys.readouterr()
     assert text in written.err
@@ -70,7 +70,7 @@ def test_what_is_not_there(argv: list[str], text: str, capsys: pytest.CaptureFix
 @pytest.mark.parametrize(
     ("verb", "what"), [("show", "type"), ("md5", "type"), ("package", "package")]
 )
-def test_nothing_asked(
+def test_no_type_is_given(
     verb: str, what: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))

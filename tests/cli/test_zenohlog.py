@@ -35,13 +35,13 @@ def test_memory_is_bounded() -> None:
     assert len(summary._seen) == 100
 
 
-def test_what_is_no_refusal_is_passed_on() -> None:
+def test_other_messages_are_passed_on() -> None:
     written: list[str] = []
     LogSummary(written.append).add("thread 'acc-0' panicked\n")
     assert written == ["thread 'acc-0' panicked"]
 
 
-def test_who_only_looks_is_not_refused() -> None:
+def test_a_probe_is_not_reported() -> None:
     written: list[str] = []
     LogSummary(written.append).add(LINE.format("tls handshake eof"))
     assert written == []

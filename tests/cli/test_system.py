@@ -1,4 +1,4 @@
-"""The lists tell the truth at once, and no command hangs, lies, or ends in a traceback."""
+"""Lists are up to date at once, and no command hangs or ends in a traceback."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def test_ctrl_c_never_prints_a_traceback(network: Network, talker: Node, line: s
             network.close()
 
 
-def test_ctrl_c_while_it_starts_shows_nothing_of_ours(network: Network, talker: Node) -> None:
+def test_ctrl_c_during_the_start_prints_nothing(network: Network, talker: Node) -> None:
     talker.params["/speed"] = 1
     moments = repeats(25, 250)
     for moment in range(moments):
@@ -230,7 +230,7 @@ def test_a_closed_pipe_ends_it_quietly(network: Network, talker: Node, line: str
 @pytest.mark.parametrize(
     "line", ["topic list", "param get /speed", "bogus", "msg md5 std_msgs/Bool"]
 )
-def test_streams_that_are_closed_are_no_error(
+def test_closed_streams_are_not_an_error(
     network: Network, talker: Node, line: str, closed: str
 ) -> None:
     talker.params["/speed"] = 1
@@ -248,7 +248,7 @@ def test_streams_that_are_closed_are_no_error(
     assert "ignored" not in done.stderr
 
 
-def test_a_full_disk_is_told(network: Network, talker: Node) -> None:
+def test_a_full_disk_is_reported(network: Network, talker: Node) -> None:
     talker.params["/speed"] = 1
     with open("/dev/full", "w", encoding="utf-8") as full:  # noqa: PTH123  # it is no file
         done = subprocess.run(
@@ -277,7 +277,7 @@ ENDING = """
 @pytest.mark.parametrize(
     ("state", "last"), [("idle", ["at the exit"]), ("busy", ["the thread", "at the exit"])]
 )
-def test_an_end_runs_what_is_to_be_run_at_the_exit(
+def test_exit_functions_and_threads_are_waited_for(
     network: Network, state: str, last: list[str]
 ) -> None:
     program = network.program(ENDING, state, "--help")
@@ -352,7 +352,7 @@ SHOWING = {
 @pytest.mark.parametrize(
     ("group", "command"), [(group, name) for group, names in SHOWING.items() for name in names]
 )
-def test_what_lists_or_shows_does_it_as_json_too(group: str, command: str) -> None:
+def test_every_command_that_shows_something_takes_json(group: str, command: str) -> None:
     parameters = load(group).commands[command].parameters()
     assert any("--json" in one.spellings for one in parameters)
 
@@ -369,7 +369,7 @@ def test_measures_as_json(shell: Shell, talker: Node) -> None:
         assert program.exit_code() == 0
 
 
-def test_short_answers_as_json(shell: Shell, talker: Node) -> None:
+def test_short_outputs_as_json(shell: Shell, talker: Node) -> None:
     talker.service("/reset", Empty, lambda _: Empty.Response())
     eventually(lambda: "/reset" in shell("service", "list").lines, "the service")
     assert shell("service", "type", "--json", "/reset").json == {"type": "std_srvs/Empty"}
