@@ -77,8 +77,13 @@ class LocalPeers:
         self._peers = peers
 
     @classmethod
-    def read(cls, rendezvous: str) -> LocalPeers:
-        """Return the sessions that are registered now."""
+    def read(cls, rendezvous: str, own: LocalPeer | None = None) -> LocalPeers:
+        """Return the sessions that are registered now.
+
+        Args:
+            rendezvous: The endpoint where they meet.
+            own: The session to leave out, as it is registered.
+        """
         prefix = f"@{_prefix(rendezvous)}"
         try:
             lines = _SOCKETS.read_text(errors="replace").splitlines()
@@ -93,6 +98,8 @@ class LocalPeers:
                 key = (peer.namespace, peer.pid, peer.port)
                 if key not in found or peer.zid:
                     found[key] = peer
+        if own is not None:
+            found.pop((own.namespace, own.pid, own.port), None)
         return cls(rendezvous, tuple(found.values()))
 
     def __iter__(self) -> Iterator[LocalPeer]:
@@ -159,8 +166,8 @@ class LocalPeers:
 class LocalRegistration:
     """The registration of a session of this process, until closed.
 
-    It is made before the session opens, so that of two that open at the same time one sees the
-    other.
+    It is made before the session reads the registrations of others, so that of two sessions that
+    open at the same time one sees the other.
 
     Args:
         rendezvous: The endpoint where the session meets others.

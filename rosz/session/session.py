@@ -92,18 +92,20 @@ class Session:
 
         Args:
             config: The configuration.
-            peers: The sessions of this machine, if the caller has read them just now.
+            peers: The sessions of this machine, if the caller has read them just now. A session
+                that is registered itself reads them again, to see others that open meanwhile.
 
         Raises:
             TransportError: Nobody answers although the configuration requires a link, an endpoint
                 is occupied or malformed, or a configuration value is refused.
             UsageError: The override text is malformed.
         """
-        if peers is None:
-            peers = LocalPeers.read(config.rendezvous)
         registration = _register(config)
+        own = None if registration is None else registration.peer
         try:
-            raw = open_raw(config, peers, None if registration is None else registration.peer)
+            if peers is None or own is not None:
+                peers = LocalPeers.read(config.rendezvous, own)
+            raw = open_raw(config, peers, own)
         except BaseException:
             if registration is not None:
                 registration.close()

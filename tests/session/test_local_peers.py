@@ -210,3 +210,12 @@ def test_a_second_router_of_a_process_is_refused(network: Network) -> None:
         with pytest.raises(TransportError, match=told):
             Session.open(config)
     Session.open(config).close()
+
+
+def test_of_two_that_open_at_once_one_sees_the_other(network: Network) -> None:
+    """Each registers before it reads; what was read before may lack the other."""
+    one, other = LocalRegistration(network.rendezvous), LocalRegistration(network.rendezvous)
+    assert list(LocalPeers.read(network.rendezvous, one.peer)) == [other.peer]
+    assert list(LocalPeers.read(network.rendezvous, other.peer)) == [one.peer]
+    one.close()
+    other.close()
