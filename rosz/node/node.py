@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
+from rosz.errors import ClosedError
 from rosz.node import control, signals, standard, takeover
 from rosz.node.client import Client
 from rosz.node.clock import nanoseconds
@@ -275,17 +277,19 @@ class Node(NodeCore):
             with kept:  # a timer that ends at once must not be forgotten before it is kept
                 self.forget(timer)
 
+        self._lifecycle.check_open("make a timer")
         with kept:
-            return self.keep(
-                Timer(
-                    nanoseconds(period, "timer period"),
-                    callback,
-                    self.clock,
-                    oneshot=oneshot,
-                    on_error=self.log.report,
-                    on_end=forget,
-                )
+            timer = Timer(
+                nanoseconds(period, "timer period"),
+                callback,
+                self.clock,
+                oneshot=oneshot,
+                on_error=self.log.report,
+                on_end=forget,
             )
+            with suppress(ClosedError):  # its first call may have closed the node
+                self.keep(timer)
+        return timer
 
     def rate(self, hz: float) -> Rate:
         """Return a rate: iterate over it, or call its ``sleep``.
