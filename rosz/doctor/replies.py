@@ -364,7 +364,10 @@ def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, b
     """Query all replicas at once, and return their digests by session."""
     request = encode(SyncRequest())
     asked = [
-        (member.zid, session.query(keys.sync(member.zid), timeout=_TIMEOUT, payload=request))
+        (
+            member.zid,
+            session.query(keys.of(member.zid, "sync"), timeout=_TIMEOUT, payload=request),
+        )
         for member in members
     ]
     return {

@@ -32,6 +32,8 @@ _JOINING_PAUSE: Final = 0.02
 class ParamClient:
     """Reads and writes parameters through the replicas of others.
 
+    Every call raises `NoReplica` if there is no replica, and `WaitTimeout` if none answers in time.
+
     Args:
         session: Session of the client; it stays open.
         domain: ROS domain.
@@ -58,22 +60,15 @@ class ParamClient:
 
         Raises:
             ParamNotFound: The parameter is not set.
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
         """
         return normalise(self._get(name).value)
 
     def origin(self, name: str) -> str:
-        """Return the writer of the value of a global name; the errors are those of `get`."""
+        """Return the writer of the value of a global name; raises as `get` does."""
         return self._get(name).origin
 
     def has(self, name: str) -> bool:
-        """Tell whether a global name is set.
-
-        Raises:
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
-        """
+        """Tell whether a global name is set."""
         try:
             self.get(name)
         except ParamNotFound:
@@ -81,12 +76,7 @@ class ParamClient:
         return True
 
     def names(self) -> list[str]:
-        """Return the sorted global names of all parameters that are not dicts.
-
-        Raises:
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
-        """
+        """Return the sorted global names of all parameters that are not dicts."""
         return [str(name) for name in self._request(ClientRequest("names")).value]
 
     def search(self, name: str, node: str = "/") -> str | None:
@@ -94,8 +84,6 @@ class ParamClient:
 
         Raises:
             ParamError: The name is empty or private.
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
         """
         try:
             return str(self._request(ClientRequest("search", name, node)).value)
@@ -107,8 +95,6 @@ class ParamClient:
 
         Raises:
             ParamError: A parameter cannot hold the value, or the root would not be a dict.
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
         """
         return self.write([(split(name), normalise(value, name))])
 
@@ -117,8 +103,6 @@ class ParamClient:
 
         Raises:
             ParamError: A parameter cannot hold the value, or the root would not be a dict.
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
         """
         return self.write(condense(spread(name, normalise(value, name))))
 
@@ -127,8 +111,6 @@ class ParamClient:
 
         Raises:
             ParamNotFound: The parameter is not set.
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
         """
         path = split(name)
         if not path:
@@ -144,8 +126,6 @@ class ParamClient:
 
         Raises:
             ParamError: The tree cannot hold a change; nothing is changed then.
-            NoReplica: There is no replica.
-            WaitTimeout: No replica answers.
         """
         from rosz.params.replica import ACK_TIMEOUT, Outcome, process_label
 
@@ -221,8 +201,8 @@ class ParamClient:
 
     def _key(self, member: Member, batch: Sequence[Change]) -> str:
         if not batch:
-            return self._keys.ask(member.zid)
-        return self._keys.scope(self._keys.set(member.zid), (path for path, _ in batch))
+            return self._keys.of(member.zid, "ask")
+        return self._keys.scope(self._keys.of(member.zid, "set"), (path for path, _ in batch))
 
     def _request_from(
         self, member: Member, key: str, payload: bytes, timeout: float

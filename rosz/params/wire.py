@@ -43,7 +43,7 @@ from __future__ import annotations
 import datetime as dt
 import struct
 from collections.abc import Iterable
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import msgspec
 
@@ -60,6 +60,7 @@ __all__ = (
     "Index",
     "Keys",
     "Member",
+    "Purpose",
     "Record",
     "SyncReply",
     "SyncRequest",
@@ -81,6 +82,10 @@ _PLAIN: Final = frozenset({bool, int, float, str, bytes})
 _HEADER: Final = struct.Struct("<QB")
 
 _Message = TypeVar("_Message", bound=msgspec.Struct)
+
+
+Purpose = Literal["write", "sync", "tell", "ask", "set"]
+"""The purpose of a query to one replica, as in its key; see the list of keys above."""
 
 
 class Member(msgspec.Struct, frozen=True, order=True):
@@ -136,25 +141,9 @@ class Keys:
         """Return the key of the acknowledgements to one writer."""
         return own_key(self._domain, "ack", zid)
 
-    def write(self, zid: str) -> str:
-        """Return the key of batches that one replica has not acknowledged."""
-        return own_key(self._domain, "store", zid, "write")
-
-    def sync(self, zid: str) -> str:
-        """Return the key on which one replica compares itself with others."""
-        return own_key(self._domain, "store", zid, "sync")
-
-    def tell(self, zid: str) -> str:
-        """Return the key on which one replica receives writes that it lacks."""
-        return own_key(self._domain, "store", zid, "tell")
-
-    def ask(self, zid: str) -> str:
-        """Return the key on which one replica reads for clients."""
-        return own_key(self._domain, "store", zid, "ask")
-
-    def set(self, zid: str) -> str:
-        """Return the key on which one replica writes for clients."""
-        return own_key(self._domain, "store", zid, "set")
+    def of(self, zid: str, purpose: Purpose) -> str:
+        """Return the key of queries to one replica."""
+        return own_key(self._domain, "store", zid, purpose)
 
     def scope(self, key: str, paths: Iterable[Path]) -> str:
         """Return the key for a write of some paths: with their common path if keys are scoped."""

@@ -218,7 +218,7 @@ def test_a_replica_out_of_step(doctor: Doctor, network: Network) -> None:
         network.node(name).params["/speed"] = 3
     session, keys = network.session(), Keys(network.domain)
     odd = SyncReply(digest=b"\1" * 512)
-    answering(network, session, keys.sync(session.zid), encode(odd))
+    answering(network, session, keys.of(session.zid, "sync"), encode(odd))
     network._keep(session.token(keys.token(Member(1, session.zid, "odd one"))))
     eventually(lambda: len(session.peers()) == 2, "links to both")
     finding = doctor()["replica-out-of-step"]

@@ -116,7 +116,7 @@ def test_doing_a_write_again_much_later_changes_nothing(network: Network) -> Non
     stamp = replica._session.stamp()
     batch = Batch.of((stamp.time, session.zid), "x", [(("a",), "old")])
     question = encode(ClientRequest("write", batch=batch, timeout=1))
-    key = Keys(0).set(replica.zid)
+    key = Keys(0).of(replica.zid, "set")
     assert session.get(key, payload=question, timeout=5)[0].ok
     replica.set("/a", "new")
     assert session.get(key, payload=question, timeout=5)[0].ok

@@ -109,9 +109,9 @@ def test_a_stamp_years_ahead_stops_no_later_write(
     with caplog.at_level(logging.WARNING, "rosz.params"):
         stranger.put(keys.change, add_header(stranger.zid, 1, encode(batch)))
         asked = {
-            keys.write(one.zid): add_header(stranger.zid, 2, encode(batch)),
-            keys.tell(one.zid): encode(SyncRequest(records=records)),
-            keys.set(one.zid): encode(ClientRequest("write", batch=batch)),
+            keys.of(one.zid, "write"): add_header(stranger.zid, 2, encode(batch)),
+            keys.of(one.zid, "tell"): encode(SyncRequest(records=records)),
+            keys.of(one.zid, "set"): encode(ClientRequest("write", batch=batch)),
         }
         for key, payload in asked.items():
             (reply,) = stranger.get(key, payload=payload, timeout=PATIENCE)
@@ -139,7 +139,7 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
     with caplog.at_level(logging.WARNING, "rosz.params"):
         assert one.compare(PATIENCE)
         assert one.compare(PATIENCE)
-        key = f"{Keys(0).tell(other.zid)}/**"
+        key = f"{Keys(0).of(other.zid, 'tell')}/**"
         network.keep(sessions[1].queryable(key, other._sync.on_tell, complete=True))
         assert one.compare(PATIENCE)
     assert other.root == {}
@@ -425,8 +425,8 @@ def test_what_nobody_wrote_is_survived(network: Network, caplog: pytest.LogCaptu
     for data in junk:
         stranger.put(keys.change, data)
         stranger.put(keys.ack(replica.zid), data)
-        for key in (keys.sync, keys.write, keys.ask):
-            stranger.get(key(replica.zid), payload=data, timeout=5)
+        for purpose in ("sync", "write", "ask"):
+            stranger.get(keys.of(replica.zid, purpose), payload=data, timeout=5)
     stranger.token(f"{keys.tokens[:-3]}/nonsense").close()
     assert replica.set("/a", 1).slow == ()
     assert replica.root == {"a": 1}

@@ -144,7 +144,7 @@ def test_keys_of_a_domain() -> None:
     assert KEYS.all_params == "@rosz/7/param/**"
     assert KEYS.param(()) == "@rosz/7/param"
     assert KEYS.param(("a", "*")) == "@rosz/7/param/a/%2A"
-    assert KEYS.ask("f0") == "@rosz/7/store/f0/ask"
+    assert KEYS.of("f0", "ask") == "@rosz/7/store/f0/ask"
     for path in [(), ("a",), ("a b", "ü/"[:-1], "%")]:
         assert KEYS.path(KEYS.param(path)) == path
     for key in ("@rosz/7/params/a", "@rosz/8/param/a", "@rosz/7/param/a/"):

@@ -161,11 +161,12 @@ class WriteBroadcaster:
         self._own = session.zid.encode()
         self._ack_publishers: dict[str, RawPublisher] = {}
         self._publisher = session.publisher(keys.change, block=True)
+        resent_key = keys.of(session.zid, "write")
         self._declared: list[Closable] = [
             session.subscriber(keys.change, self._on_change, remote_only=True),
             session.subscriber(f"{keys.change}/*/**", self._on_scoped_change, remote_only=True),
             session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
-            session.queryable(f"{keys.write(session.zid)}/**", self._on_resent, complete=True),
+            session.queryable(f"{resent_key}/**", self._on_resent, complete=True),
         ]
 
     def send(
@@ -240,7 +241,7 @@ class WriteBroadcaster:
             return
         for zid in sorted(pending.waiting.copy()):
             self._session.get_async(
-                self._keys.scope(self._keys.write(zid), (path for path, _ in changes)),
+                self._keys.scope(self._keys.of(zid, "write"), (path for path, _ in changes)),
                 partial(self._on_resend_reply, zid, pending.number),
                 lambda: None,
                 payload=message,
@@ -324,7 +325,7 @@ class WriteBroadcaster:
     def _on_resent(self, query: Query) -> None:
         message = query.payload or b""
         try:
-            reach = self._keys.reach(query.key, self._keys.write(self._session.zid))
+            reach = self._keys.reach(query.key, self._keys.of(self._session.zid, "write"))
         except DecodeError as error:
             with query:
                 query.reply_error(str(error))

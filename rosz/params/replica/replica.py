@@ -1,10 +1,8 @@
 """Copies of the parameter store: the replica of a process, and followers.
 
 A replica first subscribes to the writes of others, then asks one of them for everything it has, and
-serves others once it has that. Reads are look-ups in its own tree. A write is applied here,
-broadcast to all others in one message, and done when each of them has acknowledged it. A replica
-that does not answer is sent the write once more, directly, and then named in a warning: the write
-stands, and that replica gets it when it answers again.
+serves others once it has that. Reads are look-ups in its own tree. A write is applied here and
+broadcast to all others (`rosz.params.replica.broadcast`).
 """
 
 from __future__ import annotations
@@ -161,9 +159,10 @@ class Replica(_Copy):
         keys, state, sync, worker = self._keys, self._state, self._sync, self._worker
         self._broadcaster = WriteBroadcaster(session, keys, state, self._members, worker, storage)
         self._parameter_keys = ParameterKeys(session, keys, state, worker)
+        tell_key = keys.of(session.zid, "tell")
         self._declared: list[Closable] = [
-            session.queryable(keys.sync(session.zid), sync.on_sync, complete=True),
-            session.queryable(f"{keys.tell(session.zid)}/**", sync.on_tell, complete=True),
+            session.queryable(keys.of(session.zid, "sync"), sync.on_sync, complete=True),
+            session.queryable(f"{tell_key}/**", sync.on_tell, complete=True),
             ClientServer(session, keys, state, self._write_for_client, worker, lambda: sync.ready),
         ]
         if settled is not None:

@@ -85,7 +85,7 @@ class ClientServer:
         self._is_ready = is_ready
         self._slots = threading.BoundedSemaphore(_MAX_WRITES)
         self._keys = keys
-        self._set_key = keys.set(session.zid)
+        self._set_key = keys.of(session.zid, "set")
         self._verbs: dict[str, Callable[[ClientRequest], ClientReply]] = {
             "get": self._get,
             "names": self._names,
@@ -93,7 +93,7 @@ class ClientServer:
             "stamp": self._stamp,
         }
         self._declared = [
-            session.queryable(keys.ask(session.zid), self._on_read, complete=True),
+            session.queryable(keys.of(session.zid, "ask"), self._on_read, complete=True),
             session.queryable(f"{self._set_key}/**", self._on_write, complete=True),
         ]
 

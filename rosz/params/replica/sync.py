@@ -1,11 +1,7 @@
 """Keeping replicas the same: joining, comparing with others, and anti-entropy.
 
-The side that asks sends its digest. If the other's digest is the same, that is all. Otherwise it
-sends the index of the buckets that differ. The other replies with the writes that the asker lacks
-and the paths of those that it lacks itself, and the asker sends these. A replica that joins has
-nothing yet, and gets everything with the first reply.
-
-All of this runs on the replica's worker; Zenoh's threads only hand over to it.
+The messages are those of `rosz.params.wire`. All of this runs on the replica's worker; Zenoh's
+threads only hand over to it.
 """
 
 from __future__ import annotations
@@ -238,7 +234,7 @@ class Synchroniser:
     def _receive(self, query: Query, payload: bytes) -> None:
         with query:
             try:
-                reach = self.keys.reach(query.key, self.keys.tell(self.session.zid))
+                reach = self.keys.reach(query.key, self.keys.of(self.session.zid, "tell"))
                 writes = [record.write() for record in decode(payload, SyncRequest).records]
                 check_reach((write.path for write in writes), reach)
                 self.state.apply(writes)
@@ -302,7 +298,7 @@ class _Comparison:
         keys, worker = self._owner.keys, self._owner.worker
         accepted: list[bool] = []
         self._query(
-            keys.scope(keys.tell(self._zid), (write.path for write in writes)),
+            keys.scope(keys.of(self._zid, "tell"), (write.path for write in writes)),
             SyncRequest(records=[Record.of(write) for write in writes]),
             lambda reply: accepted.append(reply.ok),
             lambda: worker.submit(lambda: self._on_sent(writes, accepted)),
@@ -325,7 +321,7 @@ class _Comparison:
         payloads: list[bytes] = []
         worker = self._owner.worker
         self._query(
-            self._owner.keys.sync(self._zid),
+            self._owner.keys.of(self._zid, "sync"),
             request,
             lambda reply: payloads.append(reply.payload) if reply.ok else None,
             lambda: worker.submit(lambda: self._on_reply(payloads, then)),
