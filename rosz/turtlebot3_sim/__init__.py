@@ -1,9 +1,9 @@
-"""A small TurtleBot3 on a flat floor: enough to drive, to look around, and to run into things.
+"""A small TurtleBot3 on a flat floor, with a laser and obstacles.
 
-``arena`` and ``robot`` are pure geometry; ``reports`` makes messages; the simulator is the node.
+`world` is pure geometry, `messages` makes the messages, and `simulator` is the node and the
+program.
 """
 
-from rosz.turtlebot3_sim.arena import ARENAS, Arena, Pillar, Wall
-from rosz.turtlebot3_sim.robot import Robot
+from rosz.turtlebot3_sim.world import ARENAS, Arena, Pillar, Robot, Wall
 
 __all__ = ("ARENAS", "Arena", "Pillar", "Robot", "Wall")

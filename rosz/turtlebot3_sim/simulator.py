@@ -1,13 +1,13 @@
-"""The robot as a node, with the topics that TurtleBot3 has in Gazebo.
+"""The program ``turtlebot3_sim``: the robot as a node, with TurtleBot3's topics in Gazebo.
 
-Time goes on in steps of 10 ms, as many in a second as the parameter ``~real_time_factor`` says.
+The simulation runs in steps of 10 ms; the parameter ``~real_time_factor`` sets its speed.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz.errors import UsageError, near_miss
 from rosz.msgs.geometry_msgs.msg import Twist
@@ -16,38 +16,35 @@ from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.sensor_msgs.msg import Imu, JointState, LaserScan
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.tf2_msgs.msg import TFMessage
-from rosz.turtlebot3_sim import reports
-from rosz.turtlebot3_sim.arena import ARENAS
-from rosz.turtlebot3_sim.robot import Robot
+from rosz.node import Node
+from rosz.turtlebot3_sim import messages
+from rosz.turtlebot3_sim.world import ARENAS, Robot
 
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("STEP_NS", "Simulator")
+__all__ = ("STEP_NS", "Simulator", "main")
 
 STEP_NS = 10_000_000
-"""Nanoseconds of one step."""
+"""Simulated time of one step in nanoseconds."""
 _ODOMETRY_HZ = 30
 _SECOND = 1_000_000_000
-_SHORTEST_PAUSE = 0.002
-_MOST_ARREARS = 0.25
-"""Seconds of wall time that a busy machine may make up for; it gives up what is beyond."""
+_MIN_PAUSE = 0.002
+_MAX_DELAY = 0.25
+"""Seconds of wall time that the simulation catches up with; a longer delay is skipped."""
 _RESETS = ("reset_world", "gazebo/reset_world")
-"""Where Gazebo has it in ROS 2 and in ROS 1."""
+"""Names of Gazebo's service in ROS 2 and in ROS 1."""
 
 
 class Simulator:
-    """A robot in an arena that a node runs; it ends with the node.
+    """A robot in an arena as a node; it ends with the node.
 
     The private parameters are ``world`` (``turtlebot3_world`` or ``empty``), ``x_pos``, ``y_pos``
-    and ``yaw`` for the start, and ``real_time_factor``. Stamps are simulated time where
-    ``/use_sim_time`` is set, else wall time; ``/clock`` is published in any case.
+    and ``yaw`` for the start, and ``real_time_factor``. Stamps are simulated time if
+    ``/use_sim_time`` is set, else wall time; ``/clock`` is always published.
 
     Args:
-        node: Whose topics and parameters they are.
+        node: Node with the topics and parameters.
 
     Raises:
-        UsageError: A parameter is not what it must be.
+        UsageError: A parameter has an invalid value.
         ParamError: A parameter has the wrong type.
     """
 
@@ -59,7 +56,7 @@ class Simulator:
             hint = near_miss(world, ARENAS) or f": expected one of {', '.join(ARENAS)}"
             raise UsageError(f"parameter ~world is '{world}'{hint}")
         self._factor = get("~real_time_factor", 1.0, type=float)
-        if not 0 < self._factor <= 1000:  # noqa: PLR2004  # more than any machine can do
+        if not 0 < self._factor <= 1000:  # noqa: PLR2004  # faster than any machine
             raise UsageError(f"parameter ~real_time_factor is '{self._factor}': expected 0 to 1000")
         x, y = (-2.0, -0.5) if world == "turtlebot3_world" else (0.0, 0.0)
         self._start = (
@@ -78,7 +75,7 @@ class Simulator:
         self._thread.start()
 
     def close(self) -> None:
-        """Let time stand still; again is no error."""
+        """Stop the simulation; a second call has no effect."""
         self._end.set()
         if threading.current_thread() is not self._thread:
             self._thread.join()
@@ -92,7 +89,7 @@ class Simulator:
         self._imu = node.publisher("imu", Imu, queue_size=1)
         self._scan = node.publisher("scan", LaserScan, queue_size=1)
         mounts = node.publisher("/tf_static", TFMessage, latch=True)
-        mounts.publish(TFMessage(reports.mounts(self._stamp())))
+        mounts.publish(TFMessage(messages.mounts(self._stamp())))
         node.subscription("cmd_vel", Twist, self._command, queue_size=1)
         for name in _RESETS:
             node.service(name, Empty, self._reset)
@@ -111,12 +108,12 @@ class Simulator:
             robot.forward = robot.turn = robot.speed = robot.wheel_left = robot.wheel_right = 0.0
 
     def _run(self) -> None:
-        """Keep pace with wall time, times the factor."""
+        """Run steps at the pace of wall time times the factor."""
         step = STEP_NS / _SECOND / self._factor
         due = time.monotonic() + step
-        while not self._end.wait(max(due - time.monotonic(), _SHORTEST_PAUSE)):
+        while not self._end.wait(max(due - time.monotonic(), _MIN_PAUSE)):
             now = time.monotonic()
-            due = max(due, now - _MOST_ARREARS)
+            due = max(due, now - _MAX_DELAY)
             while due <= now and not self._end.is_set():
                 self._step()
                 due += step
@@ -125,21 +122,29 @@ class Simulator:
         with self._lock:
             self._robot.step(STEP_NS / _SECOND)
             before, self._time = self._time, self._time + STEP_NS
-            self._clock.publish(Clock(reports.stamp(self._time)))
+            self._clock.publish(Clock(messages.stamp(self._time)))
             now = self._stamp()
             if _passes(before, self._time, _ODOMETRY_HZ):
-                self._odometry.publish(reports.odometry(self._robot, now))
-                self._tf.publish(TFMessage([reports.transform(self._robot, now)]))
-                self._joints.publish(reports.joints(self._robot, now))
-                self._imu.publish(reports.imu(self._robot, now))
-            if _passes(before, self._time, 1 / reports.SCAN_PERIOD):
-                self._scan.publish(reports.scan(self._robot, now))
+                self._odometry.publish(messages.odometry(self._robot, now))
+                self._tf.publish(TFMessage([messages.transform(self._robot, now)]))
+                self._joints.publish(messages.joints(self._robot, now))
+                self._imu.publish(messages.imu(self._robot, now))
+            if _passes(before, self._time, 1 / messages.SCAN_PERIOD):
+                self._scan.publish(messages.scan(self._robot, now))
 
     def _stamp(self) -> Any:
         simulated = self._node.clock.simulated
-        return reports.stamp(self._time if simulated else time.time_ns())
+        return messages.stamp(self._time if simulated else time.time_ns())
+
+
+def main() -> None:
+    """Simulate until the node is shut down."""
+    with Node("turtlebot3_sim") as node:
+        node.context.cooperative = True
+        Simulator(node)
+        node.spin()
 
 
 def _passes(before: int, now: int, hz: float) -> bool:
-    """Tell whether something that happens so often is due between two times, in nanoseconds."""
+    """Return whether a periodic event is due between two times in nanoseconds."""
     return int(before * hz // _SECOND) != int(now * hz // _SECOND)

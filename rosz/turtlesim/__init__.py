@@ -1,11 +1,11 @@
-"""Turtles that draw: ROS 1's turtlesim, with a window or without, and the programs around it.
+"""Turtles that draw: ROS 1's turtlesim, with or without a window, and its other programs.
 
-``turtle``, ``world``, ``field``, ``shape`` and ``picture`` are pure: physics and pixels. The
-simulator puts them on the network, the window and the snapshot show them.
+`field`, `world` and `picture` are pure: pixels and physics. `simulator` is the node. `snapshot`,
+which serves and fetches pictures, and the programs `program`, `teleop` and `drivers` are public
+modules, because each is loaded alone.
 """
 
 from rosz.turtlesim.snapshot import Picture, fetch
-from rosz.turtlesim.turtle import Pen, Turtle
-from rosz.turtlesim.world import World
+from rosz.turtlesim.world import Pen, Turtle, World
 
 __all__ = ("Pen", "Picture", "Turtle", "World", "fetch")

@@ -1,7 +1,7 @@
-"""The picture below the turtles: pixels in a row of bytes, and lines across them.
+"""The picture that turtles draw on.
 
 Coordinates are pixels from the upper left corner, x to the right and y down; pixel ``i`` has its
-centre at ``i``. Everything outside the picture may be drawn on, and is not seen.
+center at ``i``. Drawing outside the picture is allowed and has no effect.
 """
 
 from __future__ import annotations
@@ -21,36 +21,38 @@ class Field:
     """An RGB picture.
 
     Args:
-        width: Pixels.
-        height: Pixels.
-        color: What it is filled with.
+        width: Width in pixels.
+        height: Height in pixels.
+        color: Initial color of all pixels.
 
     Attributes:
-        pixels: Three bytes a pixel, row by row from the top.
-        version: Grows with every change, so that a view knows when to look again.
+        width: As given.
+        height: As given.
+        pixels: Three bytes per pixel, row by row from the top.
+        version: Number that grows with every change.
     """
 
     def __init__(self, width: int, height: int, color: Color) -> None:
-        self.width = width
-        self.height = height
-        self.version = 0
-        self.pixels = bytearray()
+        self.width: int = width
+        self.height: int = height
+        self.version: int = 0
+        self.pixels: bytearray = bytearray()
         self.fill(color)
 
     def copy(self) -> Field:
-        """Return a picture that goes its own way from here."""
-        twin = Field(0, 0, (0, 0, 0))
-        twin.width, twin.height, twin.version = self.width, self.height, self.version
-        twin.pixels = bytearray(self.pixels)
-        return twin
+        """Return an independent copy."""
+        copied = Field(0, 0, (0, 0, 0))
+        copied.width, copied.height, copied.version = self.width, self.height, self.version
+        copied.pixels = bytearray(self.pixels)
+        return copied
 
     def fill(self, color: Color) -> None:
-        """Give all pixels one colour."""
+        """Fill the picture with a color."""
         self.pixels = bytearray(bytes(color) * (self.width * self.height))
         self.version += 1
 
     def color_at(self, x: float, y: float) -> Color:
-        """Return the colour of the pixel nearest to a place; beyond the edge, that of the edge."""
+        """Return the color of the pixel nearest to a place, which may be outside the picture."""
         column = _nearest(x, self.width)
         at = 3 * (_nearest(y, self.height) * self.width + column)
         red, green, blue = self.pixels[at : at + 3]
@@ -60,10 +62,10 @@ class Field:
         """Draw a straight line with round ends.
 
         Args:
-            start: One end.
-            end: The other; the same makes a dot.
-            width: Pixels across.
-            color: Its colour.
+            start: Start of the line.
+            end: End of the line; may equal the start.
+            width: Width in pixels.
+            color: Color of the line.
         """
         radius = width / 2
         body = _body(start, end, radius)
@@ -77,7 +79,7 @@ class Field:
         self.version += 1
 
     def _fill_row(self, row: int, left: float, right: float, color: Color) -> None:
-        """Colour the pixels of a row whose centres lie from left, included, to right, excluded."""
+        """Fill the pixels of a row whose centers lie from left, included, to right, excluded."""
         first = max(0, math.ceil(left))
         end = min(self.width, math.ceil(right))
         if first < end:
@@ -86,7 +88,7 @@ class Field:
 
 
 def span(polygon: Sequence[Point], y: float) -> tuple[float, float] | None:
-    """Return where a horizontal line enters and leaves a convex polygon; None if it misses it."""
+    """Return where a horizontal line enters and leaves a convex polygon; None if it does not."""
     crossings: list[float] = []
     x1, y1 = polygon[-1]
     for x2, y2 in polygon:
@@ -100,16 +102,16 @@ def _nearest(value: float, size: int) -> int:
     return min(max(math.floor(value + 0.5), 0), size - 1)
 
 
-def _disc_span(centre: Point, radius: float, row: int) -> tuple[float, float] | None:
-    down = row - centre[1]
+def _disc_span(center: Point, radius: float, row: int) -> tuple[float, float] | None:
+    down = row - center[1]
     if not -radius <= down < radius:
         return None
     half = math.sqrt(radius * radius - down * down)
-    return centre[0] - half, centre[0] + half
+    return center[0] - half, center[0] + half
 
 
 def _body(start: Point, end: Point, radius: float) -> tuple[Point, ...]:
-    """Return the corners of a line without its round ends."""
+    """Return the corners of the rectangular part of a line."""
     (x1, y1), (x2, y2) = start, end
     length = math.hypot(x2 - x1, y2 - y1)
     if length == 0:

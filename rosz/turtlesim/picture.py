@@ -1,57 +1,149 @@
-"""A picture of the field with its turtles, as PNG (W3C PNG Specification, third edition)."""
+"""The appearance of turtles, and pictures of the field as PNG (W3C PNG Specification)."""
 
 from __future__ import annotations
 
 import math
 import struct
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
-from rosz.turtlesim.field import Color, Field, span
-from rosz.turtlesim.shape import Patch, looks
-from rosz.turtlesim.turtle import Turtle
+import msgspec
 
-__all__ = ("encode_png", "paint", "take")
+from rosz.turtlesim.field import Color, Field, Point, span
+from rosz.turtlesim.world import UNIT_PIXELS, Turtle
+
+__all__ = ("Patch", "encode_png", "paint", "patches", "render")
+
+_CORNERS = 20
+
+
+class Patch(msgspec.Struct, frozen=True):
+    """A convex polygon of one color.
+
+    Attributes:
+        color: Color of the polygon.
+        outline: Corners in pixels of the field.
+    """
+
+    color: Color
+    outline: tuple[Point, ...]
+
+
+class _Palette(msgspec.Struct, frozen=True):
+    """The colors of one kind of turtle."""
+
+    skin: Color
+    rim: Color
+    shell: Color
+    plate: Color
+
+
+_KINDS = (
+    _Palette((126, 186, 96), (56, 94, 40), (92, 142, 62), (148, 190, 104)),
+    _Palette((222, 178, 108), (104, 62, 26), (160, 102, 48), (206, 152, 84)),
+    _Palette((108, 190, 178), (22, 84, 92), (38, 128, 132), (104, 190, 180)),
+    _Palette((226, 146, 120), (112, 34, 34), (172, 62, 52), (226, 120, 92)),
+    _Palette((196, 160, 214), (74, 40, 104), (118, 72, 152), (174, 128, 202)),
+    _Palette((214, 206, 120), (98, 92, 24), (152, 144, 48), (208, 200, 104)),
+)
+_EYE = (24, 24, 24)
+
+
+def _oval(center: Point, radii: Point, turned: float = 0.0) -> tuple[Point, ...]:
+    cos, sin = math.cos(turned), math.sin(turned)
+    corners: list[Point] = []
+    for number in range(_CORNERS):
+        angle = math.tau * number / _CORNERS
+        x, y = radii[0] * math.cos(angle), radii[1] * math.sin(angle)
+        corners.append((center[0] + cos * x - sin * y, center[1] + sin * x + cos * y))
+    return tuple(corners)
+
+
+def _plate(x: float, y: float, size: float) -> tuple[Point, ...]:
+    angles = (math.tau * number / 6 for number in range(6))
+    return tuple((x + size * math.cos(angle), y + size * math.sin(angle)) for angle in angles)
+
+
+# A turtle that looks along x; one unit is one turtle length.
+_LIMBS = (
+    ((-0.36, 0.07), (-0.36, -0.07), (-0.52, 0.0)),
+    _oval((0.25, 0.33), (0.19, 0.085), 1.0),
+    _oval((0.25, -0.33), (0.19, 0.085), -1.0),
+    _oval((-0.27, 0.29), (0.15, 0.08), 2.3),
+    _oval((-0.27, -0.29), (0.15, 0.08), -2.3),
+    _oval((0.46, 0.0), (0.14, 0.115)),
+)
+_EYES = (_oval((0.52, 0.055), (0.025, 0.025)), _oval((0.52, -0.055), (0.025, 0.025)))
+_RIM = _oval((0.0, 0.0), (0.40, 0.335))
+_SHELL = _oval((0.0, 0.0), (0.36, 0.295))
+_PLATES = (
+    _plate(0.0, 0.0, 0.105),
+    _plate(0.2, 0.0, 0.085),
+    _plate(-0.2, 0.0, 0.085),
+    *(_plate(x, y, 0.085) for x in (0.1, -0.1) for y in (0.165, -0.165)),
+)
+
+
+def patches(turtle: Turtle) -> Iterator[Patch]:
+    """Yield the polygons of a turtle at its position, from the lowest to the uppermost."""
+    palette = _KINDS[turtle.kind % len(_KINDS)]
+    at_x, at_y = turtle.pixel
+    ahead = UNIT_PIXELS * math.cos(turtle.theta)
+    aside = UNIT_PIXELS * math.sin(turtle.theta)
+    layers = (
+        (palette.skin, _LIMBS),
+        (_EYE, _EYES),
+        (palette.rim, (_RIM,)),
+        (palette.shell, (_SHELL,)),
+        (palette.plate, _PLATES),
+    )
+    for color, outlines in layers:
+        for outline in outlines:
+            placed = (
+                (at_x + ahead * x - aside * y, at_y - aside * x - ahead * y) for x, y in outline
+            )
+            yield Patch(color, tuple(placed))
+
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _TRUE_COLOR_8 = (8, 2, 0, 0, 0)
-"""Depth in bits, colour type, and the only methods of compression, filtering and interlace."""
+"""Bit depth, color type, and the methods of compression, filtering and interlacing."""
 _LINES = 4
-"""Lines looked at in each row of pixels, for smooth edges."""
+"""Sampled lines in each row of pixels, for smooth edges."""
 
 
-def take(field: Field, turtles: Iterable[Turtle]) -> bytes:
-    """Return a picture as PNG.
+def render(field: Field, turtles: Iterable[Turtle]) -> bytes:
+    """Render a field with its turtles as PNG.
 
     Args:
-        field: What was drawn; it stays as it is.
-        turtles: Who is on it, from the lowest to the uppermost.
+        field: Field, which is not changed.
+        turtles: Turtles, from the lowest to the uppermost.
     """
     pixels = bytearray(field.pixels)
     for turtle in turtles:
-        for patch in looks(turtle):
+        for patch in patches(turtle):
             paint(pixels, field.width, field.height, patch)
     return encode_png(pixels, field.width, field.height)
 
 
 def paint(pixels: bytearray, width: int, height: int, patch: Patch) -> None:
-    """Paint a patch with smooth edges.
+    """Paint a polygon with smooth edges.
 
     Args:
-        pixels: RGB, row by row.
-        width: Pixels of a row.
-        height: Rows.
-        patch: What to paint; what is outside the picture is left out.
+        pixels: RGB pixels, row by row.
+        width: Width in pixels.
+        height: Height in pixels.
+        patch: Polygon to paint; the parts outside the picture are ignored.
     """
     rows = [y for _, y in patch.outline]
     for row in range(max(0, math.floor(min(rows))), min(height, math.ceil(max(rows)) + 1)):
-        cover = _coverage(patch, row, width)
-        for column, share in cover.items():
+        coverage = _coverage(patch, row, width)
+        for column, share in coverage.items():
             _blend(pixels, 3 * (row * width + column), patch.color, min(share, 1.0))
 
 
 def _coverage(patch: Patch, row: int, width: int) -> dict[int, float]:
-    """Return how much of each pixel of a row a patch covers, from 0 to 1."""
+    """Return the share of each pixel of a row that a polygon covers, from 0 to 1."""
     cover: dict[int, float] = {}
     for line in range(_LINES):
         found = span(patch.outline, row - 0.5 + (line + 0.5) / _LINES)
@@ -70,15 +162,15 @@ def _blend(pixels: bytearray, at: int, color: Color, share: float) -> None:
 
 
 def encode_png(pixels: bytes | bytearray, width: int, height: int) -> bytes:
-    """Return an RGB picture as PNG.
+    """Encode an RGB picture as PNG.
 
     Args:
-        pixels: Three bytes a pixel, row by row from the top.
-        width: Pixels.
-        height: Pixels.
+        pixels: Three bytes per pixel, row by row from the top.
+        width: Width in pixels.
+        height: Height in pixels.
     """
     stride = 3 * width
-    # Each row says first how it is filtered: 0 is not at all.
+    # Each row begins with the number of its filter; 0 is none.
     rows = b"".join(b"\0" + pixels[at : at + stride] for at in range(0, stride * height, stride))
     header = struct.pack(">2I5B", width, height, *_TRUE_COLOR_8)
     return b"".join(

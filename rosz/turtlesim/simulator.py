@@ -1,7 +1,7 @@
 """The simulation as a node: topics, services and parameters of ROS 1's turtlesim (ROS wiki).
 
-One lock guards the world. A thread moves it on at 62.5 steps a second of wall time, as the original
-does even where time is simulated.
+One lock guards the world. A thread runs 62.5 steps per second of wall time, even where time is
+simulated, as in ROS 1.
 """
 
 from __future__ import annotations
@@ -14,32 +14,117 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from rosz.errors import NotFoundError, RoszError, ServiceError
+from rosz.errors import NotFoundError, RoszError, ServiceError, UsageError
+from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_srvs.srv import Empty, EmptyRequest
-from rosz.msgs.turtlesim.srv import Kill, KillRequest, Spawn, SpawnRequest, SpawnResponse
+from rosz.msgs.turtlesim.msg import Color, Pose
+from rosz.msgs.turtlesim.srv import (
+    Kill,
+    KillRequest,
+    SetPen,
+    SetPenRequest,
+    Spawn,
+    SpawnRequest,
+    SpawnResponse,
+    TeleportAbsolute,
+    TeleportAbsoluteRequest,
+    TeleportRelative,
+    TeleportRelativeRequest,
+)
+from rosz.node import Timer, TimerEvent
 from rosz.node.clock import Clock
-from rosz.node.timer import Timer, TimerEvent
-from rosz.turtlesim import picture
-from rosz.turtlesim.ports import Ports
-from rosz.turtlesim.snapshot import Picture, offer
-from rosz.turtlesim.turtle import SIZE, STEP_SECONDS, Turtle
-from rosz.turtlesim.world import BACKGROUND, FIRST, START, World
+from rosz.turtlesim import snapshot
+from rosz.turtlesim.picture import render
+from rosz.turtlesim.snapshot import Picture
+from rosz.turtlesim.world import BACKGROUND, FIRST, SIZE, START, STEP_SECONDS, Pen, Turtle, World
 
 if TYPE_CHECKING:
     from rosz.node import Node
 
 __all__ = ("Simulator", "View")
 
+Work = Callable[[Turtle], None]
+
 _CHANNELS = ("~background_r", "~background_g", "~background_b")
 
 
+class _TurtleTopics:
+    """The topics and services of a turtle.
+
+    Args:
+        node: Node of the simulation.
+        name: Name of the turtle.
+        change: Function that runs a change of the turtle of a name under the lock.
+    """
+
+    def __init__(self, node: Node, name: str, change: Callable[[str, Work], None]) -> None:
+        self._node = node
+        self._name = name
+        self._change = change
+        self._pose = node.publisher(f"{name}/pose", Pose, queue_size=1)
+        self._color = node.publisher(f"{name}/color_sensor", Color, queue_size=1)
+        self._parts = (
+            self._pose,
+            self._color,
+            node.subscription(f"{name}/cmd_vel", Twist, self._command, queue_size=1),
+            node.service(f"{name}/set_pen", SetPen, self._set_pen),
+            node.service(f"{name}/teleport_absolute", TeleportAbsolute, self._teleport_to),
+            node.service(f"{name}/teleport_relative", TeleportRelative, self._teleport_by),
+        )
+
+    def publish(self, turtle: Turtle) -> None:
+        """Publish the pose of the turtle and the color below it."""
+        self._pose.publish(Pose(turtle.x, turtle.y, turtle.theta, turtle.speed, turtle.turn))
+        self._color.publish(Color(*turtle.sees))
+
+    def close(self) -> None:
+        """Close all topics and services."""
+        for part in reversed(self._parts):
+            part.close()
+
+    def _command(self, twist: Twist) -> None:
+        now = time.monotonic()
+        try:
+            self._change(
+                self._name,
+                lambda turtle: turtle.command(
+                    now, forward=twist.linear.x, left=twist.linear.y, turn=twist.angular.z
+                ),
+            )
+        except UsageError as error:
+            self._node.log.warning("ignoring a command for [%s]: %s", self._name, error, throttle=1)
+
+    def _set_pen(self, request: SetPenRequest) -> None:
+        def change_pen(turtle: Turtle) -> None:
+            if request.off:  # the color stays for later
+                turtle.pen = Pen(turtle.pen.color, turtle.pen.width, on=False)
+            else:
+                turtle.pen = Pen((request.r, request.g, request.b), request.width or 1)
+
+        self._change(self._name, change_pen)
+
+    def _teleport_to(self, request: TeleportAbsoluteRequest) -> None:
+        x, y, theta = request.x, request.y, request.theta
+        self._move(lambda turtle: turtle.teleport_to(x, y, theta))
+
+    def _teleport_by(self, request: TeleportRelativeRequest) -> None:
+        length, theta = request.linear, request.angular
+        self._move(lambda turtle: turtle.teleport_by(length, theta))
+
+    def _move(self, work: Work) -> None:
+        try:
+            self._change(self._name, work)
+        except UsageError as error:
+            raise ServiceError(str(error)) from error
+
+
 class View(msgspec.Struct, frozen=True):
-    """What a window needs to show the world at one moment.
+    """The state of the world for a window.
 
     Attributes:
-        pixels: Of the field; None if it is what it was.
-        version: Of the field.
-        turtles: Copies, from the lowest to the uppermost.
+        pixels: Pixels of the field; None if they have not changed.
+        version: Version of the field.
+        turtles: Copies of the turtles, from the lowest to the uppermost.
     """
 
     pixels: bytes | None
@@ -48,16 +133,16 @@ class View(msgspec.Struct, frozen=True):
 
 
 class Simulator:
-    """A world of turtles that a node runs; it ends with the node.
+    """A world of turtles as a node; it ends with the node.
 
     Args:
-        node: Whose topics, services and parameters they are.
+        node: Node with the topics, services and parameters.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._lock = threading.Lock()
-        self._ports: dict[str, Ports] = {}
+        self._topics: dict[str, _TurtleTopics] = {}
         self._ended = False
         missing = {
             name: value
@@ -72,7 +157,7 @@ class Simulator:
         node.service("reset", Empty, self._reset)
         node.service("spawn", Spawn, self._spawn)
         node.service("kill", Kill, self._kill)
-        offer(node, self.picture)
+        snapshot.serve(node, self.picture)
         self._add(START, START, 0.0, FIRST)
         node.on_shutdown(self._end)
         period = round(STEP_SECONDS * 1e9)
@@ -82,11 +167,11 @@ class Simulator:
         """Return a picture of the field and its turtles."""
         with self._lock:
             field, turtles = self._world.field.copy(), self._copies()
-        # Painting takes longer than a step: the turtles do not wait for it.
-        return Picture(self._node.name, picture.take(field, turtles))
+        # Without the lock: rendering takes longer than a step.
+        return Picture(self._node.name, render(field, turtles))
 
     def view(self, known: int) -> View:
-        """Return what there is to see.
+        """Return the state of the world.
 
         Args:
             known: Version of the field that the caller has.
@@ -105,13 +190,13 @@ class Simulator:
             if self._ended:
                 return
             for bump in self._world.step(time.monotonic()):
-                x, y = bump.wish
-                # The original counts y from above here.
+                x, y = bump.goal
+                # ROS 1 counts y from above here.
                 self._node.log.warning(
                     "Oh no! I hit the wall! (Clamping from [x=%f, y=%f])", x, SIZE - y
                 )
-            for name, ports in self._ports.items():
-                ports.publish(self._world.turtles[name])
+            for name, topics in self._topics.items():
+                topics.publish(self._world.turtles[name])
 
     def _end(self, _: str) -> None:
         with self._lock:
@@ -128,20 +213,20 @@ class Simulator:
         background = self._background()
         with self._lock:
             self._world.reset(background)
-            # The first turtle keeps its topics, so that nobody has to connect to them anew.
-            gone = [self._ports.pop(name) for name in list(self._ports) if name != FIRST]
-            kept = FIRST in self._ports
-        for ports in gone:
-            ports.close()
+            # The first turtle keeps its topics, so that others stay connected.
+            gone = [self._topics.pop(name) for name in list(self._topics) if name != FIRST]
+            kept = FIRST in self._topics
+        for topics in gone:
+            topics.close()
         if not kept:
-            self._open_ports(FIRST)
+            self._open_topics(FIRST)
         self._announce(FIRST, START, START, 0.0)
 
     def _spawn(self, request: SpawnRequest) -> SpawnResponse:
         try:
             name = self._add(request.x, request.y, request.theta, request.name)
         except RoszError as error:
-            raise self._refusal(error) from error
+            raise self._report(error) from error
         return SpawnResponse(name)
 
     def _kill(self, request: KillRequest) -> None:
@@ -149,44 +234,44 @@ class Simulator:
             try:
                 self._world.kill(request.name)
             except NotFoundError as error:
-                raise self._refusal(error) from error
-            ports = self._ports.pop(request.name, None)
-        if ports is not None:
-            ports.close()
+                raise self._report(error) from error
+            topics = self._topics.pop(request.name, None)
+        if topics is not None:
+            topics.close()
 
-    def _refusal(self, error: RoszError) -> ServiceError:
+    def _report(self, error: RoszError) -> ServiceError:
         text = str(error)
         self._node.log.error("%s%s", text[:1].upper(), text[1:])
         return ServiceError(text)
 
     def _add(self, x: float, y: float, theta: float, name: str) -> str:
-        """Put a turtle on the field, with its topics and services; returns its name.
+        """Add a turtle with its topics and services, and return its name.
 
         Raises:
-            UsageError: The name is taken, or a number is no place.
-            InvalidName: The name is none that a topic may have.
+            UsageError: The name is taken, or a number is not finite.
+            InvalidName: The name is not legal in a topic.
         """
         if name:
             self._node.resolve(f"{name}/pose")
         with self._lock:
             name = self._world.spawn(x, y, theta, name)
-        self._open_ports(name)
+        self._open_topics(name)
         self._announce(name, x, y, theta)
         return name
 
     def _announce(self, name: str, x: float, y: float, theta: float) -> None:
         self._node.log.info("Spawning turtle [%s] at x=[%f], y=[%f], theta=[%f]", name, x, y, theta)
 
-    def _open_ports(self, name: str) -> None:
-        ports = Ports(self._node, name, self._with)
+    def _open_topics(self, name: str) -> None:
+        topics = _TurtleTopics(self._node, name, self._change)
         with self._lock:
-            if name in self._world.turtles and name not in self._ports:
-                self._ports[name] = ports
+            if name in self._world.turtles and name not in self._topics:
+                self._topics[name] = topics
                 return
-        ports.close()
+        topics.close()
 
-    def _with(self, name: str, work: Callable[[Turtle], None]) -> None:
-        """Do something to a turtle, unless it has been taken away meanwhile."""
+    def _change(self, name: str, work: Callable[[Turtle], None]) -> None:
+        """Change a turtle under the lock, unless it was removed meanwhile."""
         with self._lock:
             turtle = self._world.turtles.get(name)
             if turtle is not None:

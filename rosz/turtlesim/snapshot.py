@@ -1,11 +1,10 @@
-"""Pictures over the network: a simulator offers them, a command fetches one.
+"""Pictures over the network: a simulator serves them, a command fetches one.
 
-They travel on a key of rosz's own, so that the lists of topics and services stay those of ROS 1.
+They use a key of rosz's own, so that the topics and services are the same as in ROS 1.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -13,12 +12,13 @@ import msgspec
 
 from rosz.errors import NotFoundError, RoszError, TransportError, UsageError, near_miss
 from rosz.wire import own_key
+from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.session import Query, Session
 
-__all__ = ("Picture", "fetch", "offer")
+__all__ = ("Picture", "fetch", "serve")
 
 _TIMEOUT = 5.0
 
@@ -27,51 +27,47 @@ class Picture(msgspec.Struct, frozen=True):
     """A picture of a simulation.
 
     Attributes:
-        node: Full name of the node that simulates.
-        png: The picture.
+        node: Full name of the simulator's node.
+        png: Picture as PNG.
     """
 
     node: str
     png: bytes
 
 
-def offer(node: Node, take: Callable[[], Picture]) -> None:
-    """Answer questions for a picture as long as a node lives.
+def serve(node: Node, take: Callable[[], Picture]) -> None:
+    """Serve pictures until a node is closed.
 
     Args:
-        node: Whose picture it is.
-        take: Takes it; called on a thread of its own.
+        node: Node of the simulator.
+        take: Function that takes a picture; called on a thread of its own.
     """
     context = node.context
     key = _key(context.domain, context.session.zid, str(node.node_id))
 
-    def serve(query: Query) -> None:
+    def reply(query: Query) -> None:
         with query:
             try:
                 query.reply(key, msgspec.msgpack.encode(take()))
             except TransportError as error:
-                node.log.warning("cannot hand a picture over: %s", error)
+                node.log.warning("cannot send a picture: %s", error)
 
-    def arrived(query: Query) -> None:
-        threading.Thread(
-            target=serve, args=(query,), name=f"rosz-picture{node.name}", daemon=True
-        ).start()
-
-    node.keep(context.session.queryable(key, arrived))
+    worker: Worker[Query] = node.keep(Worker(f"rosz-picture{node.name}", reply))
+    node.keep(context.session.queryable(key, worker.submit))
 
 
 def fetch(session: Session, domain: int, node: str = "") -> Picture:
-    """Ask the running simulators for a picture.
+    """Fetch a picture from a running simulator.
 
     Args:
-        session: Where to ask.
-        domain: The ROS domain.
-        node: Full name of the one to ask; may be left out where there is only one.
+        session: Session to use.
+        domain: ROS domain.
+        node: Full name of the simulator's node; may be empty if there is only one.
 
     Raises:
         NotFoundError: There is no simulator, or none of that name.
-        UsageError: There are several, and none is named.
-        RoszError: An answer is damaged.
+        UsageError: There are several, and no name is given.
+        RoszError: A reply is damaged.
     """
     replies = session.get(_key(domain, "*", "*"), timeout=_TIMEOUT)
     try:

@@ -1,80 +1,265 @@
-"""The turtles of a simulation and the field that they draw on. No clock, no network."""
+"""Turtles, how they move and draw, and the world that they share. Pure: no clock, no network."""
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import msgspec
 
 from rosz.errors import NotFoundError, UsageError
 from rosz.turtlesim.field import Color, Field, Point
-from rosz.turtlesim.turtle import FIELD_PIXELS, SIZE, Turtle, check_finite
 
-__all__ = ("BACKGROUND", "FIRST", "START", "Bump", "World")
+__all__ = (
+    "BACKGROUND",
+    "COMMAND_SECONDS",
+    "FIELD_PIXELS",
+    "FIRST",
+    "SIZE",
+    "START",
+    "STEP_SECONDS",
+    "UNIT_PIXELS",
+    "Bump",
+    "Pen",
+    "Turtle",
+    "World",
+    "check_finite",
+)
+
+FIELD_PIXELS = 500
+"""Width and height of the field in pixels."""
+UNIT_PIXELS = 45
+"""Pixels of one unit of length, which is about the length of a turtle."""
+SIZE = (FIELD_PIXELS - 1) / UNIT_PIXELS
+"""Width and height of the field in units, 11.09: the largest x and y."""
+STEP_SECONDS = 0.016
+"""Simulated time of one step: 62.5 steps per second."""
+COMMAND_SECONDS = 1.0
+"""Time for which a turtle follows a command that is not repeated."""
+
+_PEN_COLOR = (179, 184, 255)
+
+
+class Pen(msgspec.Struct, frozen=True):
+    """The pen of a turtle.
+
+    Attributes:
+        color: Color of the line.
+        width: Width of the line in pixels.
+        on: Whether the pen draws.
+    """
+
+    color: Color = _PEN_COLOR
+    width: int = 3
+    on: bool = True
+
+
+class _Teleport(msgspec.Struct, frozen=True):
+    """A teleport: to a place, or by an angle and a distance from the current place."""
+
+    theta: float
+    to: Point | None = None
+    length: float = 0.0
+
+
+@dataclass
+class Turtle:
+    """A turtle.
+
+    Attributes:
+        x: Distance from the left edge in units.
+        y: Distance from the lower edge in units.
+        theta: Heading in rad, counter-clockwise from the x axis.
+        kind: Number of its appearance.
+        forward: Forward speed in units per second.
+        left: Speed to the left in units per second.
+        turn: Angular speed in rad/s, counter-clockwise.
+        pen: Pen of the turtle.
+        sees: Color below the turtle, before it drew the last step.
+    """
+
+    x: float
+    y: float
+    theta: float
+    kind: int = 0
+    forward: float = 0.0
+    left: float = 0.0
+    turn: float = 0.0
+    pen: Pen = field(default_factory=Pen)
+    sees: Color = (0, 0, 0)
+    _commanded: float = -math.inf
+    _teleports: list[_Teleport] = field(default_factory=list)
+
+    @property
+    def pixel(self) -> Point:
+        """Position on the picture."""
+        return _pixel((self.x, self.y))
+
+    @property
+    def speed(self) -> float:
+        """Speed regardless of direction."""
+        return math.hypot(self.forward, self.left)
+
+    def command(self, now: float, *, forward: float, left: float, turn: float) -> None:
+        """Set the speed for the next second.
+
+        Args:
+            now: Time in seconds, of the same clock as for `step`.
+            forward: Forward speed in units per second.
+            left: Speed to the left in units per second.
+            turn: Angular speed in rad/s.
+
+        Raises:
+            UsageError: A speed is infinite or not a number.
+        """
+        check_finite(forward=forward, left=left, turn=turn)
+        self.forward, self.left, self.turn = forward, left, turn
+        self._commanded = now
+
+    def teleport_to(self, x: float, y: float, theta: float) -> None:
+        """Move to a place at the next step, and draw a line there.
+
+        Raises:
+            UsageError: An argument is infinite or not a number.
+        """
+        check_finite(x=x, y=y, theta=theta)
+        self._teleports.append(_Teleport(theta, (x, min(y, SIZE))))
+
+    def teleport_by(self, length: float, theta: float) -> None:
+        """Rotate, then move forward, at the next step.
+
+        Raises:
+            UsageError: An argument is infinite or not a number.
+        """
+        check_finite(linear=length, angular=theta)
+        self._teleports.append(_Teleport(theta, length=length))
+
+    def step(self, picture: Field, now: float) -> Point | None:
+        """Move for `STEP_SECONDS`, and draw.
+
+        Args:
+            picture: Field to draw on.
+            now: Time in seconds.
+
+        Returns:
+            The place behind the wall where the turtle was going, if a wall stopped it.
+        """
+        for teleport in self._teleports:
+            self._jump(teleport, picture)
+        self._teleports.clear()
+        if now - self._commanded > COMMAND_SECONDS:
+            self.forward = self.left = self.turn = 0.0
+        before = self.x, self.y
+        self.theta = _normal(self.theta + self.turn * STEP_SECONDS)
+        ahead, aside = self.forward * STEP_SECONDS, self.left * STEP_SECONDS
+        cos, sin = math.cos(self.theta), math.sin(self.theta)
+        goal = self.x + cos * ahead - sin * aside, self.y + sin * ahead + cos * aside
+        self.x, self.y = (min(max(value, 0.0), SIZE) for value in goal)
+        self.sees = picture.color_at(*self.pixel)
+        self._draw(picture, before)
+        return goal if goal != (self.x, self.y) else None
+
+    def _jump(self, teleport: _Teleport, picture: Field) -> None:
+        before = self.x, self.y
+        if teleport.to is None:
+            self.theta += teleport.theta
+            self.x += math.cos(self.theta) * teleport.length
+            self.y += math.sin(self.theta) * teleport.length
+        else:
+            self.theta = teleport.theta
+            self.x, self.y = teleport.to
+        self._draw(picture, before)
+
+    def _draw(self, picture: Field, before: Point) -> None:
+        if self.pen.on and before != (self.x, self.y):
+            picture.line(_pixel(before), self.pixel, self.pen.width, self.pen.color)
+
+
+def _pixel(place: Point) -> Point:
+    return place[0] * UNIT_PIXELS, (SIZE - place[1]) * UNIT_PIXELS
+
+
+def _normal(angle: float) -> float:
+    """Return the same angle from -pi, included, to pi, excluded."""
+    rest = math.remainder(angle, math.tau)
+    return rest if rest < math.pi else rest - math.tau
+
+
+def check_finite(**numbers: float) -> None:
+    """Check that numbers are finite.
+
+    Raises:
+        UsageError: A number is infinite or not a number; the text names it.
+    """
+    for name, value in numbers.items():
+        if not math.isfinite(value):
+            raise UsageError(f"{name} is '{value}': expected a finite number")
+
 
 BACKGROUND = (69, 86, 255)
-"""Colour of a field unless told otherwise."""
+"""Default color of the field."""
 FIRST = "turtle1"
-"""Name of the turtle that is there from the start."""
+"""Name of the first turtle."""
 (START,) = struct.unpack("f", struct.pack("f", SIZE / 2))
-"""Where it is, x and y: the middle of the field, in the single precision of messages."""
+"""Initial x and y of the first turtle: the middle, in the single precision of messages."""
 
 
 class Bump(msgspec.Struct, frozen=True):
-    """A turtle ran into a wall.
+    """A collision with a wall.
 
     Attributes:
-        turtle: Its name.
-        wish: Where it wanted to be.
+        turtle: Name of the turtle.
+        goal: Place behind the wall where the turtle was going.
     """
 
     turtle: str
-    wish: Point
+    goal: Point
 
 
 class World:
-    """A field with turtles on it; empty at first.
+    """A field with turtles; empty at first.
 
     Args:
-        background: Colour of the field.
+        background: Color of the field.
 
     Attributes:
-        field: What was drawn.
-        turtles: By name, in the order in which they came.
+        field: Field with the lines of the turtles.
+        turtles: Turtles by name, in the order of their creation.
     """
 
     def __init__(self, background: Color = BACKGROUND) -> None:
-        self.field = Field(FIELD_PIXELS, FIELD_PIXELS, background)
+        self.field: Field = Field(FIELD_PIXELS, FIELD_PIXELS, background)
         self.turtles: dict[str, Turtle] = {}
         self._named = 0
-        self._hatched = 0
+        self._spawned = 0
 
     def spawn(self, x: float, y: float, theta: float, name: str = "") -> str:
-        """Put a turtle on the field.
+        """Add a turtle.
 
         Args:
-            x: Units from the left.
-            y: Units from below.
+            x: Distance from the left edge in units.
+            y: Distance from the lower edge in units.
             theta: Heading in rad.
-            name: Its name; ``turtle1``, ``turtle2`` … when empty.
+            name: Name of the turtle; ``turtle1``, ``turtle2`` … when empty.
 
         Returns:
             The name.
 
         Raises:
-            UsageError: The name is taken, or a number is infinite or none.
+            UsageError: The name is taken, or an argument is infinite or not a number.
         """
         check_finite(x=x, y=y, theta=theta)
         name = name or self.free_name()
         if name in self.turtles:
             raise UsageError(f"a turtle named [{name}] already exists")
-        self.turtles[name] = Turtle(x, y, theta, kind=self._hatched)
-        self._hatched += 1
+        self.turtles[name] = Turtle(x, y, theta, kind=self._spawned)
+        self._spawned += 1
         return name
 
     def spawn_first(self) -> str:
-        """Put the turtle on the field that is there from the start, in its middle."""
+        """Add the first turtle, in the middle of the field."""
         return self.spawn(START, START, 0.0)
 
     def free_name(self) -> str:
@@ -86,37 +271,37 @@ class World:
                 return name
 
     def kill(self, name: str) -> None:
-        """Take a turtle off the field; its lines stay.
+        """Remove a turtle; its lines stay.
 
         Raises:
-            NotFoundError: There is none of that name.
+            NotFoundError: There is no turtle of that name.
         """
         if name not in self.turtles:
             raise NotFoundError(f"tried to kill turtle [{name}], which does not exist")
         del self.turtles[name]
 
     def clear(self, background: Color) -> None:
-        """Wipe all lines away.
+        """Remove all lines.
 
         Args:
-            background: Colour of the field from now on.
+            background: New color of the field.
         """
         self.field.fill(background)
 
     def reset(self, background: Color) -> str:
-        """Start over with one turtle; returns its name."""
+        """Restart with one turtle, and return its name."""
         self.turtles.clear()
-        self._named = self._hatched = 0
+        self._named = self._spawned = 0
         self.clear(background)
         return self.spawn_first()
 
     def step(self, now: float) -> Iterator[Bump]:
-        """Move all turtles on by one step; yields who is stopped by a wall.
+        """Move all turtles by one step, and yield the collisions.
 
         Args:
             now: Time in seconds, as for `Turtle.command`.
         """
         for name, turtle in self.turtles.items():
-            wish = turtle.step(self.field, now)
-            if wish is not None:
-                yield Bump(name, wish)
+            goal = turtle.step(self.field, now)
+            if goal is not None:
+                yield Bump(name, goal)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rosz.turtlebot3_sim.arena import ARENAS, EMPTY, PILLARS, Arena, Pillar, Wall
+from rosz.turtlebot3_sim.world import ARENAS, EMPTY, PILLARS, Arena, Pillar, Wall
 
 WALL = Wall(1.0, -1.0, 1.0, 3.0)
 PILLAR = Pillar(2.0, 0.0, 0.5)

@@ -7,8 +7,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rosz.errors import UsageError
-from rosz.turtlebot3_sim.arena import EMPTY, PILLARS, Arena, Pillar, Wall
-from rosz.turtlebot3_sim.robot import BODY_RADIUS, MAX_FORWARD, MAX_TURN, TRACK, WHEEL_RADIUS, Robot
+from rosz.turtlebot3_sim.world import (
+    BODY_RADIUS,
+    EMPTY,
+    MAX_FORWARD,
+    MAX_TURN,
+    PILLARS,
+    TRACK,
+    WHEEL_RADIUS,
+    Arena,
+    Pillar,
+    Robot,
+    Wall,
+)
 
 
 def drive(robot: Robot, forward: float, turn: float, seconds: float) -> None:

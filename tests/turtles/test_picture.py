@@ -6,15 +6,14 @@ import random
 import pytest
 
 from rosz.turtlesim import picture
-from rosz.turtlesim.shape import Patch, looks
-from rosz.turtlesim.turtle import SIZE, Turtle
-from rosz.turtlesim.world import BACKGROUND, World
+from rosz.turtlesim.picture import Patch, patches
+from rosz.turtlesim.world import BACKGROUND, SIZE, Turtle, World
 
 from . import png
 
 
 def taken(world: World) -> bytes:
-    return picture.take(world.field, world.turtles.values())
+    return picture.render(world.field, world.turtles.values())
 
 
 def test_png_gives_back_the_pixels() -> None:
@@ -49,8 +48,7 @@ def test_the_turtle_is_in_the_picture_and_not_on_the_field() -> None:
     [(0.0, (1, 0)), (math.pi / 2, (0, -1)), (math.pi, (-1, 0)), (-math.pi / 2, (0, 1))],
 )
 def test_the_head_is_ahead(theta: float, ahead: tuple[int, int]) -> None:
-    patches = list(looks(Turtle(5.0, 5.0, theta)))
-    eyes = [patch for patch in patches if patch.color == (24, 24, 24)]
+    eyes = [patch for patch in patches(Turtle(5.0, 5.0, theta)) if patch.color == (24, 24, 24)]
     assert len(eyes) == 2
     for eye in eyes:
         x = sum(corner[0] for corner in eye.outline) / len(eye.outline) - 5.0 * 45

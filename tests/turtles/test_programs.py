@@ -9,9 +9,8 @@ from network import Network, Program
 
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
-from rosz.turtlesim.square import Move, Square
-from rosz.turtlesim.turtle import STEP_SECONDS
-from rosz.turtlesim.world import START, World
+from rosz.turtlesim.drivers import Move, Square
+from rosz.turtlesim.world import START, STEP_SECONDS, World
 
 from .conftest import Watcher
 
@@ -116,8 +115,8 @@ def test_the_square_on_a_world_without_network() -> None:
         move = square.next(Pose(turtle.x, turtle.y, turtle.theta, turtle.speed, turtle.turn))
         turtle.command(now, forward=move.forward, left=0.0, turn=move.turn)
         assert list(world.step(now)) == []
-        corners += [(turtle.x, turtle.y)] * square.news.count("Reached goal")
-        square.news.clear()
+        corners += [(turtle.x, turtle.y)] * square.messages.count("Reached goal")
+        square.messages.clear()
     sides = [math.dist(*pair) for pair in zip(corners[::2], corners[2::2], strict=False)]
     assert len(sides) > 3
     assert sides == pytest.approx([1.9] * len(sides), abs=0.05)
@@ -130,7 +129,7 @@ def test_the_square_waits_until_the_turtle_stands() -> None:
     assert square.next(Pose(x=1.95, linear_velocity=1.0)) == Move()
     assert square.next(Pose(x=1.96, linear_velocity=1.0)) == Move()
     assert square.next(Pose(x=1.97)) == Move(turn=0.4)
-    assert square.news == [
+    assert square.messages == [
         "New goal [2.000000 0.000000, 0.000000]",
         "Reached goal",
         "New goal [1.970000 0.000000, 1.570796]",
@@ -149,9 +148,9 @@ def test_draw_square_drives_the_turtle(network: Network, rosz: Callable[..., Pro
 def test_draw_square_goes_on_without_a_reset(network: Network) -> None:
     program = network.program(
         """
-        from rosz.turtlesim import square
-        square._RESET_SECONDS = 0.1
-        square.main()
+        from rosz.turtlesim import drivers
+        drivers._RESET_SECONDS = 0.1
+        drivers.draw_square()
         """
     )
     program.wait_for("cannot reset the field: no service '/reset'")

@@ -16,8 +16,7 @@ from rosz.msgs.turtlesim.srv import Kill, SetPen, Spawn, TeleportAbsolute, Telep
 from rosz.qos import ROSOUT
 from rosz.turtlesim import fetch
 from rosz.turtlesim.simulator import Simulator
-from rosz.turtlesim.turtle import SIZE
-from rosz.turtlesim.world import START
+from rosz.turtlesim.world import SIZE, START
 
 from . import png
 from .conftest import Scene, wait_for_turtle

@@ -17,7 +17,7 @@ from network import PATIENCE, Network
 
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.turtlesim.msg import Pose
-from rosz.turtlesim.keyboard import KeyDecoder
+from rosz.turtlesim.teleop import KeyDecoder
 
 LAUNCH = """
 <launch><node pkg="turtlesim" name="keys" type="turtle_teleop_key" output="screen"/></launch>

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rosz.errors import UsageError
 from rosz.turtlesim.field import Field
-from rosz.turtlesim.turtle import SIZE, STEP_SECONDS, Pen, Turtle
+from rosz.turtlesim.world import SIZE, STEP_SECONDS, Pen, Turtle
 
 BLUE = (69, 86, 255)
 MIDDLE = SIZE / 2

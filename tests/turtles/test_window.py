@@ -79,9 +79,9 @@ def test_the_window_shows_the_field(network: Network, display: Display) -> None:
 def test_closing_the_window_ends_the_node(network: Network, display: Display) -> None:
     program = network.program(
         """
-        from rosz.turtlesim import program, window
+        from rosz.turtlesim import program
 
-        class Closed(window.Window):
+        class Closed(program.Window):
             def run(self):
                 self._root.after(100, self.close)
                 super().run()

@@ -75,4 +75,4 @@ def test_bumps_name_the_turtle(world: World) -> None:
     world.turtles["west"].command(0.0, forward=1.0, left=0.0, turn=0.0)
     (bump,) = world.step(0.0)
     assert bump.turtle == "west"
-    assert bump.wish == pytest.approx((-0.016, 5.0))
+    assert bump.goal == pytest.approx((-0.016, 5.0))

@@ -1,4 +1,4 @@
-"""What the robot tells about itself, as messages (REP 103, REP 105)."""
+"""The messages of the robot (REP 103, REP 105)."""
 
 from __future__ import annotations
 
@@ -19,15 +19,24 @@ from rosz.msgs.geometry_msgs.msg import (
 from rosz.msgs.nav_msgs.msg import Odometry
 from rosz.msgs.sensor_msgs.msg import Imu, JointState, LaserScan
 from rosz.msgs.std_msgs.msg import Header
-from rosz.turtlebot3_sim.robot import BEAMS, LASER_X, RANGE_MAX, RANGE_MIN, Robot
+from rosz.turtlebot3_sim.world import BEAMS, LASER_X, RANGE_MAX, RANGE_MIN, Robot
 
-__all__ = ("imu", "joints", "mounts", "odometry", "scan", "stamp", "transform")
+__all__ = (
+    "SCAN_PERIOD",
+    "imu",
+    "joints",
+    "mounts",
+    "odometry",
+    "scan",
+    "stamp",
+    "transform",
+)
 
 SCAN_PERIOD = 0.2
-"""Seconds from scan to scan."""
+"""Seconds between two scans."""
 _GRAVITY = 9.80665
 _UNKNOWN = 1e6
-"""Variance of what wheels cannot tell: height, roll and pitch."""
+"""Variance of what wheels cannot measure: height, roll and pitch."""
 
 
 def _diagonal(*values: float) -> list[float]:
@@ -43,12 +52,12 @@ _ACCELERATION_COVARIANCE = _diagonal(2.9e-4, 2.9e-4, 2.9e-4)
 
 
 def stamp(nanoseconds: int) -> Time:
-    """Return a time as messages have it."""
+    """Return a time in nanoseconds as a message."""
     return Time(*divmod(nanoseconds, 1_000_000_000))
 
 
 def odometry(robot: Robot, now: Time) -> Odometry:
-    """Return where the robot is in frame ``odom``, and how it moves in its own."""
+    """Return the pose of the robot in frame ``odom``, and its speed in its own frame."""
     pose = Pose(Point(robot.x, robot.y, 0.0), _heading(robot.theta))
     twist = Twist(Vector3(x=robot.speed), Vector3(z=robot.turn))
     return Odometry(
@@ -60,13 +69,13 @@ def odometry(robot: Robot, now: Time) -> Odometry:
 
 
 def transform(robot: Robot, now: Time) -> TransformStamped:
-    """Return the same place as a transform."""
+    """Return the pose of the robot in frame ``odom`` as a transform."""
     place = Transform(Vector3(robot.x, robot.y, 0.0), _heading(robot.theta))
     return TransformStamped(Header(stamp=now, frame_id="odom"), "base_footprint", place)
 
 
 def mounts(now: Time) -> list[TransformStamped]:
-    """Return where the parts of the robot sit on it."""
+    """Return the static transforms of the parts of the robot."""
     upright = Quaternion(w=1.0)
     rolled = Quaternion(x=-math.sqrt(0.5), w=math.sqrt(0.5))
     places = (
@@ -77,13 +86,15 @@ def mounts(now: Time) -> list[TransformStamped]:
         ("base_link", "wheel_right_link", (0.0, -0.08, 0.023), rolled),
     )
     return [
-        TransformStamped(Header(stamp=now, frame_id=parent), child, Transform(Vector3(*at), turned))
-        for parent, child, at, turned in places
+        TransformStamped(
+            Header(stamp=now, frame_id=parent), child, Transform(Vector3(*position), rotation)
+        )
+        for parent, child, position, rotation in places
     ]
 
 
 def scan(robot: Robot, now: Time) -> LaserScan:
-    """Return what the laser sees."""
+    """Return a scan of the laser."""
     return LaserScan(
         Header(stamp=now, frame_id="base_scan"),
         angle_min=0.0,
@@ -98,7 +109,7 @@ def scan(robot: Robot, now: Time) -> LaserScan:
 
 
 def imu(robot: Robot, now: Time) -> Imu:
-    """Return heading, turning speed, and acceleration with gravity and that of a curve."""
+    """Return heading, angular speed, and acceleration by gravity and by the curve."""
     return Imu(
         Header(stamp=now, frame_id="imu_link"),
         _heading(robot.theta),
@@ -111,7 +122,7 @@ def imu(robot: Robot, now: Time) -> Imu:
 
 
 def joints(robot: Robot, now: Time) -> JointState:
-    """Return how far the wheels have turned, and how fast they do."""
+    """Return the angles and speeds of the wheels."""
     return JointState(
         Header(stamp=now),
         ["wheel_left_joint", "wheel_right_joint"],

@@ -1,4 +1,4 @@
-"""The program ``draw_square``: a turtle draws a square, again and again."""
+"""The programs ``draw_square`` and ``mimic``, which drive turtles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node, TimerEvent
 from rosz.node.standard import serve_loggers
 
-__all__ = ("Move", "Square", "main")
+__all__ = ("Move", "Square", "draw_square", "mimic")
 
 _SIDE = 2.0
 _SPEED = 1.0
@@ -26,11 +26,11 @@ _RESET_SECONDS = 5.0
 
 
 class Move(msgspec.Struct, frozen=True):
-    """A speed to go at.
+    """A speed.
 
     Attributes:
-        forward: Units per second.
-        turn: rad/s.
+        forward: Forward speed in units per second.
+        turn: Angular speed in rad/s.
     """
 
     forward: float = 0.0
@@ -38,24 +38,24 @@ class Move(msgspec.Struct, frozen=True):
 
 
 class Square:
-    """Where to go next: a side, a stop, a quarter turn, a stop, and so on. No clock, no network.
+    """The moves of a square: a side, a stop, a quarter turn, a stop, and so on.
 
     Attributes:
-        goal: Place and heading that it is on its way to.
-        news: What to log, oldest first.
+        goal: Place and heading of the current goal.
+        messages: Messages to log, oldest first.
     """
 
     def __init__(self) -> None:
-        self.goal = (0.0, 0.0, 0.0)
-        self.news: list[str] = []
+        self.goal: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self.messages: list[str] = []
         self._moves = self._plan()
         self._pose = Pose()
 
     def next(self, pose: Pose) -> Move:
-        """Return how to move on.
+        """Return the next move.
 
         Args:
-            pose: Where the turtle is.
+            pose: Current pose of the turtle.
         """
         self._pose = pose
         return next(self._moves)
@@ -64,13 +64,13 @@ class Square:
         while True:
             at = self._pose
             cos, sin = math.cos(at.theta), math.sin(at.theta)
-            self._head_for(at.x + _SIDE * cos, at.y + _SIDE * sin, at.theta)
-            while self._ahead() >= _NEAR:
+            self._set_goal(at.x + _SIDE * cos, at.y + _SIDE * sin, at.theta)
+            while self._distance_left() >= _NEAR:
                 yield Move(forward=_SPEED)
             yield from self._stop()
             at = self._pose
-            self._head_for(at.x, at.y, math.remainder(at.theta + math.pi / 2, math.tau))
-            while self._to_turn() >= _NEAR_ANGLE:
+            self._set_goal(at.x, at.y, math.remainder(at.theta + math.pi / 2, math.tau))
+            while self._angle_left() >= _NEAR_ANGLE:
                 yield Move(turn=_TURN_SPEED)
             yield from self._stop()
 
@@ -78,23 +78,23 @@ class Square:
         yield Move()
         while self._pose.linear_velocity or self._pose.angular_velocity:
             yield Move()
-        self.news.append("Reached goal")
+        self.messages.append("Reached goal")
 
-    def _head_for(self, x: float, y: float, theta: float) -> None:
+    def _set_goal(self, x: float, y: float, theta: float) -> None:
         self.goal = (x, y, theta)
-        self.news.append(f"New goal [{x:f} {y:f}, {theta:f}]")
+        self.messages.append(f"New goal [{x:f} {y:f}, {theta:f}]")
 
-    def _ahead(self) -> float:
-        """Return how far the goal is ahead; below 0 once it has been passed."""
+    def _distance_left(self) -> float:
+        """Return the distance to the goal; negative once the turtle has passed it."""
         x, y, theta = self.goal
         return (x - self._pose.x) * math.cos(theta) + (y - self._pose.y) * math.sin(theta)
 
-    def _to_turn(self) -> float:
+    def _angle_left(self) -> float:
         return math.remainder(self.goal[2] - self._pose.theta, math.tau)
 
 
-def main() -> None:
-    """Clear the field, and draw until told to end."""
+def draw_square() -> None:
+    """Reset the field, and draw squares until the node is shut down."""
     with Node("draw_square") as node:
         serve_loggers(node)
         square = Square()
@@ -110,14 +110,34 @@ def main() -> None:
         def draw(_: TimerEvent) -> None:
             if poses:
                 move = square.next(poses[-1])
-                for text in square.news:
+                for text in square.messages:
                     node.log.info("%s", text)
-                square.news.clear()
+                square.messages.clear()
                 commands.publish(Twist(Vector3(x=move.forward), Vector3(z=move.turn)))
 
-        def arrived(pose: Pose) -> None:
+        def receive(pose: Pose) -> None:
             poses[:] = [pose]
 
-        node.subscription("turtle1/pose", Pose, arrived, queue_size=1)
+        node.subscription("turtle1/pose", Pose, receive, queue_size=1)
         node.timer(_PERIOD, draw)
+        node.spin()
+
+
+def mimic() -> None:
+    """Make a turtle move like another one until the node is shut down.
+
+    The topics are ``input/pose`` and ``output/cmd_vel``; remapping ``input`` or ``output`` remaps
+    all topics below it, as with roscpp.
+    """
+    with Node("turtle_mimic") as node:
+        serve_loggers(node)
+        output = f"{node.resolve('output')}/cmd_vel"
+        commands = node.publisher(output, Twist, queue_size=1)
+
+        def follow(pose: Pose) -> None:
+            commands.publish(
+                Twist(Vector3(x=pose.linear_velocity), Vector3(z=pose.angular_velocity))
+            )
+
+        node.subscription(f"{node.resolve('input')}/pose", Pose, follow, queue_size=1)
         node.spin()
