@@ -99,10 +99,10 @@ class Lifecycle:
         log: logging.Logger = _log,
         on_fork: Callable[[], object] | None = None,
     ) -> None:
-        self.closing = False
-        self.closed = False
-        self.reason = ""
-        self.forked = False
+        self.closing: bool = False
+        self.closed: bool = False
+        self.reason: str = ""
+        self.forked: bool = False
         self._what = what
         self._log = log
         self._on_fork = None if on_fork is None else weakref.WeakMethod(on_fork)

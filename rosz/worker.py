@@ -129,7 +129,7 @@ class Worker(Generic[T]):
         self._when_free: list[Callable[[], object]] = []
         self._threads: set[threading.Thread] = set()
         self._idle = 0
-        self.closed = False
+        self.closed: bool = False
         if receive is not None:
             self._add_thread()
 

@@ -20,7 +20,7 @@ class View:
     """
 
     def __init__(self, tokens: Iterable[Token], processes: Iterable[ProcessToken] = ()) -> None:
-        self.tokens = tuple(tokens)
+        self.tokens: tuple[Token, ...] = tuple(tokens)
         self._processes = tuple(processes)
 
     def nodes(self) -> list[str]:

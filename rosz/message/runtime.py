@@ -51,7 +51,7 @@ _T = TypeVar("_T")
 
 PADDING = tuple(bytes(n) for n in range(8))
 
-texts = Texts()
+texts: Texts = Texts()
 """Cache shared by all types, since the same frame names occur in many."""
 
 _MOST_SHAPES = 4096

@@ -83,7 +83,7 @@ class Client:
         description_callback: Callable[[Description], object] | None = None,
     ) -> None:
         self.node = node
-        self.name = node.resolve(name).rstrip("/")
+        self.name: str = node.resolve(name).rstrip("/")
         self.timeout = timeout
         self.config_callback = config_callback
         self.description_callback = description_callback

@@ -96,8 +96,8 @@ class Description:
         whole = root or Group(_ROOT, tuple(settings), tuple(groups), id=0)
         taken = [group.id for group, _ in _walk(whole, 0)]
         numbers = itertools.count(max(taken) + 1)
-        self.root = _numbered(whole, numbers)
-        self.groups = tuple(_walk(self.root, 0))
+        self.root: Group = _numbered(whole, numbers)
+        self.groups: tuple[tuple[Group, int], ...] = tuple(_walk(self.root, 0))
         self.settings: dict[str, Setting] = {}
         for group, _ in self.groups:
             for setting in group.settings:

@@ -79,7 +79,7 @@ class Server:
         self.node = node
         self.description = description
         self.callback = callback
-        self.name = node.resolve(_private(namespace)).rstrip("/")
+        self.name: str = node.resolve(_private(namespace)).rstrip("/")
         self._lock = threading.RLock()
         self._values = description.clamp(description.defaults() | self._stored())
         self._states = description.states()

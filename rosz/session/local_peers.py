@@ -181,7 +181,7 @@ class LocalRegistration:
     """
 
     def __init__(self, rendezvous: str, *, reachable: bool = True) -> None:
-        self.peer = LocalPeer(pid_namespace(), os.getpid(), 0)
+        self.peer: LocalPeer = LocalPeer(pid_namespace(), os.getpid(), 0)
         self._rendezvous = rendezvous
         self._sockets: list[socket.socket] = []
         self._reserved: socket.socket | None = None

@@ -60,7 +60,7 @@ class MeshReadiness:
         mesh: bool = True,
         everywhere: bool = False,
     ) -> None:
-        self.ready = threading.Event()
+        self.ready: threading.Event = threading.Event()
         self._session = session
         self._timeout = timeout
         self._stop = stop

@@ -54,7 +54,7 @@ class Cancellation:
     """
 
     def __init__(self) -> None:
-        self.token = zenoh.CancellationToken()
+        self.token: zenoh.CancellationToken = zenoh.CancellationToken()
 
     def cancel(self) -> None:
         """End the queries, so that nobody waits for their replies; a second call has no effect."""
@@ -68,7 +68,7 @@ class Reply(Sample):
 
     def __init__(self, raw: zenoh.Reply) -> None:
         sample: Any = raw.ok
-        self.ok = sample is not None
+        self.ok: bool = sample is not None
         if sample is None:
             sample = _Error(raw)
         super().__init__(sample)

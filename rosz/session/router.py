@@ -63,10 +63,12 @@ class Router:
             config_file=environment.zenoh_config,
             override=environment.zenoh_override,
         )
+        self.endpoints: tuple[str, ...]
+        self.connect: tuple[str, ...]
         self.endpoints, self.connect = places_of(config)
         self._lifecycle = Lifecycle("the router", log=_log)
         try:
-            self.session = self._lifecycle.keep(Session.open(config))
+            self.session: Session = self._lifecycle.keep(Session.open(config))
         except TransportError as error:
             raise _explain(error, self.endpoints) from error
         self._lifecycle.keep(NewInterfaces(config, Session.open))

@@ -78,8 +78,8 @@ class Session:
 
     def __init__(self, raw: zenoh.Session, *, secured: bool = False, rendezvous: str = "") -> None:
         self.secured = secured
-        self.zid = str(raw.zid())
-        self.clock = HybridClock(self.zid)
+        self.zid: str = str(raw.zid())
+        self.clock: HybridClock = HybridClock(self.zid)
         self._raw: Any = raw
         self._rendezvous = rendezvous
         self._lifecycle = Lifecycle("the session", log=_log, on_fork=self._close_in_child)

@@ -147,7 +147,7 @@ class SystemContext:
         self._packages = packages
         self._anonymous = anonymous
         self.environ = environ
-        self.cwd = str(cwd)
+        self.cwd: str = str(cwd)
 
     def read(self, path: str) -> bytes:
         """Return the content of a file.

@@ -66,8 +66,8 @@ class TagRule:
     """
 
     def __init__(self, attributes: str, more: str = "", holds: str = "") -> None:
-        self.attributes = frozenset(f"{attributes} {more} if unless".split())
-        self.holds = frozenset(holds.split())
+        self.attributes: frozenset[str] = frozenset(f"{attributes} {more} if unless".split())
+        self.holds: frozenset[str] = frozenset(holds.split())
 
 
 _BODY = (
@@ -197,10 +197,12 @@ class Element:
     def __init__(
         self, document: Document, tag: str, attributes: dict[str, str], place: tuple[int, int, int]
     ) -> None:
-        self.tag = tag
-        self.attributes = attributes
+        self.tag: str = tag
+        self.attributes: dict[str, str] = attributes
         self.children: list[Element] = []
         self.chunks: list[tuple[str, int, int]] = []
+        self.line: int
+        self.column: int
         self.line, self.column, self._offset = place
         self._document = document
 
@@ -260,7 +262,7 @@ class Document:
     def __init__(self, path: str, data: bytes) -> None:
         self.path = path
         self.data = data
-        self.launch = Element(self, "launch", {}, (0, 0, 0))
+        self.launch: Element = Element(self, "launch", {}, (0, 0, 0))
 
     def source(self, offset: int) -> str:
         """Return the source of the tag at a byte offset, or "" if it cannot be read.

@@ -39,7 +39,7 @@ class Scope:
     """
 
     def __init__(self, ns: str, file: str) -> None:
-        self.ns = make_global(ns)
+        self.ns: str = make_global(ns)
         self.file = file
         self.args: dict[str, str] = {}
         self.declared: list[str] = []
@@ -47,7 +47,7 @@ class Scope:
         self.env: list[tuple[str, str]] = []
         self.private: list[tuple[str, Any, Any]] = []
         self.waits: tuple[Any, ...] = ()
-        self.included = False
+        self.included: bool = False
         self.incoming: dict[str, str] | None = None
         self.lenient = False
         self.remaps: list[tuple[str, str]] = []

@@ -44,7 +44,7 @@ class Tag:
     ) -> None:
         self.element = element
         self.scope = scope
-        self.name = element.tag.lower()
+        self.name: str = element.tag.lower()
         self._substitution = substitution
         self._warn = warn
         self._includes = includes
