@@ -140,7 +140,7 @@ class ActionServer:
         with self._changed:
             goal = self.next_goal
             if goal is None:
-                self.node.log.error("Attempting to accept the next goal when one is not available")
+                self.node.log.error("cannot accept a goal: none is waiting")
                 return None
             if self.is_active():
                 self.set_preempted(text=_SUPERSEDED)
@@ -166,7 +166,7 @@ class ActionServer:
         """Publish feedback about the current goal."""
         goal = self.current_goal
         if goal is None:
-            self.node.log.error("Attempting to publish feedback while there is no goal")
+            self.node.log.error("cannot publish feedback: no goal was accepted")
             return
         message = self._types.action_feedback(self._header(), goal.status, feedback)
         self._publishers["feedback"].publish(message)
@@ -229,9 +229,7 @@ class ActionServer:
         with self._changed:
             goal = self.current_goal
             if goal is None or goal.status.status in TERMINAL:
-                self.node.log.error(
-                    "To transition to a terminal state, the goal must be active; there is none"
-                )
+                self.node.log.error("cannot end a goal: none is being executed")
                 return
             self._end(goal, status, result, text)
 
@@ -272,15 +270,15 @@ class ActionServer:
         except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
             if node.is_shutdown:
                 return
-            node.log.report("Exception in your execute callback", error)
+            node.log.report(f"the execute function of action '{self.name}' failed", error)
             if self.is_active():
                 self.set_aborted(None, f"Exception in execute callback: {error}")
             return
         if self.is_active() and not node.is_shutdown:
             node.log.warning(
-                "Your executeCallback did not set the goal to a terminal status. This is a bug"
-                " in your ActionServer implementation. Fix your code! For now, the ActionServer"
-                " will set this goal to aborted"
+                "the execute function of action '%s' returned without ending the goal, which is"
+                " aborted; call set_succeeded, set_aborted or set_preempted",
+                self.name,
             )
             self.set_aborted(None, "No terminal state was set.")
 

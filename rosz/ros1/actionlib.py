@@ -113,7 +113,7 @@ class SimpleActionClient:
             Whether it has ended.
         """
         if self._goal is None:
-            self._client.node.log.error("Called wait_for_result when no goal exists")
+            self._client.node.log.error("cannot wait for a result: no goal was sent")
             return False
         return self._goal.wait(_seconds(timeout))
 
@@ -205,8 +205,7 @@ class SimpleActionServer(ActionServer):
         """Call a function when there is a new goal to accept."""
         if self.execute_callback is not None:
             self.node.log.warning(
-                "Cannot call SimpleActionServer.register_goal_callback() because an executeCallback"
-                " exists. Not going to register it."
+                "register_goal_callback() has no effect: the server has an execute callback"
             )
         else:
             self.on_goal = cb

@@ -1,4 +1,4 @@
-"""Trees of frames, against real tf2, and over a network."""
+"""Trees of frames, compared with real tf2, and over a network."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_random_trees(seed: int) -> None:
     )
 
 
-def test_answers_of_tf2_word_by_word() -> None:
+def test_texts_are_those_of_tf2() -> None:
     same(
         _SETUP
         + """
@@ -133,7 +133,7 @@ result = [found.header.stamp.to_sec(), found.header.frame_id, found.child_frame_
     )
 
 
-def test_old_transforms_are_forgotten() -> None:
+def test_old_transforms_are_dropped() -> None:
     buffer = Buffer(length_ns=2 * S)
     assert buffer.set("map", "base", 10 * S, IDENTITY)
     assert not buffer.set("map", "base", 10 * S, IDENTITY)
@@ -147,7 +147,7 @@ def test_old_transforms_are_forgotten() -> None:
     assert buffer.frames() == ["arm", "base"]
 
 
-def test_a_frame_may_get_another_parent() -> None:
+def test_a_frame_can_change_its_parent() -> None:
     buffer = Buffer()
     buffer.set("shelf", "cup", 1 * S, Pose((1.0, 0.0, 0.0), IDENTITY.rotation))
     buffer.set("hand", "cup", 2 * S, Pose((2.0, 0.0, 0.0), IDENTITY.rotation))
@@ -240,7 +240,7 @@ def test_static_transforms_are_copied(network: Network) -> None:
     assert buffer.lookup("base", "laser")[0].translation[0] == 1.0
 
 
-def test_time_that_moves_back_clears(network: Network) -> None:
+def test_a_time_jump_back_clears_the_buffer(network: Network) -> None:
     robot = network.node("robot")
     robot.params.set("/use_sim_time", True)
     clock = robot.publisher("/clock", Clock, qos=CLOCK)

@@ -22,7 +22,7 @@ WAYPOINTS = ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
 
 
 class Heard:
-    """The newest message of a topic, and how many there were."""
+    """The newest message of a topic, and the number of messages."""
 
     def __init__(self, node: Node, topic: str, message_type: Any) -> None:
         self.count = 0
@@ -37,7 +37,7 @@ class Heard:
 
 
 def start(network: Network, **params: object) -> Node:
-    """Start a simulation, and return a node beside it."""
+    """Start a simulation, and return another node."""
     user = network.node("user")
     for name, value in params.items():
         user.params[f"/turtlebot3_sim/{name}"] = value
@@ -145,7 +145,7 @@ def test_through_the_waypoints_of_the_tutorial(network: Network) -> None:
     arrived = threading.Event()
 
     def control(_: object) -> None:
-        """Turn to the next waypoint on the spot, then drive there, and correct the course."""
+        """Turn to the next waypoint, then drive there and correct the course."""
         if odometry.last is None or arrived.is_set():
             return
         pose = odometry.last.pose.pose

@@ -1,4 +1,4 @@
-"""A running simulation, and what watches it."""
+"""A running simulation, and its observers."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from rosz.turtlesim.simulator import Simulator
 
 
 class Watcher:
-    """The poses of a turtle as they come."""
+    """The poses of a turtle."""
 
     def __init__(self, node: Node, name: str) -> None:
         self._poses: SimpleQueue[Pose] = SimpleQueue()
         node.subscription(f"{name}/pose", Pose, self._poses.put, queue_size=1000)
 
     def wait_for(self, condition: Callable[[Pose], Any] = lambda _: True) -> Pose:
-        """Return the next pose that is as wanted."""
+        """Return the next pose that meets a condition."""
         for _ in range(int(PATIENCE * 62.5)):
             pose = self._poses.get(timeout=PATIENCE)
             if condition(pose):
@@ -31,14 +31,14 @@ class Watcher:
 
 
 def wait_for_turtle(user: Node, name: str) -> None:
-    """Wait until a node reaches all that a simulation offers."""
+    """Wait until a node knows the services of a turtle."""
     user.context.graph.wait_for(
         lambda view: bool(view.servers(f"{name}/teleport_relative")), PATIENCE, name
     )
 
 
 class Scene:
-    """A simulation, and a node beside it.
+    """A simulation and another node.
 
     Attributes:
         sim: Node of the simulation.
@@ -52,12 +52,12 @@ class Scene:
         wait_for_turtle(self.user, "/turtle1")
 
     def call(self, name: str, service_type: Any, *values: Any) -> Any:
-        """Call a service from beside."""
+        """Call a service from the other node."""
         with self.user.client(name, service_type, timeout=PATIENCE) as client:
             return client(*values)
 
     def watch(self, name: str = "turtle1") -> Watcher:
-        """Follow the poses of a turtle."""
+        """Observe the poses of a turtle."""
         return Watcher(self.user, name)
 
 

@@ -1,4 +1,4 @@
-"""A reader of PNG, just enough for what is written here, and strict about it."""
+"""A strict reader of the kind of PNG that turtlesim writes."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ Color = tuple[int, int, int]
 
 
 class Image(NamedTuple):
-    """A picture of three bytes a pixel."""
+    """A picture with three bytes per pixel."""
 
     width: int
     height: int
     rows: list[bytes]
 
     def at(self, x: int, y: int) -> Color:
-        """Return the colour of a pixel."""
+        """Return the color of a pixel."""
         red, green, blue = self.rows[y][3 * x : 3 * x + 3]
         return red, green, blue
 
     def colors(self) -> set[Color]:
-        """Return all colours in it."""
+        """Return all colors of the picture."""
         return {self.at(x, y) for y in range(self.height) for x in range(self.width)}
 
 

@@ -24,7 +24,7 @@ def drawn(field: Field) -> set[tuple[int, int]]:
 
 
 def distance(pixel: tuple[int, int], start: Point, end: Point) -> float:
-    """Return how far a pixel is from a line, the plain way."""
+    """Return the distance from a pixel to a line, calculated simply."""
     along_x, along_y = end[0] - start[0], end[1] - start[1]
     length = along_x**2 + along_y**2
     share = 0.0
@@ -36,7 +36,7 @@ def distance(pixel: tuple[int, int], start: Point, end: Point) -> float:
 
 
 @given(st.tuples(near, near), st.tuples(near, near), st.integers(1, 30))
-def test_a_line_is_what_lies_within_half_its_width(start: Point, end: Point, width: int) -> None:
+def test_a_line_covers_pixels_within_half_its_width(start: Point, end: Point, width: int) -> None:
     field = Field(SIZE, SIZE, BLACK)
     field.line(start, end, width, WHITE)
     white = drawn(field)
@@ -63,7 +63,7 @@ def test_a_line_without_length_is_a_dot() -> None:
     assert drawn(field) == {(x, y) for x in (3, 4, 5) for y in (3, 4, 5)}
 
 
-def test_lines_far_outside_are_not_seen_and_cost_nothing() -> None:
+def test_lines_far_outside_are_invisible_and_cheap() -> None:
     field = Field(9, 9, BLACK)
     field.line((1e30, 1e30), (2e30, -1e30), 3, WHITE)
     assert drawn(field) == set()
@@ -86,7 +86,7 @@ def test_every_change_is_a_new_version() -> None:
     assert versions == sorted(set(versions))
 
 
-def test_a_copy_goes_its_own_way() -> None:
+def test_a_copy_is_independent() -> None:
     field = Field(4, 3, BLACK)
     copy = field.copy()
     field.fill(WHITE)

@@ -16,7 +16,7 @@ def taken(world: World) -> bytes:
     return picture.render(world.field, world.turtles.values())
 
 
-def test_png_gives_back_the_pixels() -> None:
+def test_png_preserves_the_pixels() -> None:
     pixels = random.Random(1).randbytes(3 * 7 * 5)
     image = png.read(picture.encode_png(pixels, 7, 5))
     assert (image.width, image.height) == (7, 5)
@@ -80,7 +80,7 @@ def test_a_quarter_of_the_height_is_a_quarter_of_the_color() -> None:
     assert tuple(pixels) == (50, 25, 10)
 
 
-def test_what_is_outside_is_left_out() -> None:
+def test_parts_outside_the_picture_are_ignored() -> None:
     world = World()
     world.spawn(0.0, 0.0, 0.0)
     world.spawn(50.0, 50.0, 0.0)

@@ -28,7 +28,7 @@ MIMIC = """
 
 @pytest.fixture
 def rosz(network: Network) -> Iterator[Callable[..., Program]]:
-    """Start a command of rosz, which ends in peace: a launch leaves nothing behind then."""
+    """Return a function that starts a command of rosz, which is interrupted after the test."""
     started: list[Program] = []
 
     def start(*words: str) -> Program:
@@ -52,7 +52,7 @@ def test_the_node_runs_and_ends(rosz: Callable[..., Program]) -> None:
     assert "Traceback" not in program.output
 
 
-def test_without_a_window_if_told_so(rosz: Callable[..., Program]) -> None:
+def test_the_headless_parameter(rosz: Callable[..., Program]) -> None:
     program = rosz("run", "turtlesim", "turtlesim_node", "_headless:=true")
     program.wait_for("No window: the parameter ~headless is set. 'rosz turtlesim snapshot")
 

@@ -25,14 +25,14 @@ FORWARD = Twist(Vector3(x=2.0), Vector3())
 
 
 def served(scene: Scene) -> set[str]:
-    """Return what the simulation offers to the other node, without what every node has."""
+    """Return the topics and services of the simulation, without those of every node."""
     view = scene.user.context.graph.refresh()
     names = {token.name for token in view.entities() if token.node_name == "/turtlesim"}
     return {name for name in names if not name.startswith(("/rosout", "/turtlesim/"))}
 
 
 def image_of(scene: Scene) -> png.Image:
-    """Return the picture as another process gets it."""
+    """Fetch the picture like another process."""
     return png.read(fetch(scene.user.context.session, scene.user.context.domain).png)
 
 
@@ -73,7 +73,7 @@ def test_a_command_moves_it_for_a_second(scene: Scene) -> None:
     assert stopped.y == START
 
 
-def test_it_goes_to_the_left_and_turns(scene: Scene) -> None:
+def test_it_moves_left_and_turns(scene: Scene) -> None:
     watcher = scene.watch()
     commands = scene.user.publisher("turtle1/cmd_vel", Twist, queue_size=1)
     commands.wait_for_subscribers()
@@ -83,7 +83,7 @@ def test_it_goes_to_the_left_and_turns(scene: Scene) -> None:
     assert pose.y > START
 
 
-def test_the_wall_is_told_of(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
+def test_walls_are_logged(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
     watcher = scene.watch()
     scene.call("turtle1/teleport_absolute", TeleportAbsolute, 99.0, 5.0, 0.0)
     assert watcher.wait_for(lambda pose: pose.x > START).x == pytest.approx(SIZE)
@@ -92,7 +92,7 @@ def test_the_wall_is_told_of(scene: Scene, capfd: pytest.CaptureFixture[str]) ->
     assert "Oh no! I hit the wall! (Clamping from [x=99.000000, y=6.088889])" in written
 
 
-def test_nonsense_is_ignored(scene: Scene) -> None:
+def test_invalid_commands_are_ignored(scene: Scene) -> None:
     watcher = scene.watch()
     logged: SimpleQueue[Log] = SimpleQueue()
     scene.user.subscription("/rosout", Log, logged.put, qos=ROSOUT)
@@ -105,7 +105,7 @@ def test_nonsense_is_ignored(scene: Scene) -> None:
     assert watcher.wait_for(lambda pose: pose.angular_velocity).x == START
 
 
-def test_nonsense_is_refused(scene: Scene) -> None:
+def test_invalid_requests_are_refused(scene: Scene) -> None:
     with pytest.raises(ServiceError, match="theta is 'inf': expected a finite number"):
         scene.call("turtle1/teleport_absolute", TeleportAbsolute, 1.0, 1.0, math.inf)
     with pytest.raises(ServiceError, match="x is 'nan'"):
@@ -125,7 +125,7 @@ def test_spawn_and_kill(scene: Scene) -> None:
         scene.call("new_turtle/teleport_relative", TeleportRelative, 1.0, 0.0)
 
 
-def test_names_that_cannot_be(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
+def test_invalid_names(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ServiceError, match=r"a turtle named \[turtle1\] already exists"):
         scene.call("spawn", Spawn, 1.0, 1.0, 0.0, "turtle1")
     with pytest.raises(ServiceError, match="is not a valid name"):
@@ -172,7 +172,7 @@ def test_background_parameters(scene: Scene) -> None:
     assert image_of(scene).at(0, 0) == (69, 255, 255)
 
 
-def test_parameters_set_before_count(network: Network) -> None:
+def test_parameters_set_before_the_start_are_used(network: Network) -> None:
     network.node("before").params["/turtlesim/background_r"] = 1
     node = network.node("turtlesim")
     Simulator(node)
@@ -186,7 +186,7 @@ def test_parameters_set_before_count(network: Network) -> None:
 @pytest.mark.parametrize(
     ("value", "red"), [("blue", 69), (True, 69), (1000, 255), (-1, 0), (7.6, 8), (math.nan, 69)]
 )
-def test_odd_backgrounds(scene: Scene, value: object, red: int) -> None:
+def test_invalid_backgrounds(scene: Scene, value: object, red: int) -> None:
     scene.sim.params["~background_r"] = value
     scene.call("clear", Empty)
     assert image_of(scene).at(0, 0)[0] == red

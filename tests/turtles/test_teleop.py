@@ -54,7 +54,7 @@ def test_keys_do_not_depend_on_the_pieces(data: bytes, cuts: list[int]) -> None:
 
 
 class Terminal:
-    """A program in a terminal, and a person at it."""
+    """A program in a terminal, and the person who uses it."""
 
     def __init__(self, network: Network, *words: str) -> None:
         self.keyboard, theirs = pty.openpty()
@@ -94,7 +94,7 @@ class Terminal:
         return bool(flags & termios.ICANON) and bool(flags & termios.ECHO)
 
     def close(self) -> None:
-        """Leave nothing behind, of a launch either."""
+        """Close everything, including the processes of a launch."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         self.process.wait(PATIENCE)
@@ -104,7 +104,7 @@ class Terminal:
 
 @pytest.fixture
 def terminals() -> Iterator[list[Terminal]]:
-    """Terminals that are closed in the end."""
+    """A function that opens terminals, which are closed after the test."""
     made: list[Terminal] = []
     yield made
     for terminal in made:
@@ -113,14 +113,14 @@ def terminals() -> Iterator[list[Terminal]]:
 
 @pytest.fixture
 def commands(network: Network) -> SimpleQueue[Twist]:
-    """What a turtle is told."""
+    """The commands for a turtle."""
     queue: SimpleQueue[Twist] = SimpleQueue()
     network.node("turtle").subscription("turtle1/cmd_vel", Twist, queue.put)
     return queue
 
 
 def speeds(commands: SimpleQueue[Twist]) -> tuple[float, float]:
-    """Return the next command: ahead, and turning."""
+    """Return the forward and the angular speed of the next command."""
     twist = commands.get(timeout=PATIENCE)
     return twist.linear.x, twist.angular.z
 
@@ -208,7 +208,7 @@ def test_it_reads_the_terminal_of_a_launch(
     assert terminal.cooked
 
 
-def test_without_keys_it_says_so(network: Network) -> None:
+def test_missing_keys_are_reported(network: Network) -> None:
     program = network.run("-m", "rosz", "run", "turtlesim", "turtle_teleop_key")
     program.wait_for(READY)
     assert program.process.stdin is not None

@@ -23,7 +23,7 @@ SCREEN = "640x600x24"
 
 
 class Display:
-    """An X display without a screen, whose pixels lie in a file (xwd(1), XWDFile.h)."""
+    """An X display without a screen, with its pixels in a file (xwd(1), XWDFile.h)."""
 
     def __init__(self, folder: Path) -> None:
         self._file = folder / "Xvfb_screen0"
@@ -38,26 +38,26 @@ class Display:
             self.name = f":{pipe.readline().strip()}"
 
     def pixels(self) -> bytes:
-        """Return what is shown, four bytes a pixel: blue, green, red and nothing."""
+        """Return the pixels of the display, four bytes each: blue, green, red and unused."""
         data = self._file.read_bytes()
         header, colors = struct.unpack_from(">I", data, 0)[0], struct.unpack_from(">I", data, 76)[0]
         return data[header + 12 * colors :]
 
     def count(self, color: tuple[int, int, int]) -> int:
-        """Return how many pixels have a colour."""
+        """Return the number of pixels of a color."""
         pixels = self.pixels()
         wanted = bytes(reversed(color))
         return sum(pixels[at : at + 3] == wanted for at in range(0, len(pixels), 4))
 
     def close(self) -> None:
-        """End it."""
+        """Close the display."""
         self._server.terminate()
         self._server.wait()
 
 
 @pytest.fixture
 def display(network: Network) -> Iterator[Display]:
-    """A display of the test's own."""
+    """A display for one test."""
     made = Display(network.folder)
     yield made
     made.close()

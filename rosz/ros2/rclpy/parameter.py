@@ -232,9 +232,7 @@ class NodeParameters:
         """Declare a parameter; see `rclpy.node.Node.declare_parameter`.
 
         Raises:
-            ParameterAlreadyDeclaredException: The parameter is declared already.
-            InvalidParameterTypeException: The overriding value is of another type.
-            InvalidParameterValueException: A check refuses the value.
+            ParameterException: The declaration is refused; the subclass tells the reason.
         """
         if name in self._known:
             raise ParameterAlreadyDeclaredException([name])

@@ -92,7 +92,7 @@ class QoSProfile:
             defaults.
 
     Raises:
-        UsageError: There is no such policy, or neither history nor depth is profile.
+        UsageError: There is no such policy, or neither history nor depth is given.
     """
 
     depth: int

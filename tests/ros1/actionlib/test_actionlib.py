@@ -1,4 +1,4 @@
-"""actionlib: goals, results, feedback and giving way, between programs."""
+"""actionlib: goals, results, feedback and preemption between programs."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_goals(network: Network, path: str) -> None:
     ]
 
 
-def test_a_newer_goal_takes_over(network: Network, path: str) -> None:
+def test_a_newer_goal_preempts(network: Network, path: str) -> None:
     network.program(SERVER, ROSZ_PACKAGE_PATH=path).wait_for("ready")
     first = network.program(
         CLIENT

@@ -1,4 +1,4 @@
-"""message_filters: the same messages in the same order, against the real ones."""
+"""message_filters compared with the real ones: the same messages in the same order."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def play():
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("slop", [0.01, 0.05, 0.2])
-def test_nearly_the_same_stamps(seed: int, slop: float) -> None:
+def test_approximate_time_synchronizer(seed: int, slop: float) -> None:
     same(
         feed(events(seed, 0.04))
         + f"""
@@ -74,7 +74,7 @@ result = heard
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_same_stamps(seed: int) -> None:
+def test_time_synchronizer(seed: int) -> None:
     same(
         feed(events(seed, 0.0))
         + """

@@ -1,4 +1,4 @@
-"""tf.transformations against the real one, and against what must hold in any case."""
+"""tf.transformations compared with the real one, and its mathematical properties."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def test_single_transformations_are_found_again() -> None:
             assert t.is_same_transform(scaled, t.scale_matrix(*t.scale_from_matrix(scaled)))
 
 
-def test_what_is_no_rotation() -> None:
+def test_matrices_that_are_not_rotations() -> None:
     with pytest.raises(ValueError, match="no eigenvector"):
         t.rotation_from_matrix(t.scale_matrix(2.0))
 

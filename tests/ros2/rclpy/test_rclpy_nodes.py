@@ -31,7 +31,7 @@ Start = Callable[..., Context]
 
 @pytest.fixture
 def start(network: Network, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
-    """What begins contexts on the test's network, with a command line."""
+    """Return a function that opens contexts on the network of the test."""
     for name, value in network.variables().items():
         monkeypatch.setenv(name, value)
     opened: list[Context] = []
@@ -48,7 +48,7 @@ def start(network: Network, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
 
 
 class World:
-    """A node and what spins it."""
+    """A node and its executor."""
 
     def __init__(self, start: Start, name: str = "robot", *args: str, **options: Any) -> None:
         self.context = start(*args)
@@ -69,7 +69,7 @@ def world(start: Start) -> World:
     return World(start)
 
 
-def test_messages_come_in_spin_and_on_its_thread(world: World) -> None:
+def test_messages_are_handled_while_spinning_and_on_its_thread(world: World) -> None:
     heard: list[tuple[int, threading.Thread]] = []
     node = world.node
     subscription = node.create_subscription(
@@ -92,7 +92,7 @@ def test_messages_come_in_spin_and_on_its_thread(world: World) -> None:
     assert node.get_node_names_and_namespaces() == [("robot", "/")]
 
 
-def test_a_queue_keeps_the_newest(world: World) -> None:
+def test_a_full_queue_keeps_the_newest_messages(world: World) -> None:
     heard: list[int] = []
     subscription = world.node.create_subscription(Int32, "n", lambda m: heard.append(m.data), 2)
     publisher = world.node.create_publisher(Int32, "n", 10)
@@ -109,7 +109,7 @@ def _last(messages: Any) -> Any:
     return messages[-1].data if messages else None
 
 
-def test_transient_local_reaches_late_joiners(world: World) -> None:
+def test_transient_local_reaches_late_subscriptions(world: World) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     world.node.create_publisher(String, "map", latched).publish(String(data="here"))
     heard: list[str] = []
@@ -135,7 +135,7 @@ def test_timers(world: World) -> None:
     assert not world.node.destroy_timer(timer)
 
 
-def test_what_a_timer_missed_is_left_out(world: World) -> None:
+def test_missed_timer_periods_are_skipped(world: World) -> None:
     ticks: list[int] = []
     timer = world.node.create_timer(0.005, lambda: ticks.append(1))
     eventually(timer.is_ready, "the timer")
@@ -147,7 +147,7 @@ def test_what_a_timer_missed_is_left_out(world: World) -> None:
     assert ticks == [1]
 
 
-def test_an_exception_leaves_spin(world: World) -> None:
+def test_spin_raises_exceptions_of_callbacks(world: World) -> None:
     world.node.create_timer(0.001, lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         world.executor.spin()
@@ -177,7 +177,7 @@ def test_services(world: World) -> None:
     assert ("/switch", ["std_srvs/srv/SetBool"]) in world.node.get_service_names_and_types()
 
 
-def test_an_async_callback_may_wait_for_a_service(world: World) -> None:
+def test_an_async_callback_can_await_a_service(world: World) -> None:
     async def serve(request: Any, response: Any) -> Any:
         inner = await world.node.create_client(SetBool, "inner").call_async(request)
         response.message = f"outer {inner.message}"
@@ -194,7 +194,7 @@ def test_an_async_callback_may_wait_for_a_service(world: World) -> None:
     assert future.result().message == "outer inner"
 
 
-def test_a_failing_service_tells_its_caller_and_leaves_spin(world: World) -> None:
+def test_a_failing_service_reports_to_its_caller_and_to_spin(world: World) -> None:
     def serve(_request: Any, _response: Any) -> Any:
         raise ValueError("no hand")
 
@@ -207,7 +207,7 @@ def test_a_failing_service_tells_its_caller_and_leaves_spin(world: World) -> Non
         future.result()
 
 
-def test_a_service_that_nobody_serves(world: World) -> None:
+def test_a_service_without_a_server(world: World) -> None:
     client = world.node.create_client(SetBool, "nothing")
     assert not client.service_is_ready()
     assert not client.wait_for_service(timeout_sec=0.01)
@@ -218,7 +218,7 @@ def test_a_service_that_nobody_serves(world: World) -> None:
     assert future.cancelled()
 
 
-def test_parameters_declared_and_got(world: World) -> None:
+def test_declare_and_get_parameters(world: World) -> None:
     node = world.node
     assert node.declare_parameter("speed", 1.5).value == 1.5
     node.declare_parameters("pid", [("p", 1), ("name", "x", ParameterDescriptor()), ("i",)])
@@ -238,7 +238,7 @@ def test_parameters_declared_and_got(world: World) -> None:
     assert not node.has_parameter("speed")
 
 
-def test_parameters_set_and_checked(world: World) -> None:
+def test_set_and_check_parameters(world: World) -> None:
     node = world.node
     node.declare_parameter("speed", 1.5)
     node.declare_parameter("fixed", 1, ParameterDescriptor(read_only=True))
@@ -275,7 +275,7 @@ def test_parameters_of_the_command_line(start: Start) -> None:
     assert world.node.resolve_topic_name("in", only_expand=True) == "/in"
 
 
-def test_parameters_are_those_of_the_store(world: World, network: Network) -> None:
+def test_parameters_are_in_the_parameter_store(world: World, network: Network) -> None:
     other = network.node("other")
     other.params.set("/robot/speed", 4)
     eventually(lambda: world.node.rosz_node.params.has("~speed"), "the parameter")
@@ -307,7 +307,7 @@ def test_names_and_clock(start: Start) -> None:
         rate.sleep()
 
 
-def test_what_is_missing_is_named(world: World) -> None:
+def test_missing_attributes_are_named(world: World) -> None:
     with pytest.raises(AttributeError, match="create_guard_condition"):
         _ = world.node.create_guard_condition
     assert not hasattr(world.node, "my_own")
@@ -318,7 +318,7 @@ def test_no_node_without_init() -> None:
         Node("robot", context=Context())
 
 
-def test_the_end_of_a_node(world: World) -> None:
+def test_destroying_a_node(world: World) -> None:
     publisher = world.node.create_publisher(Int32, "n", 10)
     world.node.destroy_node()
     world.node.destroy_node()
@@ -353,7 +353,7 @@ def test_several_threads(start: Start) -> None:
         context.shutdown()
 
 
-def test_groups_exclude(start: Start) -> None:
+def test_exclusive_callback_groups(start: Start) -> None:
     context = start()
     node = Node("robot", context=context)
     inside = threading.Lock()

@@ -1,4 +1,4 @@
-"""Programs with rclpy as tutorials write them, in processes of their own."""
+"""Programs with rclpy, as in tutorials, in processes of their own."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_log_options(network: Network) -> None:
     ]
 
 
-def test_arguments_of_both_worlds(network: Network) -> None:
+def test_arguments_of_ros1_and_ros2(network: Network) -> None:
     script = """
         import sys
         import rosz.ros1
@@ -143,7 +143,7 @@ def test_arguments_of_both_worlds(network: Network) -> None:
     assert ros1.lines[0].startswith("/k/m /k/b 2.5")
 
 
-def test_begin_again(network: Network) -> None:
+def test_init_again_after_shutdown(network: Network) -> None:
     program = network.program(
         """
         import rosz.ros1

@@ -75,7 +75,7 @@ def test_parameters(value: object, kind: Parameter.Type) -> None:
     assert (again.name, again.type_, again.value) == ("p", kind, value)
 
 
-def test_what_no_parameter_can_be() -> None:
+def test_invalid_parameter_values() -> None:
     for value in ({"a": 1}, [1, "a"], object()):
         with pytest.raises(UsageError, match="a parameter cannot be"):
             Parameter("p", value=value)
@@ -114,7 +114,7 @@ def test_command_lines() -> None:
     assert remove_ros_args(["p", "--ros-args", "-r", "a:=b", "--", "c"]) == ["p", "c"]
 
 
-def test_classic_parameters_count_too() -> None:
+def test_ros1_parameters_on_the_command_line() -> None:
     assert parse(["_speed:=2", "__name:=me"]).params == {"": {"speed": 2}}
 
 
