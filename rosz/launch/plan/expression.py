@@ -1,13 +1,13 @@
 """Evaluate the expressions of ``$(eval …)`` by walking Python's syntax tree.
 
-Nothing is passed to Python's own ``eval``. An expression may use constants, operators,
-comprehensions, plain lambdas, and the names and methods listed here; anything else is refused by
-name. Names are looked up in roslaunch's order: the functions of launch files and of `math`, the
-args of the file, then those functions of Python that only compute.
+Nothing is passed to Python's own ``eval``. An expression may use constants, operators, lists,
+tuples, sets, dicts, f-strings, and call the functions and methods listed here; anything else is
+refused by name. Names are looked up in roslaunch's order: the functions of launch files and of
+`math`, the args of the file, then those functions of Python that only compute.
 
-An expression may come from a stranger, so it has a budget of steps and elements. Every value that
-is computed is charged for its size, and `_Evaluation._check_size` charges the operations that can
-explode before they run.
+An expression may come from a stranger. It has no loops, so the number of its operations is limited
+by its length. The total size of all values is limited too: each value is charged when it is
+computed, and the operations whose result may be huge are charged before they run.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ import operator
 import re
 import string
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, ItemsView, Iterable, KeysView, Mapping, ValuesView
 from typing import Any
 
 from rosz.errors import near_miss
@@ -28,19 +27,19 @@ from rosz.launch.plan.document import TextError
 __all__ = ("evaluate",)
 
 _MAX_LENGTH = 10_000
-_MAX_DEPTH = 80
+_MAX_DEPTH = 150
 _MAX_BITS = 4096
 _MAX_WIDTH = 9_999
 _MAX_DIGITS = 400
-_BUDGET = 100_000
+_MAX_RANGE = 2**60
+_MAX_SIZE = 100_000
 _CHARACTERS_PER_UNIT = 64
 
 _WIDE = re.compile(r"\d{5,}")
-_WIDE_PERCENT = re.compile(r"%(\([^)]*\))?[^a-zA-Z%]*?\d{5,}")
-_STAR_PERCENT = re.compile(r"%(\([^)]*\))?[^a-zA-Z%]*\*")
+_WIDE_PERCENT = re.compile(r"%(\([^)]*\))?[^a-zA-Z%]*?(\d{5,}|\*)")
 
-_VALUES = (bool, int, float, complex, str, list, tuple, dict, set, frozenset, range, type(None))
-_FORMATTED = (bool, int, float, complex, str, type(None))
+_VALUES = (bool, int, float, complex, str, list, tuple, dict, set, range, type(None))
+_ITERATORS = (enumerate, reversed, zip, KeysView, ValuesView, ItemsView)
 
 _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -71,37 +70,45 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.NotIn: lambda item, container: item not in container,
 }
 
-_METHODS: Mapping[type, frozenset[str]] = {
-    str: frozenset(
-        name
-        for name in dir(str)
-        if not name.startswith("_")
-        and name not in {"encode", "expandtabs", "format_map", "maketrans", "translate"}
-    ),
-    list: frozenset({"copy", "count", "index"}),
-    tuple: frozenset({"count", "index"}),
-    dict: frozenset({"copy", "get", "items", "keys", "values"}),
-    range: frozenset({"count", "index"}),
-    set: frozenset({"difference", "intersection", "issubset", "issuperset", "union"}),
-    int: frozenset({"bit_length", "conjugate"}),
-    float: frozenset({"hex", "is_integer"}),
+_NOT_FOR_TEXT = {"encode", "expandtabs", "format_map", "maketrans", "translate"}
+_METHODS: Mapping[type, set[str]] = {
+    str: {name for name in dir(str) if not name.startswith("_")} - _NOT_FOR_TEXT,
+    list: {"copy", "count", "index"},
+    tuple: {"count", "index"},
+    range: {"count", "index"},
+    dict: {"copy", "get", "items", "keys", "values"},
+    set: {"difference", "intersection", "issubset", "issuperset", "union"},
+    float: {"hex", "is_integer"},
 }
 
 _MATH: Mapping[str, Any] = {
     "true": True,
     "false": False,
-    **{name: value for name, value in vars(math).items() if not name.startswith("_")},
+    **{
+        name: value
+        for name, value in vars(math).items()
+        if not name.startswith("_") and name not in {"prod", "sumprod"}  # they multiply anything
+    },
 }
 
 _BUILTINS: Mapping[str, Callable[..., Any]] = {
     function.__name__: function
     for function in (
-        *(abs, all, any, bin, bool, chr, complex, dict, divmod, enumerate, filter, float),
-        *(format, frozenset, hex, int, isinstance, len, list, map, max, min, oct, ord, range),
-        *(repr, reversed, round, set, slice, sorted, str, sum, tuple, zip),
+        *(abs, all, any, bin, bool, chr, dict, divmod, enumerate, float, format, hex, int, len),
+        *(list, max, min, oct, ord, range, repr, reversed, round, set, sorted, str, sum, tuple),
+        zip,
     )
 }
-_ITERATORS = (enumerate, filter, map, reversed, zip)
+
+_REFUSED: Mapping[type[ast.expr], str] = {
+    ast.DictComp: "a dict comprehension",
+    ast.GeneratorExp: "a generator expression",
+    ast.Lambda: "a lambda",
+    ast.ListComp: "a list comprehension",
+    ast.NamedExpr: "':='",
+    ast.SetComp: "a set comprehension",
+    ast.Starred: "'*'",
+}
 
 
 def evaluate(
@@ -119,8 +126,8 @@ def evaluate(
         args: Names of the args, for suggestions.
 
     Raises:
-        TextError: If the text is not an expression, uses something that is not allowed, takes too
-            many steps, or fails.
+        TextError: If the text is not an expression, uses something that is not allowed, makes
+            too large values, or fails.
     """
     if len(text) > _MAX_LENGTH:
         raise TextError(f"the expression is longer than {_MAX_LENGTH} characters")
@@ -138,31 +145,32 @@ def evaluate(
         raise TextError(f"not an expression: {error or 'nested too deep'}") from None
     evaluation = _Evaluation(functions, arg, args)
     try:
-        value = evaluation.value(tree.body)
-        if not isinstance(value, _VALUES):
-            raise _Refused("the result is a function; expected a value")  # noqa: TRY301
-        return str(value)
+        return str(evaluation.value(tree.body))
     except _Refused as error:
         raise TextError(str(error), max(evaluation.column, 0) + shift) from None
-    except RecursionError:
-        raise TextError("it calls itself without end", max(evaluation.column, 0) + shift) from None
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except _PYTHON_ERRORS as error:
         reason = f"the expression fails: {type(error).__name__}: {error}"
         raise TextError(reason, max(evaluation.column, 0) + shift) from None
 
 
 class _Refused(Exception):
-    """An expression that is not allowed or takes too much."""
+    """An expression that is not allowed or makes too large values."""
 
 
-_FAILURES = (
-    *(_Refused, TextError, ArithmeticError, AttributeError, LookupError, RecursionError),
-    *(TypeError, ValueError),
-)
+_PYTHON_ERRORS = (ArithmeticError, LookupError, RecursionError, TypeError, ValueError)
 
 
-class _Evaluation(string.Formatter):
-    """The evaluation of one expression; as a formatter, it does the work of ``str.format``."""
+class _Evaluation:
+    """The evaluation of one expression.
+
+    Args:
+        functions: The functions of launch files by name.
+        arg: Function that returns the value of an arg by name, or None.
+        args: Names of the args, for suggestions.
+
+    Attributes:
+        column: Column of the innermost part that failed, or -1.
+    """
 
     def __init__(
         self,
@@ -173,63 +181,9 @@ class _Evaluation(string.Formatter):
         self._functions = functions
         self._arg = arg
         self._args = args
-        self._locals: list[dict[str, Any]] = []
-        self._left = _BUDGET
+        self._left: float = _MAX_SIZE
         self._depth = 0
         self.column = -1
-
-    def _charge(self, units: float) -> None:
-        self._left -= int(min(units, 2 * _BUDGET))
-        if self._left < 0:
-            raise _Refused(f"it takes more than {_BUDGET} steps or elements")
-
-    def _settle(self, value: Any) -> Any:
-        """Charge a value for its size, and return it."""
-        self._charge(1 + _size(value, self._left + 1))
-        return value
-
-    def _check_size(self, operation: str, *operands: Any) -> None:  # noqa: C901, PLR0912  # a list
-        """Charge an operation whose result may be large, before it runs."""
-        match operation, operands:
-            case "Pow", (int(base), int(exponent)):
-                self._check_bits(base.bit_length() * exponent)
-            case "LShift", (int(number), int(places)):
-                self._check_bits(number.bit_length() + places)
-            case "Mult", (int(left), int(right)):
-                self._check_bits(left.bit_length() + right.bit_length())
-            case "Mult", ((str() | list() | tuple()) as sequence, int(times)):
-                unit = _CHARACTERS_PER_UNIT if isinstance(sequence, str) else 1
-                self._charge(len(sequence) * max(times, 0) // unit)
-            case "Mult", (int(times), (str() | list() | tuple()) as sequence):
-                self._check_size("Mult", sequence, times)
-            case "Mod", (str(pattern), values):
-                _check_width(_MAX_WIDTH + 1 if _WIDE_PERCENT.search(pattern) else 0)
-                if _STAR_PERCENT.search(pattern):
-                    raise _Refused("a field width from a value ('*') is not available")
-                self._charge(pattern.count("%") * _size(values, self._left + 1))
-            case "format", (str(spec),):
-                _check_width(_MAX_WIDTH + 1 if _WIDE.search(spec) else 0)
-            case "center" | "ljust" | "rjust" | "zfill", (_, int(width), *_):
-                _check_width(width)
-            case "join", (str(separator), list(parts)):
-                self._check_size("Mult", separator, len(parts))
-            case "replace", (str(text), str(_), str(new), *_):
-                self._check_size("Mult", new, len(text) + 1)
-            case "factorial" | "comb" | "perm", (int(number), *_):
-                self._check_bits(number * math.log2(max(number, 2)))
-            case "lcm", numbers:
-                self._check_bits(sum(number.bit_length() for number in numbers))
-            case "round", (int(digits),):
-                if abs(digits) > _MAX_DIGITS:
-                    raise _Refused(f"it rounds to more than {_MAX_DIGITS} digits")
-            case "range", (range() as numbers,):
-                span = abs(numbers.stop - numbers.start)
-                self._charge(span // abs(numbers.step))
-
-    def _check_bits(self, bits: float) -> None:
-        if bits > _MAX_BITS:
-            raise _Refused(f"it makes a number of more than {_MAX_BITS} bits")
-        self._charge(bits // 256)
 
     def value(self, node: ast.expr) -> Any:
         """Return the value of a node of the syntax tree."""
@@ -237,71 +191,80 @@ class _Evaluation(string.Formatter):
             raise _Refused(f"it nests deeper than {_MAX_DEPTH}")
         self._depth += 1
         try:
-            return self._settle(self._evaluate(node))
-        except _FAILURES:
-            if self.column < 0:  # the innermost node that failed
+            return self._charged(self._evaluate(node))
+        except (_Refused, TextError, *_PYTHON_ERRORS):
+            if self.column < 0:
                 self.column = node.col_offset
             raise
         finally:
             self._depth -= 1
+
+    def _charge(self, size: float) -> None:
+        self._left -= size
+        if self._left < 0:
+            raise _Refused(f"it takes more than {_MAX_SIZE} steps or elements")
+
+    def _charged(self, value: Any) -> Any:
+        """Charge a value for its size, and return it."""
+        self._charge(_size(value, self._left))
+        return value
 
     def _evaluate(self, node: ast.expr) -> Any:  # noqa: C901, PLR0911, PLR0912  # a list
         match node:
             case ast.Constant(value) if isinstance(value, _VALUES):
                 return value
             case ast.Name(name):
-                return self._name(name)
-            case ast.BinOp():
-                return self._binary(node)
+                value = self._name(name)
+                if callable(value):
+                    raise _Refused(f"'{name}' is a function; it can only be called: {name}(…)")
+                return value
+            case ast.BinOp(left, op, right):
+                return self._operate(op, self.value(left), self.value(right))
             case ast.UnaryOp(op, operand):
-                return self._operate(type(op), self.value(operand))
-            case ast.BoolOp(op, values):
-                return self._either(values, stop=isinstance(op, ast.Or))
-            case ast.Compare(left, ops, comparators):
-                return self._compare(self.value(left), zip(ops, comparators, strict=True))
+                return self._operate(op, self.value(operand))
+            case ast.BoolOp(op, parts):
+                return self._either(parts, stop=isinstance(op, ast.Or))
+            case ast.Compare():
+                return self._compare(node)
             case ast.IfExp(test, body, orelse):
                 return self.value(body if self.value(test) else orelse)
-            case ast.List(elements):
-                return self._elements(elements)
-            case ast.Tuple(elements):
-                return tuple(self._elements(elements))
-            case ast.Set(elements):
-                return set(self._elements(elements))
-            case ast.Dict(keys, values):
-                return self._dict(zip(keys, values, strict=True))
+            case ast.List(parts):
+                return [self.value(part) for part in parts]
+            case ast.Tuple(parts):
+                return tuple([self.value(part) for part in parts])
+            case ast.Set(parts):
+                return {self.value(part) for part in parts}
+            case ast.Dict(keys, parts):
+                return {self._key(k): self.value(v) for k, v in zip(keys, parts, strict=True)}
+            case ast.Subscript(owner, ast.Slice(lower, upper, step)):
+                bounds = [part and self.value(part) for part in (lower, upper, step)]
+                return self.value(owner)[slice(*bounds)]
             case ast.Subscript(owner, index):
                 return self.value(owner)[self.value(index)]
-            case ast.Slice(lower, upper, step):
-                return slice(*(part and self.value(part) for part in (lower, upper, step)))
+            case ast.Call(ast.Name(name)):
+                return self._call(node, name, self._name(name))
+            case ast.Call(ast.Attribute(owner, name) as method):
+                return self._call_method(node, self.value(owner), name, method.end_col_offset)
+            case ast.Call(function):
+                raise _Refused(f"{self.value(function)!r} is not a function")
             case ast.Attribute(owner, name):
-                return self._method(self.value(owner), name, node.end_col_offset)
-            case ast.Call(function, args, keywords):
-                return self._call(self.value(function), self._elements(args), keywords)
-            case ast.Lambda(spec, body):
-                return self._lambda(spec, body)
-            case ast.ListComp(element, loops) | ast.GeneratorExp(element, loops):
-                return self._comprehend(loops, element)
-            case ast.SetComp(element, loops):
-                return set(self._comprehend(loops, element))
-            case ast.DictComp(key, value, loops):
-                return dict(self._comprehend(loops, key, value))
-            case ast.JoinedStr(values):
-                return "".join(str(self.value(part)) for part in values)
-            case ast.FormattedValue(value, conversion, spec):
-                shown = self.value(value)
+                self._check_method(self.value(owner), name, node.end_col_offset)
+                raise _Refused(f"'.{name}' is a method; it can only be called: .{name}(…)")
+            case ast.JoinedStr(parts):
+                return "".join([self.value(part) for part in parts])
+            case ast.FormattedValue(part, conversion, spec):
+                shown = self.value(part)
                 shown = repr(shown) if conversion in {ord("r"), ord("a")} else shown
-                return self.format_field(shown, self.value(spec) if spec else "")
-        raise _Refused(f"{_describe(node)} is not available in expressions")
+                return self._run("format", format, shown, self.value(spec) if spec else "")
+        found = repr(node.value) if isinstance(node, ast.Constant) else type(node).__name__
+        raise _Refused(f"{_REFUSED.get(type(node), found)} is not available in expressions")
 
     def _name(self, name: str) -> Any:
-        for names in (*reversed(self._locals), self._functions):
-            if name in names:
-                return names[name]
+        if name in self._functions:
+            return self._functions[name]
         value = _MATH[name] if name in _MATH else self._arg(name)
         if value is None:
             value = _BUILTINS.get(name)
-        if callable(value) and not isinstance(value, type):
-            return partial(self._run, value)  # checked also when Python calls it, as in map
         if value is not None:
             return value
         known = [*_MATH, *self._functions, *_BUILTINS]
@@ -310,20 +273,15 @@ class _Evaluation(string.Formatter):
             hint = "; use the names of math alone: write 'pi', not 'math.pi'"
         raise _Refused(f"'{name}' is not an arg of this file and not a function{hint}")
 
-    def _binary(self, node: ast.BinOp) -> Any:
-        chain = [node]  # a long sum nests deeply to the left, so it is not evaluated recursively
-        while isinstance(chain[-1].left, ast.BinOp):
-            chain.append(chain[-1].left)
-        result = self.value(chain[-1].left)
-        for step in reversed(chain):
-            result = self._operate(type(step.op), result, self.value(step.right))
-        return result
+    def _key(self, node: ast.expr | None) -> Any:
+        if node is None:
+            raise _Refused("'**' is not available in expressions")
+        return self.value(node)
 
-    def _operate(self, kind: type[ast.AST], *operands: Any) -> Any:
-        if kind not in _OPERATORS:
+    def _operate(self, op: ast.AST, *operands: Any) -> Any:
+        if type(op) not in _OPERATORS:
             raise _Refused("'@' is not available in expressions")
-        self._check_size(kind.__name__, *operands)
-        return self._settle(_OPERATORS[kind](*operands))
+        return self._run(type(op).__name__, _OPERATORS[type(op)], *operands)
 
     def _either(self, parts: Iterable[ast.expr], *, stop: bool) -> Any:
         result: Any = None
@@ -333,193 +291,122 @@ class _Evaluation(string.Formatter):
                 break
         return result
 
-    def _compare(self, left: Any, rest: Iterable[tuple[ast.cmpop, ast.expr]]) -> Any:
+    def _compare(self, node: ast.Compare) -> Any:
+        left = self.value(node.left)
         result: Any = True
-        for op, comparator in rest:
+        for op, comparator in zip(node.ops, node.comparators, strict=True):
             right = self.value(comparator)
-            self._settle((left, right))  # comparing long values takes time
-            result = self._operate(type(op), left, right)
+            result = self._operate(op, left, right)
             if not result:
                 break
             left = right
         return result
 
-    def _elements(self, nodes: Iterable[ast.expr]) -> list[Any]:
-        elements: list[Any] = []
-        for node in nodes:
-            if isinstance(node, ast.Starred):
-                elements += self.value(node.value)
-            else:
-                elements.append(self.value(node))
-        return elements
-
-    def _dict(self, items: Iterable[tuple[ast.expr | None, ast.expr]]) -> dict[Any, Any]:
-        result: dict[Any, Any] = {}
-        for key, value in items:
-            if key is None:
-                result.update(self.value(value))
-            else:
-                result[self.value(key)] = self.value(value)
-        return result
-
-    def _method(self, owner: Any, name: str, column: int | None) -> Callable[..., Any]:
-        allowed = _METHODS.get(type(owner), frozenset())
+    def _check_method(self, owner: Any, name: str, column: int | None) -> None:
+        allowed = _METHODS.get(type(owner), set())
         if name not in allowed:
             self.column = column or 0
             known = f"; it has {', '.join(sorted(allowed))}" if allowed else ""
-            kind = "function" if callable(owner) else type(owner).__name__
-            raise _Refused(f"'.{name}' of a {kind} is not available{known}")
+            raise _Refused(f"'.{name}' of a {type(owner).__name__} is not available{known}")
 
-        def call(*args: Any, **kwargs: Any) -> Any:
-            self._settle((owner, args))
-            if name == "format":
-                return self.vformat(owner, args, kwargs)
-            if name == "join":
-                args = tuple(list(arg) for arg in args)
-            self._check_size(name, owner, *args)
-            result = getattr(owner, name)(*args, **kwargs)
-            return list(result) if name in {"items", "keys", "values"} else result
+    def _call_method(self, node: ast.Call, owner: Any, name: str, column: int | None) -> Any:
+        self._check_method(owner, name, column)
+        return self._call(node, f".{name}", getattr(type(owner), name), owner)
 
-        return call
-
-    def _call(self, function: Any, args: list[Any], keywords: Iterable[ast.keyword]) -> Any:
-        kwargs: dict[str, Any] = {}
-        for keyword in keywords:
-            value = self.value(keyword.value)
-            kwargs.update(value if keyword.arg is None else {keyword.arg: value})
+    def _call(self, node: ast.Call, name: str, function: Any, *owner: Any) -> Any:
         if not callable(function):
             raise _Refused(f"{function!r} is not a function")
-        self._settle(args)
+        args = [*owner, *(self.value(arg) for arg in node.args)]
+        if any(keyword.arg is None for keyword in node.keywords):
+            raise _Refused("'**' is not available in expressions")
+        kwargs = {str(keyword.arg): self.value(keyword.value) for keyword in node.keywords}
+        return self._run(name, function, *args, **kwargs)
+
+    def _run(self, name: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        """Run an operation, a function or a method within the limits."""
+        if _bits(name, args) > _MAX_BITS:
+            raise _Refused(f"it makes a number of more than {_MAX_BITS} bits")
+        _check_width(name, args)
+        digits = args[1] if len(args) > 1 else kwargs.get("ndigits")
+        if name == "round" and abs(digits or 0) > _MAX_DIGITS:
+            raise _Refused(f"it rounds to more than {_MAX_DIGITS} digits")
+        self._charge(_growth(name, args, kwargs))
         result = function(*args, **kwargs)
-        if isinstance(result, range):
-            self._check_size("range", result)
-        return list(result) if function in _ITERATORS else result
-
-    def _run(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-        """Call a function of Python or `math` within the limits."""
-        if function is sum:
-            return self._fold(ast.Add, 0, *args, **kwargs)
-        if function is math.prod:
-            return self._fold(ast.Mult, 1, *args, **kwargs)
-        if function is format:
-            return self.format_field(*args, **kwargs)
-        if function is round:
-            return self._round(*args, **kwargs)
-        self._check_size(function.__name__, *args)
-        return function(*args, **kwargs)
-
-    def _round(self, number: Any, ndigits: Any = None) -> Any:
-        self._check_size("round", ndigits)
-        return round(number, ndigits)
-
-    def _fold(
-        self, kind: type[ast.operator], neutral: Any, items: Iterable[Any], start: Any = None
-    ) -> Any:
-        """Return the ``sum`` or ``prod`` of values, with each step within the limits."""
-        result = neutral if start is None else start
-        for item in items:
-            result = self._operate(kind, result, item)
-        return result
-
-    def get_field(
-        self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]
-    ) -> tuple[Any, Any]:
-        """Return the value of a replacement field, which may not name an attribute."""
-        if "." in field_name:
-            raise _Refused(f"'{{{field_name}}}' reaches for an attribute")
-        found: tuple[Any, Any] = super().get_field(field_name, args, kwargs)
-        return found
-
-    def format_field(self, value: Any, format_spec: str = "") -> str:
-        """Return a formatted value of limited width."""
-        self._check_size("format", format_spec)
-        if not isinstance(value, _FORMATTED):
-            return str(value)
-        text: str = self._settle(format(value, format_spec))
-        return text
-
-    def _lambda(self, spec: ast.arguments, body: ast.expr) -> Callable[..., Any]:
-        if spec.vararg or spec.kwarg or spec.kwonlyargs or spec.defaults:
-            raise _Refused("a lambda takes plain parameters only")
-        names = [parameter.arg for parameter in (*spec.posonlyargs, *spec.args)]
-        outer = list(self._locals)
-
-        def call(*values: Any) -> Any:
-            if len(values) != len(names):
-                raise _Refused(f"a lambda of {len(names)} parameters got {len(values)}")
-            caller = self._locals
-            self._locals = [*outer, dict(zip(names, values, strict=True))]
-            try:
-                return self.value(body)
-            finally:
-                self._locals = caller
-
-        return call
-
-    def _comprehend(self, loops: list[ast.comprehension], *element: ast.expr) -> list[Any]:
-        """Return the elements of a comprehension, which are pairs for a dict."""
-        self._locals.append({})
-        try:
-            rounds = self._loop(loops)
-            if len(element) == 1:
-                return [self.value(element[0]) for _ in rounds]
-            return [tuple(self.value(part) for part in element) for _ in rounds]
-        finally:
-            self._locals.pop()
-
-    def _loop(self, loops: list[ast.comprehension]) -> Iterator[None]:
-        if not loops:
-            yield
-            return
-        first, *others = loops
-        for item in self.value(first.iter):
-            self._charge(1)
-            self._assign(first.target, item)
-            if all(self.value(test) for test in first.ifs):
-                yield from self._loop(others)
-
-    def _assign(self, target: ast.expr, item: Any) -> None:
-        if isinstance(target, ast.Name):
-            self._locals[-1][target.id] = item
-            return
-        if not isinstance(target, ast.Tuple | ast.List):
-            raise _Refused("a loop assigns to names only")
-        items = list(item)
-        if len(items) != len(target.elts):
-            raise _Refused(f"expected {len(target.elts)} values in a loop, got {len(items)}")
-        for part, value in zip(target.elts, items, strict=True):
-            self._assign(part, value)
+        return list(result) if isinstance(result, _ITERATORS) else result
 
 
-def _describe(node: ast.expr) -> str:
-    if isinstance(node, ast.Constant):
-        return repr(node.value)
-    name = type(node).__name__
-    return {"NamedExpr": "':='", "Starred": "'*'"}.get(name, name)
+def _bits(name: str, args: tuple[Any, ...]) -> float:
+    """Return the largest number of bits that the result of an operation on numbers may have."""
+    match name, args:
+        case "Pow", (int(base), int(exponent)):
+            return base.bit_length() * exponent
+        case "LShift", (int(number), int(places)):
+            return number.bit_length() + places
+        case "Mult", (int(left), int(right)):
+            return left.bit_length() + right.bit_length()
+        case "factorial" | "comb" | "perm", (int(number), *_):
+            return number * math.log2(max(number, 2))
+        case "lcm", numbers:
+            return float(sum(number.bit_length() for number in numbers))
+    return 0
 
 
-def _check_width(width: int) -> None:
-    if width > _MAX_WIDTH:
-        raise _Refused(f"it makes a field wider than {_MAX_WIDTH}")
+def _check_width(name: str, args: tuple[Any, ...]) -> None:
+    """Refuse an operation that makes a field of great or unknown width."""
+    wide = False
+    match name, args:
+        case "Mod", (str(pattern), _):
+            wide = bool(_WIDE_PERCENT.search(pattern))
+        case "format", (_, str(spec)):
+            wide = bool(_WIDE.search(spec))
+        case ".format", (str(template), *_):
+            for _, field, form, _ in string.Formatter().parse(template):
+                if "." in (field or ""):
+                    raise _Refused(f"'{{{field}}}' reaches for an attribute")
+                wide = wide or "{" in (form or "") or bool(_WIDE.search(form or ""))
+        case ".center" | ".ljust" | ".rjust" | ".zfill", (_, int(width), *_):
+            wide = width > _MAX_WIDTH
+    if wide:
+        raise _Refused(f"it makes a field wider than {_MAX_WIDTH}, or of a width from a value")
 
 
-def _size(value: Any, limit: int) -> int:
-    """Return the number of elements of a value at any depth, counted up to a limit."""
-    total = 0
+def _growth(name: str, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> float:
+    """Return the size that the result of an operation on sequences may have."""
+    match name, args:
+        case "Mult", (((str() | list() | tuple()) as sequence), int(times)) | (
+            int(times),
+            ((str() | list() | tuple()) as sequence),
+        ):
+            return _size(sequence) * max(times, 0)
+        case "Mod", (str(pattern), values):
+            return pattern.count("%") * _size(values)
+        case ".format", (str(template), *values):
+            return template.count("{") * _size([*values, *kwargs.values()])
+        case ".join", (str(separator), (str() | list() | tuple() | set() | dict()) as parts):
+            return len(separator) * len(parts) / _CHARACTERS_PER_UNIT
+        case ".replace", (str(text), _, str(new), *_):
+            return len(new) * (len(text) + 1) / _CHARACTERS_PER_UNIT
+    return 0
+
+
+def _size(value: Any, limit: float = _MAX_SIZE) -> float:
+    """Return the size of a value with its elements at any depth, counted up to a limit."""
+    total = 0.0
     stack = [value]
     while stack and total <= limit:
         item = stack.pop()
+        total += 1
         if isinstance(item, str):
-            total += len(item) // _CHARACTERS_PER_UNIT
-        elif isinstance(item, int) and item.bit_length() > _MAX_BITS:
-            total += _BUDGET
+            total += len(item) / _CHARACTERS_PER_UNIT
+        elif isinstance(item, int):
+            total += _MAX_SIZE if item.bit_length() > _MAX_BITS else item.bit_length() / 256
         elif isinstance(item, range):
-            total += len(item)
+            # Whole numbers above 2 ** 61 may have equal hashes, which makes a set of them slow.
+            large = max(abs(item.start), abs(item.stop)) > _MAX_RANGE
+            total += _MAX_SIZE if large else len(item)
         elif isinstance(item, dict):
-            total += len(item)
             stack += item.keys()
             stack += item.values()
-        elif isinstance(item, list | tuple | set | frozenset):
-            total += len(item)
+        elif isinstance(item, list | tuple | set):
             stack += item
     return total

@@ -7,7 +7,7 @@ import os
 import subprocess
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ _WORKER = Path(__file__).with_name("roslaunch_worker.py")
 
 
 class Roslaunch:
-    """Real roslaunch in one long-lived process.
+    """Real roslaunch in one long-lived process, started again after a question that failed.
 
     Args:
         environ: Its environment, by `environment`.
@@ -40,6 +40,10 @@ class Roslaunch:
 
     def __init__(self, environ: Mapping[str, str]) -> None:
         self._log = Path(environ["ROS_HOME"], "roslaunch.log")
+        self._environ = dict(environ)
+        self._start()
+
+    def _start(self) -> None:
         with self._log.open("w") as log:
             self._process = subprocess.Popen(
                 [_PYTHON, _WORKER],
@@ -47,7 +51,7 @@ class Roslaunch:
                 stdout=subprocess.PIPE,
                 stderr=log,
                 text=True,
-                env=dict(environ),
+                env=self._environ,
             )
         if not self._line():
             self.close()
@@ -74,10 +78,16 @@ class Roslaunch:
             "environ": dict(environ or {}),
             "unset": ["ROS_NAMESPACE", "ROSZ_TEST"],
         }
-        self._process.stdin.write(json.dumps(question) + "\n")
-        self._process.stdin.flush()
-        line = self._line()
-        assert line, self._log.read_text()[-2000:]
+        try:
+            self._process.stdin.write(json.dumps(question) + "\n")
+            self._process.stdin.flush()
+            line = self._line()
+            assert line, self._log.read_text()[-2000:]
+        except BaseException:  # such as a time limit: the reply would be taken for the next one
+            self._process.kill()
+            self.close()
+            self._start()
+            raise
         found: dict[str, Any] = json.loads(line)
         return found
 
@@ -85,7 +95,8 @@ class Roslaunch:
         """End the process."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.close()
+        with suppress(BrokenPipeError):
+            self._process.stdin.close()
         self._process.wait(10)
         self._process.stdout.close()
 

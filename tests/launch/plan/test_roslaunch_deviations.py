@@ -17,6 +17,9 @@ STRICTER = {
     "attributes of values": """<launch><param name="a" value="$(eval (1).real)"/></launch>""",
     "huge numbers": """<launch><param name="a" value="$(eval 2 ** 20000 % 7)"/></launch>""",
     "functions as results": """<launch><param name="a" value="$(eval str)"/></launch>""",
+    "comprehensions": """<launch><param name="a" value="$(eval [i for i in [1]])"/></launch>""",
+    "lambdas": """<launch><param name="a" value="$(eval (lambda: 1)())"/></launch>""",
+    "starred elements": """<launch><param name="a" value="$(eval [*[1], 2])"/></launch>""",
     "a null document": "<launch><rosparam>null</rosparam></launch>",
     "letters beyond ASCII in names": '<launch><remap from="größe" to="b"/></launch>',
     "delays that are no number": """<launch>
@@ -27,8 +30,6 @@ STRICTER = {
 # What roslaunch refuses for want of a feature, rosz has.
 RICHER = {
     "dates as parameters": "<launch><rosparam>a: 2020-01-02</rosparam></launch>",
-    "args in loops of expressions": """<launch><arg name="n" value="2"/>
-      <param name="a" value="$(eval [n for i in range(2)])"/></launch>""",
     "var": '<launch><arg name="n" value="2"/><param name="a" value="$(var n)"/></launch>',
     "find-pkg-share": '<launch><param name="a" value="$(find-pkg-share demo_robot)"/></launch>',
     "exec": '<launch><node pkg="demo_nodes" exec="talker.py"/></launch>',
