@@ -10,7 +10,7 @@ from rosz.params.paths import Path, climb, joined, resolve, split
 from rosz.params.replica import ACK_TIMEOUT, Changed, Replica, Watch
 from rosz.params.replica.state import not_found
 from rosz.params.tree import MISSING
-from rosz.params.values import convert, copy, normalise_at
+from rosz.params.values import convert, copy, normalise
 from rosz.params.writes import Change, condense
 
 __all__ = ("Params",)
@@ -125,7 +125,7 @@ class Params:
         changes: list[Change] = []
         for name, value in values.items():
             path = self._path(name)
-            changes.append((path, normalise_at(path, value)))
+            changes.append((path, normalise(value, path)))
         self._replica.write(condense(changes), origin=self._origin, timeout=timeout)
 
     def delete(self, name: str, *, timeout: float = ACK_TIMEOUT) -> None:

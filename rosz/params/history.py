@@ -30,7 +30,7 @@ from typing import Final
 
 from rosz.errors import DecodeError
 from rosz.params.paths import Path
-from rosz.params.tree import MISSING, Draft, Missing, Tree, lookup, with_delete, with_put
+from rosz.params.tree import MISSING, Draft, Missing, Tree, lookup
 from rosz.params.values import Value
 from rosz.params.writes import DELETED, Write, check_write
 
@@ -43,7 +43,7 @@ except ImportError:
 __all__ = ("BUCKETS", "EMPTY_DIGEST", "History")
 
 BUCKETS: Final = 64
-_MAX_PENDING: Final = 1000
+_MAX_TOGGLED: Final = 1000
 _DIGEST: Final = struct.Struct(f"<{BUCKETS}Q")
 EMPTY_DIGEST: Final = bytes(_DIGEST.size)
 """The digest of the empty set."""
@@ -51,35 +51,6 @@ EMPTY_DIGEST: Final = bytes(_DIGEST.size)
 
 def _bucket_of(path: str) -> int:
     return zlib.crc32(path.encode()) % BUCKETS
-
-
-class _Digest:
-    """The digest of a set of writes.
-
-    Writes come and go far more often than the digest is read, so `toggle` only lists them. They are
-    folded in when the digest is read, or when the list is long.
-    """
-
-    __slots__ = ("_numbers", "_pending")
-
-    def __init__(self) -> None:
-        self._numbers = [0] * BUCKETS
-        self._pending: list[tuple[Path, int, str]] = []
-
-    def toggle(self, write: Write) -> None:
-        """Add a write, or remove it if it is in the set."""
-        self._pending.append((write.path, write.time, write.clock))
-        if len(self._pending) >= _MAX_PENDING:
-            self.numbers()
-
-    def numbers(self) -> list[int]:
-        """Return the number of each bucket."""
-        pending, self._pending = self._pending, []
-        for path, time, clock in pending:
-            text = "/".join(path)
-            mark = blake2b(f"{time} {clock} {text}".encode(), digest_size=8).digest()
-            self._numbers[_bucket_of(text)] ^= int.from_bytes(mark, "little")
-        return self._numbers
 
 
 class _Node:
@@ -104,7 +75,10 @@ class History:
         self.root: Tree = {}
         self.latest = 0
         self._top = _Node()
-        self._digest = _Digest()
+        self._buckets = [0] * BUCKETS
+        # Writes come and go far more often than the digest is read: they are only listed here, and
+        # folded in when the digest is read, or when the list is long.
+        self._toggled: list[Write] = []
         self._deletions: dict[Path, Write] = {}
         self._count = 0
 
@@ -131,7 +105,10 @@ class History:
                 new.append(write)
                 steps += replayed
         if steps:
-            self.root = _replay(self.root, steps)
+            draft = Draft(self.root)
+            for step in steps:
+                draft.change(step.path, step.value)
+            self.root = draft.root
         return new
 
     def writes(self) -> Iterator[Write]:
@@ -149,7 +126,7 @@ class History:
 
     def digest(self) -> bytes:
         """Return the digest of the set, in the form that replicas exchange."""
-        return _DIGEST.pack(*self._digest.numbers())
+        return _DIGEST.pack(*self._numbers())
 
     def differing(self, digest: bytes) -> list[int]:
         """Return the buckets in which this set differs from the set of another digest.
@@ -160,7 +137,7 @@ class History:
         if len(digest) != _DIGEST.size:
             raise DecodeError("digest", 0, f"{len(digest)} bytes, expected {_DIGEST.size}")
         theirs = _DIGEST.unpack(digest)
-        return [index for index, ours in enumerate(self._digest.numbers()) if ours != theirs[index]]
+        return [index for index, ours in enumerate(self._numbers()) if ours != theirs[index]]
 
     def find(self, path: Path) -> Write | None:
         """Return the write at exactly this path."""
@@ -249,7 +226,7 @@ class History:
         if node.write is not None:
             self._remove(node)
         node.write = write
-        self._digest.toggle(write)
+        self._toggle(write)
         self._count += 1
         if write.value is DELETED:
             self._deletions[write.path] = write
@@ -259,10 +236,25 @@ class History:
         if write is None:
             return
         node.write = None
-        self._digest.toggle(write)
+        self._toggle(write)
         self._count -= 1
         if write.value is DELETED:
             del self._deletions[write.path]
+
+    def _toggle(self, write: Write) -> None:
+        """Add a write to the digest, or remove it if it is in it."""
+        self._toggled.append(write)
+        if len(self._toggled) >= _MAX_TOGGLED:
+            self._numbers()
+
+    def _numbers(self) -> list[int]:
+        """Return the number of each bucket of the digest."""
+        toggled, self._toggled = self._toggled, []
+        for write in toggled:
+            text = "/".join(write.path)
+            mark = blake2b(f"{write.time} {write.clock} {text}".encode(), digest_size=8).digest()
+            self._buckets[_bucket_of(text)] ^= int.from_bytes(mark, "little")
+        return self._buckets
 
     def _above(self, path: Path) -> Iterator[Write]:
         """Yield the writes at a path and above, from the root down; each is newer than the last."""
@@ -309,19 +301,3 @@ def _comes_after(write: Write, other: Write) -> bool:
     if write.time != other.time:
         return write.time > other.time
     return write.order > other.order
-
-
-def _replay(root: Tree, steps: list[Write]) -> Tree:
-    """Return the tree after replaying writes on a tree."""
-    if len(steps) == 1:
-        step = steps[0]
-        if step.value is DELETED:
-            return with_delete(root, step.path)
-        return with_put(root, step.path, step.value)
-    draft = Draft(root)
-    for step in steps:
-        if step.value is DELETED:
-            draft.delete(step.path)
-        else:
-            draft.put(step.path, step.value)
-    return draft.root

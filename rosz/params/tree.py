@@ -15,7 +15,7 @@ import msgspec
 
 from rosz.params.paths import Path, joined
 from rosz.params.values import Value
-from rosz.params.writes import DELETED, Change, check_write
+from rosz.params.writes import DELETED, Change, Deleted, check_write
 
 __all__ = (
     "MISSING",
@@ -26,8 +26,6 @@ __all__ = (
     "leaves",
     "lookup",
     "preview",
-    "with_delete",
-    "with_put",
 )
 
 Tree = dict[str, Value]
@@ -69,32 +67,6 @@ def leaves(value: Value, path: Path = ()) -> Iterator[tuple[Path, Value]]:
         yield from leaves(item, (*path, key))
 
 
-def with_put(root: Tree, path: Path, value: Value) -> Tree:
-    """Return a tree with a value set: it replaces what is there, and all above become dicts."""
-    if not path:
-        return dict(value)
-    changed, parent = _opened(root, path)
-    parent[path[-1]] = value
-    return changed
-
-
-def with_delete(root: Tree, path: Path) -> Tree:
-    """Return a tree without a path: all above become dicts, and stay even if empty."""
-    changed, parent = _opened(root, path)
-    parent.pop(path[-1], None)
-    return changed
-
-
-def _opened(root: Tree, path: Path) -> tuple[Tree, Tree]:
-    """Return a copy of a tree that may be changed at a path, and the dict to change."""
-    changed = node = root.copy()
-    for part in path[:-1]:
-        below = node.get(part)
-        node[part] = below = below.copy() if type(below) is dict else {}
-        node = below
-    return changed, node
-
-
 class Draft:
     """A tree that is being changed many times; each dict is copied only once.
 
@@ -109,16 +81,14 @@ class Draft:
         self.root = root
         self._own: dict[int, Tree] = {}
 
-    def put(self, path: Path, value: Value) -> None:
-        """Set a value: it replaces what is there, and all above become dicts."""
-        if path:
+    def change(self, path: Path, value: Value | Deleted) -> None:
+        """Set a value or delete a path; all above become dicts, and stay even if empty."""
+        if value is DELETED:
+            self._parent(path).pop(path[-1], None)
+        elif path:
             self._parent(path)[path[-1]] = value
         else:
             self.root = value
-
-    def delete(self, path: Path) -> None:
-        """Delete a path: all above become dicts, and stay even if empty."""
-        self._parent(path).pop(path[-1], None)
 
     def _parent(self, path: Path) -> Tree:
         node = self.root = self._writable(self.root)
@@ -164,10 +134,7 @@ def preview(root: Tree, changes: Iterable[Change]) -> list[Difference]:
     draft = Draft(root)
     for path, value in changes:
         check_write(path, value)
-        if value is DELETED:
-            draft.delete(path)
-        else:
-            draft.put(path, value)
+        draft.change(path, value)
     old = {joined(path): value for path, value in leaves(root) if path}
     new = {joined(path): value for path, value in leaves(draft.root) if path}
     return [

@@ -19,7 +19,6 @@ __all__ = (
     "convert",
     "copy",
     "normalise",
-    "normalise_at",
     "type_name",
     "unsound_text",
 )
@@ -55,12 +54,6 @@ class _RefusedError(Exception):
         self.trail: list[str] = []
         super().__init__(reason)
 
-    def error(self, name: str) -> ParamError:
-        """Return the error for a parameter of this name."""
-        start = f"'{name}' cannot be set: " if name else ""
-        inside = f"at {''.join(reversed(self.trail))}: " if self.trail else ""
-        return ParamError(f"{start}{inside}{self.reason}")
-
 
 def type_name(value: object) -> str:
     """Return the name of a value's type in messages, such as ``int``, ``timestamp`` or ``null``."""
@@ -79,7 +72,7 @@ def unsound_text(text: str) -> str:
     return ""
 
 
-def normalise(value: object, name: str = "") -> Value:
+def normalise(value: object, name: str | tuple[str, ...] = "") -> Value:
     """Return a private copy of a value in the store's own types.
 
     Tuples become lists, and instances of subclasses become instances of the base class. Objects
@@ -87,7 +80,7 @@ def normalise(value: object, name: str = "") -> Value:
 
     Args:
         value: Value to set.
-        name: Name of the parameter, for the error message.
+        name: Name or path of the parameter, for the error message.
 
     Raises:
         ParamError: A parameter cannot hold the value, or a part of it; the message names the place.
@@ -95,15 +88,10 @@ def normalise(value: object, name: str = "") -> Value:
     try:
         return _normalise(value, 0)
     except _RefusedError as refused:
-        raise refused.error(name) from None
-
-
-def normalise_at(path: tuple[str, ...], value: object) -> Value:
-    """Return a value for a path, as `normalise` does for a name."""
-    try:
-        return _normalise(value, 0)
-    except _RefusedError as refused:
-        raise refused.error(f"/{'/'.join(path)}") from None
+        shown = name if isinstance(name, str) else f"/{'/'.join(name)}"
+        start = f"'{shown}' cannot be set: " if shown else ""
+        inside = f"at {''.join(reversed(refused.trail))}: " if refused.trail else ""
+        raise ParamError(f"{start}{inside}{refused.reason}") from None
 
 
 def copy(value: Value) -> Value:

@@ -50,7 +50,7 @@ import msgspec
 from rosz.errors import DecodeError, ParamError
 from rosz.params.paths import Path, common_path, from_key, joined, to_key
 from rosz.params.values import Value, normalise
-from rosz.params.writes import DELETED, Change, Write, delete, put
+from rosz.params.writes import DELETED, Change, Write, put
 from rosz.wire import own_key
 
 __all__ = (
@@ -135,7 +135,7 @@ class Keys:
         Raises:
             DecodeError: The key is not the key of a parameter.
         """
-        return _path_below(key, self.params, self.all_params)
+        return self.reach(key, self.params)
 
     def ack(self, zid: str) -> str:
         """Return the key of the acknowledgements to one writer."""
@@ -162,7 +162,9 @@ class Keys:
         Raises:
             DecodeError: The key does not start with ``base``, or names no path.
         """
-        return _path_below(key, base, f"{base}/**")
+        if key != base and not key.startswith(f"{base}/"):
+            raise DecodeError("parameter key", 0, f"'{key}', expected '{base}/**'")
+        return from_key(key[len(base) + 1 :])
 
     def token(self, member: Member) -> str:
         """Return the liveliness token of a replica."""
@@ -182,12 +184,6 @@ class Keys:
                 "replica token", 0, f"'{token}', expected '{head}<zid>/<start>/<who>'"
             )
         return Member(int(chunks[1]), chunks[0], joined(from_key(chunks[2]))[1:])
-
-
-def _path_below(key: str, base: str, expected: str) -> Path:
-    if key != base and not key.startswith(f"{base}/"):
-        raise DecodeError("parameter key", 0, f"'{key}', expected '{expected}'")
-    return from_key(key[len(base) + 1 :])
 
 
 def check_reach(paths: Iterable[Path], reach: Path) -> None:
@@ -243,17 +239,9 @@ class Batch(msgspec.Struct, array_like=True):
         Raises:
             DecodeError: The store cannot hold a value or path in the message.
         """
-        stamp = _stamp(self.time, self.clock)
-        origin = self.origin
-        try:
-            found = [
-                put(split_path(path), stamp, normalise(value), origin) for path, value in self.puts
-            ]
-            if self.deletions:
-                found += [delete(split_path(path), stamp, origin) for path in self.deletions]
-        except ParamError as error:
-            raise DecodeError("parameter batch", -1, str(error)) from error
-        return found
+        stamp, origin = (self.time, self.clock), self.origin
+        puts = [_read_write(path, stamp, value, origin) for path, value in self.puts]
+        return puts + [_read_write(path, stamp, DELETED, origin) for path in self.deletions]
 
 
 class Record(msgspec.Struct, array_like=True):
@@ -285,14 +273,8 @@ class Record(msgspec.Struct, array_like=True):
         Raises:
             DecodeError: The store cannot hold the value or path.
         """
-        stamp = _stamp(self.time, self.clock)
-        path = split_path(self.path)
-        try:
-            if not self.value:
-                return delete(path, stamp, self.origin)
-            return put(path, stamp, normalise(self.value[0]), self.origin)
-        except ParamError as error:
-            raise DecodeError("parameter record", -1, str(error)) from error
+        value = self.value[0] if self.value else DELETED
+        return _read_write(self.path, (self.time, self.clock), value, self.origin)
 
 
 class Index(msgspec.Struct, array_like=True):
@@ -453,36 +435,28 @@ def split_path(text: str) -> Path:
 
 def pack_value(value: Value) -> Any:
     """Return a value in msgpack's types, which have no timestamps with a time zone."""
-    return _replace_moments(value) if _has_moments(value) else value
-
-
-def _stamp(time: int, clock: str) -> tuple[int, str]:
-    if time <= 0:
-        raise DecodeError("parameter stamp", -1, f"the time {time}, expected one after the epoch")
-    return time, clock
-
-
-def _has_moments(value: Value) -> bool:
     kind = type(value)
     if kind in _PLAIN:
-        return False
+        return value
     if kind is dict:
-        return any(_has_moments(item) for item in value.values())
+        return {key: pack_value(item) for key, item in value.items()}
     if kind is list:
-        return any(_has_moments(item) for item in value)
-    return kind is dt.datetime or kind is dt.date
+        return [pack_value(item) for item in value]
+    return msgspec.msgpack.Ext(
+        _MOMENT if kind is dt.datetime else _DATE, value.isoformat().encode()
+    )
 
 
-def _replace_moments(value: Value) -> Any:
-    if type(value) is dict:
-        return {key: _replace_moments(item) for key, item in value.items()}
-    if type(value) is list:
-        return [_replace_moments(item) for item in value]
-    if type(value) is dt.datetime:
-        return msgspec.msgpack.Ext(_MOMENT, value.isoformat().encode())
-    if type(value) is dt.date:
-        return msgspec.msgpack.Ext(_DATE, value.isoformat().encode())
-    return value
+def _read_write(path: str, stamp: tuple[int, str], value: Any, origin: str) -> Write:
+    if stamp[0] <= 0:
+        raise DecodeError(
+            "parameter stamp", -1, f"the time {stamp[0]}, expected one after the epoch"
+        )
+    try:
+        checked = value if value is DELETED else normalise(value)
+        return put(split_path(path), stamp, checked, origin)
+    except ParamError as error:
+        raise DecodeError("parameter write", -1, str(error)) from error
 
 
 def _read_extension(code: int, data: memoryview) -> Any:

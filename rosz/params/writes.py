@@ -28,7 +28,6 @@ __all__ = (
     "check_time",
     "check_write",
     "condense",
-    "delete",
     "put",
     "spread",
 )
@@ -85,23 +84,16 @@ class Write(msgspec.Struct, frozen=True):
         return self.value is DELETED
 
 
-def put(path: Path, stamp: tuple[int, str], value: Value, origin: str = "") -> Write:
-    """Return the write that sets a normalised value.
+def put(path: Path, stamp: tuple[int, str], value: Value | Deleted, origin: str = "") -> Write:
+    """Return the write of a normalised value, or of a deletion; at the root, that sets ``{}``.
 
     Raises:
         ParamError: The root would not be a dict, or the path is too deep.
     """
+    if value is DELETED and not path:
+        value = {}
     check_write(path, value)
     return Write(path, stamp[0], stamp[1], value, origin)
-
-
-def delete(path: Path, stamp: tuple[int, str], origin: str = "") -> Write:
-    """Return the write that deletes a path; at the root, the write that leaves it empty.
-
-    Raises:
-        ParamError: The path is too deep.
-    """
-    return put(path, stamp, DELETED if path else {}, origin)
 
 
 def check_time(write: Write, now: int) -> None:

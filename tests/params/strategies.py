@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from rosz.params.paths import Path
-from rosz.params.writes import DELETED, Write, delete, put
+from rosz.params.writes import DELETED, Write, put
 
 # Few names, so that writes meet; odd ones among them.
 PARTS = st.sampled_from(["a", "b", "a b", "*", "ü?#$@%/"[:-1]])
@@ -51,9 +51,7 @@ def writes(draw: st.DrawFn, max_size: int = 12) -> list[Write]:
     for stamp in stamps:
         path = draw(PATHS)
         value = draw(st.one_of(st.just(DELETED), VALUES if path else DICTS))
-        found.append(
-            delete(path, stamp) if value is DELETED else put(path, stamp, value, origin="test")
-        )
+        found.append(put(path, stamp, value, "" if value is DELETED else "test"))
     return found
 
 

@@ -11,7 +11,7 @@ from rosz.errors import ParamError
 from rosz.params.history import History
 from rosz.params.tree import MISSING, leaves, lookup
 from rosz.params.values import MAX_DEPTH
-from rosz.params.writes import DELETED, Write, check_write, condense, delete, put
+from rosz.params.writes import DELETED, Write, check_write, condense, put
 
 from .oracle import replay
 from .strategies import DICTS, PATHS, VALUES, shared, writes
@@ -153,7 +153,7 @@ def test_remembered_deletions_are_bounded() -> None:
     for time in range(1, 3001):
         path = ("ns", f"n{time}")
         history.apply([put(path, (2 * time, "a"), time)])
-        history.apply([delete(path, (2 * time + 1, "a"))])
+        history.apply([put(path, (2 * time + 1, "a"), DELETED)])
         if time % 100 == 0:
             history.forget(0, 50)
             assert len(history) <= 51
@@ -164,20 +164,20 @@ def test_remembered_deletions_are_bounded() -> None:
 
 
 def test_a_deletion_that_cuts_a_part_from_a_whole_dict_stays() -> None:
-    history = of([put(("a",), (1, "c"), {"x": 1, "y": 2}), delete(("a", "x"), (2, "c"))])
+    history = of([put(("a",), (1, "c"), {"x": 1, "y": 2}), put(("a", "x"), (2, "c"), DELETED)])
     assert history.forget(1 << 62, 0) == 0
     assert history.root == {"a": {"y": 2}}
 
 
 def test_an_older_put_stays_dead_under_a_remembered_deletion() -> None:
-    history = of([delete(("a",), (5, "c"))])
+    history = of([put(("a",), (5, "c"), DELETED)])
     assert history.apply([put(("a", "b"), (4, "d"), 1)]) == []
     assert history.root == {}
 
 
 def test_a_leaf_that_became_a_dict_stays_one_when_its_child_goes() -> None:
     history = of([put(("a",), (1, "c"), 5)], [put(("a", "b"), (2, "c"), 1)])
-    history.apply([delete(("a", "b"), (3, "c"))])
+    history.apply([put(("a", "b"), (3, "c"), DELETED)])
     assert history.root == {"a": {}}
     history.forget(1 << 62, 0)
     assert history.root == {"a": {}}
@@ -231,7 +231,7 @@ def test_the_root_is_a_dict_and_paths_have_an_end() -> None:
 
 def test_deleting_the_root_empties_it() -> None:
     history = of([put(("a",), (1, "c"), 1)])
-    history.apply([delete((), (2, "c"))])
+    history.apply([put((), (2, "c"), DELETED)])
     assert history.root == {}
     assert len(history) == 1
 

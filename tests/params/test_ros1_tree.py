@@ -12,7 +12,7 @@ from rosz.errors import ParamError
 from rosz.params.history import History
 from rosz.params.paths import climb, joined, split
 from rosz.params.tree import MISSING, leaves, lookup
-from rosz.params.writes import Change, condense, delete, put, spread
+from rosz.params.writes import DELETED, Change, condense, put, spread
 from rosz.params.yaml import dump, load_documents
 
 from .ros1 import Ros1
@@ -56,7 +56,7 @@ class Sequential:
         if found is MISSING or (kind == "delete" and not path):
             return "KeyError"
         if kind == "delete":
-            self.history.apply([delete(path, stamp)])
+            self.history.apply([put(path, stamp, DELETED)])
             return None
         return found
 

@@ -12,7 +12,7 @@ import pytest
 from rosz.errors import DecodeError, ParamError
 from rosz.params.replica.state import State
 from rosz.params.wire import Batch, add_header, encode
-from rosz.params.writes import Write, delete, put
+from rosz.params.writes import DELETED, Write, put
 from rosz.session import HybridClock, Stamp
 
 YEAR = 365 * 86_400 * 10**9
@@ -182,7 +182,7 @@ def test_what_was_saved_years_ahead_counts_as_new(caplog: pytest.LogCaptureFixtu
         put(("b",), (5, "bb"), "sound"),
         put(("a", "x"), (LATE, "bb"), "newest"),
         put(("a",), (LATE - 1, "bb"), {"x": "older", "y": 1}),
-        delete(("b",), (LATE, "bb")),
+        put(("b",), (LATE, "bb"), DELETED),
     ]
     begun = time.time_ns()
     with caplog.at_level(logging.WARNING, "rosz.params"):

@@ -17,7 +17,7 @@ from hypothesis import given
 from rosz.errors import StoreError
 from rosz.params.history import History
 from rosz.params.replica.storage import Storage, StoreFile
-from rosz.params.writes import Write, delete, put
+from rosz.params.writes import DELETED, Write, put
 
 from .network import Network, until
 from .strategies import writes
@@ -68,8 +68,12 @@ def test_what_is_hidden_leaves_the_file(tmp_path: Path) -> None:
     path = tmp_path / "params"
     saved(
         path,
-        [put(("a", "b"), (1, "c"), 1), put(("a b",), (1, "c"), 1), put(("a", "c"), (9, "c"), 1)],
-        [delete(("a",), (5, "c"))],
+        [
+            put(("a", "b"), (1, "c"), 1),
+            put(("a b",), (1, "c"), 1),
+            put(("a", "c"), (9, "c"), 1),
+        ],
+        [put(("a",), (5, "c"), DELETED)],
     )
     base = sqlite3.connect(path)
     assert base.execute("SELECT path FROM writes ORDER BY path").fetchall() == [
@@ -84,7 +88,7 @@ def test_what_is_hidden_leaves_the_file(tmp_path: Path) -> None:
 
 def test_replacing_drops_all_else(tmp_path: Path) -> None:
     store = StoreFile(tmp_path / "params")
-    store.save([put(("a",), (1, "c"), 1), delete(("b",), (2, "c"))])
+    store.save([put(("a",), (1, "c"), 1), put(("b",), (2, "c"), DELETED)])
     moment = dt.datetime(2024, 1, 2, tzinfo=dt.UTC)
     store.replace([put(("c",), (3, "c"), {"when": moment, "raw": b"\x00"})])
     assert [(write.path, write.value) for write in store.load()] == [

@@ -96,7 +96,7 @@ def test_any_msgpack_is_a_message_or_the_named_error(kind: type[Any], value: Any
 @pytest.mark.parametrize(
     ("message", "reason"),
     [
-        (Batch(0, "a", ""), "the time 0, expected one after"),
+        (Batch(0, "a", "", [("a", 1)]), "the time 0, expected one after"),
         (Batch(5, "a", "", [("a//b", 1)]), "'a//b', expected 'a//b'|expected"),
         (Batch(5, "a", "", [("", 1)]), "the root of all parameters is a dict"),
         (Batch(5, "a", "", [("a", None)]), "null is not a parameter value"),

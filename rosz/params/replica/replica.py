@@ -28,7 +28,7 @@ from rosz.params.replica.serve import ClientServer, ParameterKeys
 from rosz.params.replica.state import NOT_A_PARAMETER, State, TreeReader, not_found
 from rosz.params.replica.sync import AntiEntropy, Synchroniser
 from rosz.params.tree import MISSING
-from rosz.params.values import normalise, normalise_at
+from rosz.params.values import normalise
 from rosz.params.wire import Keys, Member
 from rosz.params.writes import DELETED, Change, Write, condense, spread
 from rosz.session import Sample, Session, Stamp, clamp_timeout
@@ -189,7 +189,7 @@ class Replica(_Copy):
             ClosedError: The replica or the session is closed.
         """
         path = to_path(name)
-        return self.write([(path, normalise_at(path, value))], origin=origin, timeout=timeout)
+        return self.write([(path, normalise(value, path))], origin=origin, timeout=timeout)
 
     def merge(
         self, name: str, value: object, *, origin: str = "", timeout: float = ACK_TIMEOUT

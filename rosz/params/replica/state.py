@@ -18,7 +18,7 @@ from rosz.params.replica.watch import Callback, TreeChange, Watch, Watchers
 from rosz.params.tree import MISSING, Missing, Tree, leaves, lookup
 from rosz.params.values import Value, copy
 from rosz.params.wire import Batch, check_reach, decode, read_header
-from rosz.params.writes import DELETED, Change, Write, check_time, delete, put
+from rosz.params.writes import Change, Write, check_time, put
 from rosz.session import HybridClock, Stamp
 
 __all__ = ("NOT_A_PARAMETER", "DamageLog", "State", "TreeReader", "names_beside", "not_found")
@@ -171,10 +171,7 @@ class State:
         with self.locked:
             given, stamp = stamp, stamp or self._now()
             at = (stamp.time, stamp.id)
-            writes = [
-                delete(path, at, origin) if value is DELETED else put(path, at, value, origin)
-                for path, value in changes
-            ]
+            writes = [put(path, at, value, origin) for path, value in changes]
             if given is not None:
                 now = time.time_ns()
                 for write in writes:

@@ -20,7 +20,7 @@ from typing import Any, Final
 
 from rosz.errors import DecodeError, RoszError, StoreError
 from rosz.params.wire import decode_value, encode_value, join_path, split_path
-from rosz.params.writes import DELETED, Write, delete, put
+from rosz.params.writes import DELETED, Write, put
 from rosz.worker import Worker
 
 __all__ = ("Storage", "StoreFile")
@@ -189,10 +189,8 @@ class StoreFile:
         value, checksum = rest
         if checksum != _checksum(path, time, clock, origin, value):
             raise DecodeError("parameter", -1, f"the checksum of '/{path}' is not {checksum}")
-        stamp = (time, clock)
-        if value is None:
-            return delete(split_path(path), stamp, origin)
-        return put(split_path(path), stamp, decode_value(value), origin)
+        found = DELETED if value is None else decode_value(value)
+        return put(split_path(path), (time, clock), found, origin)
 
     @contextmanager
     def _errors(self, what: str) -> Iterator[None]:
