@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from queue import SimpleQueue
+from typing import Any
 
 import pytest
 from network import Network, eventually
@@ -13,6 +15,7 @@ from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.turtlesim.msg import Color, Pose
 from rosz.msgs.turtlesim.srv import Kill, SetPen, Spawn, TeleportAbsolute, TeleportRelative
+from rosz.node import Service
 from rosz.qos import ROSOUT
 from rosz.turtlesim import fetch
 from rosz.turtlesim.simulator import Simulator
@@ -244,3 +247,20 @@ def test_spawning_killing_and_stepping_at_once(scene: Scene) -> None:
     assert not failed
     assert not [name for name in served(scene) if name.startswith("/t") and "turtle1" not in name]
     scene.watch().wait_for()
+
+
+def test_reset_may_be_called_as_soon_as_it_is_served(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = network.node("turtlesim")
+    serve = node.service
+
+    def serve_and_call(name: str, service_type: Any, handler: Callable[[Any], Any]) -> Service:
+        service = serve(name, service_type, handler)
+        if name == "reset":
+            handler(Empty.Request())
+        return service
+
+    monkeypatch.setattr(node, "service", serve_and_call)
+    (turtle,) = Simulator(node).view(0).turtles
+    assert (turtle.x, turtle.y) == (START, START)
