@@ -53,8 +53,9 @@ class ClientGoal:
         self._on_done = on_done
         self._on_active = on_active
         self._on_feedback = on_feedback
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._listed = False
+        self._finished = False
         self._done = threading.Event()
 
     @property
@@ -89,7 +90,7 @@ class ClientGoal:
 
     def update(self, statuses: list[GoalStatus]) -> None:
         """Take the state of the goal from a status message."""
-        if self.done:
+        if self._finished:
             return
         for status in statuses:
             if status.goal_id.id == self.id.id:
@@ -102,12 +103,15 @@ class ClientGoal:
 
     def _advance(self, status: GoalStatus) -> None:
         with self._lock:
-            if self.done or status.status in TERMINAL:
+            if self._finished or status.status in TERMINAL:
                 return  # the end comes with the result message
             self.status = status
-            starts = not self.started and status.status in RUNNING
-            self.started = self.started or starts
-        if starts:
+            self._start(status.status in RUNNING)
+
+    def _start(self, running: bool) -> None:
+        """Call `on_active` once, with the lock held, so that it returns before `on_done`."""
+        if running and not self.started:
+            self.started = True
             self._call(self._on_active)
 
     def receive_feedback(self, feedback: Any) -> None:
@@ -118,13 +122,11 @@ class ClientGoal:
     def finish(self, status: GoalStatus, result: Any) -> None:
         """End the goal with a terminal state and a result."""
         with self._lock:
-            if self.done:
+            if self._finished:
                 return
-            starts = not self.started and status.status in _EXECUTED
-            self.started = self.started or starts
+            self._finished = True
             self.status, self.result = status, result
-        if starts:
-            self._call(self._on_active)
+            self._start(status.status in _EXECUTED)
         self._call(self._on_done, self)
         self._done.set()
         self.forget()

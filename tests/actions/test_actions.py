@@ -190,6 +190,32 @@ def test_an_execution_without_a_final_state_is_aborted(world: World) -> None:
     )
 
 
+def test_on_active_returns_before_on_done(world: World) -> None:
+    events: list[str] = []
+    entered, leave = threading.Event(), threading.Event()
+
+    def on_active() -> None:
+        entered.set()
+        leave.wait(TIMEOUT)
+        events.append("active")
+
+    client = ActionClient(world.client_node, "count", world.count.action)
+    goal = client.send(
+        world.count.goal(1), on_active=on_active, on_done=lambda _: events.append("done")
+    )
+    running = threading.Thread(target=goal.update, args=([GoalStatus(goal.id, GoalStatus.ACTIVE)],))
+    running.start()
+    assert entered.wait(TIMEOUT)
+    ending = threading.Thread(
+        target=goal.finish, args=(GoalStatus(goal.id, GoalStatus.SUCCEEDED), None)
+    )
+    ending.start()
+    leave.set()
+    running.join(TIMEOUT)
+    assert goal.wait(TIMEOUT)
+    assert events == ["active", "done"]
+
+
 def test_waiting_has_limits(world: World) -> None:
     client = ActionClient(world.client_node, "count", world.count.action)
     assert not client.wait_for_server(0.01)
