@@ -180,7 +180,7 @@ def _source(parameters: Sequence[Parameter], words: Sequence[str], line: Line) -
     if pending is not None:
         return _source_of(pending)
     if line.word.startswith("-") and not ended:
-        shown = [one for one in parameters if isinstance(one.mark, Option) and not one.mark.hidden]
+        shown = [one for one in parameters if isinstance(one.mark, Option) and one.mark.help]
         names = [max(one.spellings, key=len) for one in shown]
         return lambda _: [*names, "--help"]
     arguments = [one for one in parameters if isinstance(one.mark, Argument)]
@@ -191,7 +191,7 @@ def _source(parameters: Sequence[Parameter], words: Sequence[str], line: Line) -
 
 
 def _source_of(one: Parameter) -> Source:
-    return (one.mark and one.mark.autocompletion) or _nothing
+    return (one.mark and one.mark.source) or _nothing
 
 
 def _nothing(_: Line) -> list[str]:

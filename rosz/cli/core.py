@@ -28,25 +28,23 @@ def core_command(
     listen: Annotated[
         list[str] | None,
         Option(
-            metavar="ENDPOINT",
-            help="Listen at this endpoint as well, such as tcp/0.0.0.0:7447; repeatable.",
+            "--listen ENDPOINT",
+            "Listen at this endpoint as well, such as tcp/0.0.0.0:7447; repeatable.",
         ),
     ] = None,
     connect: Annotated[
         list[str] | None,
         Option(
-            metavar="ENDPOINT",
-            help="Connect to this endpoint, such as tcp/robot1:7447; repeatable.",
+            "--connect ENDPOINT", "Connect to this endpoint, such as tcp/robot1:7447; repeatable."
         ),
     ] = None,
     keys: Annotated[
-        str, Option(metavar="DIR", help="Folder of the keys for links beyond this machine.")
+        str, Option("--keys DIR", "Folder of the keys for links beyond this machine.")
     ] = "",
     store: Annotated[
-        str,
-        Option(metavar="FILE", help="Keep the parameters in a file.", autocompletion=suggest.files),
+        str, Option("--store FILE", "Keep the parameters in a file.", suggest.files)
     ] = "",
-    port: Annotated[str, Option("-p", "--port", hidden=True)] = "",
+    port: Annotated[str, Option("-p --port")] = "",
 ) -> None:
     """Run a meeting point with a copy of the parameters, until it is stopped.
 

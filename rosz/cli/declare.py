@@ -8,71 +8,71 @@ declarations do not need it: `rosz.cli.reading` reads a sound command line from 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import islice
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    NamedTuple,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 if TYPE_CHECKING:
     from rosz.cli.suggest import Source
 
-__all__ = ("App", "Argument", "Command", "Option", "Parameter", "values_last")
+__all__ = ("App", "Argument", "Command", "Json", "Option", "Parameter", "values_last")
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-class Argument:
+class Argument(NamedTuple):
     """A positional argument; a parameter of a list type takes all words that are left.
 
     Args:
         metavar: The name in help.
         help: The description in help.
-        autocompletion: The source of completions.
+        source: The source of completions.
     """
 
-    __slots__ = ("autocompletion", "help", "metavar")
-
-    def __init__(
-        self,
-        metavar: str,
-        *,
-        help: str | None = None,  # noqa: A002  # as in typer
-        autocompletion: Source | None = None,
-    ) -> None:
-        self.metavar = metavar
-        self.help = help
-        self.autocompletion = autocompletion
+    metavar: str
+    help: str | None = None
+    source: Source | None = None
 
 
-class Option:
+class Option(NamedTuple):
     """An option; a parameter of type `bool` makes it a flag.
 
     Args:
-        names: The spellings; ``--`` and the parameter's name when none is given.
-        metavar: The name of the value in help.
-        help: The description in help.
-        hidden: Whether help and completion leave it out.
-        autocompletion: The source of completions of the value.
+        form: The spellings and the name of the value, such as ``-n --count COUNT``.
+        help: The description in help; without one, help and completion leave the option out.
+        source: The source of completions of the value.
     """
 
-    __slots__ = ("autocompletion", "help", "hidden", "metavar", "names")
+    form: str
+    help: str | None = None
+    source: Source | None = None
 
-    def __init__(
-        self,
-        *names: str,
-        metavar: str | None = None,
-        help: str | None = None,  # noqa: A002  # as in typer
-        hidden: bool = False,
-        autocompletion: Source | None = None,
-    ) -> None:
-        self.names = names
-        self.metavar = metavar
-        self.help = help
-        self.hidden = hidden
-        self.autocompletion = autocompletion
+    @property
+    def names(self) -> list[str]:
+        """The spellings."""
+        return [word for word in self.form.split() if word.startswith("-")]
+
+    @property
+    def metavar(self) -> str | None:
+        """The name of the value in help."""
+        return next((word for word in self.form.split() if not word.startswith("-")), None)
 
 
-class Parameter:
+Json = Annotated[bool, Option("--json", "Print JSON.")]
+
+
+class Parameter(NamedTuple):
     """One parameter of a command's function.
 
     Args:
@@ -85,60 +85,35 @@ class Parameter:
         default: The value when it is not given.
     """
 
-    __slots__ = ("default", "kind", "many", "mark", "name", "required")
-
-    def __init__(
-        self,
-        name: str,
-        kind: Callable[[Any], Any],
-        mark: Argument | Option | None,
-        *,
-        many: bool,
-        required: bool,
-        default: Any = None,
-    ) -> None:
-        self.name = name
-        self.kind = kind
-        self.mark = mark
-        self.many = many
-        self.required = required
-        self.default = default
+    name: str
+    kind: Callable[[Any], Any]
+    mark: Argument | Option | None
+    many: bool
+    required: bool
+    default: Any
 
     @property
-    def spellings(self) -> tuple[str, ...]:
+    def spellings(self) -> list[str]:
         """The spellings of an option; empty for a positional argument."""
-        if not isinstance(self.mark, Option):
-            return ()
-        return self.mark.names or (f"--{self.name.replace('_', '-')}",)
+        return self.mark.names if isinstance(self.mark, Option) else []
 
 
-class Command:
+class Command(NamedTuple):
     """One command.
 
     Args:
         function: The function that runs it.
-        help: The description; the function's docstring when not given.
+        help: The description.
         arrange: A function that puts the words into the order in which they are read.
         interspersed: Whether options may follow positional arguments.
         tolerant: Whether unknown options count as positional arguments.
     """
 
-    __slots__ = ("arrange", "function", "help", "interspersed", "tolerant")
-
-    def __init__(
-        self,
-        function: Callable[..., Any],
-        help: str | None,  # noqa: A002  # as in typer
-        arrange: Callable[[list[str]], list[str]] | None,
-        *,
-        interspersed: bool,
-        tolerant: bool,
-    ) -> None:
-        self.function = function
-        self.help = help or function.__doc__ or ""
-        self.arrange = arrange
-        self.interspersed = interspersed
-        self.tolerant = tolerant
+    function: Callable[..., Any]
+    help: str
+    arrange: Callable[[list[str]], list[str]] | None
+    interspersed: bool
+    tolerant: bool
 
     def parameters(self) -> list[Parameter]:
         """Return the parameters of the function, in order."""
@@ -149,25 +124,19 @@ class Command:
         given = function.__defaults__ or ()
         defaults: dict[str, Any] = dict(zip(names[len(names) - len(given) :], given, strict=True))
         defaults |= function.__kwdefaults__ or {}
-        hints = get_type_hints(function, include_extras=True)
-        hints.pop("return", None)
-        return [_parameter(name, hint, defaults) for name, hint in hints.items()]
-
-
-def _parameter(name: str, hint: Any, defaults: Mapping[str, Any]) -> Parameter:
-    mark = next(iter(getattr(hint, "__metadata__", ())), None)
-    kind = hint if mark is None else hint.__origin__
-    if get_origin(kind) in {Union, UnionType}:
-        (kind,) = (one for one in get_args(kind) if one is not NoneType)
-    many = get_origin(kind) is list
-    return Parameter(
-        name,
-        get_args(kind)[0] if many else kind,
-        mark,
-        many=many,
-        required=name not in defaults,
-        default=defaults.get(name),
-    )
+        found = []
+        for name, hint in get_type_hints(function, include_extras=True).items():
+            if name == "return":
+                continue
+            mark = next(iter(getattr(hint, "__metadata__", ())), None)
+            kind = hint if mark is None else hint.__origin__
+            if get_origin(kind) in {Union, UnionType}:
+                (kind,) = (one for one in get_args(kind) if one is not NoneType)
+            many = get_origin(kind) is list
+            kind = get_args(kind)[0] if many else kind
+            required = name not in defaults
+            found.append(Parameter(name, kind, mark, many, required, defaults.get(name)))
+        return found
 
 
 class App:
@@ -185,7 +154,7 @@ class App:
         self,
         help: str = "",  # noqa: A002  # as in typer
         *,
-        is_remapping: Callable[[str], bool] | None = None,
+        is_remapping: Callable[[str], bool] = lambda _: False,
     ) -> None:
         self.help = help
         self.commands: dict[str, Command] = {}
@@ -200,21 +169,22 @@ class App:
         interspersed: bool = True,
         tolerant: bool = False,
     ) -> Callable[[_Function], _Function]:
-        """Return a decorator that declares a command; the arguments are those of `Command`."""
+        """Return a decorator that declares a command; the arguments are those of `Command`.
+
+        The function's docstring is the description when none is given.
+        """
 
         def declare(function: _Function) -> _Function:
-            self.commands[name] = Command(
-                function, help, arrange, interspersed=interspersed, tolerant=tolerant
-            )
+            text = help or function.__doc__ or ""
+            self.commands[name] = Command(function, text, arrange, interspersed, tolerant)
             return function
 
         return declare
 
     def split(self, argv: Sequence[str]) -> tuple[list[str], list[str]]:
         """Return the remappings of a command line, and its other words in reading order."""
-        test = self._is_remapping
-        remappings = [] if test is None else [word for word in argv if test(word)]
-        words = [word for word in argv if word not in remappings] if remappings else list(argv)
+        remappings = [word for word in argv if self._is_remapping(word)]
+        words = [word for word in argv if word not in remappings]
         head = 1 if self.help else 0
         command = self.commands.get(words[0] if head and words else "")
         if command is not None and command.arrange is not None:
@@ -222,7 +192,7 @@ class App:
         return remappings, words
 
 
-def values_last(with_value: frozenset[str]) -> Callable[[list[str]], list[str]]:
+def values_last(*with_value: str) -> Callable[[list[str]], list[str]]:
     """Return a function that moves options to the front, so that ``-1`` can be a value.
 
     Args:

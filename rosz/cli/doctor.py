@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli.console import count, paint, print_json, takes_escapes
-from rosz.cli.declare import App, Option
+from rosz.cli.declare import App, Json, Option
 from rosz.cli.limits import seconds
 
 if TYPE_CHECKING:
@@ -21,10 +21,8 @@ app = App()
 @app.command()
 def doctor_command(
     *,
-    wait: Annotated[
-        float, Option(metavar="SECONDS", help="Time limit for listening to samples.")
-    ] = 1.0,
-    json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
+    wait: Annotated[float, Option("--wait SECONDS", "Time limit for listening to samples.")] = 1.0,
+    json: Json = False,
 ) -> int:
     """Find problems on this machine and network, and print what shows them and what to do.
 

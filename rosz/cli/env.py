@@ -23,13 +23,11 @@ def env_command(
     shell: Annotated[
         str,
         Argument(
-            "SHELL",
-            help="bash, zsh or fish; the one in the variable SHELL if omitted.",
-            autocompletion=suggest.shells,
+            "SHELL", "bash, zsh or fish; the one in the variable SHELL if omitted.", suggest.shells
         ),
     ] = "",
     *,
-    json: Annotated[bool, Option("--json", help="Print the settings of rosz as JSON.")] = False,
+    json: Annotated[bool, Option("--json", "Print the settings of rosz as JSON.")] = False,
 ) -> None:
     """Print shell code that makes rostopic, roslaunch and the like run rosz.
 

@@ -20,23 +20,21 @@ def gen_command(
         list[str] | None,
         Argument(
             "PACKAGE",
-            help="Names or folders; the package around the working folder if omitted.",
-            autocompletion=suggest.packages,
+            "Names or folders; the package around the working folder if omitted.",
+            suggest.packages,
         ),
     ] = None,
     *,
     output: Annotated[
         str,
         Option(
-            "-o",
-            "--output",
-            metavar="FOLDER",
-            help="Folder to write to; src in the package if omitted.",
-            autocompletion=suggest.files,
+            "-o --output FOLDER",
+            "Folder to write to; src in the package if omitted.",
+            suggest.files,
         ),
     ] = "",
     check: Annotated[
-        bool, Option("--check", help="Write nothing; the exit code is 1 if a module is stale.")
+        bool, Option("--check", "Write nothing; the exit code is 1 if a module is stale.")
     ] = False,
 ) -> int:
     """Write Python modules for messages and services, for editors and type checkers.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from rosz.cli.console import count, print_json
-from rosz.cli.declare import App, Argument, Option
+from rosz.cli.declare import App, Argument, Json, Option
 from rosz.cli.limits import at_least
 from rosz.errors import UsageError
 
@@ -17,13 +17,7 @@ __all__ = ("app",)
 app = App("Make and check the keys that links between machines need (ROSZ_KEYS).")
 
 _Folder = Annotated[
-    str,
-    Option(
-        "--dir",
-        "-d",
-        metavar="DIR",
-        help="Folder of all keys; ROSZ_KEYS or the working folder if omitted.",
-    ),
+    str, Option("--dir -d DIR", "Folder of all keys; ROSZ_KEYS or the working folder if omitted.")
 ]
 
 
@@ -31,10 +25,8 @@ _Folder = Annotated[
 def init_keys(
     folder: Annotated[str, Argument("DIR")],
     *,
-    name: Annotated[
-        str, Option(metavar="NAME", help="Name of the authority in certificates.")
-    ] = "rosz",
-    days: Annotated[int, Option(metavar="DAYS", help="Time until the authority expires.")] = 3650,
+    name: Annotated[str, Option("--name NAME", "Name of the authority in certificates.")] = "rosz",
+    days: Annotated[int, Option("--days DAYS", "Time until the authority expires.")] = 3650,
 ) -> None:
     """Make a folder for keys, with an authority that signs them."""
     from rosz.security.authority import Authority
@@ -54,12 +46,9 @@ def add_keys(
     *,
     address: Annotated[
         list[str] | None,
-        Option(
-            metavar="ADDRESS",
-            help="An address or another name of the host; repeatable.",
-        ),
+        Option("--address ADDRESS", "An address or another name of the host; repeatable."),
     ] = None,
-    days: Annotated[int, Option(metavar="DAYS", help="Time until the keys expire.")] = 825,
+    days: Annotated[int, Option("--days DAYS", "Time until the keys expire.")] = 825,
     folder: _Folder = "",
 ) -> None:
     """Make keys for machines or people."""
@@ -77,7 +66,7 @@ def add_keys(
 @app.command("list")
 def list_keys(
     *,
-    json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
     folder: _Folder = "",
 ) -> None:
     """List the holders of keys, with their addresses and the dates on which the keys expire."""
@@ -94,11 +83,9 @@ def list_keys(
 
 @app.command("check")
 def check_keys(
-    folder: Annotated[
-        str, Argument("DIR", help="ROSZ_KEYS or the working folder if omitted.")
-    ] = "",
+    folder: Annotated[str, Argument("DIR", "ROSZ_KEYS or the working folder if omitted.")] = "",
     *,
-    json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> int:
     """Check certificates, access to key files, and rules; exit code 1 if something is wrong."""
     from rosz.security.review import review

@@ -47,98 +47,75 @@ def launch_command(
         list[str] | None,
         Argument(
             "FILE|ARG:=VALUE",
-            help="Launch files: PACKAGE FILE, or paths; '-' is standard input. ARG:=VALUE sets an"
+            "Launch files: PACKAGE FILE, or paths; '-' is standard input. ARG:=VALUE sets an"
             " arg of the files.",
-            autocompletion=suggest.launch_words,
+            suggest.launch_words,
         ),
     ] = None,
     *,
-    screen: Annotated[bool, Option("--screen", help="Show the output of all nodes.")] = False,
-    log: Annotated[bool, Option("--log", help="Write the output of all nodes to files.")] = False,
-    required: Annotated[
-        bool, Option("--required", help="End the launch when any node ends.")
-    ] = False,
-    wait: Annotated[
-        bool, Option("--wait", help="Wait until a core or another launch runs.")
-    ] = False,
-    local: Annotated[bool, Option("--local", help="Leave out nodes of other machines.")] = False,
+    screen: Annotated[bool, Option("--screen", "Show the output of all nodes.")] = False,
+    log: Annotated[bool, Option("--log", "Write the output of all nodes to files.")] = False,
+    required: Annotated[bool, Option("--required", "End the launch when any node ends.")] = False,
+    wait: Annotated[bool, Option("--wait", "Wait until a core or another launch runs.")] = False,
+    local: Annotated[bool, Option("--local", "Leave out nodes of other machines.")] = False,
     prefix: Annotated[
-        bool, Option("--prefix", help="Begin each line with the name of its node.")
+        bool, Option("--prefix", "Begin each line with the name of its node.")
     ] = False,
-    verbose: Annotated[bool, Option("-v", help="Print more.")] = False,
+    verbose: Annotated[bool, Option("-v", "Print more.")] = False,
     no_summary: Annotated[
-        bool, Option("--no-summary", help="Do not print what will be started.")
+        bool, Option("--no-summary", "Do not print what will be started.")
     ] = False,
     disable_title: Annotated[
-        bool, Option("--disable-title", help="Do not change the title of the terminal.")
+        bool, Option("--disable-title", "Do not change the title of the terminal.")
     ] = False,
     sigint_timeout: Annotated[
         float,
-        Option(metavar="SECONDS", help="Time from SIGINT to SIGTERM when nodes are stopped."),
+        Option("--sigint-timeout SECONDS", "Time from SIGINT to SIGTERM when nodes are stopped."),
     ] = 15.0,
     sigterm_timeout: Annotated[
-        float, Option(metavar="SECONDS", help="Time from SIGTERM to SIGKILL.")
+        float, Option("--sigterm-timeout SECONDS", "Time from SIGTERM to SIGKILL.")
     ] = 2.0,
     keys: Annotated[
-        str, Option(metavar="DIR", help="Folder of the keys for links beyond this machine.")
+        str, Option("--keys DIR", "Folder of the keys for links beyond this machine.")
     ] = "",
     pid: Annotated[
-        str,
-        Option(
-            metavar="FILE",
-            help="Write the process id of the launch to a file.",
-            autocompletion=suggest.files,
-        ),
+        str, Option("--pid FILE", "Write the process id of the launch to a file.", suggest.files)
     ] = "",
-    nodes: Annotated[bool, Option("--nodes", help="List the nodes.")] = False,
-    args: Annotated[
-        str | None, Option(metavar="NODE", help="Print the command line of a node.")
-    ] = None,
+    nodes: Annotated[bool, Option("--nodes", "List the nodes.")] = False,
+    args: Annotated[str | None, Option("--args NODE", "Print the command line of a node.")] = None,
     find_node: Annotated[
-        str | None, Option(metavar="NODE", help="Print the file that declares a node.")
+        str | None, Option("--find-node NODE", "Print the file that declares a node.")
     ] = None,
-    files: Annotated[bool, Option("--files", help="List the files.")] = False,
-    ros_args: Annotated[
-        bool, Option("--ros-args", help="List the args that the file takes.")
-    ] = False,
-    dump_params: Annotated[
-        bool, Option("--dump-params", help="Print all parameters as YAML.")
-    ] = False,
+    files: Annotated[bool, Option("--files", "List the files.")] = False,
+    ros_args: Annotated[bool, Option("--ros-args", "List the args that the file takes.")] = False,
+    dump_params: Annotated[bool, Option("--dump-params", "Print all parameters as YAML.")] = False,
     dump_plan: Annotated[
-        bool, Option("--dump-plan", help="Print the whole plan of the launch as JSON.")
+        bool, Option("--dump-plan", "Print the whole plan of the launch as JSON.")
     ] = False,
-    status: Annotated[bool, Option("--status", help="List the nodes of running launches.")] = False,
+    status: Annotated[bool, Option("--status", "List the nodes of running launches.")] = False,
     restart: Annotated[
-        str | None,
-        Option(
-            metavar="NODE",
-            help="Restart a node of a running launch.",
-            autocompletion=suggest.nodes,
-        ),
+        str | None, Option("--restart NODE", "Restart a node of a running launch.", suggest.nodes)
     ] = None,
     stop: Annotated[
-        str | None,
-        Option(
-            metavar="NODE", help="Stop a node of a running launch.", autocompletion=suggest.nodes
-        ),
+        str | None, Option("--stop NODE", "Stop a node of a running launch.", suggest.nodes)
     ] = None,
-    json: Annotated[bool, Option("--json", help="Print JSON, with --status.")] = False,
+    json: Annotated[bool, Option("--json", "Print JSON, with --status.")] = False,
     machine: Annotated[
         list[str] | None,
         Option(
-            metavar="[NAME=][USER@]ADDRESS[:PORT]",
-            help="Address of a machine of the file; without NAME, of the machine for nodes that"
+            "--machine [NAME=][USER@]ADDRESS[:PORT]",
+            "Address of a machine of the file; without NAME, of the machine for nodes that"
             " name none.",
         ),
     ] = None,
     lost_after: Annotated[
         float,
-        Option(metavar="SECONDS", help="Time without a sign of another machine until it is lost."),
+        Option("--lost-after SECONDS", "Time without a sign of another machine until it is lost."),
     ] = 30.0,
-    agent: Annotated[bool, Option("--agent", hidden=True)] = False,
-    skip_log_check: Annotated[bool, Option("--skip-log-check", hidden=True)] = True,
-    port: Annotated[str, Option("--port", "-p", hidden=True)] = "",
-    core: Annotated[bool, Option("--core", hidden=True)] = False,
+    agent: Annotated[bool, Option("--agent")] = False,
+    skip_log_check: Annotated[bool, Option("--skip-log-check")] = True,
+    port: Annotated[str, Option("--port -p")] = "",
+    core: Annotated[bool, Option("--core")] = False,
 ) -> int:
     """Start the nodes of launch files, and run until they end.
 

@@ -42,33 +42,23 @@ def log_command(
         list[str] | None,
         Argument(
             "NODE",
-            help="Nodes or namespaces to follow; all if omitted. 'level NODE LOGGER LEVEL' sets the"
+            "Nodes or namespaces to follow; all if omitted. 'level NODE LOGGER LEVEL' sets the"
             " level of a logger, 'levels NODE' lists the levels.",
-            autocompletion=suggest.nodes,
+            suggest.nodes,
         ),
     ] = None,
     *,
     level: Annotated[
-        str,
-        Option(
-            "--level",
-            "-l",
-            metavar="LEVEL",
-            help="The lowest level to print.",
-            autocompletion=suggest.levels,
-        ),
+        str, Option("--level -l LEVEL", "The lowest level to print.", suggest.levels)
     ] = "DEBUG",
     grep: Annotated[
-        str,
-        Option("--grep", metavar="PATTERN", help="Print only messages that contain this pattern."),
+        str, Option("--grep PATTERN", "Print only messages that contain this pattern.")
     ] = "",
-    count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="Stop after this number of messages.")
-    ] = None,
+    count: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
     verbose: Annotated[
-        bool, Option("-v", "--verbose", help="Print places in the source code as well.")
+        bool, Option("-v --verbose", "Print places in the source code as well.")
     ] = False,
-    json: Annotated[bool, Option("--json", help="Print one line of JSON per message.")] = False,
+    json: Annotated[bool, Option("--json", "Print one line of JSON per message.")] = False,
 ) -> None:
     """Follow the log of nodes, or set and list the levels of their loggers.
 

@@ -35,7 +35,7 @@ def topics() -> dict[str, str]:
 @app.command()
 def help_command(
     topic: Annotated[
-        str, Argument("TOPIC", help="A page of the manual, or a command; lists the pages if empty.")
+        str, Argument("TOPIC", "A page of the manual, or a command; lists the pages if empty.")
     ] = "",
 ) -> None:
     """Print a page of the manual, or list the pages.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_error, print_json, print_lines, print_result, until_stopped
-from rosz.cli.declare import Argument, Option
+from rosz.cli.declare import Argument, Json, Option
 from rosz.cli.limits import at_least
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
 
@@ -26,21 +26,15 @@ _TOOL = "rosnode"
 _PING_PERIOD = 1.0
 _REASON = "user request"
 
-_Json = Annotated[bool, Option("--json", help="Print JSON.")]
-
 
 @app.command("list")
 def list_command(
     call: Call,
-    namespace: Annotated[
-        str, Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.nodes)
-    ] = "",
+    namespace: Annotated[str, Argument("NAMESPACE", "Lists all if omitted.", suggest.nodes)] = "",
     *,
-    everything: Annotated[
-        bool, Option("-a", "--all", help="Print where each node runs as well.")
-    ] = False,
-    places: Annotated[bool, Option("-u", help="Print only where each node runs.")] = False,
-    json: _Json = False,
+    everything: Annotated[bool, Option("-a --all", "Print where each node runs as well.")] = False,
+    places: Annotated[bool, Option("-u", "Print only where each node runs.")] = False,
+    json: Json = False,
 ) -> None:
     """List nodes."""
     from rosz.introspect.nodes import list_nodes
@@ -59,12 +53,12 @@ def list_command(
 @app.command("info")
 def info_command(
     call: Call,
-    nodes: Annotated[list[str], Argument("NODE", autocompletion=suggest.nodes)],
+    nodes: Annotated[list[str], Argument("NODE", source=suggest.nodes)],
     *,
     quiet: Annotated[
-        bool, Option("-q", "--quiet", help="Do not send requests to the nodes themselves.")
+        bool, Option("-q --quiet", "Do not send requests to the nodes themselves.")
     ] = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Print the topics, services and connections of nodes."""
     from rosz.introspect.nodes import find_nodes, format_connections, format_node
@@ -126,11 +120,10 @@ def _info_row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> 
 def machine_command(
     call: Call,
     machine: Annotated[
-        str,
-        Argument("MACHINE", help="Lists all machines if omitted.", autocompletion=suggest.machines),
+        str, Argument("MACHINE", "Lists all machines if omitted.", suggest.machines)
     ] = "",
     *,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """List the machines that nodes run on, or the nodes on one machine."""
     from rosz.introspect.nodes import list_nodes, machines, nodes_on_machine
@@ -143,12 +136,11 @@ def machine_command(
 @app.command("ping")
 def ping_command(
     call: Call,
-    node: Annotated[str, Argument("NODE", autocompletion=suggest.nodes)] = "",
+    node: Annotated[str, Argument("NODE", source=suggest.nodes)] = "",
     *,
-    everybody: Annotated[bool, Option("-a", "--all", help="Ping all nodes once.")] = False,
+    everybody: Annotated[bool, Option("-a --all", "Ping all nodes once.")] = False,
     count: Annotated[
-        int | None,
-        Option("-c", metavar="COUNT", help="Number of pings; without it, ping until stopped."),
+        int | None, Option("-c COUNT", "Number of pings; without it, ping until stopped.")
     ] = None,
 ) -> int:
     """Print how long a node takes to reply; exit code 1 if it does not reply."""
@@ -224,11 +216,10 @@ def _ping_all(call: Call) -> int:
 def kill_command(
     call: Call,
     nodes: Annotated[
-        list[str] | None,
-        Argument("NODE", help="Asks which one if omitted.", autocompletion=suggest.nodes),
+        list[str] | None, Argument("NODE", "Asks which one if omitted.", suggest.nodes)
     ] = None,
     *,
-    everybody: Annotated[bool, Option("-a", "--all", help="Kill all nodes.")] = False,
+    everybody: Annotated[bool, Option("-a --all", "Kill all nodes.")] = False,
 ) -> int:
     """Shut nodes down, and wait until they have ended."""
     if everybody and nodes:

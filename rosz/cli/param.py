@@ -20,7 +20,7 @@ from rosz.cli.console import (
     warn,
     write_file,
 )
-from rosz.cli.declare import App, Argument, Option, values_last
+from rosz.cli.declare import App, Argument, Json, Option, values_last
 from rosz.cli.limits import at_least
 from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, YamlError
 
@@ -50,21 +50,19 @@ def _is_special(word: str) -> bool:
 
 app = App("Get and set parameters.", is_remapping=_is_special)
 
-_Verbose = Annotated[bool, Option("-v", help="Print each step to standard error.")]
-_Json = Annotated[bool, Option("--json", help="Print JSON.")]
-_Name = Annotated[str, Argument("NAME", autocompletion=suggest.params)]
-_Space = Annotated[str, Argument("NAMESPACE", autocompletion=suggest.params)]
+_Verbose = Annotated[bool, Option("-v", "Print each step to standard error.")]
+_Name = Annotated[str, Argument("NAME", source=suggest.params)]
+_Space = Annotated[str, Argument("NAMESPACE", source=suggest.params)]
 
 
 @app.command("list")
 def list_command(
     call: Call,
     namespace: Annotated[
-        str | None,
-        Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.params),
+        str | None, Argument("NAMESPACE", "Lists all if omitted.", suggest.params)
     ] = None,
     *,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """List parameters."""
     with _client(call) as client:
@@ -82,10 +80,10 @@ def get_command(
     name: _Name,
     *,
     readable: Annotated[
-        bool, Option("-p", help="Print it for reading; the output may not be valid YAML.")
+        bool, Option("-p", "Print it for reading; the output may not be valid YAML.")
     ] = False,
     verbose: _Verbose = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> int:
     """Print a parameter, or all parameters below a namespace, as YAML."""
     with _client(call) as client:
@@ -102,33 +100,19 @@ def get_command(
     return 0
 
 
-@app.command("set", arrange=values_last(frozenset({"-t", "--textfile", "-b", "--binfile"})))
+@app.command("set", arrange=values_last("-t", "--textfile", "-b", "--binfile"))
 def set_command(
     call: Call,
     name: _Name,
     value: Annotated[
-        str | None, Argument("VALUE", help="The value in YAML; '-' reads it from standard input.")
+        str | None, Argument("VALUE", "The value in YAML; '-' reads it from standard input.")
     ] = None,
     *,
     text_file: Annotated[
-        str,
-        Option(
-            "-t",
-            "--textfile",
-            metavar="FILE",
-            help="Set it to the text in a file.",
-            autocompletion=suggest.files,
-        ),
+        str, Option("-t --textfile FILE", "Set it to the text in a file.", suggest.files)
     ] = "",
     binary_file: Annotated[
-        str,
-        Option(
-            "-b",
-            "--binfile",
-            metavar="FILE",
-            help="Set it to the bytes in a file.",
-            autocompletion=suggest.files,
-        ),
+        str, Option("-b --binfile FILE", "Set it to the bytes in a file.", suggest.files)
     ] = "",
     verbose: _Verbose = False,
 ) -> None:
@@ -166,13 +150,12 @@ def delete_command(call: Call, name: _Name, *, verbose: _Verbose = False) -> int
 def dump_command(
     call: Call,
     file: Annotated[
-        str,
-        Argument("FILE", help="Standard output if omitted, or '-'.", autocompletion=suggest.files),
+        str, Argument("FILE", "Standard output if omitted, or '-'.", suggest.files)
     ] = "",
     namespace: _Space = "",
     *,
     verbose: _Verbose = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> int:
     """Write parameters to a file as YAML."""
     from rosz.params.yaml import dump
@@ -197,16 +180,14 @@ def dump_command(
 @app.command("load")
 def load_command(
     call: Call,
-    file: Annotated[
-        str, Argument("FILE", help="'-' is standard input.", autocompletion=suggest.files)
-    ],
+    file: Annotated[str, Argument("FILE", "'-' is standard input.", suggest.files)],
     namespace: _Space = "",
     *,
     dry_run: Annotated[
-        bool, Option("--dry-run", help="Print what would change, and change nothing.")
+        bool, Option("--dry-run", "Print what would change, and change nothing.")
     ] = False,
     verbose: _Verbose = False,
-    json: Annotated[bool, Option("--json", help="Print the result of --dry-run as JSON.")] = False,
+    json: Annotated[bool, Option("--json", "Print the result of --dry-run as JSON.")] = False,
 ) -> None:
     """Set parameters from a YAML file; if one of them is wrong, set none."""
     if json and not dry_run:
@@ -237,7 +218,7 @@ def search_command(
     name: _Name,
     namespace: _Space = "",
     *,
-    json: _Json = False,
+    json: Json = False,
 ) -> int:
     """Print the full name of a parameter, searched in a namespace and then in those above it."""
     with _client(call) as client:
@@ -257,10 +238,8 @@ def watch_command(
     call: Call,
     name: _Name,
     *,
-    count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="Stop after this number of changes.")
-    ] = None,
-    json: _Json = False,
+    count: Annotated[int | None, Option("-n COUNT", "Stop after this number of changes.")] = None,
+    json: Json = False,
 ) -> None:
     """Print changes of a parameter, or of all parameters in a namespace, as they happen."""
     if count is not None:

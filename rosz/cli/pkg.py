@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
 from rosz.cli.console import count, paint, print_json, print_result, takes_escapes, warn
-from rosz.cli.declare import App, Argument, Option
+from rosz.cli.declare import App, Argument, Json, Option
 from rosz.errors import NotFoundError
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ __all__ = ("app",)
 
 app = App("List, find, create and check packages.")
 
-_Json = Annotated[bool, Option("--json", help="Print JSON.")]
 
 _BUILT_IN = frozenset(
     {"catkin", "message_generation", "message_runtime", "roslib", "rospy", "roscpp"}
@@ -32,8 +31,8 @@ _CATKIN_TARGETS = frozenset({"all", "clean", "install", "run_tests", "tests", "t
 @app.command("list")
 def list_packages(
     *,
-    names: Annotated[bool, Option("--names", "-n", help="Print only the names.")] = False,
-    json: _Json = False,
+    names: Annotated[bool, Option("--names -n", "Print only the names.")] = False,
+    json: Json = False,
 ) -> None:
     """List all packages with their folders."""
     index = _index()
@@ -46,12 +45,9 @@ def list_packages(
 
 @app.command("find")
 def find_package(
-    name: Annotated[
-        str,
-        Argument("PACKAGE", help="The workspace if omitted.", autocompletion=suggest.packages),
-    ] = "",
+    name: Annotated[str, Argument("PACKAGE", "The workspace if omitted.", suggest.packages)] = "",
     *,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Print the folder of a package."""
     package = _index().find(name) if name else _workspace()
@@ -63,20 +59,16 @@ def find_package(
 def create_package(
     name: Annotated[str, Argument("NAME")],
     dependencies: Annotated[
-        list[str] | None, Argument("DEPENDENCY", autocompletion=suggest.packages)
+        list[str] | None, Argument("DEPENDENCY", source=suggest.packages)
     ] = None,
     *,
     description: Annotated[
-        str, Option("--description", "-d", metavar="TEXT", help="Description of the package.")
+        str, Option("--description -d TEXT", "Description of the package.")
     ] = "",
-    maintainer: Annotated[
-        str, Option("--maintainer", "-m", metavar="NAME", help="Name of the maintainer.")
-    ] = "",
-    license_name: Annotated[
-        str, Option("--license", "-l", metavar="NAME", help="Name of the license.")
-    ] = "",
+    maintainer: Annotated[str, Option("--maintainer -m NAME", "Name of the maintainer.")] = "",
+    license_name: Annotated[str, Option("--license -l NAME", "Name of the license.")] = "",
     bare: Annotated[
-        bool, Option("--bare", help="Create only the files that catkin_create_pkg creates.")
+        bool, Option("--bare", "Create only the files that catkin_create_pkg creates.")
     ] = False,
 ) -> None:
     """Create a package in the working folder, with a message, a talker and a launch file."""
@@ -139,15 +131,15 @@ def check_command(
         list[str] | None,
         Argument(
             "FOLDER|PACKAGE",
-            help="The workspace around the working folder if omitted.",
-            autocompletion=suggest.packages_and_folders,
+            "The workspace around the working folder if omitted.",
+            suggest.packages_and_folders,
         ),
     ] = None,
     *,
     setup: Annotated[
-        bool, Option("--setup", help="Write devel/setup.bash and the like, as catkin_make does.")
+        bool, Option("--setup", "Write devel/setup.bash and the like, as catkin_make does.")
     ] = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> int:
     """Check packages: manifest, definitions, launch files, .cfg files and scripts.
 

@@ -28,91 +28,76 @@ def read(app: App, argv: Sequence[str]) -> Callable[[], Any] | None:
         argv: The words that follow the name of the app.
     """
     remappings, words = app.split(argv)
-    name = words.pop(0) if app.help and words else ""
-    command = app.commands.get(name)
+    command = app.commands.get(words.pop(0) if app.help and words else "")
     if command is None:
         return None
+    parameters = command.parameters()
+    values: dict[str, Any] = {}
     try:
-        values = _Reader(command).values(words, remappings)
+        positional = _read_options(command, parameters, words, values)
+        _assign(parameters, positional, values)
     except _NotSound:
         return None
+    for one in parameters:
+        if one.mark is None:
+            values[one.name] = one.kind(remappings)
+        elif one.required and one.name not in values:
+            return None
     return lambda: command.function(**values)
 
 
-class _Reader:
-    """Reads the words of one command.
-
-    Args:
-        command: The command.
-    """
-
-    def __init__(self, command: Command) -> None:
-        self._interspersed = command.interspersed
-        self._parameters = command.parameters()
-        self._options = {word: one for one in self._parameters for word in one.spellings}
-        self._values: dict[str, Any] = {}
-
-    def values(self, words: Sequence[str], remappings: Sequence[str]) -> dict[str, Any]:
-        """Return the values of the parameters that are given, by name.
-
-        Args:
-            words: The words that follow the name of the command.
-            remappings: The remappings of the command line.
-
-        Raises:
-            _NotSound: Typer has to read the words.
-        """
-        positional: list[str] = []
-        left = iter(words)
-        for word in left:
-            if word == _END_OF_OPTIONS:
-                positional += left
-            elif word.startswith("-") and word != "-":
-                self._read_option(word, left)
-            else:
-                positional.append(word)
-                if not self._interspersed:
-                    positional += left
-        self._assign(positional)
-        for one in self._parameters:
-            if one.mark is None:
-                self._values[one.name] = one.kind(remappings)
-            elif one.required and one.name not in self._values:
+def _read_options(
+    command: Command, parameters: Sequence[Parameter], words: Sequence[str], values: dict[str, Any]
+) -> list[str]:
+    """Read the options among the words into values, and return the positional words."""
+    options = {word: one for one in parameters for word in one.spellings}
+    positional: list[str] = []
+    left = iter(words)
+    for word in left:
+        if word == _END_OF_OPTIONS:
+            positional += left
+        elif word.startswith("-") and word != "-":
+            name, given, text = word.partition("=") if word.startswith("--") else (word, "", "")
+            one = options.get(name)
+            if one is None:
                 raise _NotSound
-        return self._values
-
-    def _read_option(self, word: str, left: Iterator[str]) -> None:
-        name, given, text = word.partition("=") if word.startswith("--") else (word, "", "")
-        one = self._options.get(name)
-        if one is None or (given and one.kind is bool):
-            raise _NotSound
-        if one.kind is bool:
-            self._values[one.name] = True
-            return
-        if not given:
-            text = next(left, _END_OF_OPTIONS)
-            if text.startswith("-") and text != "-":
-                raise _NotSound
-        value = _convert(one, text)
-        if one.many:
-            self._values.setdefault(one.name, []).append(value)
+            _read_option(one, text if given else None, left, values)
         else:
-            self._values[one.name] = value
+            positional.append(word)
+            if not command.interspersed:
+                positional += left
+    return positional
 
-    def _assign(self, words: list[str]) -> None:
-        """Assign positional words to the arguments in turn; a list takes all that are left."""
-        for one in self._parameters:
-            if not words:
-                return
-            if not isinstance(one.mark, Argument):
-                continue
-            if one.many:
-                self._values[one.name] = [_convert(one, word) for word in words]
-                return
-            self._values[one.name] = _convert(one, words[0])
-            words = words[1:]
-        if words:
+
+def _read_option(
+    one: Parameter, text: str | None, left: Iterator[str], values: dict[str, Any]
+) -> None:
+    if one.kind is bool:
+        if text is not None:
             raise _NotSound
+        values[one.name] = True
+        return
+    if text is None:
+        text = next(left, _END_OF_OPTIONS)
+        if text.startswith("-") and text != "-":
+            raise _NotSound
+    value = _convert(one, text)
+    if one.many:
+        values.setdefault(one.name, []).append(value)
+    else:
+        values[one.name] = value
+
+
+def _assign(parameters: Sequence[Parameter], words: Sequence[str], values: dict[str, Any]) -> None:
+    """Assign positional words to the arguments in turn; a list takes all that are left."""
+    for one in parameters:
+        if words and isinstance(one.mark, Argument):
+            taken = words if one.many else words[:1]
+            found = [_convert(one, word) for word in taken]
+            values[one.name] = found if one.many else found[0]
+            words = words[len(taken) :]
+    if words:
+        raise _NotSound
 
 
 def _convert(one: Parameter, word: str) -> Any:

@@ -19,7 +19,7 @@ from rosz.cli.console import (
     warn,
     write_file,
 )
-from rosz.cli.declare import Argument, Option, values_last
+from rosz.cli.declare import Argument, Json, Option, values_last
 from rosz.cli.limits import at_least, seconds
 from rosz.errors import NotFoundError, WaitTimeout, near_miss
 
@@ -36,24 +36,21 @@ _QUIET_SECONDS = 1.0
 """Time to wait for a node before saying so."""
 _FOR_EVER = 1e9
 
-_Json = Annotated[bool, Option("--json", help="Print JSON.")]
-_Node = Annotated[str, Argument("NODE", autocompletion=suggest.nodes)]
-_Setting = Annotated[str, Argument("SETTING", help="All settings if omitted.")]
+_Node = Annotated[str, Argument("NODE", source=suggest.nodes)]
+_Setting = Annotated[str, Argument("SETTING", "All settings if omitted.")]
 _Timeout = Annotated[
     float | None,
     Option(
-        "-t",
-        "--timeout",
-        metavar="SECONDS",
-        help="Time limit to wait for the node and for its reply. Without it the node must be"
+        "-t --timeout SECONDS",
+        "Time limit to wait for the node and for its reply. Without it the node must be"
         " running, and reply within 10 seconds.",
     ),
 ]
-_Wait = Annotated[bool, Option("--wait", help="Wait until the node runs.")]
+_Wait = Annotated[bool, Option("--wait", "Wait until the node runs.")]
 
 
 @app.command("list")
-def list_command(call: Call, *, json: _Json = False) -> None:
+def list_command(call: Call, *, json: Json = False) -> None:
     """List the nodes that have settings."""
     from rosz.reconfigure import find_servers
 
@@ -69,7 +66,7 @@ def get_command(
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Print all settings of a node as dynparam does, or the value of one setting."""
     from rosz.params.yaml import format_get
@@ -90,18 +87,16 @@ def get_command(
         print_lines([repr(in_groups(config, tree))])
 
 
-@app.command("set", arrange=values_last(frozenset({"-t", "--timeout"})))
+@app.command("set", arrange=values_last("-t", "--timeout"))
 def set_command(
     call: Call,
     node: _Node,
-    setting: Annotated[
-        str, Argument("SETTING|YAML", help="One setting, or a dictionary of several.")
-    ],
-    value: Annotated[str | None, Argument("VALUE", help="The value of one setting.")] = None,
+    setting: Annotated[str, Argument("SETTING|YAML", "One setting, or a dictionary of several.")],
+    value: Annotated[str | None, Argument("VALUE", "The value of one setting.")] = None,
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Change settings of a node; a choice can be given by its name."""
     from rosz.reconfigure import load
@@ -118,7 +113,7 @@ def set_from_parameters_command(
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Change settings of a node to the private parameters of this command, such as _gain:=2."""
     with _client(call, node, timeout, wait=wait) as client:
@@ -136,9 +131,7 @@ def set_from_parameters_command(
 def dump_command(
     call: Call,
     node: _Node,
-    file: Annotated[
-        str, Argument("FILE", help="'-' is standard output.", autocompletion=suggest.files)
-    ],
+    file: Annotated[str, Argument("FILE", "'-' is standard output.", suggest.files)],
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
@@ -158,13 +151,11 @@ def dump_command(
 def load_command(
     call: Call,
     node: _Node,
-    file: Annotated[
-        str, Argument("FILE", help="'-' is standard input.", autocompletion=suggest.files)
-    ],
+    file: Annotated[str, Argument("FILE", "'-' is standard input.", suggest.files)],
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Change settings of a node to those in a YAML file, also one written by ROS 1's dynparam."""
     from pathlib import Path
@@ -185,7 +176,7 @@ def describe_command(
     *,
     timeout: _Timeout = None,
     wait: _Wait = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Print the types, values, bounds, choices and groups of the settings of a node."""
     with _client(call, node, timeout, wait=wait) as client:
@@ -198,12 +189,10 @@ def watch_command(
     call: Call,
     node: _Node,
     *,
-    count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="Stop after this number of changes.")
-    ] = None,
+    count: Annotated[int | None, Option("-n COUNT", "Stop after this number of changes.")] = None,
     timeout: _Timeout = None,
     wait: _Wait = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Print changes of the settings of a node as they happen."""
     if count is not None:

@@ -21,34 +21,23 @@ app = App()
 # Options behind the package belong to the program.
 @app.command(interspersed=False)
 def run_command(
-    package: Annotated[str, Argument("PACKAGE", autocompletion=suggest.packages)] = "",
+    package: Annotated[str, Argument("PACKAGE", source=suggest.packages)] = "",
     executable: Annotated[
-        str,
-        Argument(
-            "EXECUTABLE", help="An executable of the package.", autocompletion=suggest.executables
-        ),
+        str, Argument("EXECUTABLE", "An executable of the package.", suggest.executables)
     ] = "",
     arguments: Annotated[
         list[str] | None,
         Argument(
             "ARGS",
-            help="Arguments of the program, such as name:=value, _param:=value, __name:=value.",
-            autocompletion=suggest.files,
+            "Arguments of the program, such as name:=value, _param:=value, __name:=value.",
+            suggest.files,
         ),
     ] = None,
     *,
     prefix: Annotated[
-        str,
-        Option(
-            "--prefix",
-            "-p",
-            metavar="COMMAND",
-            help="Run the program with a command, such as 'gdb --args'.",
-        ),
+        str, Option("--prefix -p COMMAND", "Run the program with a command, such as 'gdb --args'.")
     ] = "",
-    debug: Annotated[
-        bool, Option("--debug", "-d", help="Print the command line of the program.")
-    ] = False,
+    debug: Annotated[bool, Option("--debug -d", "Print the command line of the program.")] = False,
 ) -> None:
     """Run an executable of a package.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result, until_stopped, warn
-from rosz.cli.declare import Argument, Option, values_last
+from rosz.cli.declare import Argument, Json, Option, values_last
 from rosz.cli.limits import seconds
 from rosz.errors import EncodeError, UsageError
 
@@ -23,20 +23,19 @@ __all__ = ("app",)
 app = new_group("List and call services.")
 
 _TOOL = "rosservice"
-_Json = Annotated[bool, Option("--json", help="Print JSON.")]
-_ServiceName = Annotated[str, Argument("SERVICE", autocompletion=suggest.services)]
+_ServiceName = Annotated[str, Argument("SERVICE", source=suggest.services)]
 
 
 @app.command("list")
 def list_command(
     call: Call,
     namespace: Annotated[
-        str, Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.services)
+        str, Argument("NAMESPACE", "Lists all if omitted.", suggest.services)
     ] = "",
     *,
-    nodes: Annotated[bool, Option("-n", "--nodes", help="Print the nodes as well.")] = False,
-    types: Annotated[bool, Option("-t", "--types", help="Print the types as well.")] = False,
-    json: _Json = False,
+    nodes: Annotated[bool, Option("-n --nodes", "Print the nodes as well.")] = False,
+    types: Annotated[bool, Option("-t --types", "Print the types as well.")] = False,
+    json: Json = False,
 ) -> None:
     """List services."""
     from rosz.introspect.services import list_services
@@ -54,7 +53,7 @@ def list_command(
 
 
 @app.command("info")
-def info_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+def info_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the node, the type and the arguments of a service."""
     from rosz.introspect.services import service_key
     from rosz.names import short_type
@@ -72,7 +71,7 @@ def info_command(call: Call, service: _ServiceName, *, json: _Json = False) -> N
 
 
 @app.command("type")
-def type_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+def type_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the type of a service."""
     from rosz.names import short_type
 
@@ -83,9 +82,9 @@ def type_command(call: Call, service: _ServiceName, *, json: _Json = False) -> N
 @app.command("find")
 def find_command(
     call: Call,
-    type_name: Annotated[str, Argument("TYPE", autocompletion=suggest.service_types)],
+    type_name: Annotated[str, Argument("TYPE", source=suggest.service_types)],
     *,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """List the services of a type."""
     from rosz.introspect.services import services_of_type
@@ -95,21 +94,21 @@ def find_command(
 
 
 @app.command("args")
-def args_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+def args_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the arguments of a service."""
     names = _arguments(call, _server(call, service))
     print_result([names], {"args": names.split()}, as_json=json)
 
 
 @app.command("node")
-def node_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+def node_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the node that provides a service."""
     name = _server(call, service).node_name
     print_result([name], {"node": name}, as_json=json)
 
 
 @app.command("uri")
-def uri_command(call: Call, service: _ServiceName, *, json: _Json = False) -> None:
+def uri_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the Zenoh key of a service."""
     from rosz.introspect.services import service_key
 
@@ -129,7 +128,7 @@ def _arguments(call: Call, token: Token) -> str:
     return list_arguments(call.types.service(token.type_name).Request)
 
 
-@app.command("call", arrange=values_last(frozenset({"--timeout"})))
+@app.command("call", arrange=values_last("--timeout"))
 def call_command(
     call: Call,
     service: _ServiceName,
@@ -137,18 +136,16 @@ def call_command(
         list[str] | None,
         Argument(
             "VALUE",
-            help="The request in YAML: one dictionary, or one value per field; read from standard"
+            "The request in YAML: one dictionary, or one value per field; read from standard"
             " input if omitted.",
-            autocompletion=suggest.request_values,
+            suggest.request_values,
         ),
     ] = None,
     *,
-    verbose: Annotated[bool, Option("-v", help="Print the request as well.")] = False,
-    wait: Annotated[bool, Option("--wait", help="Wait for the service.")] = False,
-    timeout: Annotated[
-        float, Option(metavar="SECONDS", help="Time limit for the response.")
-    ] = 3600.0,
-    json: _Json = False,
+    verbose: Annotated[bool, Option("-v", "Print the request as well.")] = False,
+    wait: Annotated[bool, Option("--wait", "Wait for the service.")] = False,
+    timeout: Annotated[float, Option("--timeout SECONDS", "Time limit for the response.")] = 3600.0,
+    json: Json = False,
 ) -> None:
     """Call a service and print its response."""
     seconds("--timeout", timeout)

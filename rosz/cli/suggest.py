@@ -1,9 +1,8 @@
 """Sources of completions: names on the network, types, packages and files.
 
 Each source is a function that returns the words that may stand where a person types. A declaration
-names its source as ``autocompletion=``. Every source answers quickly or not at all, because a
-person waits after pressing the TAB key; and this module imports little, because every command
-imports it.
+names its source. Every source answers quickly or not at all, because a person waits after pressing
+the TAB key; and this module imports little, because every command imports it.
 """
 
 from __future__ import annotations

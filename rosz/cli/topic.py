@@ -19,7 +19,7 @@ from rosz.cli.console import (
     until_stopped,
     warn,
 )
-from rosz.cli.declare import Argument, Option
+from rosz.cli.declare import Argument, Json, Option
 from rosz.cli.limits import at_least, per_second
 from rosz.errors import ClosedError, EncodeError, NotFoundError, UsageError
 
@@ -43,39 +43,32 @@ _PERIOD = 1.0
 _DEPTH = 10_000
 """Messages that wait while the terminal is slow."""
 
-_Json = Annotated[bool, Option("--json", help="Print JSON.")]
-_Window = Annotated[
-    int | None, Option("-w", "--window", metavar="COUNT", help="Number of messages to average.")
-]
+_Window = Annotated[int | None, Option("-w --window COUNT", "Number of messages to average.")]
 _Condition = Annotated[
     str,
     Option(
-        "--filter",
-        metavar="EXPRESSION",
-        help="Use only messages for which a Python expression is true; m is the message, topic its"
+        "--filter EXPRESSION",
+        "Use only messages for which a Python expression is true; m is the message, topic its"
         " topic.",
     ),
 ]
-_TopicName = Annotated[str, Argument("TOPIC", autocompletion=suggest.topics)]
-_TopicOrField = Annotated[str, Argument("TOPIC_OR_FIELD", autocompletion=suggest.topics)]
+_TopicName = Annotated[str, Argument("TOPIC", source=suggest.topics)]
+_TopicOrField = Annotated[str, Argument("TOPIC_OR_FIELD", source=suggest.topics)]
 
 
 @app.command("list")
 def list_command(
     call: Call,
-    namespace: Annotated[
-        str, Argument("NAMESPACE", help="Lists all if omitted.", autocompletion=suggest.topics)
-    ] = "",
+    namespace: Annotated[str, Argument("NAMESPACE", "Lists all if omitted.", suggest.topics)] = "",
     *,
     verbose: Annotated[
-        bool,
-        Option("-v", "--verbose", help="Print types and numbers of publishers and subscribers."),
+        bool, Option("-v --verbose", "Print types and numbers of publishers and subscribers.")
     ] = False,
-    publishers: Annotated[bool, Option("-p", help="List only published topics.")] = False,
-    subscribers: Annotated[bool, Option("-s", help="List only subscribed topics.")] = False,
-    types: Annotated[bool, Option("-t", "--types", help="Print types.")] = False,
-    host: Annotated[bool, Option("--host", help="Group topics by host.")] = False,
-    json: _Json = False,
+    publishers: Annotated[bool, Option("-p", "List only published topics.")] = False,
+    subscribers: Annotated[bool, Option("-s", "List only subscribed topics.")] = False,
+    types: Annotated[bool, Option("-t --types", "Print types.")] = False,
+    host: Annotated[bool, Option("--host", "Group topics by host.")] = False,
+    json: Json = False,
 ) -> None:
     """List topics."""
     if publishers and subscribers:
@@ -114,7 +107,7 @@ def list_command(
 
 
 @app.command("info")
-def info_command(call: Call, topic: _TopicName, *, json: _Json = False) -> None:
+def info_command(call: Call, topic: _TopicName, *, json: Json = False) -> None:
     """Print the type, the publishers and the subscribers of a topic."""
     from rosz.introspect import topics as library
 
@@ -135,7 +128,7 @@ def info_command(call: Call, topic: _TopicName, *, json: _Json = False) -> None:
 
 
 @app.command("type")
-def type_command(call: Call, topic: _TopicOrField, *, json: _Json = False) -> None:
+def type_command(call: Call, topic: _TopicOrField, *, json: Json = False) -> None:
     """Print the type of a topic, or of a field of its messages."""
     from rosz.introspect.fields import find_target
     from rosz.introspect.subscribe import resolve_field, topic_types
@@ -151,9 +144,9 @@ def type_command(call: Call, topic: _TopicOrField, *, json: _Json = False) -> No
 @app.command("find")
 def find_command(
     call: Call,
-    type_name: Annotated[str, Argument("TYPE", autocompletion=suggest.topic_types)],
+    type_name: Annotated[str, Argument("TYPE", source=suggest.topic_types)],
     *,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """List the topics of a type."""
     from rosz.introspect import topics as library
@@ -167,25 +160,17 @@ def echo_command(
     call: Call,
     topic: _TopicOrField,
     *,
-    count: Annotated[
-        int | None, Option("-n", metavar="COUNT", help="Stop after this number of messages.")
-    ] = None,
-    once: Annotated[bool, Option("-1", "--once", help="Stop after one message.")] = False,
-    plot: Annotated[
-        bool, Option("-p", help="Print comma-separated numbers, for plotting.")
-    ] = False,
-    width: Annotated[
-        int | None, Option("-w", metavar="WIDTH", help="Print numbers with a fixed width.")
-    ] = None,
+    count: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
+    once: Annotated[bool, Option("-1 --once", "Stop after one message.")] = False,
+    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False,
+    width: Annotated[int | None, Option("-w WIDTH", "Print numbers with a fixed width.")] = None,
     condition: _Condition = "",
-    nostr: Annotated[bool, Option("--nostr", help="Leave strings out.")] = False,
-    noarr: Annotated[bool, Option("--noarr", help="Leave arrays out.")] = False,
-    clear: Annotated[
-        bool, Option("-c", "--clear", help="Clear the screen before each message.")
-    ] = False,
-    offset: Annotated[bool, Option("--offset", help="Print times as seconds from now.")] = False,
-    raw: Annotated[bool, Option("--raw", help="Print the bytes without decoding them.")] = False,
-    json: _Json = False,
+    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False,
+    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False,
+    clear: Annotated[bool, Option("-c --clear", "Clear the screen before each message.")] = False,
+    offset: Annotated[bool, Option("--offset", "Print times as seconds from now.")] = False,
+    raw: Annotated[bool, Option("--raw", "Print the bytes without decoding them.")] = False,
+    json: Json = False,
 ) -> None:
     """Print the messages of a topic."""
     from rosz.introspect.echo import EchoOptions
@@ -319,14 +304,14 @@ class _Printer:
 @app.command("hz")
 def hz_command(
     call: Call,
-    topics: Annotated[list[str], Argument("TOPIC", autocompletion=suggest.topics)],
+    topics: Annotated[list[str], Argument("TOPIC", source=suggest.topics)],
     *,
     window: _Window = None,
     condition: _Condition = "",
     wall_time: Annotated[
-        bool, Option("--wall-time", help="Measure wall time instead of simulated time.")
+        bool, Option("--wall-time", "Measure wall time instead of simulated time.")
     ] = False,
-    json: _Json = False,
+    json: Json = False,
 ) -> None:
     """Print once per second how many messages arrive per second."""
     from rosz.introspect.fields import Filter
@@ -371,7 +356,7 @@ def _measure(node: Node, token: Token, tick: Callable[[], None], condition: Filt
 
 @app.command("bw")
 def bw_command(
-    call: Call, topic: _TopicName, *, window: _Window = None, json: _Json = False
+    call: Call, topic: _TopicName, *, window: _Window = None, json: Json = False
 ) -> None:
     """Print once per second how many bytes arrive per second."""
     from rosz.introspect.measure import BandwidthMeter, format_bandwidth
@@ -392,7 +377,7 @@ def bw_command(
 
 @app.command("delay")
 def delay_command(
-    call: Call, topic: _TopicName, *, window: _Window = None, json: _Json = False
+    call: Call, topic: _TopicName, *, window: _Window = None, json: Json = False
 ) -> None:
     """Print once per second the age of the messages, by the stamp in their header."""
     from rosz.introspect.measure import DelayMeter, format_delay, read_stamp
@@ -453,41 +438,31 @@ def _print_stats(found: Mapping[str, Struct | None]) -> None:
 def pub_command(
     call: Call,
     topic: _TopicName,
-    type_name: Annotated[str, Argument("TYPE", autocompletion=suggest.topic_type)],
+    type_name: Annotated[str, Argument("TYPE", source=suggest.topic_type)],
     values: Annotated[
         list[str] | None,
         Argument(
             "VALUE",
-            help="The message in YAML: one dictionary, or one value per field; read from standard"
+            "The message in YAML: one dictionary, or one value per field; read from standard"
             " input if omitted.",
-            autocompletion=suggest.pub_values,
+            suggest.pub_values,
         ),
     ] = None,
     *,
-    rate: Annotated[
-        float | None, Option("-r", "--rate", metavar="HZ", help="Publish at this rate.")
-    ] = None,
-    once: Annotated[bool, Option("-1", "--once", help="Publish one message and stop.")] = False,
+    rate: Annotated[float | None, Option("-r --rate HZ", "Publish at this rate.")] = None,
+    once: Annotated[bool, Option("-1 --once", "Publish one message and stop.")] = False,
     latch: Annotated[
-        bool, Option("-l", "--latch", help="Latch also with -f, -r and standard input.")
+        bool, Option("-l --latch", "Latch also with -f, -r and standard input.")
     ] = False,
     file: Annotated[
-        str,
-        Option(
-            "-f",
-            "--file",
-            metavar="FILE",
-            help="Read messages from a YAML file.",
-            autocompletion=suggest.files,
-        ),
+        str, Option("-f --file FILE", "Read messages from a YAML file.", suggest.files)
     ] = "",
-    verbose: Annotated[bool, Option("-v", help="Print what is published.")] = False,
+    verbose: Annotated[bool, Option("-v", "Print what is published.")] = False,
     substitute: Annotated[
-        bool,
-        Option("-s", "--substitute-keywords", help="Replace 'now' and 'auto' in each message."),
+        bool, Option("-s --substitute-keywords", "Replace 'now' and 'auto' in each message.")
     ] = False,
     use_rostime: Annotated[
-        bool, Option("--use-rostime", help="Take 'now' and 'auto' from ROS time.")
+        bool, Option("--use-rostime", "Take 'now' and 'auto' from ROS time.")
     ] = False,
 ) -> None:
     """Publish messages."""

@@ -21,22 +21,11 @@ app = new_group("Save pictures of turtlesims; 'rosz run turtlesim turtlesim_node
 def snapshot(
     call: Call,
     file: Annotated[
-        str,
-        Argument(
-            "FILE.png",
-            help="The file to write; '-' is standard output.",
-            autocompletion=suggest.files,
-        ),
+        str, Argument("FILE.png", "The file to write; '-' is standard output.", suggest.files)
     ],
     *,
     node: Annotated[
-        str,
-        Option(
-            "--node",
-            metavar="NODE",
-            help="The turtlesim, if several run.",
-            autocompletion=suggest.nodes,
-        ),
+        str, Option("--node NODE", "The turtlesim, if several run.", suggest.nodes)
     ] = "",
 ) -> None:
     """Save a picture of the field with its turtles."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import typer
 from typer.exceptions import TyperException
 
-from rosz.cli.declare import App, Command, Option, Parameter
+from rosz.cli.declare import App, Argument, Command, Option, Parameter
 from rosz.errors import UsageError
 
 __all__ = ("run", "translate")
@@ -87,37 +87,33 @@ def _group() -> None: ...
 
 def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
     """Return a function for typer: it has typer's annotations, and calls the command's."""
-    function = command.function
-    hints = get_type_hints(function, include_extras=True)
-    signature = inspect.signature(function).parameters
+    signature = inspect.signature(command.function, eval_str=True).parameters
     fixed: dict[str, Any] = {}
     kept: list[inspect.Parameter] = []
     for one in command.parameters():
         if one.mark is None:
             fixed[one.name] = one.kind(remappings)
         else:
-            annotation = _annotate(hints[one.name].__origin__, one)
-            kept.append(signature[one.name].replace(annotation=annotation))
+            given = signature[one.name]
+            hint: Any = given.annotation.__origin__
+            kept.append(given.replace(annotation=Annotated[hint, _declare(one, one.mark)]))
 
     def call(**values: Any) -> Any:
-        return function(**values, **fixed)
+        return command.function(**values, **fixed)
 
     call.__annotations__ = {one.name: one.annotation for one in kept}
     call.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]  # for inspect
     return call
 
 
-def _annotate(hint: Any, one: Parameter) -> Any:
-    """Return a type annotated for typer."""
+def _declare(one: Parameter, mark: Argument | Option) -> Any:
+    """Return the declaration of a parameter for typer."""
     parser = _parser(one.kind) if one.kind in _NUMBERS else None
-    mark = one.mark
-    assert mark is not None  # noqa: S101  # the caller has looked
-    if isinstance(mark, Option):
-        option = typer.Option(
-            *one.spellings, metavar=mark.metavar, help=mark.help, hidden=mark.hidden, parser=parser
-        )
-        return Annotated[hint, option]
-    return Annotated[hint, typer.Argument(metavar=mark.metavar, help=mark.help, parser=parser)]
+    if isinstance(mark, Argument):
+        return typer.Argument(metavar=mark.metavar, help=mark.help, parser=parser)
+    return typer.Option(
+        *mark.names, metavar=mark.metavar, help=mark.help, hidden=mark.help is None, parser=parser
+    )
 
 
 def _parser(kind: Callable[[str], Any]) -> Callable[[Any], Any]:

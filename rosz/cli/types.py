@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result
-from rosz.cli.declare import App, Argument, Option
+from rosz.cli.declare import App, Argument, Json, Option
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
@@ -18,23 +18,17 @@ if TYPE_CHECKING:
 
 __all__ = ("msg", "srv")
 
-_Json = Annotated[bool, Option("--json", help="Print JSON.")]
-_Single = Annotated[bool, Option("-s", help="Print all on one line.")]
+_Single = Annotated[bool, Option("-s", "Print all on one line.")]
 _TypeName = Annotated[
     str,
     Argument(
         "TYPE",
-        help="PACKAGE/NAME, or NAME alone; read from standard input if omitted.",
-        autocompletion=suggest.definitions,
+        "PACKAGE/NAME, or NAME alone; read from standard input if omitted.",
+        suggest.definitions,
     ),
 ]
 _Package = Annotated[
-    str,
-    Argument(
-        "PACKAGE",
-        help="A package; read from standard input if omitted.",
-        autocompletion=suggest.packages,
-    ),
+    str, Argument("PACKAGE", "A package; read from standard input if omitted.", suggest.packages)
 ]
 
 
@@ -54,9 +48,9 @@ class _Types:
         name: _TypeName = "",
         *,
         raw: Annotated[
-            bool, Option("-r", "--raw", help="Print the definition as written, with comments.")
+            bool, Option("-r --raw", "Print the definition as written, with comments.")
         ] = False,
-        json: _Json = False,
+        json: Json = False,
     ) -> None:
         definitions = self._definitions(call)
         wanted = _given(name)
@@ -69,25 +63,25 @@ class _Types:
                 print_lines([f"[{_short(one)}]:"])
             print_lines([definitions.text(one) if raw else definitions.show(one)])
 
-    def list(self, call: Call, *, json: _Json = False) -> None:
+    def list(self, call: Call, *, json: Json = False) -> None:
         names = call.types.names(self._kind)
         print_result(names, names, as_json=json)
 
-    def md5(self, call: Call, name: _TypeName = "", *, json: _Json = False) -> None:
+    def md5(self, call: Call, name: _TypeName = "", *, json: Json = False) -> None:
         definitions = self._definitions(call)
         _print_hashes(definitions, name, definitions.md5, as_json=json)
 
-    def hash(self, call: Call, name: _TypeName = "", *, json: _Json = False) -> None:
+    def hash(self, call: Call, name: _TypeName = "", *, json: Json = False) -> None:
         definitions = self._definitions(call)
         _print_hashes(definitions, name, definitions.hash, as_json=json)
 
     def package(
-        self, call: Call, package: _Package = "", *, single: _Single = False, json: _Json = False
+        self, call: Call, package: _Package = "", *, single: _Single = False, json: Json = False
     ) -> None:
         names = call.types.names(self._kind, _given(package, "package"))
         print_result([" ".join(names)] if single else names, names, as_json=json)
 
-    def packages(self, call: Call, *, single: _Single = False, json: _Json = False) -> None:
+    def packages(self, call: Call, *, single: _Single = False, json: Json = False) -> None:
         names = call.types.packages(self._kind)
         print_result([" ".join(names)] if single else names, names, as_json=json)
 

@@ -46,7 +46,7 @@ def test_help_holds_the_whole_declaration(
         return
     assert joined(declared.help) in joined(text)
     for one in declared.parameters():
-        if one.mark is None or (isinstance(one.mark, Option) and one.mark.hidden):
+        if one.mark is None or (isinstance(one.mark, Option) and one.mark.help is None):
             continue
         for fact in (*one.spellings, one.mark.metavar or "", one.mark.help or ""):
             assert fact in joined(text)

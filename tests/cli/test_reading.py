@@ -25,16 +25,16 @@ def take(
     first: Annotated[str, Argument("FIRST")],
     more: Annotated[list[str] | None, Argument("MORE")] = None,
     *,
-    flag: Annotated[bool, Option("-f", "--flag")] = False,
-    count: Annotated[int | None, Option("-n", metavar="COUNT")] = None,
-    rate_of_all: Annotated[float, Option(metavar="HZ")] = 1.5,
-    each: Annotated[list[str] | None, Option("--each", hidden=True)] = None,
+    flag: Annotated[bool, Option("-f --flag")] = False,
+    count: Annotated[int | None, Option("-n COUNT")] = None,
+    rate_of_all: Annotated[float, Option("--rate-of-all HZ")] = 1.5,
+    each: Annotated[list[str] | None, Option("--each")] = None,
 ) -> None:
     """Take what there is."""
     seen.append((remappings, first, more or None, flag, count, rate_of_all, each or None))
 
 
-@app.command("set", arrange=values_last(frozenset({"-t"})))
+@app.command("set", arrange=values_last("-t"))
 def set_(
     name: Annotated[str, Argument("NAME")],
     value: Annotated[int, Argument("VALUE")] = 7,
@@ -141,7 +141,7 @@ def test_a_lone_command() -> None:
 
 
 def test_a_value_may_begin_like_an_option() -> None:
-    arrange = values_last(frozenset({"-t"}))
+    arrange = values_last("-t")
     line = "a -t file -1 b -v -- -x"
     assert " ".join(arrange(line.split())) == "-t file -v -- a -1 b -x"
     assert arrange(["-t"]) == ["-t", "--"]

@@ -78,5 +78,5 @@ def _option(one: Parameter) -> dict[str, Any]:
     if one.kind is bool:
         del shared["metavar"]
     return {"names": sorted(one.spellings, key=len), **shared} | (
-        {"hidden": True} if one.mark.hidden else {}
+        {"hidden": True} if one.mark.help is None else {}
     )
