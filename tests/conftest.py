@@ -2,7 +2,8 @@
 
 Markers select a part of the tests: ``pytest -m hosts``, ``pytest -m "not system and not ros1"``.
 ``system`` (opens sessions or starts processes) and ``hosts`` (network namespaces) follow from the
-fixtures of a test and its folder; ``ros1`` (compares with real ROS 1) is written in the file.
+fixtures of a test and its folder. ``ros1`` (compares with real ROS 1) follows from a fixture that
+starts ROS 1; otherwise it is written in the file.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
+import oracle
 import pytest
 from network import Network
 
@@ -26,6 +28,8 @@ def pytest_configure() -> None:
 
 _HOSTS = Path(__file__).parent / "hosts"
 _SYSTEM = {"course", "faults", "hosts", "interop"}
+_ROS_1 = {"genpy", "ros", "ros1", "roslaunch"}
+"""Fixtures that start real ROS 1."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -34,8 +38,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         folder = item.path.relative_to(_HOSTS.parent).parts[0]
         if folder == _HOSTS.name:
             item.add_marker(pytest.mark.hosts)
-        if folder in _SYSTEM or "network" in getattr(item, "fixturenames", ()):
+        fixtures = set(getattr(item, "fixturenames", ()))
+        if folder in _SYSTEM or "network" in fixtures:
             item.add_marker(pytest.mark.system)
+        if fixtures & _ROS_1:
+            item.add_marker(pytest.mark.ros1)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Refuse ROS 1 to tests that lack the mark."""
+    oracle.marked = item.get_closest_marker("ros1") is not None
 
 
 @pytest.fixture

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracle import Worker, require
 from params.network import Network, until
-from params.ros1 import Ros1, available
 
 from rosz.cli.main import run
 from rosz.cli.param import _format_scalar, _parse_scalar
@@ -28,10 +28,9 @@ Command = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
-def ros1() -> Iterator[Ros1]:
-    if not available():
-        pytest.skip("ROS 1 is not installed: apt install python3-rosmaster python3-rosparam")
-    worker = Ros1()
+def ros1() -> Iterator[Worker]:
+    require("rosmaster", "rosparam", package="python3-rosmaster, python3-rosparam")
+    worker = Worker("rosparam_calls")
     yield worker
     worker.close()
 
@@ -198,7 +197,7 @@ def words_of(line: str) -> list[str]:
 
 
 def test_it_does_what_rosparam_does(
-    ros1: Ros1, replica: Replica, param: Command, tmp_path: Path
+    ros1: Worker, replica: Replica, param: Command, tmp_path: Path
 ) -> None:
     assert replica.root == {}
     folders = {"theirs": tmp_path / "theirs", "ours": tmp_path}

@@ -78,6 +78,7 @@ def test_no_type_is_given(
     assert capsys.readouterr().err == f"rosz: no {what} is given\n"
 
 
+@pytest.mark.ros1
 @pytest.mark.parametrize("kind", ["Bool", "String", "Float64", "ColorRGBA", "Empty"])
 @pytest.mark.parametrize("verb", ["show", "md5"])
 def test_as_rosmsg(verb: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:

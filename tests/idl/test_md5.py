@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
 import pytest
+from oracle import MESSAGES
 
 from rosz.idl import message_md5, parse_service, service_md5
 from rosz.typestore import TypeStore
 
 from .definitions import catalog_of
 
-INSTALLED = Path("/usr/lib/python3/dist-packages")
 RULE = "=" * 80 + "\nMSG: "
 
 # Pinned, as ROS 1 has known them for ever.
@@ -67,7 +66,7 @@ def test_rule() -> None:
 def installed() -> list[tuple[str, str, str]]:
     """Return the type, full text and hash of every message class that ROS 1 installed."""
     found = []
-    for file in sorted(INSTALLED.glob("*/msg/_*.py")) + sorted(INSTALLED.glob("*/srv/_*.py")):
+    for file in sorted(MESSAGES.glob("*/msg/_*.py")) + sorted(MESSAGES.glob("*/srv/_*.py")):
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):
             if not isinstance(node, ast.ClassDef):
                 continue
@@ -92,6 +91,7 @@ def full(name: str) -> str:
     return name if name.count("/") == 2 else name.replace("/", "/msg/")
 
 
+@pytest.mark.ros1
 @pytest.mark.skipif(not INSTALLED_TYPES, reason="needs Debian's ROS 1 message packages")
 def test_every_installed_message() -> None:
     assert len(INSTALLED_TYPES) > 100
@@ -106,6 +106,7 @@ def test_every_installed_message() -> None:
         assert message_md5(catalog.message(full(name)), catalog) == expected, name
 
 
+@pytest.mark.ros1
 @pytest.mark.skipif(not INSTALLED_TYPES, reason="needs Debian's ROS 1 message packages")
 def test_shipped_types_that_ros_1_has_too() -> None:
     """Most of what both worlds have means the same in both, and hashes so."""

@@ -1,9 +1,9 @@
 """Compare what rosz.idl makes of the definitions with the plain reading, and with real ROS 1."""
 
 import re
-from pathlib import Path
 
 import pytest
+from oracle import MESSAGES
 
 from rosz.idl import (
     Catalog,
@@ -16,8 +16,6 @@ from rosz.idl import (
 )
 
 from .fingerprints import FILES, type_hash
-
-ROS_1 = Path("/usr/lib/python3/dist-packages")  # where Debian installs ROS 1's generated modules
 
 # Jazzy changed these, or what they hold: fields or constants added, renamed or of another type.
 CHANGED = {
@@ -52,7 +50,7 @@ def installed() -> dict[str, str]:
     found = {}
     for name in (*named("msg"), *named("srv")):
         package, kind, base = name.split("/")
-        module = ROS_1 / package / kind / f"_{base}.py"
+        module = MESSAGES / package / kind / f"_{base}.py"
         if module.exists():
             # A service's own class follows those of its request and response.
             sums = re.findall(r"^ +_md5sum = ['\"](\w+)", module.read_text("utf-8"), re.MULTILINE)
@@ -82,6 +80,7 @@ def test_action_has_the_fields_of_the_file(name: str) -> None:
     assert parts == [[field.name for field in part.fields] for part in FILES[name].sections]
 
 
+@pytest.mark.ros1
 @pytest.mark.skipif(not INSTALLED, reason="ROS 1's message packages are not installed")
 def test_installed_ros_1_types_have_the_md5sum_of_ros_1() -> None:
     ours = {

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from genpy_oracle import Oracle, start
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracle import Worker, require
 
 from rosz.errors import EncodeError
 from rosz.message import Message
@@ -37,8 +37,9 @@ TYPES = [
 
 
 @pytest.fixture(scope="module")
-def oracle() -> Iterator[Oracle]:
-    worker = start()
+def genpy() -> Iterator[Worker]:
+    require("genpy", "std_msgs.msg", package="python3-genpy, python3-std-msgs")
+    worker = Worker("genpy_calls")
     yield worker
     worker.close()
 
@@ -62,14 +63,14 @@ def as_genpy(cls: type[Message], plain: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", TYPES)
 @pytest.mark.parametrize("width", [None, 7])
-def test_strify_as_genpy(oracle: Oracle, name: str, width: int | None) -> None:
+def test_strify_as_genpy(genpy: Worker, name: str, width: int | None) -> None:
     rng = random.Random(name)
     cls = STORE.message(name)
     spec = STORE._catalog.message(cls._type_name)
     for _ in range(8):
         plain = values.value(rng, STORE._catalog, spec)
         offset = [rng.randint(0, 9), rng.randint(0, 999_999_999)] if rng.random() < 0.2 else None
-        theirs = oracle.ask(type=name, args=[as_genpy(cls, plain)], width=width, offset=offset)
+        theirs = genpy.call("text", name, [as_genpy(cls, plain)], width=width, offset=offset)
         ours = strify_message(
             values.build(cls, plain),
             time_offset=Time(*offset) if offset else None,
@@ -80,18 +81,18 @@ def test_strify_as_genpy(oracle: Oracle, name: str, width: int | None) -> None:
 
 @settings(deadline=None, max_examples=200)
 @given(st.text(st.characters(exclude_categories=["Cs"]), max_size=120))
-def test_strings_as_genpy(oracle: Oracle, text: str) -> None:
+def test_strings_as_genpy(genpy: Worker, text: str) -> None:
     if text:
-        theirs = oracle.ask(type="std_msgs/String", args=[text])
+        theirs = genpy.call("text", "std_msgs/String", [text])
         assert strify_message(String(text)) == theirs["value"]
-    theirs = oracle.ask(type="sensor_msgs/JointState", args=[{"name": [text, "b"]}])
+    theirs = genpy.call("text", "sensor_msgs/JointState", [{"name": [text, "b"]}])
     joints = STORE.message("sensor_msgs/JointState")()
     fill_message_args(joints, {"name": [text, "b"]})
     assert strify_message(joints) == theirs["value"]
 
 
-def test_fields_can_be_left_out(oracle: Oracle) -> None:
-    theirs = oracle.ask(type="geometry_msgs/Twist", args=[{}], fields=["angular", "x"])
+def test_fields_can_be_left_out(genpy: Worker) -> None:
+    theirs = genpy.call("text", "geometry_msgs/Twist", [{}], fields=["angular", "x"])
     assert strify_message(Twist(), field_filter=lambda _: ["angular", "x"]) == theirs["value"]
 
 
@@ -170,16 +171,16 @@ def filled(name: str, args: Any) -> Message:
 
 
 @pytest.mark.parametrize(("name", "args"), FILLS)
-def test_fill_as_genpy(oracle: Oracle, name: str, args: Any) -> None:
-    theirs = oracle.ask(type=name, args=listed(args), now=NOW)["value"]
+def test_fill_as_genpy(genpy: Worker, name: str, args: Any) -> None:
+    theirs = genpy.call("text", name, listed(args), now=NOW)["value"]
     if name in ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovariance"):
         theirs = theirs.replace("w: 0.0", "w: 1.0")  # ROS 2's default of a quaternion
     assert str(filled(name, args)) == theirs
 
 
 @pytest.mark.parametrize(("name", "args", "expected"), BAD_FILLS)
-def test_what_genpy_refuses(oracle: Oracle, name: str, args: Any, expected: str) -> None:
-    assert "error" in oracle.ask(type=name, args=listed(args), now=NOW)
+def test_what_genpy_refuses(genpy: Worker, name: str, args: Any, expected: str) -> None:
+    assert "error" in genpy.call("text", name, listed(args), now=NOW)
     with pytest.raises(EncodeError) as caught:
         filled(name, args)
     assert expected in str(caught.value)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rospy_oracle import ask
+from oracle import real
 from simulation import SimulatedClock
 
 from rosz.node.clock import Clock
@@ -71,15 +71,15 @@ rospy.init_node('talker', log_level=rospy.DEBUG, disable_signals=True)
 handler, = [h for h in logging.getLogger('rosout').handlers if hasattr(h, '_stdout')]
 log = types.SimpleNamespace(debug=rospy.logdebug, info=rospy.loginfo, warn=rospy.logwarn,
                             error=rospy.logerr, fatal=rospy.logfatal)
-moment = question['moment']
+moment = given['moment']
 real_time, real_strftime = time.time, time.strftime
-program = compile(open(question['program']).read(), question['program'], 'exec')
+program = compile(open(given['program']).read(), given['program'], 'exec')
 seen = []
-for form in question['formats']:
+for form in given['formats']:
     os.environ.pop('ROSCONSOLE_FORMAT', None)
     if form is not None:
         os.environ['ROSCONSOLE_FORMAT'] = form
-    for ros_time in question['ros_times']:
+    for ros_time in given['ros_times']:
         if ros_time is None:
             rospy.rostime.switch_to_wallclock()
         else:
@@ -92,10 +92,8 @@ for form in question['formats']:
             time.time, time.strftime = real_time, real_strftime
             seen.append([handler._stdout.getvalue(), handler._stderr.getvalue()])
 written = open(rospy.core._log_filename).read()
-answer([seen, [line for line in written.splitlines() if line.startswith('[rosout]')
-         and ' 2023-11-14 22:13:20,123: ' in line]])
-sys.__stdout__.flush()
-os._exit(0)
+result = [seen, [line for line in written.splitlines() if line.startswith('[rosout]')
+         and ' 2023-11-14 22:13:20,123: ' in line]]
 """
 
 
@@ -132,6 +130,7 @@ def clock_at(ros_time: int | None) -> Clock:
     return SimulatedClock(ros_time)
 
 
+@pytest.mark.ros1
 def test_console_and_file_are_rospys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = tmp_path / "program.py"
     program.write_text(_PROGRAM)
@@ -142,7 +141,9 @@ def test_console_and_file_are_rospys(tmp_path: Path, monkeypatch: pytest.MonkeyP
         "formats": _FORMATS,
         "ros_times": ros_times,
     }
-    expected, written = ask(_ROSPY_CONSOLE, question, tmp_path)
+    expected, written = real(
+        _ROSPY_CONSOLE, "rospy", "python3-rospy", given=question, home=str(tmp_path)
+    )
     seen = []
     for text_format in _FORMATS:
         for ros_time in ros_times:

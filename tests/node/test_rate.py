@@ -6,7 +6,7 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from rospy_oracle import ask
+from oracle import real
 from simulation import SECOND, START, SimulatedClock, Task
 
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
@@ -46,7 +46,7 @@ def run(loop):
     return seen
 
 rospy.rostime.set_rostime_initialized(True)
-answer([run(loop) for loop in question])
+result = [run(loop) for loop in given]
 """
 
 
@@ -114,9 +114,10 @@ def _run(loop: dict[str, object]) -> list[int | str]:
     return clock.seen
 
 
+@pytest.mark.ros1
 def test_rate_sleeps_exactly_as_rospys_does(tmp_path: Path) -> None:
     loops = _loops(400)
-    expected = ask(_ROSPY_LOOPS, loops, tmp_path)
+    expected = real(_ROSPY_LOOPS, "rospy", "python3-rospy", given=loops, home=str(tmp_path))
     assert sum(turn == "moved back" for seen in expected for turn in seen) > 100
     for loop, seen in zip(loops, expected, strict=True):
         assert _run(loop) == seen, loop

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
+from oracle import Worker, require
 
 from .network import Network
-from .ros1 import Ros1, available
 
 # ROSZ_EXAMPLES=20000 makes a night of it.
 settings.register_profile(
@@ -20,10 +20,9 @@ settings.load_profile("params")
 
 
 @pytest.fixture(scope="session")
-def ros1() -> Iterator[Ros1]:
-    if not available():
-        pytest.skip("ROS 1 is not installed: apt install python3-rosmaster python3-rosparam")
-    worker = Ros1()
+def ros1() -> Iterator[Worker]:
+    require("rosmaster", "rosparam", package="python3-rosmaster, python3-rosparam")
+    worker = Worker("rosparam_calls")
     yield worker
     worker.close()
 

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from oracle import Worker
 
 from rosz.errors import ParamError
 from rosz.params.history import History
@@ -15,7 +16,6 @@ from rosz.params.tree import MISSING, leaves, lookup
 from rosz.params.writes import DELETED, Change, condense, put, spread
 from rosz.params.yaml import dump, load_documents
 
-from .ros1 import Ros1
 from .strategies import BELOW_ROOT, DICTS, PARTS, PATHS, VALUES
 
 NAMES = PATHS.map(joined)
@@ -66,7 +66,7 @@ class Sequential:
 
 @given(STEPS)
 def test_every_sequential_history_gives_ros_1s_tree(
-    ros1: Ros1, steps: list[tuple[str, str, Any]]
+    ros1: Worker, steps: list[tuple[str, str, Any]]
 ) -> None:
     ours = Sequential()
     results = [ours.step(*step) for step in steps]
@@ -85,7 +85,7 @@ def _one_word(result: Any) -> Any:
     DICTS, st.lists(DOCUMENTS, min_size=1, max_size=3), st.sampled_from(["/", "/a", "/a/b", "/q"])
 )
 def test_loading_merges_as_rosparam_does(
-    ros1: Ros1, start: dict[str, Any], documents: list[Any], namespace: str
+    ros1: Worker, start: dict[str, Any], documents: list[Any], namespace: str
 ) -> None:
     text = "".join(f"---\n{dump(document)}" for document in documents if _plain(document))
     failed, expected = ros1.call("load", start, text, namespace)
@@ -136,7 +136,7 @@ def _plain(value: Any) -> bool:
         ("a//b: 1\nc/: 2", "/n"),
     ],
 )
-def test_odd_files_load_as_rosparam_loads_them(ros1: Ros1, text: str, namespace: str) -> None:
+def test_odd_files_load_as_rosparam_loads_them(ros1: Worker, text: str, namespace: str) -> None:
     start = {"a": {"old": 1}, "ns": 3}
     failed, expected = ros1.call("load", start, text, namespace)
     assert failed is None
@@ -146,7 +146,7 @@ def test_odd_files_load_as_rosparam_loads_them(ros1: Ros1, text: str, namespace:
     assert ours.root == expected
 
 
-def test_the_root_cannot_be_loaded_with_a_leaf(ros1: Ros1) -> None:
+def test_the_root_cannot_be_loaded_with_a_leaf(ros1: Worker) -> None:
     assert ros1.call("load", {}, "5", "/")[0] is not None
     with pytest.raises(ParamError, match="'/' can only be set to a dict, not to the int 5"):
         list(spread("/", 5))

@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from oracle import Worker
 
 from rosz.errors import YamlError
 from rosz.params.values import normalise
 from rosz.params.yaml import dump, format_get, load, load_all, load_documents, pretty
 
-from .ros1 import Ros1
 from .strategies import VALUES
 
 TEXTS = [
@@ -72,7 +72,7 @@ TEXTS = [
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_texts_mean_what_they_mean_to_rosparam(ros1: Ros1, text: str) -> None:
+def test_texts_mean_what_they_mean_to_rosparam(ros1: Worker, text: str) -> None:
     failed, values = ros1.call("read", text)
     assert failed is None
     found = load_all(text)
@@ -205,7 +205,7 @@ def _printable(value: Any) -> bool:
 
 
 @given(VALUES.filter(_printable))
-def test_printing_is_rosparams(ros1: Ros1, value: Any) -> None:
+def test_printing_is_rosparams(ros1: Worker, value: Any) -> None:
     assert [dump(value), format_get(value), pretty(value)] == ros1.call("show", value)
 
 
@@ -247,7 +247,7 @@ LONG = "word " * 40
         {"multi": "one\ntwo", "list": [1, "a\nb"], "n": 1.5},
     ],
 )
-def test_odd_values_print_as_rosparam_prints_them(ros1: Ros1, value: Any) -> None:
+def test_odd_values_print_as_rosparam_prints_them(ros1: Worker, value: Any) -> None:
     assert [dump(value), format_get(value), pretty(value)] == ros1.call("show", value)
 
 

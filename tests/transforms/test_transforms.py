@@ -6,7 +6,7 @@ import random
 
 import pytest
 from network import Network, eventually
-from ros1_oracle import same
+from oracle import same
 
 from rosz.errors import (
     ExtrapolationNeeded,
@@ -65,6 +65,7 @@ def numbers(chance: random.Random) -> list[float]:
     return [chance.uniform(-5, 5) for _ in range(3)] + [part / length for part in rotation]
 
 
+@pytest.mark.ros1
 @pytest.mark.parametrize("seed", range(6))
 def test_random_trees(seed: int) -> None:
     chance = random.Random(seed)
@@ -90,6 +91,7 @@ def test_random_trees(seed: int) -> None:
     )
 
 
+@pytest.mark.ros1
 def test_texts_are_those_of_tf2() -> None:
     same(
         _SETUP
@@ -118,6 +120,7 @@ result = [ask(target, source, seconds) for target, source, seconds in [
     )
 
 
+@pytest.mark.ros1
 def test_fixed_frames() -> None:
     same(
         _SETUP

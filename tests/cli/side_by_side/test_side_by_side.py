@@ -25,10 +25,6 @@ _NODES = ("topic echo", "topic hz", "topic bw", "topic delay", "topic pub", "ser
 _STATEFUL = "param "
 """Commands that build on those before them."""
 
-needs_ros1 = pytest.mark.skipif(
-    not Ros1.available(), reason="ROS 1 is not installed: apt install python3-rostopic ..."
-)
-
 
 def answers(world: World, lines: Sequence[str]) -> list[tuple[str, Outcome]]:
     """Return what a world answers to lines; one may be there twice, and mean something else then.
@@ -74,7 +70,7 @@ def test_rosz_answers_as_ros_1() -> None:
     assert not alike & set(DIFFERENCES), "these no longer differ"
 
 
-@needs_ros1
+@pytest.mark.ros1
 @pytest.mark.timeout(240)
 def test_ros_1_answers_as_recorded() -> None:
     if os.environ.get("ROSZ_TEST_RECORD"):

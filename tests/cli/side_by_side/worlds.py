@@ -6,17 +6,17 @@ import os
 import shlex
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import threading
-import time
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
 import msgspec
+from network import eventually, free_port
+from oracle import PYTHON, is_installed, require
 
 from rosz.session import is_listening
 
@@ -24,7 +24,8 @@ __all__ = ("Outcome", "Ros1", "Rosz", "World")
 
 _ROOT = Path(__file__).parents[3]
 _NODES = Path(__file__).with_name("nodes.py")
-_PATIENCE = 40.0
+_TIMEOUT = 40.0
+_MODULES = ("rosmaster", "rostopic", "rosservice", "rosnode", "rosmsg", "rosparam", "std_srvs.srv")
 _SOME = 3
 """Lines after which what goes on for ever has said enough."""
 
@@ -87,8 +88,8 @@ class World:
             if interrupt:
                 out, err = _beginning(process)
             else:
-                out, err = process.communicate(timeout=_PATIENCE)
-            return Outcome(process.wait(_PATIENCE), out, err)
+                out, err = process.communicate(timeout=_TIMEOUT)
+            return Outcome(process.wait(_TIMEOUT), out, err)
 
     def start(self, *command: str) -> subprocess.Popen[str]:
         """Start a program that ends with this world."""
@@ -122,7 +123,7 @@ class World:
             process = self._programs.pop()
             process.send_signal(signal.SIGINT)
             try:
-                process.wait(_PATIENCE)
+                process.wait(_TIMEOUT)
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
@@ -135,22 +136,20 @@ class Ros1(World):
     """ROS 1 as Debian packages it."""
 
     def __init__(self) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
+        require(*_MODULES, package="ros-base, python3-rostopic and the other commands")
+        self._port = free_port()
         environ = {
             "PATH": "/usr/bin:/bin",
             "LANG": "C.UTF-8",
             "ROS_MASTER_URI": f"http://127.0.0.1:{self._port}",
             "ROS_IP": "127.0.0.1",
         }
-        super().__init__(["/usr/bin/python3"], environ)
+        super().__init__([PYTHON], environ)
 
     @staticmethod
     def available() -> bool:
-        """Tell whether it is installed."""
-        tools = ("roscore", "rostopic", "rosservice", "rosnode", "rosmsg", "rosparam")
-        return all(Path("/usr/bin", tool).exists() for tool in tools)
+        """Return whether it is installed."""
+        return is_installed(*_MODULES)
 
     def command(self, line: str) -> list[str]:
         group, *words = split(line)
@@ -158,10 +157,7 @@ class Ros1(World):
 
     def __enter__(self) -> Self:
         self.start("/usr/bin/roscore", "-p", str(self._port))
-        deadline = time.monotonic() + _PATIENCE
-        while not is_listening(f"tcp/127.0.0.1:{self._port}"):
-            assert time.monotonic() < deadline, "roscore does not start"
-            time.sleep(0.02)
+        eventually(lambda: is_listening(f"tcp/127.0.0.1:{self._port}"), "roscore", _TIMEOUT)
         return super().__enter__()
 
 
@@ -201,7 +197,7 @@ def _beginning(process: subprocess.Popen[str]) -> tuple[str, str]:
         said.append(line)
         if len(said) == _SOME:
             process.send_signal(signal.SIGINT)
-    listener.join(_PATIENCE)
+    listener.join(_TIMEOUT)
     return "".join(said[:_SOME]), "".join(complaints)
 
 

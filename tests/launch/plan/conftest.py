@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from .roslaunch_oracle import Roslaunch, Rosz, environment, real_roslaunch
+from .roslaunch_oracle import Roslaunch, Rosz, environment
 
 PACKAGES = Path(__file__).with_name("packages")
 
@@ -19,8 +19,9 @@ def environ(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.fixture(scope="session")
 def roslaunch(environ: dict[str, str]) -> Iterator[Roslaunch]:
-    with real_roslaunch(environ) as found:
-        yield found
+    found = Roslaunch(environ)
+    yield found
+    found.close()
 
 
 @pytest.fixture(scope="session")

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pytest
 import yaml
+from oracle import Worker, require
 
 from rosz import names
 from rosz.errors import RoszError
@@ -27,40 +24,17 @@ from rosz.launch.plan import (
 )
 from rosz.packages import PackageIndex
 
-_PYTHON = Path("/usr/bin/python3")
-_WORKER = Path(__file__).with_name("roslaunch_worker.py")
 
-
-class Roslaunch:
-    """Real roslaunch in one long-lived process, started again after a question that failed.
+class Roslaunch(Worker):
+    """Real roslaunch in one long-lived process.
 
     Args:
         environ: Its environment, by `environment`.
     """
 
     def __init__(self, environ: Mapping[str, str]) -> None:
-        self._log = Path(environ["ROS_HOME"], "roslaunch.log")
-        self._environ = dict(environ)
-        self._start()
-
-    def _start(self) -> None:
-        with self._log.open("w") as log:
-            self._process = subprocess.Popen(
-                [_PYTHON, _WORKER],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                text=True,
-                env=self._environ,
-            )
-        if not self._line():
-            self.close()
-            reason = (self._log.read_text().splitlines() or ["it ended at once"])[-1]
-            pytest.skip(f"no roslaunch to compare with: {reason}")
-
-    def _line(self) -> str:
-        assert self._process.stdout is not None
-        return self._process.stdout.readline()
+        require("roslaunch", package="python3-roslaunch")
+        super().__init__("roslaunch_calls", environ)
 
     def ask(
         self,
@@ -70,7 +44,6 @@ class Roslaunch:
         environ: Mapping[str, str] | None = None,
     ) -> dict[str, Any]:
         """Return what roslaunch makes of some files."""
-        assert self._process.stdin is not None
         question = {
             "files": list(files),
             "argv": list(argv),
@@ -78,27 +51,8 @@ class Roslaunch:
             "environ": dict(environ or {}),
             "unset": ["ROS_NAMESPACE", "ROSZ_TEST"],
         }
-        try:
-            self._process.stdin.write(json.dumps(question) + "\n")
-            self._process.stdin.flush()
-            line = self._line()
-            assert line, self._log.read_text()[-2000:]
-        except BaseException:  # such as a time limit: the reply would be taken for the next one
-            self._process.kill()
-            self.close()
-            self._start()
-            raise
-        found: dict[str, Any] = json.loads(line)
+        found: dict[str, Any] = self.call("load", question)
         return found
-
-    def close(self) -> None:
-        """End the process."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with suppress(BrokenPipeError):
-            self._process.stdin.close()
-        self._process.wait(10)
-        self._process.stdout.close()
 
 
 def environment(packages: Path, home: Path) -> dict[str, str]:
@@ -111,18 +65,6 @@ def environment(packages: Path, home: Path) -> dict[str, str]:
         "ROS_MASTER_URI": "http://127.0.0.1:1",
         "ROS_PACKAGE_PATH": str(packages),
     }
-
-
-@contextmanager
-def real_roslaunch(environ: Mapping[str, str]) -> Iterator[Roslaunch]:
-    """Start real roslaunch; skip where there is none."""
-    if not _PYTHON.exists():
-        pytest.skip(f"no Python at {_PYTHON}, so no roslaunch to compare with")
-    found = Roslaunch(environ)
-    try:
-        yield found
-    finally:
-        found.close()
 
 
 class Rosz:

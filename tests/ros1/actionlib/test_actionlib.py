@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from network import Network
-from ros1_oracle import real
+from oracle import real
 
 from rosz.packages import PackageIndex
 from rosz.typestore import TypeStore
@@ -152,6 +152,7 @@ def test_goal_callbacks(network: Network, path: str) -> None:
     assert program.lines == ["9 True", "goal 7", "preempt True", "True 2 False", "False"]
 
 
+@pytest.mark.ros1
 def test_messages_of_actions_are_those_of_ros1(tmp_path: Path) -> None:
     text = "int64 a\nint64 b\n---\nint64 sum\n---\n"
     folder = tmp_path / "actionlib" / "action"

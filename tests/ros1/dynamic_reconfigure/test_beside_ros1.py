@@ -6,7 +6,6 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -16,14 +15,14 @@ from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 import pytest
-from network import Network, Program, eventually
+from network import Network, Program, eventually, free_port
+from oracle import PYTHON, require
 
 from .cfg_samples import BESIDE, SAMPLES
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.ros1, pytest.mark.timeout(300)]
 
 PROGRAMS = Path(__file__).with_name("programs")
-PYTHON = "/usr/bin/python3"
 _PROGRAM_SAYS = re.compile(r"\[\(|/|serving|end")
 """Lines of the server itself: what the libraries log of a fault is theirs."""
 
@@ -96,16 +95,9 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ros(workspace: Path) -> Iterator[Side]:
-    probe = "import dynamic_reconfigure, rospy, roslaunch"
-    installed = (
-        DYNPARAM.exists()
-        and not subprocess.run([PYTHON, "-c", probe], check=False, capture_output=True).returncode
-    )
-    if not installed:
-        pytest.skip("nothing to compare with (Debian: ros-base, python3-dynamic-reconfigure)")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    modules = ("dynamic_reconfigure", "rospy", "roslaunch")
+    require(*modules, package="ros-base, python3-dynamic-reconfigure")
+    port = free_port()
     generated = workspace / "generated"
     variables = {
         "PATH": "/usr/bin:/bin",

@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from oracle import PYTHON, require
 
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import GroupState
@@ -20,7 +21,6 @@ from rosz.ros1.importer import install, uninstall
 
 from .cfg_samples import BESIDE, SAMPLES
 
-PYTHON = Path("/usr/bin/python3")
 CHANGES = {"a": 1, "b": True, "c": "x", "d": 0.5}
 NAMES = [*SAMPLES, "Test"]
 
@@ -38,13 +38,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 @pytest.fixture(scope="module")
 def theirs(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("generated")
-    if not PYTHON.exists():
-        pytest.skip(f"no Python at {PYTHON}, so no dynamic_reconfigure to compare with")
-    probe = subprocess.run(
-        [PYTHON, "-c", "import dynamic_reconfigure"], check=False, capture_output=True
-    )
-    if probe.returncode:
-        pytest.skip("nothing to compare with (Debian: python3-dynamic-reconfigure)")
+    require("dynamic_reconfigure", package="python3-dynamic-reconfigure")
     done = subprocess.run(
         [PYTHON, "-W", "ignore", str(Path(__file__).with_name("reconfigure_worker.py"))],
         input=json.dumps(

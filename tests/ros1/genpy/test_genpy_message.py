@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 import pytest
-from ros1_oracle import same
+from oracle import same
 
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.sensor_msgs.msg import LaserScan
@@ -24,6 +24,7 @@ TYPES = (
 )
 
 
+@pytest.mark.ros1
 def test_types_are_checked_as_genpy_does() -> None:
     same(
         f"""
@@ -68,6 +69,7 @@ def test_classes_by_name() -> None:
         genpy.message.get_message_class("String")
 
 
+@pytest.mark.ros1
 def test_printable_arguments() -> None:
     same(
         """

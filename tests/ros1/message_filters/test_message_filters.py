@@ -7,7 +7,7 @@ import time
 
 import pytest
 from network import Network
-from ros1_oracle import same
+from oracle import same
 
 from rosz.msgs.builtin_interfaces.msg import Time
 
@@ -58,6 +58,7 @@ def play():
     )
 
 
+@pytest.mark.ros1
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("slop", [0.01, 0.05, 0.2])
 def test_approximate_time_synchronizer(seed: int, slop: float) -> None:
@@ -73,6 +74,7 @@ result = heard
     )
 
 
+@pytest.mark.ros1
 @pytest.mark.parametrize("seed", range(3))
 def test_time_synchronizer(seed: int) -> None:
     same(
@@ -87,6 +89,7 @@ result = heard
     )
 
 
+@pytest.mark.ros1
 def test_messages_without_stamps() -> None:
     same(
         _SETUP
@@ -104,6 +107,7 @@ result = heard
     )
 
 
+@pytest.mark.ros1
 def test_cache() -> None:
     same(
         _SETUP

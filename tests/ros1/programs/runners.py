@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -16,7 +15,8 @@ from typing import IO, NamedTuple
 from xmlrpc.client import ServerProxy
 
 import pytest
-from network import Network, eventually
+from network import Network, eventually, free_port
+from oracle import PYTHON, require
 
 from .scenarios import Part, Scenario
 
@@ -24,12 +24,11 @@ __all__ = ("Outcome", "Ros", "Rosz")
 
 SCRIPTS = Path(__file__).parent / "scripts"
 PACKAGES = Path(__file__).parent / "packages"
-_DEBIAN = "/usr/bin/python3"
 _GENPY = Path("/usr/lib/genpy")
 _TIMEOUT = 25.0
 _NEEDED = (
-    "genpy, rospy, rosgraph_msgs, std_srvs, geometry_msgs, nav_msgs, sensor_msgs, diagnostic_msgs,"
-    " roscpp.srv, numpy"
+    *("genpy", "rospy", "rosmaster", "rosgraph_msgs", "std_srvs", "geometry_msgs", "nav_msgs"),
+    *("sensor_msgs", "diagnostic_msgs", "roscpp.srv", "numpy"),
 )
 
 _CHANGING: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
@@ -163,9 +162,7 @@ class Ros(_Runner):
 
     def __init__(self, folder: Path) -> None:
         self._generated = folder / "generated"
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         self._variables = {
             "PATH": "/usr/bin:/bin",
             "HOME": str(folder),
@@ -192,7 +189,7 @@ class Ros(_Runner):
 
     def command(self, part: Part) -> list[str]:
         """Return the command line for Debian's Python."""
-        return [_DEBIAN, str(SCRIPTS / part.script), *part.arguments]
+        return [PYTHON, str(SCRIPTS / part.script), *part.arguments]
 
     def variables(self) -> dict[str, str]:
         """Return the environment with the URI of the roscore."""
@@ -214,13 +211,7 @@ class Ros(_Runner):
             self._core.wait()
 
     def _require(self) -> None:
-        if not Path("/usr/bin/roscore").exists():
-            pytest.skip("no real ROS 1 to compare with (Debian: ros-base, python3-rospy)")
-        done = subprocess.run(
-            [_DEBIAN, "-c", f"import {_NEEDED}"], capture_output=True, text=True, check=False
-        )
-        if done.returncode:
-            pytest.skip(f"ROS 1 to compare with is incomplete: {done.stderr.splitlines()[-1]}")
+        require(*_NEEDED, package="ros-base, python3-rospy, python3-numpy and messages")
 
     def _generate(self) -> None:
         """Generate Python modules of the test packages with genpy, as catkin_make does."""
@@ -234,7 +225,7 @@ class Ros(_Runner):
                 generator = str(_GENPY / f"gen{kind}_py.py")
                 options = ["-p", package.name, "-o", str(target)]
                 for command in ([*files, *paths], ["--initpy"]):
-                    subprocess.run([_DEBIAN, generator, *options, *command], check=True)
+                    subprocess.run([PYTHON, generator, *options, *command], check=True)
             (target.parent / "__init__.py").touch()
 
     def _parameters(self) -> list[str]:

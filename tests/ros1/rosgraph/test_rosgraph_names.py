@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from ros1_oracle import same
+from oracle import same
 
 from rosz.ros1.rosgraph import names, network
 
@@ -14,6 +14,7 @@ ONE = ("canonicalize_name", "is_legal_name", "is_legal_base_name", "is_legal_rem
 ARGUMENTS = ["a:=b", "_a:=b", "__name:=x", "a:=", ":=b", "/a:=~b", "a:=b:=c", "x", "a:= b ", "1:=2"]
 
 
+@pytest.mark.ros1
 @pytest.mark.parametrize("function", ONE)
 def test_functions_of_one_argument(function: str) -> None:
     skipped = "[1:-1]" if function == "namespace" else ""
@@ -27,6 +28,7 @@ def test_functions_of_one_argument(function: str) -> None:
     )
 
 
+@pytest.mark.ros1
 @pytest.mark.parametrize("function", ["is_global", "is_private"])
 def test_predicates(function: str) -> None:
     same(
@@ -39,6 +41,7 @@ def test_predicates(function: str) -> None:
     )
 
 
+@pytest.mark.ros1
 def test_join_and_resolve() -> None:
     same(
         f"""
@@ -60,6 +63,7 @@ def test_join_and_resolve() -> None:
     )
 
 
+@pytest.mark.ros1
 def test_command_lines() -> None:
     same(
         f"""
@@ -88,6 +92,7 @@ def test_anonymous_names_are_legal() -> None:
     assert names.is_legal_base_name(name)
 
 
+@pytest.mark.ros1
 def test_names_of_resources() -> None:
     same(
         f"""
@@ -110,6 +115,7 @@ def test_names_of_resources() -> None:
     )
 
 
+@pytest.mark.ros1
 def test_addresses() -> None:
     assert network.get_local_addresses()
     assert network.is_local_address("127.0.0.1")

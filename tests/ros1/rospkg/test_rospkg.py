@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from ros1_oracle import same
+from oracle import same
 
 from rosz.ros1 import roslib, rospkg
 
@@ -51,6 +51,7 @@ def test_find_packages(packs: rospkg.RosPack, tmp_path: Path) -> None:
     assert packs.ros_paths == packs.get_ros_paths() == [str(tmp_path)]
 
 
+@pytest.mark.ros1
 def test_error_of_a_missing_package(tmp_path: Path) -> None:
     same(
         f"""
@@ -76,6 +77,7 @@ def test_manifest(packs: rospkg.RosPack, tmp_path: Path) -> None:
     assert found.is_catkin
 
 
+@pytest.mark.ros1
 @pytest.mark.usefixtures("packs")
 def test_manifest_equals_that_of_rospkg(tmp_path: Path) -> None:
     same(
@@ -127,6 +129,7 @@ def test_shipped_packages_are_found() -> None:
     assert roslib.get_pkg_dir("std_msgs") == rospkg.RosPack().get_path("std_msgs")
 
 
+@pytest.mark.ros1
 def test_folders_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("ROS_HOME", "ROS_LOG_DIR", "ROS_ROOT", "ROS_TEST_RESULTS_DIR", "ROS_ETC_DIR"):
         monkeypatch.delenv(name, raising=False)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ros1_oracle import same
+from oracle import same
 
 from rosz.errors import UsageError
 from rosz.ros1.tf import transformations as t
@@ -34,6 +34,7 @@ def test_all_orders_of_axes_are_tried() -> None:
     assert len(ORDERS) == 24
 
 
+@pytest.mark.ros1
 def test_angles_of_all_orders() -> None:
     same(
         f"""
@@ -62,6 +63,7 @@ def test_angles_come_to_the_same_rotation(axes: str) -> None:
             np.testing.assert_allclose(t.euler_matrix(*found, axes), matrix, atol=1e-7)
 
 
+@pytest.mark.ros1
 def test_orders_as_numbers() -> None:
     same(
         """
@@ -81,6 +83,7 @@ def test_invalid_orders_of_axes(axes: str) -> None:
         t.euler_matrix(0, 0, 0, axes)
 
 
+@pytest.mark.ros1
 def test_quaternions() -> None:
     same(
         """
@@ -101,6 +104,7 @@ def test_quaternions() -> None:
     )
 
 
+@pytest.mark.ros1
 def test_quaternion_of_a_matrix() -> None:
     same(
         """
@@ -116,6 +120,7 @@ def test_quaternion_of_a_matrix() -> None:
     )
 
 
+@pytest.mark.ros1
 def test_matrices() -> None:
     same(
         """
@@ -144,6 +149,7 @@ def test_matrices() -> None:
     )
 
 
+@pytest.mark.ros1
 def test_vectors() -> None:
     same(
         """
@@ -162,6 +168,7 @@ def test_vectors() -> None:
     )
 
 
+@pytest.mark.ros1
 def test_parts_of_a_matrix() -> None:
     same(
         """

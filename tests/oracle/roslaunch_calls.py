@@ -1,11 +1,10 @@
-"""Real roslaunch under the system's Python: a line of JSON in, a line of JSON out."""
+"""Functions of real roslaunch."""
 
 from __future__ import annotations
 
 import contextlib
 import importlib
 import io
-import json
 import os
 import sys
 import xmlrpc.client
@@ -17,9 +16,7 @@ def module(name: str) -> Any:
     return importlib.import_module(name)
 
 
-yaml = module("yaml")
 graph_names = module("rosgraph.names")
-roslaunch = module("roslaunch")
 arg_dump = module("roslaunch.arg_dump")
 config_module = module("roslaunch.config")
 node_args = module("roslaunch.node_args")
@@ -31,7 +28,6 @@ XmlLoader = module("roslaunch.xmlloader").XmlLoader
 # The core's own definition costs two processes per file and adds nothing of the file's.
 config_module.load_roscore = lambda *_, **__: None
 
-ANSWERS = os.fdopen(os.dup(1), "w")
 counts: dict[str, int] = {}
 
 
@@ -98,7 +94,7 @@ def start(config: Any) -> None:
             node_args.create_local_process_args(node, node.machine)
 
 
-def answer(question: Any) -> dict[str, Any]:
+def load(question: Any) -> dict[str, Any]:
     """Load the requested files and report on them."""
     os.chdir(question["cwd"])
     for name in question["unset"]:
@@ -150,11 +146,3 @@ def answer(question: Any) -> dict[str, Any]:
     except Exception as error:  # noqa: BLE001  # whatever it is, roslaunch gives up
         return {"error": f"at the start, {type(error).__name__}: {error}"}
     return found
-
-
-ANSWERS.write(json.dumps({"roslaunch": roslaunch.__file__, "yaml": yaml.__version__}) + "\n")
-ANSWERS.flush()
-with contextlib.redirect_stdout(sys.stderr):
-    for line in sys.stdin:
-        ANSWERS.write(json.dumps(answer(json.loads(line))) + "\n")
-        ANSWERS.flush()

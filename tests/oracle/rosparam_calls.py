@@ -1,15 +1,10 @@
-"""Runs under the interpreter that ROS 1 is installed for, and does there what it is asked.
-
-Each request is one pickled list on stdin, each answer one on stdout, both behind their length.
-"""
+"""Functions of real rosparam and rosmaster.paramserver."""
 
 # ruff: noqa: ANN001, ANN201, BLE001
 # mypy: ignore-errors
 import contextlib
 import io
 import os
-import pickle
-import struct
 import sys
 import xmlrpc.client
 
@@ -147,22 +142,3 @@ def commands(lines, stdin, folder):
                 err.write(f"{error.__class__.__name__}: {error}")
         answers.append((code, out.getvalue(), err.getvalue()))
     return answers
-
-
-CALLS = {"commands": commands, "history": history, "load": load, "read": read, "show": show}
-
-
-def main():
-    stdin, stdout = sys.stdin.buffer, sys.stdout.buffer
-    while True:
-        head = stdin.read(4)
-        if not head:
-            return
-        name, *arguments = pickle.loads(stdin.read(struct.unpack("<I", head)[0]))
-        body = pickle.dumps(CALLS[name](*arguments), protocol=4)
-        stdout.write(struct.pack("<I", len(body)) + body)
-        stdout.flush()
-
-
-if __name__ == "__main__":
-    main()
