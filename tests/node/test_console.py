@@ -58,6 +58,7 @@ failing(log)
 '''
 _ROSPY_CONSOLE = """
 import io, logging, os, time, types
+import rosmaster, rospy
 import rosmaster.master, rosmaster.registrations
 
 class Terminal(io.StringIO):

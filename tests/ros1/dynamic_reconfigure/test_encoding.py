@@ -21,6 +21,8 @@ from rosz.ros1.importer import install, uninstall
 
 from .cfg_samples import BESIDE, SAMPLES
 
+pytestmark = pytest.mark.ros1
+
 CHANGES = {"a": 1, "b": True, "c": "x", "d": 0.5}
 NAMES = [*SAMPLES, "Test"]
 
