@@ -109,8 +109,11 @@ class Lifecycle:
         self._parts: list[Closable] = []
         self._hooks: list[Hook] = []
         self._closer: dict[str, tuple[int]] = {}
-        self._closing_flag = _Flag()
-        self._closed_flag = _Flag()
+        # Locks that are released once, since a signal handler must not set an event whose own
+        # thread is about to wait for it.
+        self._until_closing, self._until_closed = threading.Lock(), threading.Lock()
+        self._until_closing.acquire()
+        self._until_closed.acquire()
         self._number = next(_numbers)
         _lifecycles.add(self)
 
@@ -197,7 +200,7 @@ class Lifecycle:
         try:
             self.reason = reason or self.reason
             self.closing = True
-            self._closing_flag.set()
+            self._until_closing.release()
             if first is not None:
                 first()
             while self._hooks:
@@ -219,7 +222,7 @@ class Lifecycle:
         Returns:
             Whether closing has begun.
         """
-        return self.closing or self._closing_flag.wait(timeout)
+        return self.closing or _wait(self._until_closing, timeout)
 
     def _close_parts(self) -> None:
         try:
@@ -231,11 +234,11 @@ class Lifecycle:
                     self._log.exception("a part of %s could not be closed", self._what)
         finally:
             self.closed = True
-            self._closed_flag.set()
+            self._until_closed.release()
 
     def _wait_for_closer(self) -> bool:
         """Wait for the first caller, which the main thread must not outrun on its way out."""
-        if self._closed_flag.wait(_CLOSED_BY):
+        if _wait(self._until_closed, _CLOSED_BY):
             return True
         self._log.warning(
             "closing %s takes more than %g s: a hook blocks it", self._what, _CLOSED_BY
@@ -247,32 +250,13 @@ class Lifecycle:
         self.forked = self.closing = self.closed = True
         self._closer = {"": (threading.get_ident(),)}
 
-    def _run_fork_hook(self) -> None:
-        on_fork = None if self._on_fork is None else self._on_fork()
-        if on_fork is not None:
-            on_fork()
 
-
-class _Flag:
-    """An event that a signal handler may set while its own thread is about to wait for it."""
-
-    def __init__(self) -> None:
-        self._is_set = False
-        self._waiters: list[threading.Lock] = []
-
-    def set(self) -> None:
-        self._is_set = True
-        while self._waiters:
-            self._waiters.pop().release()
-
-    def wait(self, timeout: float | None) -> bool:
-        waiter = threading.Lock()
-        waiter.acquire()
-        self._waiters.append(waiter)
-        try:
-            return self._is_set or waiter.acquire(timeout=-1 if timeout is None else timeout)
-        finally:
-            _remove(self._waiters, waiter)
+def _wait(until: threading.Lock, timeout: float | None) -> bool:
+    """Wait for the release of a lock, and release it for the next waiter."""
+    released = until.acquire(timeout=-1 if timeout is None else timeout)
+    if released:
+        until.release()
+    return released
 
 
 def _remove(items: list[T], item: T) -> bool:
@@ -293,7 +277,9 @@ def _close_all_in_child() -> None:
     for lifecycle in inherited:
         lifecycle._close_in_child()  # noqa: SLF001
     for lifecycle in inherited:
-        lifecycle._run_fork_hook()  # noqa: SLF001
+        on_fork = lifecycle._on_fork and lifecycle._on_fork()  # noqa: SLF001
+        if on_fork is not None:
+            on_fork()
 
 
 os.register_at_fork(after_in_child=_close_all_in_child)

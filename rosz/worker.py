@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from rosz.errors import ClosedError
 
@@ -57,26 +57,12 @@ def run_task(task: Callable[[], object]) -> None:
     task()
 
 
-class _End:
-    """The end of a queue."""
-
-
-class _Barrier:
-    """A place in a queue that `Worker.flush` waits for."""
-
-    def __init__(self) -> None:
-        self.reached = threading.Event()
-
-
 class _Delayed:
     """An item that is due later."""
 
     def __init__(self, due: float, item: Any) -> None:
         self.due = due
         self.item = item
-
-
-_END: Final = _End()
 
 
 class Worker(Generic[T]):
@@ -121,7 +107,8 @@ class Worker(Generic[T]):
         self._size = size
         self._log = logger
         # A SimpleQueue is reentrant: a signal handler that logs may submit while submit runs.
-        self._queue: SimpleQueue[T | _Delayed | _Barrier | _End] = SimpleQueue()
+        # Beside items it holds the events that `flush` waits for, and None at its end.
+        self._queue: SimpleQueue[T | _Delayed | threading.Event | None] = SimpleQueue()
         self._delayed: list[tuple[float, int, T]] = []
         self._numbers = itertools.count()
         self._waiting = 0
@@ -201,9 +188,9 @@ class Worker(Generic[T]):
         """
         if self.is_current or self.closed or not self._threads:
             return not self.waiting
-        barrier = _Barrier()
-        self._queue.put(barrier)
-        return barrier.reached.wait(timeout)
+        reached = threading.Event()
+        self._queue.put(reached)
+        return reached.wait(timeout)
 
     def close(self, timeout: float = _CLOSE_TIMEOUT) -> None:
         """Handle what is queued, and end; a second call has no effect.
@@ -216,7 +203,7 @@ class Worker(Generic[T]):
         with self._lock:
             first, self.closed = not self.closed, True
         if first:
-            self._queue.put(_END)
+            self._queue.put(None)
         if self.is_current:
             return
         deadline = time.monotonic() + timeout
@@ -230,7 +217,7 @@ class Worker(Generic[T]):
                 if not self._threads:
                     self._add_thread()
 
-    def _add_thread(self) -> bool:
+    def _add_thread(self) -> None:
         thread = threading.Thread(target=self._run, name=self.name, daemon=True)
         self._threads.add(thread)
         self._idle += 1
@@ -241,7 +228,6 @@ class Worker(Generic[T]):
             if not started:
                 self._threads.discard(thread)
                 self._idle -= 1
-        return started
 
     def _run(self) -> None:
         single = self._limit == 1
@@ -291,21 +277,21 @@ class Worker(Generic[T]):
                 entry = self._queue.get(timeout=wait)
             except Empty:
                 continue
-            if isinstance(entry, _End):
-                self._release_barriers()
-                self._queue.put(entry)  # for the other threads
+            if entry is None:
+                self._end_flushes()
+                self._queue.put(None)  # for the other threads
                 return None
-            if isinstance(entry, _Barrier):
-                entry.reached.set()
+            if isinstance(entry, threading.Event):
+                entry.set()
             elif isinstance(entry, _Delayed):
                 heapq.heappush(self._delayed, (entry.due, next(self._numbers), entry.item))
             else:
                 return entry
 
-    def _release_barriers(self) -> None:
+    def _end_flushes(self) -> None:
         """Wake those who called `flush` while the worker was being closed."""
         with suppress(Empty):
             while True:
                 entry = self._queue.get_nowait()
-                if isinstance(entry, _Barrier):
-                    entry.reached.set()
+                if isinstance(entry, threading.Event):
+                    entry.set()

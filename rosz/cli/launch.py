@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         StatusClient,
         Workplace,
     )
-    from rosz.node.context import Context
+    from rosz.node import Context
     from rosz.packages import PackageIndex
 
 __all__ = ("app",)
@@ -279,7 +279,7 @@ class _Launch:
         self, plan: Plan, options: Options, *, wait: bool, router: RouterProcess | None = None
     ) -> int:
         from rosz.launch.run import Network, Runner
-        from rosz.node.context import Context
+        from rosz.node import Context
 
         with Context(self.environment) as context:
             if wait:

@@ -84,7 +84,7 @@ def _set_level(call: Call, words: Sequence[str]) -> None:
         raise UsageError("expected: rosz log level NODE LOGGER LEVEL")
     from rosz.introspect.nodes import find_nodes, set_level
     from rosz.introspect.survey import take_survey
-    from rosz.node.logger import parse_severity
+    from rosz.node import parse_severity
 
     _, node, logger, level = words
     parse_severity(level)

@@ -21,7 +21,7 @@ from rosz.doctor.finding import Finding, error, warning
 from rosz.doctor.machine import stopped_note
 from rosz.errors import DecodeError
 from rosz.introspect.survey import Survey, process_address, take_survey
-from rosz.node.control import NodeInfo, Request, control_key
+from rosz.node import NodeInfo, Request, control_key
 from rosz.params.wire import Keys, Member, SyncReply, SyncRequest, decode, encode
 from rosz.session import Sample, Session
 from rosz.wire import Kind, Token, entity_key, unpack_attachment

@@ -18,8 +18,7 @@ from rosz.names import short_type
 from rosz.wire import Kind, Token, tokens_key
 
 if TYPE_CHECKING:
-    from rosz.node import NodeInfo
-    from rosz.node.control import Request
+    from rosz.node import NodeInfo, Request
     from rosz.session import Session
 
 __all__ = (
@@ -190,7 +189,7 @@ def query_node(
         WaitTimeout: The node does not reply in time.
         RoszError: The node refuses, or its reply cannot be decoded; the text says why.
     """
-    from rosz.node.control import control_key
+    from rosz.node import control_key
 
     key = control_key(node.domain, node.zid, node.node_id)
     replies = session.get(key, payload=msgspec.msgpack.encode(request), timeout=timeout)
@@ -216,7 +215,7 @@ def query_node(
 
 def get_info(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> NodeInfo:
     """Return the information that a node gives of itself; errors as those of `query_node`."""
-    from rosz.node.control import NodeInfo, Request
+    from rosz.node import NodeInfo, Request
 
     return query_node(session, node, Request("info"), NodeInfo, timeout)
 
@@ -257,7 +256,7 @@ def kill(session: Session, node: Token, reason: str) -> None:
         WaitTimeout: The node does not reply, or replies and stays.
         RoszError: The node refuses.
     """
-    from rosz.node.control import Request
+    from rosz.node import Request
 
     gone = threading.Event()
     prefix = f"{tokens_key(node.domain, node.zid).removesuffix('**')}{node.node_id}/"
@@ -302,13 +301,13 @@ def kill_nodes(
 
 def get_levels(session: Session, node: Token) -> dict[str, str]:
     """Return the loggers of a node with their levels; errors as those of `query_node`."""
-    from rosz.node.control import Request
+    from rosz.node import Request
 
     return query_node(session, node, Request("levels"), dict[str, str])
 
 
 def set_level(session: Session, node: Token, logger: str, level: str) -> None:
     """Set the level of a logger of a node; errors as those of `query_node`."""
-    from rosz.node.control import Request
+    from rosz.node import Request
 
     query_node(session, node, Request("set_level", logger=logger, level=level), bool)

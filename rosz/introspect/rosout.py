@@ -9,7 +9,7 @@ import msgspec
 
 from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import Log
-from rosz.node.logger import parse_severity, severity_name
+from rosz.node import parse_severity, severity_name
 
 __all__ = ("LogFilter", "LogLine", "format_line", "read_line", "ros1_node")
 

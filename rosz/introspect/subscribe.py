@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rosz import names
 from rosz.errors import DefinitionError, InvalidName, NotFoundError
 from rosz.introspect.fields import Target, find_target
-from rosz.node.entity import Entity
+from rosz.node import Entity
 from rosz.qos import DEFAULT
 from rosz.wire import NO_HASH, Kind, Token, entity_key
 

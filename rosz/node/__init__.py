@@ -1,32 +1,59 @@
 """Nodes and their parts: publishers, subscriptions, services, clients, timers, a log.
 
-Other packages of rosz may also import these modules directly: `clock`, `control`, `entity`, `log`,
-`log_handlers`, `logger`, `service`, `signals`, `standard` and `type_description`. They serve the
-ROS 1 and ROS 2 names, bags and bridges, and commands that would otherwise load more than they need.
+`type_description` is imported on its own: only what asks other nodes for definitions loads it.
 """
 
 from rosz.node.client import Client
+from rosz.node.clock import Clock
 from rosz.node.context import Context
-from rosz.node.control import NodeInfo
-from rosz.node.decoder import MessageInfo
+from rosz.node.control import NodeInfo, Request, control_key
+from rosz.node.entity import Entity
+from rosz.node.log import NodeLog, NodeLogger
+from rosz.node.log_handlers import (
+    ConsoleHandler,
+    LogHandler,
+    RosoutHandler,
+    parse_severity,
+    severity,
+    severity_name,
+)
 from rosz.node.node import Node
 from rosz.node.publisher import Publisher, SubscriberLink
 from rosz.node.service import Service
-from rosz.node.subscription import GenericSubscription, Subscription
+from rosz.node.signals import of_program
+from rosz.node.standard import serve_loggers, simulate
+from rosz.node.subscription import GenericSubscription, MessageInfo, Subscription
 from rosz.node.timer import Rate, Timer, TimerEvent
+
+PUBLIC_MODULES = ("type_description",)
 
 __all__ = (
     "Client",
+    "Clock",
+    "ConsoleHandler",
     "Context",
+    "Entity",
     "GenericSubscription",
+    "LogHandler",
     "MessageInfo",
     "Node",
     "NodeInfo",
+    "NodeLog",
+    "NodeLogger",
     "Publisher",
     "Rate",
+    "Request",
+    "RosoutHandler",
     "Service",
     "SubscriberLink",
     "Subscription",
     "Timer",
     "TimerEvent",
+    "control_key",
+    "of_program",
+    "parse_severity",
+    "serve_loggers",
+    "severity",
+    "severity_name",
+    "simulate",
 )

@@ -18,7 +18,8 @@ from rosz import names
 from rosz.errors import ClosedError
 from rosz.lifecycle import Closable, Hook, Lifecycle, Registration
 from rosz.node.context import Context
-from rosz.node.log import DEFAULT_FORMAT, NodeLog
+from rosz.node.log import NodeLog
+from rosz.node.log_handlers import DEFAULT_FORMAT
 from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Where the log of a node goes: the console, a file of bounded size, and ``/rosout``."""
+"""Where a node's log goes: console, a file of bounded size, ``/rosout``; ROS's severities."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from abc import abstractmethod
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,9 +18,8 @@ from io import FileIO
 from pathlib import Path
 from typing import TextIO
 
-from rosz.errors import ClosedError
+from rosz.errors import ClosedError, UsageError, near_miss
 from rosz.node.clock import Clock
-from rosz.node.logger import severity, severity_name
 from rosz.worker import Worker
 
 __all__ = (
@@ -32,7 +32,16 @@ __all__ = (
     "PublishLine",
     "RosoutHandler",
     "log_file_name",
+    "parse_severity",
+    "severity",
+    "severity_name",
 )
+
+_NAMES = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
+"""Severity to name; the numbers are those of rcl_interfaces/Log."""
+
+_LEVELS = tuple(_NAMES)
+_BY_NAME = {name: level for level, name in _NAMES.items()} | {"WARNING": 30, "CRITICAL": 50}
 
 DEFAULT_FORMAT = "[${severity}] [${time}]: ${message}"
 """Default of ``ROSCONSOLE_FORMAT``."""
@@ -60,6 +69,31 @@ PublishLine = Callable[[int, str, str, str, str, int, int], object]
 """Called with severity, name, message, file, function, line, and stamp in nanoseconds."""
 
 _Line = tuple[int, str, str, str, str, int, int]
+
+
+def severity(level: int) -> int:
+    """Return the severity of a logging level: the highest that is not above it."""
+    return _LEVELS[max(bisect_right(_LEVELS, level) - 1, 0)]
+
+
+def severity_name(level: int) -> str:
+    """Return ROS's name of a logging level."""
+    return _NAMES[severity(level)]
+
+
+def parse_severity(name: str) -> int:
+    """Return the level of a name, ROS's or Python's, in upper or lower case.
+
+    Raises:
+        UsageError: No level has that name.
+    """
+    level = _BY_NAME.get(name.upper())
+    if level is None:
+        hint = near_miss(name.upper(), _NAMES.values())
+        raise UsageError(
+            f"'{name}' is not a level: expected one of {', '.join(_NAMES.values())}{hint}"
+        )
+    return level
 
 
 class LogHandler(logging.Handler):
@@ -384,11 +418,10 @@ class RosoutHandler(logging.Handler):
         if self._worker.full:
             self._dropped += 1
             return
-        name = self._ros_name + record.name.removeprefix(self._base)
         self._worker.submit(
             (
                 severity(record.levelno),
-                name,
+                self._ros_name + record.name.removeprefix(self._base),
                 self.format(record),
                 record.pathname,
                 record.funcName or "",
@@ -430,18 +463,16 @@ class RosoutHandler(logging.Handler):
             return
         try:
             publish(*line)
-            self._publish_dropped(publish)
+            dropped, self._dropped = self._dropped, 0
+            if dropped:
+                text = (
+                    f"{dropped} messages are missing here: more was logged than could be published"
+                )
+                here = __file__, "_publish_line", 0
+                publish(logging.WARNING, self._ros_name, text, *here, self._clock.now())
         except ClosedError:
             return  # the node ended before this began
         except Exception as error:  # noqa: BLE001  # whatever publishing may raise
             if not self._reported and not self._worker.closed:
                 self._reported = True
                 self._on_problem(f"cannot publish the log on /rosout: {error}")
-
-    def _publish_dropped(self, publish: PublishLine) -> None:
-        dropped, self._dropped = self._dropped, 0
-        if dropped:
-            text = f"{dropped} messages are missing here: more was logged than could be published"
-            now = self._clock.now()
-            here = __file__, "_publish_dropped"
-            publish(logging.WARNING, self._ros_name, text, *here, 0, now)

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from rosz.errors import ClosedError
-from rosz.node import control, signals, standard, takeover
+from rosz.node import control, signals, standard
 from rosz.node.client import Client
 from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
@@ -71,7 +71,7 @@ class Node(NodeCore):
     def _begin(self) -> None:
         standard.set_initial_params(self)
         control.serve_control(self)
-        takeover.yield_to_newer(self)
+        control.yield_to_newer(self)
         self._announce()
         if not self.context.passing:
             standard.follow_clock(self)
@@ -145,7 +145,7 @@ class Node(NodeCore):
     def subscription(
         self,
         topic: str,
-        message_type: str,
+        message_type: str | None = None,
         callback: Callable[..., Any] | None = None,
         *,
         queue_size: int = 10,
@@ -153,18 +153,6 @@ class Node(NodeCore):
         raw: bool = False,
         with_info: bool = False,
     ) -> Subscription[Any]: ...
-    @overload
-    def subscription(
-        self,
-        topic: str,
-        message_type: None = None,
-        callback: Callable[..., Any] | None = None,
-        *,
-        queue_size: int = 10,
-        qos: QoS | None = None,
-        raw: bool = False,
-        with_info: bool = False,
-    ) -> GenericSubscription: ...
     def subscription(
         self,
         topic: str,

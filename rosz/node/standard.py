@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz.errors import ClosedError, NotFoundError, UsageError, YamlError
 from rosz.node.core import NodeCore
 from rosz.node.publisher import Publisher
 from rosz.node.service import Service
-from rosz.node.subscription import Subscription
+from rosz.node.subscription import MessageInfo, Subscription
 from rosz.qos import CLOCK, ROSOUT, SERVICES
 from rosz.worker import start_thread
-
-if TYPE_CHECKING:
-    from rosz.node.decoder import MessageInfo
 
 __all__ = ("follow_clock", "open_rosout", "serve_loggers", "set_initial_params", "simulate")
 

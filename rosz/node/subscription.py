@@ -11,6 +11,7 @@ and have a second thread, started with the first of them; callbacks run one at a
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections import deque
@@ -19,20 +20,21 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import msgspec
+
 from rosz.errors import ClosedError, DecodeError, RoszError, WaitTimeout
 from rosz.node.core import NodeCore
-from rosz.node.decoder import Decoder, Received
 from rosz.node.entity import ANY, Entity
 from rosz.qos import QoS
 from rosz.session import LONGEST_WAIT, clamp_timeout
-from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, ros_type
+from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, read_attachment, ros_type
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.session import PullSubscriber, Reply, Sample
 
-__all__ = ("GenericSubscription", "Subscription")
+__all__ = ("GenericSubscription", "MessageInfo", "Subscription")
 
 M = TypeVar("M")
 
@@ -43,6 +45,138 @@ _MOST = 1 << 20
 """Largest queue: Zenoh allocates 256 bytes for each sample at once, and aborts if it cannot."""
 
 _HISTORY_TIMEOUT = 10.0
+_KINDS_OF_DAMAGE = 10
+_PUBLISHERS = 1000
+"""Publishers to remember; the oldest is forgotten, because nothing tells when that is safe."""
+
+
+class MessageInfo(msgspec.Struct, frozen=True):
+    """Where a message comes from.
+
+    Attributes:
+        source_time: Time of publication by the sender's clock, in nanoseconds since the Unix epoch;
+            0 if unknown.
+        reception_time: Time of dispatch here, in nanoseconds since the Unix epoch.
+        sequence: Number within its publisher, from 1; 0 if unknown, or if the message was sent to
+            this subscription alone.
+        gid: 16 bytes that identify the publisher; empty if unknown.
+        lost: Samples of that publisher missing right before this one: lost, or pushed out of the
+            queue by newer ones.
+        type_name: ``pkg/msg/Name``.
+        type_hash: ``RIHS01_…``, the hash of the type's definition.
+    """
+
+    source_time: int
+    reception_time: int
+    sequence: int
+    gid: bytes
+    lost: int
+    type_name: str
+    type_hash: str = ""
+
+
+Received = tuple[Any, MessageInfo | None]
+"""A message with its info, if that is wanted."""
+
+
+class _Publisher:
+    """What is remembered of a publisher."""
+
+    __slots__ = ("last", "replays")
+
+    def __init__(self) -> None:
+        self.last = 0
+        self.replays = False
+
+
+class Decoder:
+    """Decode samples, count lost ones, and drop damaged and repeated ones.
+
+    Args:
+        topic: Name of the topic, for the log.
+        type_name: ``pkg/msg/Name``.
+        type_hash: ``RIHS01_…``.
+        message_type: Class of the messages; when not given, the encoded bytes are the messages.
+        log: Logger for damage, which is logged once per kind.
+        with_info: Whether to make a `MessageInfo` for each message.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        type_name: str,
+        type_hash: str,
+        message_type: type[Message] | None,
+        log: logging.Logger,
+        *,
+        with_info: bool,
+    ) -> None:
+        self._topic = topic
+        self._type_name = type_name
+        self._type_hash = type_hash
+        self._decode: Callable[[bytes], Any] | None = None
+        self._has_header = False
+        if message_type is not None:
+            self._decode = message_type._decode
+            self._has_header = message_type._has_header
+        self._log = log
+        self._with_info = with_info
+        self._publishers: dict[bytes, _Publisher] = {}
+        self._reported: set[str] = set()
+
+    def expect_replay(self, gid: bytes) -> None:
+        """Expect the samples of a publisher twice: live, and from its cache.
+
+        That holds beyond the publisher's end, because replies of its cache may still be on the way.
+        """
+        self._publisher(gid).replays = True
+
+    def decode(self, sample: Sample | Reply) -> Received | None:
+        """Decode one sample; ``None`` if it is damaged or a repetition."""
+        sequence, source_time, gid, lost = 0, 0, b"", 0
+        try:
+            attachment = sample.attachment
+            if attachment is not None:
+                sequence, source_time, gid = read_attachment(attachment)
+                if sequence > 0:
+                    publisher = self._publishers.get(gid) or self._publisher(gid)
+                    last = publisher.last
+                    if sequence <= last and publisher.replays:
+                        return None
+                    publisher.last = sequence
+                    if last and sequence > last:
+                        lost = sequence - last - 1
+            payload = sample.payload
+            message: Any = payload if self._decode is None else self._decode(payload)
+        except DecodeError as error:
+            self._report(error)
+            return None
+        if self._has_header:
+            # ROS 1 code reads the sequence number from there.
+            message.header.seq = sequence
+        if not self._with_info:
+            return message, None
+        return message, MessageInfo(
+            source_time, time.time_ns(), sequence, gid, lost, self._type_name, self._type_hash
+        )
+
+    def _publisher(self, gid: bytes) -> _Publisher:
+        publisher = self._publishers.get(gid)
+        if publisher is None:
+            if len(self._publishers) >= _PUBLISHERS:
+                self._publishers.pop(next(iter(self._publishers)), None)
+            publisher = self._publishers[gid] = _Publisher()
+        return publisher
+
+    def _report(self, error: DecodeError) -> None:
+        """Log damage once per kind, so that a broken sender does not fill the disk."""
+        kind = f"{error.type_name}: {error.reason}"
+        if kind not in self._reported and len(self._reported) < _KINDS_OF_DAMAGE:
+            self._reported.add(kind)
+            self._log.warning(
+                "dropping damaged samples on '%s' (told once): %.300s", self._topic, error
+            )
+
 
 _Item = tuple["Sample | Reply", Decoder | None]
 """A sample, with its decoder if its key does not tell its type."""

@@ -11,8 +11,7 @@ from rosz.errors import RoszError
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.turtlesim.msg import Pose
-from rosz.node import Node, TimerEvent
-from rosz.node.standard import serve_loggers
+from rosz.node import Node, TimerEvent, serve_loggers
 
 __all__ = ("Move", "Square", "draw_square", "mimic")
 

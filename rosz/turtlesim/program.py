@@ -5,8 +5,7 @@ The window uses Tk of the standard library, and must run on the main thread.
 
 from __future__ import annotations
 
-from rosz.node import Node
-from rosz.node.standard import serve_loggers
+from rosz.node import Node, serve_loggers
 from rosz.turtlesim.picture import patches
 from rosz.turtlesim.simulator import Simulator
 from rosz.turtlesim.world import FIELD_PIXELS

@@ -31,8 +31,7 @@ from rosz.msgs.turtlesim.srv import (
     TeleportRelative,
     TeleportRelativeRequest,
 )
-from rosz.node import Timer, TimerEvent
-from rosz.node.clock import Clock
+from rosz.node import Clock, Timer, TimerEvent
 from rosz.turtlesim import snapshot
 from rosz.turtlesim.picture import render
 from rosz.turtlesim.snapshot import Picture

@@ -18,8 +18,7 @@ from typing import Self
 
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
-from rosz.node import Node
-from rosz.node.standard import serve_loggers
+from rosz.node import Node, serve_loggers
 
 __all__ = ("KeyDecoder", "Keyboard", "Teleop", "main")
 

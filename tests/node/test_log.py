@@ -13,8 +13,8 @@ from simulation import SECOND, START, SimulatedClock
 
 from rosz.errors import NotFoundError, UsageError
 from rosz.node.clock import Clock
-from rosz.node.log import NodeLog
-from rosz.node.logger import NodeLogger, parse_severity, severity_name
+from rosz.node.log import NodeLog, NodeLogger
+from rosz.node.log_handlers import parse_severity, severity_name
 
 
 class Collect(logging.Handler):

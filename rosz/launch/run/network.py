@@ -30,7 +30,7 @@ from rosz.params import DELETED, Change, condense, normalise, split
 from rosz.session import Session, is_listening
 
 if TYPE_CHECKING:
-    from rosz.node.context import Context
+    from rosz.node import Context
     from rosz.params.replica import Replica
 
 __all__ = (

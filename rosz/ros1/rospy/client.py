@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosz import names
 from rosz.errors import InvalidName, ParamError, ParamNotFound
-from rosz.node import Node
-from rosz.node.log_handlers import RosoutHandler
-from rosz.node.standard import serve_loggers
+from rosz.node import Node, RosoutHandler, serve_loggers
 from rosz.ros1.exceptions import ROSException, ROSInitException
 from rosz.ros1.rosgraph.names import myargv
 from rosz.ros1.rospy.core import (

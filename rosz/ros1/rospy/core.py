@@ -19,7 +19,7 @@ from types import FrameType
 from typing import Any
 from urllib.parse import urlparse
 
-from rosz.node.signals import of_program
+from rosz.node import of_program
 from rosz.ros1.exceptions import (
     ROSException,
     ROSInitException,
@@ -330,29 +330,23 @@ def _throttled(level: int, option: str) -> Callable[..., None]:
     return log
 
 
-logdebug = _log(logging.DEBUG)
-loginfo = logout = _log(logging.INFO)
-logwarn = _log(logging.WARNING)
-logerr = _log(logging.ERROR)
-logfatal = _log(logging.CRITICAL)
+_ALL = tuple(LEVELS.values())
 
-logdebug_once = _log(logging.DEBUG, once=True)
-loginfo_once = _log(logging.INFO, once=True)
-logwarn_once = _log(logging.WARNING, once=True)
-logerr_once = _log(logging.ERROR, once=True)
-logfatal_once = _log(logging.CRITICAL, once=True)
-
-logdebug_throttle = _throttled(logging.DEBUG, "throttle")
-loginfo_throttle = _throttled(logging.INFO, "throttle")
-logwarn_throttle = _throttled(logging.WARNING, "throttle")
-logerr_throttle = _throttled(logging.ERROR, "throttle")
-logfatal_throttle = _throttled(logging.CRITICAL, "throttle")
-
-logdebug_throttle_identical = _throttled(logging.DEBUG, "throttle_identical")
-loginfo_throttle_identical = _throttled(logging.INFO, "throttle_identical")
-logwarn_throttle_identical = _throttled(logging.WARNING, "throttle_identical")
-logerr_throttle_identical = _throttled(logging.ERROR, "throttle_identical")
-logfatal_throttle_identical = _throttled(logging.CRITICAL, "throttle_identical")
+logdebug, loginfo, logwarn, logerr, logfatal = (_log(level) for level in _ALL)
+logout = loginfo
+logdebug_once, loginfo_once, logwarn_once, logerr_once, logfatal_once = (
+    _log(level, once=True) for level in _ALL
+)
+logdebug_throttle, loginfo_throttle, logwarn_throttle, logerr_throttle, logfatal_throttle = (
+    _throttled(level, "throttle") for level in _ALL
+)
+(
+    logdebug_throttle_identical,
+    loginfo_throttle_identical,
+    logwarn_throttle_identical,
+    logerr_throttle_identical,
+    logfatal_throttle_identical,
+) = (_throttled(level, "throttle_identical") for level in _ALL)
 
 
 def _rospy_log(level: int) -> Callable[..., None]:
@@ -363,10 +357,7 @@ def _rospy_log(level: int) -> Callable[..., None]:
     return log
 
 
-rospydebug = _rospy_log(logging.DEBUG)
-rospyinfo = _rospy_log(logging.INFO)
-rospywarn = _rospy_log(logging.WARNING)
-rospyerr = _rospy_log(logging.ERROR)
+rospydebug, rospyinfo, rospywarn, rospyerr = (_rospy_log(level) for level in _ALL[:-1])
 
 
 class PythonLogHandler(logging.Handler):

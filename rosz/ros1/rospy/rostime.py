@@ -12,7 +12,7 @@ from rosz.ros1.state import state
 from rosz.time import ClassicConstructor
 
 if TYPE_CHECKING:
-    from rosz.node.clock import Clock
+    from rosz.node import Clock
 
 __all__ = (
     "Duration",

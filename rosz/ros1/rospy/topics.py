@@ -10,12 +10,12 @@ import threading
 import traceback
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self
 
 from rosz.errors import ClosedError, EncodeError, RoszError
 from rosz.message import Message
 from rosz.names import check, is_valid
-from rosz.node import GenericSubscription, MessageInfo, Node, SubscriberLink, Subscription
+from rosz.node import MessageInfo, Node, SubscriberLink, Subscription
 from rosz.node import Publisher as NodePublisher
 from rosz.qos import QoS
 from rosz.ros1.exceptions import ROSException, ROSSerializationException
@@ -155,10 +155,8 @@ class Publisher(Topic):
         super().__init__(name, data_class, "pub")
         if queue_size is None:
             warnings.warn(_NO_QUEUE_SIZE, SyntaxWarning, stacklevel=2)
-        self.impl = _shared_publisher(
-            self.resolved_name, data_class, latch=latch, queue_size=queue_size
-        )
-        self.impl.add(self, subscriber_listener)
+        self.impl = _SharedPublisher.of(self, state.publishers, queue_size)
+        self.impl.add(self, subscriber_listener, latch=latch)
 
     def publish(self, *args: Any, **kwds: Any) -> None:
         """Publish a message.
@@ -224,7 +222,7 @@ class Subscriber(Topic):
             raise ROSException("buffer size must be a positive integer")
         self.callback = callback
         self.callback_args = callback_args
-        self.impl = _shared_subscription(self.resolved_name, data_class, queue_size)
+        self.impl = _SharedSubscription.of(self, state.subscriptions, queue_size)
         self.impl.add(self, callback, callback_args)
 
 
@@ -247,6 +245,18 @@ class _Shared:
         self.closed = False
         self._depth = queue_size if isinstance(queue_size, int) else 0
         self._lock = threading.RLock()
+
+    @classmethod
+    def of(
+        cls, topic: Topic, known: dict[tuple[str, type[Any]], Any], queue_size: int | None
+    ) -> Self:
+        """Return the object of a topic and type, created on first use."""
+        key = topic.resolved_name, topic.data_class
+        with state.lock:
+            if key not in known:
+                known[key] = cls(*key, queue_size)
+            shared: Self = known[key]
+        return shared
 
 
 class _SharedPublisher(_Shared):
@@ -280,35 +290,36 @@ class _SharedPublisher(_Shared):
             if self.closed or self.data_class is AnyMsg:
                 return
             before = self._publisher
-            if self.is_latch:
-                qos = QoS(depth=1, durability="transient_local")
-            else:
-                qos = QoS(depth=self._depth) if self._depth > 0 else QoS(history="keep_all")
-            self._publisher = NodePublisher(node, self.name, self.data_class, qos)
-            node.keep(self._publisher)
+            qos = QoS(depth=self._depth) if self._depth > 0 else QoS(history="keep_all")
+            self._publisher = self._declare(node, self.data_class, qos)
             for listener in self._listeners:
                 self._listen(self._publisher, listener)
         if before is not None:
             before.close()
 
-    def make_latching(self) -> None:
-        """Latch messages from now on."""
-        with self._lock:
-            if self.is_latch:
-                return
-            self.is_latch = True
-            opened = self._publisher is not None
-        if opened and state.node is not None:
-            self.open(state.node)
+    def _declare(self, node: Node, kind: type[Any], qos: QoS) -> NodePublisher[Any]:
+        if self.is_latch:
+            qos = QoS(depth=1, durability="transient_local")
+        return node.keep(NodePublisher(node, self.name, kind, qos))
 
-    def add(self, member: object, listener: SubscribeListener | None) -> None:
-        """Add a publisher."""
+    def add(self, member: object, listener: SubscribeListener | None, *, latch: bool) -> None:
+        """Add a publisher; the first one creates the publisher of the node.
+
+        A later one that latches makes all of them latch from now on.
+        """
         with self._lock:
+            first = not self._members
             self._members.append(member)
             if listener is not None:
                 self._listeners.append(listener)
                 if self._publisher is not None:
                     self._listen(self._publisher, listener)
+            reopen = latch and not self.is_latch and self._publisher is not None
+            self.is_latch = self.is_latch or latch
+        if first:
+            when_ready(self.open)
+        elif reopen and state.node is not None:
+            self.open(state.node)
 
     def remove(self, member: object) -> None:
         """Remove a publisher; close this one after the last."""
@@ -366,8 +377,7 @@ class _SharedPublisher(_Shared):
                     )
                 package, _, name = origin["type"].partition("/")
                 kind: Any = node.context.types.message(f"{package}/msg/{name}")
-                qos = QoS(depth=1, durability="transient_local") if self.is_latch else QoS()
-                self._publisher = node.keep(NodePublisher(node, self.name, kind, qos))
+                self._publisher = self._declare(node, kind, QoS())
         self._publisher.publish_raw(message._buff)  # noqa: SLF001
 
     def _refuse(self, publisher: NodePublisher[Any], error: EncodeError) -> None:
@@ -407,25 +417,6 @@ class _SharedPublisher(_Shared):
         publisher.on_connection(connected, disconnected)
 
 
-def _shared_publisher(
-    name: str, data_class: type[Any], *, latch: bool, queue_size: int | None
-) -> _SharedPublisher:
-    """Return the shared publisher of a topic, created on first use."""
-    with state.lock:
-        known: _SharedPublisher | None = state.publishers.get((name, data_class))
-        if known is None:
-            shared = state.publishers[name, data_class] = _SharedPublisher(
-                name, data_class, queue_size
-            )
-            shared.is_latch = latch
-    if known is None:
-        when_ready(shared.open)
-        return shared
-    if latch:
-        known.make_latching()
-    return known
-
-
 class _SharedSubscription(_Shared):
     """The subscription of the node that all subscribers of a topic and type share."""
 
@@ -433,7 +424,7 @@ class _SharedSubscription(_Shared):
         super().__init__(name, data_class, queue_size)
         self.queue_size = queue_size
         self._members: tuple[_Member, ...] = ()
-        self._subscription: Subscription[Any] | GenericSubscription | None = None
+        self._subscription: Subscription[Any] | None = None
         self._origins: dict[bytes, Token] = {}
         self._latched: dict[bytes, tuple[Any, MessageInfo]] = {}
 
@@ -443,21 +434,19 @@ class _SharedSubscription(_Shared):
             if self.closed:
                 return
             qos = QoS(depth=self._depth if self._depth > 0 else _NO_LIMIT)
-            if self.data_class is AnyMsg:
-                self._subscription = GenericSubscription(
-                    node, self.name, self._receive_any, qos, raw=True, with_info=True
-                )
-            elif self.name in _LOGS and self.type == "rosgraph_msgs/Log":
+            name = self.name
+            receive: Callable[[Any, MessageInfo], None] = self._receive
+            kind: type[Any] | None = self.data_class
+            raw = kind is AnyMsg
+            if raw:
+                kind, receive = None, self._receive_any
+            elif name in _LOGS and self.type == "rosgraph_msgs/Log":
                 from rosz.msgs.rcl_interfaces.msg import Log as Ros2Log
 
-                self._subscription = Subscription(
-                    node, "/rosout", Ros2Log, self._receive_log, qos, with_info=True
-                )
-            else:
-                self._subscription = Subscription(
-                    node, self.name, self.data_class, self._receive, qos, with_info=True
-                )
-            node.keep(self._subscription)
+                name, kind, receive = "/rosout", Ros2Log, self._receive_log
+            self._subscription = node.keep(
+                Subscription(node, name, kind, receive, qos, raw=raw, with_info=True)
+            )
 
     def add(
         self, member: object, callback: Callable[..., object] | None, callback_args: Any
@@ -567,19 +556,6 @@ class _SharedSubscription(_Shared):
                 # Without the frames that called the callback.
                 lines = traceback.format_exception(error.with_traceback(trace and trace.tb_next))
                 state.node.log.error("bad callback: %s\n%s", callback, "".join(lines))
-
-
-def _shared_subscription(
-    name: str, data_class: type[Any], queue_size: int | None
-) -> _SharedSubscription:
-    """Return the shared subscription of a topic, created on first use."""
-    with state.lock:
-        shared: _SharedSubscription | None = state.subscriptions.get((name, data_class))
-        if shared is None:
-            shared = state.subscriptions[name, data_class] = _SharedSubscription(
-                name, data_class, queue_size
-            )
-    return shared
 
 
 def _connection_header(message: Message) -> dict[str, str]:

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rosz.errors import RoszError, ServiceError, WaitTimeout
+from rosz.node import Clock as RoszClock
 from rosz.node import Node as RoszNode
 from rosz.node import Publisher as RoszPublisher
 from rosz.node import Subscription as RoszSubscription
 from rosz.node import Timer as RoszTimer
-from rosz.node.clock import Clock as RoszClock
 from rosz.qos import QoS
 from rosz.ros2.rclpy.executors import CallbackGroup, Future
 from rosz.ros2.rclpy.time import Clock, Rate

@@ -11,10 +11,15 @@ from enum import IntEnum
 from typing import Any
 
 from rosz.errors import UsageError
-from rosz.node.clock import Clock
-from rosz.node.log import NodeLog
-from rosz.node.log_handlers import ConsoleHandler, LogHandler
-from rosz.node.logger import NodeLogger, severity, severity_name
+from rosz.node import (
+    Clock,
+    ConsoleHandler,
+    LogHandler,
+    NodeLog,
+    NodeLogger,
+    severity,
+    severity_name,
+)
 
 __all__ = ("LoggingSeverity", "RcutilsLogger", "get_logger", "write_as_rclpy")
 

@@ -9,7 +9,7 @@ from rosz import names
 from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rosz.node import Node as RoszNode
-from rosz.node.standard import simulate
+from rosz.node import simulate
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.ros2.rclpy.entities import Client, Publisher, Service, Subscription, Timer
 from rosz.ros2.rclpy.exceptions import NotInitializedException, ParameterNotDeclaredException

@@ -10,8 +10,8 @@ from typing import Any, Self, overload
 from rosz.errors import ClosedError
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
+from rosz.node import Clock as _RosClock
 from rosz.node import Rate as _Rate
-from rosz.node.clock import Clock as _RosClock
 from rosz.qos import FOREVER
 from rosz.ros2.rclpy.exceptions import ROSInterruptException
 

@@ -192,7 +192,7 @@ def test_signals_left_to_the_program(network: Network) -> None:
         main = threading.get_ident()
         def interrupt():
             names = []
-            while "spin" not in names or names[0] != "wait":
+            while "spin" not in names or names[0] != "_wait":
                 frame, names = sys._current_frames()[main], []
                 while frame is not None:
                     names.append(frame.f_code.co_name)
