@@ -10,7 +10,7 @@ from rosz.errors import EncodeError, NotFoundError, UsageError, YamlError
 from rosz.message import slots
 from rosz.message.convert import fill_message_args
 from rosz.msgs.builtin_interfaces.msg import Time
-from rosz.params.yaml_nodes import read_plain
+from rosz.params.yaml import read_plain
 from rosz.time import DurationValue, TimeValue
 
 __all__ = (

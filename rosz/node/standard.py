@@ -29,7 +29,7 @@ def set_initial_params(node: NodeCore) -> None:
     """
     if not node.context.arguments.params:
         return
-    from rosz.params.yaml_nodes import read_plain
+    from rosz.params.yaml import read_plain
 
     for name, text in node.context.arguments.params.items():
         try:

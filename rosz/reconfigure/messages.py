@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
-import msgspec
-
 from rosz.errors import DecodeError, ParamError
 from rosz.msgs.dynamic_reconfigure.msg import (
     BoolParameter,
@@ -26,7 +24,7 @@ from rosz.msgs.dynamic_reconfigure.msg import (
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import Group as GroupMessage
 from rosz.reconfigure.description import Config, Description, Group
-from rosz.reconfigure.setting import Kind, Scalar, Setting, kind_of
+from rosz.reconfigure.setting import BOUNDS, Scalar, Setting, kind_of
 
 __all__ = (
     "DESCRIPTIONS",
@@ -43,7 +41,6 @@ __all__ = (
     "group_dict",
     "in_groups",
     "initial_config",
-    "pack_config",
     "pack_description",
     "pack_values",
     "unpack_description",
@@ -58,6 +55,7 @@ SET: Final = "set_parameters"
 
 _LEVELS: Final = 0xFFFFFFFF
 _ROOT: Final = 0
+_SETTING_FIELDS: Final = ("name", "default", "description", "level", "min", "max", "edit_method")
 
 
 def pack_values(values: Mapping[str, Any]) -> ConfigMessage:
@@ -74,26 +72,6 @@ def pack_values(values: Mapping[str, Any]) -> ConfigMessage:
             case "double":
                 message.doubles.append(DoubleParameter(name, value))
     return message
-
-
-def pack_config(
-    description: Description, values: Mapping[str, Any], states: Mapping[int, bool]
-) -> ConfigMessage:
-    """Return the message of values and of the states of all groups, inner groups before outer ones.
-
-    The root comes first all the same.
-    """
-    message = pack_values(values)
-    (root, parent), *_ = description.groups
-    message.groups = [GroupState(root.name, states.get(root.id, root.state), root.id, parent)]
-    message.groups += _packed_states(root, states)
-    return message
-
-
-def _packed_states(group: Group, states: Mapping[int, bool]) -> Iterator[GroupState]:
-    for inner in group.groups:
-        yield from _packed_states(inner, states)
-        yield GroupState(inner.name, states.get(inner.id, inner.state), inner.id, group.id)
 
 
 def unpack_values(message: ConfigMessage) -> dict[str, Any]:
@@ -134,50 +112,21 @@ def unpack_description(message: ConfigDescription) -> Description:
     Raises:
         DecodeError: The message contradicts itself.
     """
+    roots = sum(group.id == _ROOT for group in message.groups)
+    if roots != 1:
+        reason = f"it contradicts itself: {roots} groups have the id 0, expected one"
+        raise DecodeError(message._type, -1, reason)
     try:
-        return Description(root=_unpack_groups(message))
+        return describe(decode_description(message))
     except (ParamError, KeyError, RecursionError) as error:
         raise DecodeError(message._type, -1, f"it contradicts itself: {error}") from error
 
 
-def _unpack_groups(message: ConfigDescription) -> Group:
-    limits = [unpack_values(one) for one in (message.dflt, message.min, message.max)]
-    children: dict[int, list[GroupMessage]] = {}
-    roots: list[GroupMessage] = []
-    for group in message.groups:
-        if group.id == _ROOT:
-            roots.append(group)
-        else:
-            children.setdefault(group.parent, []).append(group)
-    if len(roots) != 1:
-        raise ParamError(f"{len(roots)} groups have the id 0, expected one")
-
-    def build(group: GroupMessage) -> Group:
-        return Group(
-            name=group.name,
-            settings=tuple(_setting(one, limits) for one in group.parameters),
-            groups=tuple(map(build, children.get(group.id, ()))),
-            type=group.type,
-            id=group.id,
-        )
-
-    return build(roots[0])
-
-
-def _setting(one: ParamDescription, limits: list[dict[str, Any]]) -> Setting:
-    default, low, high = (values[one.name] for values in limits)
-    try:
-        kind = msgspec.convert(one.type, Kind)
-    except msgspec.ValidationError as error:
-        raise ParamError(f"'{one.name}' is of the unknown type '{one.type}'") from error
-    return Setting(one.name, default, one.description, one.level, low, high, one.edit_method, kind)
-
-
-def describe(config_description: dict[str, Any]) -> Description:
-    """Return the description of a generated module.
+def describe(config_description: Mapping[str, Any]) -> Description:
+    """Return the description that a root group stands for.
 
     Args:
-        config_description: Root group of the module.
+        config_description: Root group of a generated module, or one that was decoded.
 
     Raises:
         ParamError: The group contradicts itself.
@@ -185,28 +134,21 @@ def describe(config_description: dict[str, Any]) -> Description:
     return Description(root=_group_of(config_description))
 
 
-def _group_of(given: dict[str, Any]) -> Group:
+def _group_of(given: Mapping[str, Any]) -> Group:
     return Group(
         name=given["name"],
         settings=tuple(_setting_of(one) for one in given["parameters"]),
-        groups=tuple(_group_of(one) for one in given["groups"]),
+        groups=tuple(map(_group_of, _inner_groups(given))),
         type=given["type"],
         state=bool(given.get("state", True)),
         id=given["id"],
     )
 
 
-def _setting_of(given: dict[str, Any]) -> Setting:
-    return Setting(
-        name=given["name"],
-        default=given["default"],
-        description=given["description"],
-        level=given["level"],
-        min=given["min"],
-        max=given["max"],
-        edit_method=given["edit_method"],
-        kind=given["type"],
-    )
+def _setting_of(given: Mapping[str, Any]) -> Setting:
+    if given["type"] not in BOUNDS:
+        raise ParamError(f"'{given['name']}' is of the unknown type '{given['type']}'")
+    return Setting(kind=given["type"], **{field: given[field] for field in _SETTING_FIELDS})
 
 
 def extract_params(group: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -222,12 +164,7 @@ def _inner_groups(group: Mapping[str, Any]) -> list[Any]:
 
 def encode_description(descr: Any) -> ConfigDescription:
     """Return the message that describes a generated module, such as ``my_pkg.cfg.MyConfig``."""
-    return ConfigDescription(
-        groups=encode_groups(None, descr.config_description),
-        max=encode_config(descr.max),
-        min=encode_config(descr.min),
-        dflt=encode_config(descr.defaults),
-    )
+    return pack_description(describe(descr.config_description))
 
 
 def encode_groups(
@@ -312,9 +249,10 @@ def decode_description(msg: ConfigDescription) -> Config:
     return root
 
 
-def _groups_of(group: Config) -> Iterator[Config]:
+def _groups_of(group: Any) -> Iterator[Any]:
+    """Yield a group, then all groups in it."""
     yield group
-    for inner in group["groups"].values():
+    for inner in _inner_groups(group):
         yield from _groups_of(inner)
 
 
@@ -349,23 +287,12 @@ def initial_config(msg: ConfigMessage, description: Mapping[str, Any] | None = N
         description: Root group of a generated module; without it, groups are left out.
     """
     config = Config(unpack_values(msg))
-    if not msg.groups or description is None:
-        return config
-    config["groups"] = get_tree(msg)
-    described = {group["id"]: group for group in _described_groups(description)}
-    for group in _groups_of(config["groups"]):
-        known = described.get(group["id"])
-        if known is not None:
-            group["state"] = group["state"] if group["id"] == _ROOT else known["state"]
-            for one in known["parameters"]:
-                group["parameters"][one["name"]] = config[one["name"]]
+    for group, known in _decode_groups(config, msg, description):
+        if group["id"] != _ROOT:
+            group["state"] = known["state"]
+        for one in known["parameters"]:
+            group["parameters"][one["name"]] = config[one["name"]]
     return config
-
-
-def _described_groups(group: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    yield group
-    for inner in _inner_groups(group):
-        yield from _described_groups(inner)
 
 
 def decode_config(msg: ConfigMessage, description: Mapping[str, Any] | None = None) -> Config:
@@ -377,15 +304,24 @@ def decode_config(msg: ConfigMessage, description: Mapping[str, Any] | None = No
             out. With it, each group holds its parameters.
     """
     config = Config(unpack_values(msg))
-    if not msg.groups or description is None:
-        return config
-    config["groups"] = get_tree(msg)
-    described = {group["id"]: group for group in _described_groups(description)}
-    for group in _groups_of(config["groups"]):
-        for one in described.get(group["id"], {"parameters": ()})["parameters"]:
+    for group, known in _decode_groups(config, msg, description):
+        for one in known["parameters"]:
             if one["name"] in config:
                 group[one["name"]] = config[one["name"]]
     return config
+
+
+def _decode_groups(
+    config: Config, msg: ConfigMessage, description: Mapping[str, Any] | None
+) -> Iterator[tuple[Config, Mapping[str, Any]]]:
+    """Add the groups of a message to a configuration; yield those that are described."""
+    if not msg.groups or description is None:
+        return
+    config["groups"] = get_tree(msg)
+    described = {group["id"]: group for group in _groups_of(description)}
+    for group in _groups_of(config["groups"]):
+        if group["id"] in described:
+            yield group, described[group["id"]]
 
 
 def in_groups(config: Config, description: Mapping[str, Any]) -> Config:

@@ -16,7 +16,7 @@ from rosz.reconfigure.messages import (
     DESCRIPTIONS,
     SET,
     UPDATES,
-    pack_config,
+    encode_config,
     pack_description,
     unpack_states,
     unpack_values,
@@ -152,13 +152,13 @@ class Server:
             if "groups" in chosen:
                 self._states = states | description.read_states(chosen["groups"])
             self._store()
-            self._updates.publish(pack_config(description, self._values, self._states))
+            self._updates.publish(encode_config(self.config))
 
     def _set(self, request: Any) -> Any:
         with self._lock:
             values = self.description.convert(unpack_values(request.config))
-            self._change(values, unpack_states(request.config))
-            return Reconfigure.Response(pack_config(self.description, self._values, self._states))
+            config = self._change(values, unpack_states(request.config))
+            return Reconfigure.Response(encode_config(config))
 
     def _stored(self) -> dict[str, Any]:
         """Return the values in the parameter store that can be converted for their settings."""

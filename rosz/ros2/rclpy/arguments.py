@@ -13,7 +13,7 @@ import msgspec
 
 from rosz import remap
 from rosz.errors import NotFoundError, UsageError, YamlError
-from rosz.params.yaml_nodes import read_plain
+from rosz.params.yaml import read_plain
 from rosz.remap import Arguments
 
 __all__ = ("RosArguments", "parse", "remove_ros_args")

@@ -16,7 +16,7 @@ from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, ParameterValue, SetParametersResult
 from rosz.params.values import type_name
-from rosz.params.yaml_nodes import read_plain
+from rosz.params.yaml import read_plain
 from rosz.ros2.rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidParameterValueException,

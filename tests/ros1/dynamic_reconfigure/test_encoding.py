@@ -14,7 +14,7 @@ from oracle import PYTHON, require
 
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import GroupState
-from rosz.reconfigure.messages import describe, pack_config, pack_description
+from rosz.reconfigure.messages import describe, encode_config, pack_description
 from rosz.ros1.dynamic_reconfigure import encoding, get_parameter_names
 from rosz.ros1.dynamic_reconfigure.cfgfile import load
 from rosz.ros1.importer import install, uninstall
@@ -143,9 +143,7 @@ def test_what_the_library_below_sends(
     assert _plain(pack_description(description)) == expected["encode_description"]
     config = description.config(description.defaults(), description.states())
     assert _without_types(_plain(config)) == _without_types(expected["initial_config"])
-    values = {key: value for key, value in config.items() if key != "groups"}
-    states = description.states()
-    assert _plain(pack_config(description, values, states)) == expected["encode_config"]
+    assert _plain(encode_config(config)) == expected["encode_config"]
 
 
 def test_the_state_of_any_group_is_found() -> None:
@@ -159,7 +157,7 @@ def test_the_state_of_any_group_is_found() -> None:
     shown = ConfigMessage(groups=[GroupState(name, True, n, 0) for n, name in enumerate("DAB")])
     first = encoding.initial_config(shown, root)
     assert [one.state for one in first.groups.groups.values()] == [True, False]
-    assert [state.state for state in pack_config(describe(root), {}, {}).groups] == [
+    assert [state.state for state in encode_config(describe(root).config({}, {})).groups] == [
         True, True, False,
     ]  # fmt: skip
 
