@@ -14,7 +14,7 @@ from rosz.errors import DecodeError, NoReplica, ParamError, ParamNotFound, WaitT
 from rosz.params.paths import joined, split
 from rosz.params.values import Value, normalise
 from rosz.params.wire import Batch, ClientReply, ClientRequest, Keys, Member, decode, encode
-from rosz.params.writes import DELETED, Change, condense, spread
+from rosz.params.writes import DELETED, Change
 from rosz.session import Session, Stamp, clamp_timeout
 
 if TYPE_CHECKING:
@@ -98,14 +98,6 @@ class ParamClient:
         """
         return self.write([(split(name), normalise(value, name))])
 
-    def merge(self, name: str, value: object) -> Outcome:
-        """Set a global name as ROS 1's command line does: a dict leaf by leaf, as one change.
-
-        Raises:
-            ParamError: A parameter cannot hold the value, or the root would not be a dict.
-        """
-        return self.write(condense(spread(name, normalise(value, name))))
-
     def delete(self, name: str) -> Outcome:
         """Delete a global name and everything below it; the root is only emptied.
 
@@ -188,7 +180,9 @@ class ParamClient:
                 self._members or self._find_members(),
                 key=lambda one: (one.zid in stopped, one.zid in self._silent),
             ):
-                reply = self._request_from(member, self._key(member, batch), payload, timeout)
+                key = self._keys.of(member.zid, "set" if batch else "ask")
+                key = self._keys.scope(key, (path for path, _ in batch))
+                reply = self._request_from(member, key, payload, timeout)
                 if reply is not None and reply.status != "joining":
                     return _checked(request, reply)
                 if time.monotonic() >= deadline:
@@ -198,11 +192,6 @@ class ParamClient:
                     raise WaitTimeout("answer about parameters", self._timeout, f"asked: {who}")
             self._members = []
             time.sleep(_JOINING_PAUSE)
-
-    def _key(self, member: Member, batch: Sequence[Change]) -> str:
-        if not batch:
-            return self._keys.of(member.zid, "ask")
-        return self._keys.scope(self._keys.of(member.zid, "set"), (path for path, _ in batch))
 
     def _request_from(
         self, member: Member, key: str, payload: bytes, timeout: float

@@ -15,6 +15,7 @@ import timeit
 from pathlib import Path
 from typing import Any
 
+from rosz.params import condense, normalise, spread
 from rosz.params.api import Params
 from rosz.params.replica import Changed, Replica
 from rosz.params.replica.storage import Storage, StoreFile
@@ -110,7 +111,7 @@ class Member:
 
     def do_load(self, values: dict[str, Any], namespace: str) -> Any:
         begun = time.perf_counter()
-        outcome = self.replica.merge(namespace, values, timeout=20)
+        outcome = self.replica.write(condense(spread(namespace, normalise(values))), timeout=20)
         return {"slow": outcome.slow, "seconds": time.perf_counter() - begun}
 
     def do_state(self) -> Any:

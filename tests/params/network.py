@@ -9,10 +9,17 @@ from typing import Any
 import network
 
 from rosz.lifecycle import Closable
-from rosz.params.replica import Replica
+from rosz.params import condense, normalise, spread
+from rosz.params.remote import ParamClient
+from rosz.params.replica import Outcome, Replica
 from rosz.session import MeshReadiness, Session, SessionConfig, serve_links
 
 PATIENCE = 10.0
+
+
+def merge(store: Replica | ParamClient, name: str, value: Any, **how: Any) -> Outcome:
+    """Set a name as ROS 1's command line does: a dict leaf by leaf, as one change."""
+    return store.write(condense(spread(name, normalise(value, name))), **how)
 
 
 class Network(network.Network):

@@ -14,7 +14,7 @@ from rosz.params.wire import Keys, decode_value
 from rosz.params.writes import Write
 from rosz.session import Reply, Session
 
-from .network import Network, until
+from .network import Network, merge, until
 from .storage import Storage
 from .strategies import BELOW_ROOT, VALUES
 
@@ -77,7 +77,7 @@ def test_a_storage_holds_what_the_store_holds(network: Network) -> None:
     one.delete("/a/c")
     other.set("/leaf", 5)
     one.set("/leaf/now/a", "dict")
-    one.merge("/", {"k": {"x": 1, "y": 2}})
+    merge(one, "/", {"k": {"x": 1, "y": 2}})
     one.set("/gone", 1)
     other.set("/", {**one.root, "z": dt.datetime(2024, 1, 2, tzinfo=dt.UTC), "gone": 2})
     other.delete("/gone")
@@ -86,7 +86,7 @@ def test_a_storage_holds_what_the_store_holds(network: Network) -> None:
 
 def source(replica: Replica) -> Write | None:
     """Return the write that /a/b has its value from."""
-    with replica._state.locked as history:
+    with replica._state as history:
         return history.source(("a", "b"))
 
 

@@ -13,7 +13,7 @@ from rosz.params.replica import Changed
 from rosz.params.writes import DELETED, condense
 from rosz.session import HybridClock
 
-from .network import Network, until
+from .network import Network, merge, until
 from .test_replica import Mute
 
 
@@ -31,7 +31,7 @@ def test_reading_and_writing_through_others(client: ParamClient) -> None:
     assert client.names() == ["/a/b", "/a/c"]
     assert client.has("/a/b")
     assert client.origin("/a/b") == "a command"
-    client.merge("/a", {"b": {"d": 3}})
+    merge(client, "/a", {"b": {"d": 3}})
     assert client.get("/") == {"a": {"b": {"d": 3}, "c": [2, b"x"]}}
     assert client.search("b", "/a/x/y") == "/a/b"
     assert client.search("q") is None

@@ -23,7 +23,7 @@ from rosz.params.wire import (
 )
 from rosz.session import HybridClock, Stamp
 
-from .network import PATIENCE, Network, until
+from .network import PATIENCE, Network, merge, until
 
 
 class SkewedClock(HybridClock):
@@ -135,7 +135,7 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
     until(lambda: len(one.members()) == 1)
     monkeypatch.setattr(one._broadcaster, "send", lambda *_: ())
     other._declared[1].close()  # where it is told: rules leave such questions without an answer
-    one.merge("/", {"a": {"b": 1, "c": 2}, "d": 3})
+    merge(one, "/", {"a": {"b": 1, "c": 2}, "d": 3})
     with caplog.at_level(logging.WARNING, "rosz.params"):
         assert one.compare(PATIENCE)
         assert one.compare(PATIENCE)
@@ -208,9 +208,9 @@ def test_a_dict_replaces_and_a_merge_does_not(network: Network) -> None:
     one.set("/a", {"x": 1, "y": 2})
     one.set("/a", {"y": 3})
     assert other.get("/a") == {"y": 3}
-    one.merge("/a", {"x": {"z": 4}})
+    merge(one, "/a", {"x": {"z": 4}})
     assert other.get("/a") == {"x": {"z": 4}, "y": 3}
-    assert one.merge("/a", {}).time == 0
+    assert merge(one, "/a", {}).time == 0
     one.set("/", {"b": 1})
     assert other.root == {"b": 1}
 
@@ -245,7 +245,7 @@ def test_all_writers_agree_in_the_end(network: Network) -> None:
 
 def test_a_batch_is_one_change_for_every_reader(network: Network) -> None:
     writer, reader = network.replicas(2)
-    writer.merge("/", {f"k{number}": 0 for number in range(300)})
+    merge(writer, "/", {f"k{number}": 0 for number in range(300)})
     stop = threading.Event()
     mixed: list[set[int]] = []
 
@@ -258,7 +258,7 @@ def test_a_batch_is_one_change_for_every_reader(network: Network) -> None:
     thread = threading.Thread(target=watch)
     thread.start()
     for value in range(1, 30):
-        writer.merge("/", {f"k{number}": value for number in range(300)})
+        merge(writer, "/", {f"k{number}": value for number in range(300)})
     stop.set()
     thread.join()
     assert mixed == []
@@ -270,7 +270,7 @@ def test_large_values_arrive_whole(network: Network) -> None:
     assert one.set("/text", text, timeout=20).slow == ()
     assert other.get("/text") == text
     many = {f"ns{number % 100}/p{number}": number for number in range(20_000)}
-    assert one.merge("/many", many, timeout=20).slow == ()
+    assert merge(one, "/many", many, timeout=20).slow == ()
     assert len(other.names()) == 20_001
     assert other.digest() == one.digest()
 
@@ -279,7 +279,7 @@ def test_readers_do_not_wait_for_large_loads(network: Network) -> None:
     one, other = network.replicas(2)
     one.set("/rate", 5)
     many = {f"p{number}": number for number in range(20_000)}
-    thread = threading.Thread(target=lambda: one.merge("/many", many, timeout=20))
+    thread = threading.Thread(target=lambda: merge(one, "/many", many, timeout=20))
     thread.start()
     reads = 0
     while thread.is_alive():

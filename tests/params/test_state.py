@@ -33,7 +33,7 @@ def state() -> State:
 
 
 def stored(shared: State) -> list[Write]:
-    with shared.locked as history:
+    with shared as history:
         return list(history.writes())
 
 
@@ -60,7 +60,7 @@ def test_what_was_noted_is_in_every_tree_read_afterwards() -> None:
     def look() -> None:
         while not stop.is_set():
             shared.root  # noqa: B018  # reading is what is tried
-            with shared.locked as history:
+            with shared as history:
                 history.digest()
 
     lookers = [threading.Thread(target=look) for _ in range(2)]

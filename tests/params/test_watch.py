@@ -12,7 +12,7 @@ from rosz.params.replica import Changed
 from rosz.params.replica.watch import TreeChange, Watchers, is_same
 from rosz.params.writes import Write, put
 
-from .network import Network
+from .network import Network, merge
 
 PATIENCE = 10
 
@@ -61,7 +61,7 @@ def test_a_batch_tells_each_name_once(network: Network) -> None:
     one = network.replica()
     heard: SimpleQueue[Changed] = SimpleQueue()
     one.watch("/ns", heard.put)
-    one.merge("/", {"ns": {"a": 1, "b": {"c": 2}}, "other": 3})
+    merge(one, "/", {"ns": {"a": 1, "b": {"c": 2}}, "other": 3})
     assert sorted(told(heard, 2)) == [("/ns/a", None, 1), ("/ns/b/c", None, 2)]
 
 

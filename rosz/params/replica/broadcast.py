@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rosz.errors import DecodeError, RoszError
 from rosz.lifecycle import Closable
-from rosz.params.paths import ROOT, Path, joined
+from rosz.params.paths import Path, joined
 from rosz.params.replica.members import Members
 from rosz.params.replica.state import NOT_A_PARAMETER, State
 from rosz.params.wire import Batch, Keys, add_header, encode, read_header
@@ -164,7 +164,7 @@ class WriteBroadcaster:
         resent_key = keys.of(session.zid, "write")
         self._declared: list[Closable] = [
             session.subscriber(keys.change, self._on_change, remote_only=True),
-            session.subscriber(f"{keys.change}/*/**", self._on_scoped_change, remote_only=True),
+            session.subscriber(f"{keys.change}/*/**", self._on_change, remote_only=True),
             session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
             session.queryable(f"{resent_key}/**", self._on_resent, complete=True),
         ]
@@ -253,33 +253,24 @@ class WriteBroadcaster:
             self.pending.acknowledge(zid, number)
 
     def _on_change(self, sample: Sample) -> None:
-        self._receive(sample.payload, ROOT)
-
-    def _on_scoped_change(self, sample: Sample) -> None:
+        """Apply a message on Zenoh's thread if that is quick, else on the worker."""
+        message = sample.payload
         try:
             reach = self._keys.reach(sample.key, self._keys.change)
-        except DecodeError as error:
-            self._state.damage.report(NOT_A_PARAMETER, error)
-            return
-        self._receive(sample.payload, reach)
-
-    def _receive(self, message: bytes, reach: Path) -> None:
-        """Apply a message on Zenoh's thread if that is quick, else on the worker."""
-        try:
             sender, number, _ = read_header(message)
         except DecodeError as error:
             self._state.damage.report(NOT_A_PARAMETER, error)
             return
         acknowledge = partial(self._acknowledge, sender, number)
-        if len(message) > _LARGE:
-            self._worker.offer(lambda: self._apply(message, reach, acknowledge))
-        elif self._state.defer(message, reach):
-            acknowledge()
-        elif self._state.try_receive(message, reach):
-            self._when_stored(acknowledge)
-        else:
-            # If the worker is busy, the write is not acknowledged, and so sent once more.
-            self._worker.offer(lambda: self._apply(message, reach, acknowledge))
+        if len(message) <= _LARGE:
+            if self._state.defer(message, reach):
+                acknowledge()
+                return
+            if self._state.try_receive(message, reach):
+                self._when_stored(acknowledge)
+                return
+        # If the worker is busy, the write is not acknowledged, and so sent once more.
+        self._worker.offer(lambda: self._apply(message, reach, acknowledge))
 
     def _apply(self, message: bytes, reach: Path, then: Callable[[], None]) -> None:
         self._state.receive(message, reach)

@@ -30,7 +30,7 @@ from rosz.params.replica.sync import AntiEntropy, Synchroniser
 from rosz.params.tree import MISSING
 from rosz.params.values import normalise
 from rosz.params.wire import Keys, Member
-from rosz.params.writes import DELETED, Change, Write, condense, spread
+from rosz.params.writes import DELETED, Change, Write
 from rosz.session import Sample, Session, Stamp, clamp_timeout
 from rosz.worker import Worker
 
@@ -163,7 +163,7 @@ class Replica(_Copy):
         self._declared: list[Closable] = [
             session.queryable(keys.of(session.zid, "sync"), sync.on_sync, complete=True),
             session.queryable(f"{tell_key}/**", sync.on_tell, complete=True),
-            ClientServer(session, keys, state, self._write_for_client, worker, lambda: sync.ready),
+            ClientServer(session, keys, state, self.write, worker, lambda: sync.ready),
         ]
         if settled is not None:
             settled.wait(_MESH_TIMEOUT)
@@ -190,19 +190,6 @@ class Replica(_Copy):
         """
         path = to_path(name)
         return self.write([(path, normalise(value, path))], origin=origin, timeout=timeout)
-
-    def merge(
-        self, name: str, value: object, *, origin: str = "", timeout: float = ACK_TIMEOUT
-    ) -> Outcome:
-        """Set a global name as ROS 1's command line does: a dict leaf by leaf, as one change.
-
-        Raises:
-            ParamError: A parameter cannot hold the value, or the root would not be a dict.
-            InvalidName: The name, or a key, is not a name.
-            ClosedError: The replica or the session is closed.
-        """
-        changes = condense(spread(name, normalise(value, name)))
-        return self.write(changes, origin=origin, timeout=timeout)
 
     def delete(
         self, name: str | Path, *, origin: str = "", timeout: float = ACK_TIMEOUT
@@ -281,7 +268,7 @@ class Replica(_Copy):
 
     def digest(self) -> bytes:
         """Return the digest of all writes; replicas with the same writes have the same digest."""
-        with self._state.locked as history:
+        with self._state as history:
             return history.digest()
 
     @property
@@ -325,13 +312,8 @@ class Replica(_Copy):
         elif self._sync.ready and member < self._own:
             self._sync.compare_soon(member)
 
-    def _write_for_client(
-        self, changes: list[Change], origin: str, stamp: Stamp, timeout: float
-    ) -> tuple[str, ...]:
-        return self.write(changes, origin=origin, stamp=stamp, timeout=timeout).slow
-
     def _writes(self) -> list[Write]:
-        with self._state.locked as history:
+        with self._state as history:
             return list(history.writes())
 
     def _compact(self) -> None:

@@ -16,9 +16,10 @@ import logging
 import re
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Final
 
-from rosz.errors import DecodeError, ParamNotFound, RoszError
+from rosz.errors import DecodeError, ParamError, ParamNotFound, RoszError
 from rosz.params.paths import Path, split
 from rosz.params.replica.state import State, TreeReader, names_beside
 from rosz.params.replica.watch import TreeChange
@@ -53,9 +54,6 @@ _STORAGE_TIMEOUT: Final = 1.0
 _STORAGES_ONLY: Final = "_by=replica"
 """Parameter of a query that storages answer and replicas do not."""
 
-WriteFunction = Callable[[list[Change], str, Stamp, float], tuple[str, ...]]
-"""Function that writes a batch: changes, origin, stamp and timeout, to the slow replicas."""
-
 
 class ClientServer:
     """Reads on the replica's worker, and writes on a thread for each write, for clients.
@@ -64,7 +62,7 @@ class ClientServer:
         session: Session of the replica.
         keys: Keys of the domain.
         state: State of the replica.
-        write: Function that writes a batch.
+        write: `Replica.write`.
         worker: Worker of the replica.
         is_ready: Function that tells whether the replica has joined.
     """
@@ -74,7 +72,7 @@ class ClientServer:
         session: Session,
         keys: Keys,
         state: State,
-        write: WriteFunction,
+        write: Callable[..., Any],
         worker: Worker[Any],
         is_ready: Callable[[], bool],
     ) -> None:
@@ -86,15 +84,12 @@ class ClientServer:
         self._slots = threading.BoundedSemaphore(_MAX_WRITES)
         self._keys = keys
         self._set_key = keys.of(session.zid, "set")
-        self._verbs: dict[str, Callable[[ClientRequest], ClientReply]] = {
-            "get": self._get,
-            "names": self._names,
-            "search": self._search,
-            "stamp": self._stamp,
-        }
+        ask_key = keys.of(session.zid, "ask")
+        on_read = partial(self._on_query, self._reply_to_read)
+        on_write = partial(self._on_query, self._start_write)
         self._declared = [
-            session.queryable(keys.of(session.zid, "ask"), self._on_read, complete=True),
-            session.queryable(f"{self._set_key}/**", self._on_write, complete=True),
+            session.queryable(ask_key, on_read, complete=True),
+            session.queryable(f"{self._set_key}/**", on_write, complete=True),
         ]
 
     def close(self) -> None:
@@ -102,38 +97,29 @@ class ClientServer:
         for declared in self._declared:
             declared.close()
 
-    def _on_read(self, query: Query) -> None:
+    def _on_query(self, handle: Callable[[Query, ClientRequest], None], query: Query) -> None:
         payload = query.payload or b""
-        if not self._worker.offer(lambda: self._read(query, payload)):
+        if not self._worker.offer(lambda: self._handle(handle, query, payload)):
             _reply(query, ClientReply("joining"))
 
-    def _on_write(self, query: Query) -> None:
-        payload = query.payload or b""
-        if not self._worker.offer(lambda: self._start_write(query, payload)):
-            _reply(query, ClientReply("joining"))
-
-    def _read(self, query: Query, payload: bytes) -> None:
+    def _handle(
+        self, handle: Callable[[Query, ClientRequest], None], query: Query, payload: bytes
+    ) -> None:
         try:
             request = decode(payload, ClientRequest)
+            if self._is_ready():
+                handle(query, request)
+            else:
+                _reply(query, ClientReply("joining"))
         except DecodeError as error:
             _reply(query, ClientReply("refused", text=str(error)))
-            return
-        verb = self._verbs.get(request.verb)
-        if verb is None:
-            _reply(query, ClientReply("refused", text=f"'{request.verb}' is not a known verb"))
-        elif self._is_ready():
-            _reply(query, self._reply_to(request, verb))
-        else:
-            _reply(query, ClientReply("joining"))
 
-    def _start_write(self, query: Query, payload: bytes) -> None:
-        try:
-            request = decode(payload, ClientRequest)
-            reach = self._keys.reach(query.key, self._set_key)
-        except DecodeError as error:
-            _reply(query, ClientReply("refused", text=str(error)))
-            return
-        if not self._is_ready() or not self._slots.acquire(blocking=False):
+    def _reply_to_read(self, query: Query, request: ClientRequest) -> None:
+        _reply(query, self._try(self._read, request))
+
+    def _start_write(self, query: Query, request: ClientRequest) -> None:
+        reach = self._keys.reach(query.key, self._set_key)
+        if not self._slots.acquire(blocking=False):
             _reply(query, ClientReply("joining"))
             return
         threading.Thread(
@@ -145,12 +131,12 @@ class ClientServer:
 
     def _finish_write(self, query: Query, request: ClientRequest, reach: Path) -> None:
         try:
-            _reply(query, self._reply_to(request, lambda one: self._write(one, reach)))
+            _reply(query, self._try(partial(self._write, reach), request))
         finally:
             self._slots.release()
 
-    def _reply_to(
-        self, request: ClientRequest, verb: Callable[[ClientRequest], ClientReply]
+    def _try(
+        self, verb: Callable[[ClientRequest], ClientReply], request: ClientRequest
     ) -> ClientReply:
         try:
             return verb(request)
@@ -160,30 +146,31 @@ class ClientServer:
         except RoszError as error:
             return ClientReply("refused", text=str(error))
 
-    def _get(self, request: ClientRequest) -> ClientReply:
-        path = split(request.name)
-        value = pack_value(self._reader.peek(path))
-        return ClientReply(value=value, origin=self._reader.origin(path))
+    def _read(self, request: ClientRequest) -> ClientReply:
+        match request.verb:
+            case "get":
+                path = split(request.name)
+                value = pack_value(self._reader.peek(path))
+                return ClientReply(value=value, origin=self._reader.origin(path))
+            case "names":
+                return ClientReply(value=self._reader.names())
+            case "search":
+                found = self._reader.search(request.name, request.node)
+                return ClientReply("missing" if found is None else "ok", value=found)
+            case "stamp":
+                return ClientReply(value=self._state.stamp().time)
+        raise ParamError(f"'{request.verb}' is not a known verb")
 
-    def _names(self, _: ClientRequest) -> ClientReply:
-        return ClientReply(value=self._reader.names())
-
-    def _search(self, request: ClientRequest) -> ClientReply:
-        found = self._reader.search(request.name, request.node)
-        return ClientReply("missing" if found is None else "ok", value=found)
-
-    def _stamp(self, _: ClientRequest) -> ClientReply:
-        return ClientReply(value=self._state.stamp().time)
-
-    def _write(self, request: ClientRequest, reach: Path) -> ClientReply:
+    def _write(self, reach: Path, request: ClientRequest) -> ClientReply:
         batch = request.batch
         if batch is None:
-            return ClientReply("refused", text="a write without a batch")
+            raise ParamError("a write without a batch")
         changes: list[Change] = [(write.path, write.value) for write in batch.writes()]
         check_reach((path for path, _ in changes), reach)
         stamp = Stamp(batch.time, batch.clock)
         timeout = min(request.timeout, _MAX_TIMEOUT)
-        return ClientReply(slow=list(self._write_batch(changes, batch.origin, stamp, timeout)))
+        outcome = self._write_batch(changes, origin=batch.origin, stamp=stamp, timeout=timeout)
+        return ClientReply(slow=list(outcome.slow))
 
 
 def _reply(query: Query, reply: ClientReply) -> None:
@@ -303,7 +290,7 @@ class ParameterKeys:
                 query.reply_error(str(error))
                 return
             for path, value in selected:
-                with self._state.locked as history:
+                with self._state as history:
                     source = history.source(path)
                 stamp = None if source is None else Stamp(source.time, source.clock)
                 query.reply(self._keys.param(path), encode_value(value), stamp=stamp)

@@ -76,6 +76,8 @@ class DamageLog:
 class State:
     """A history behind a lock. Its tree is read without the lock.
 
+    As a context manager it locks the history, applies deferred messages, and returns the history.
+
     Messages of other replicas are deferred: they are applied when somebody reads the tree. So a
     process whose parameters nobody reads costs the writers almost nothing, and a reader always sees
     the newest state.
@@ -87,7 +89,6 @@ class State:
         clock: Clock of the session; it is kept ahead of all writes seen.
 
     Attributes:
-        locked: Context manager that locks the history, applies deferred messages and returns it.
         watchers: Callbacks that are notified of changes.
         damage: Log of damaged messages.
     """
@@ -98,15 +99,21 @@ class State:
         self._root: Tree = {}
         self._clock = clock
         self._history = History()
-        self.locked = _Locked(self, self._history)
         self._lock = threading.RLock()
         self._holder = 0
         self._on_new: Callable[[list[Write]], None] | None = None
         self._deferred: deque[tuple[bytes, Path]] = deque()
         self._applying = False
 
+    def __enter__(self) -> History:
+        self.acquire()
+        return self._history
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
     def __len__(self) -> int:
-        with self.locked as history:
+        with self as history:
             return len(history)
 
     @property
@@ -120,7 +127,7 @@ class State:
     def apply_deferred(self) -> None:
         """Apply deferred messages, unless this thread is at work on the history already."""
         if self._holder != threading.get_ident():
-            with self.locked:
+            with self:
                 pass
 
     def defer(self, message: bytes, reach: Path = ROOT) -> bool:
@@ -142,7 +149,7 @@ class State:
 
     def receive(self, message: bytes, reach: Path = ROOT) -> None:
         """Apply a message of another replica; the arguments are those of `defer`."""
-        with self.locked:
+        with self:
             self._receive(message, reach)
 
     def try_receive(self, message: bytes, reach: Path = ROOT) -> bool:
@@ -168,7 +175,7 @@ class State:
             ParamError: The tree cannot hold a change; nothing is changed then.
             DecodeError: The given stamp lies years ahead; nothing is changed then.
         """
-        with self.locked:
+        with self:
             given, stamp = stamp, stamp or self._now()
             at = (stamp.time, stamp.id)
             writes = [put(path, at, value, origin) for path, value in changes]
@@ -184,7 +191,7 @@ class State:
         Raises:
             ParamError: The tree cannot hold a write; nothing is changed then.
         """
-        with self.locked:
+        with self:
             self._apply(self._check_times(writes, _REFUSED)[0])
 
     def restore(self, writes: Iterable[Write]) -> bool:
@@ -196,7 +203,7 @@ class State:
         Raises:
             ParamError: The tree cannot hold a write.
         """
-        with self.locked:
+        with self:
             sound, ahead = self._check_times(writes, _STORED_AHEAD)
             self._apply(sound)
             for write in sorted(ahead, key=lambda write: write.order):
@@ -206,12 +213,12 @@ class State:
 
     def on_new(self, callback: Callable[[list[Write]], None]) -> None:
         """Call a function with all new writes from now on, in order; it must return quickly."""
-        with self.locked:
+        with self:
             self._on_new = callback
 
     def stamp(self) -> Stamp:
         """Return a stamp that is later than all writes seen."""
-        with self.locked:
+        with self:
             return self._now()
 
     def forget(self, age: int, keep: int) -> int:
@@ -224,16 +231,16 @@ class State:
         Returns:
             The number of deletions dropped.
         """
-        with self.locked as history:
+        with self as history:
             return history.forget(self._now().time - age, keep)
 
     def watch(self, path: Path, callback: Callback) -> Watch:
         """Call a function on all changes of a path from now on."""
-        with self.locked:
+        with self:
             return self.watchers.add(path, callback)
 
     def acquire(self, timeout: float = -1) -> bool:
-        """Lock the history and apply deferred messages; see `locked`.
+        """Lock the history and apply deferred messages.
 
         Args:
             timeout: Time limit in seconds; none if negative.
@@ -314,23 +321,6 @@ class State:
         return change
 
 
-class _Locked:
-    """Context manager of a state: its history, locked, with all deferred messages applied."""
-
-    __slots__ = ("_history", "_state")
-
-    def __init__(self, state: State, history: History) -> None:
-        self._state = state
-        self._history = history
-
-    def __enter__(self) -> History:
-        self._state.acquire()
-        return self._history
-
-    def __exit__(self, *_: object) -> None:
-        self._state.release()
-
-
 class TreeReader:
     """Reading access to a copy of the store. Safe for threads.
 
@@ -391,7 +381,7 @@ class TreeReader:
 
     def origin(self, name: str | Path) -> str:
         """Return the writer of a value, as shown to people; empty if nobody wrote it."""
-        with self._state.locked as history:
+        with self._state as history:
             write = history.source(to_path(name))
         return write.origin if write is not None else ""
 

@@ -42,6 +42,8 @@ __all__ = ("AntiEntropy", "Synchroniser")
 
 _log = logging.getLogger("rosz.params")
 
+_DAMAGED_COMPARISON: Final = "a replica sent a damaged comparison"
+_DAMAGED_WRITES: Final = "a replica sent damaged writes"
 _TIMEOUT: Final = 5.0
 _NEXT_AFTER: Final = 0.3
 """Seconds after which a joining replica asks the next replica as well."""
@@ -133,13 +135,15 @@ class Synchroniser:
     def on_sync(self, query: Query) -> None:
         """Handle a request of another replica on the ``sync`` key."""
         payload = query.payload or b""
-        if not self.worker.offer(lambda: self._answer(query, payload)):
+        respond = partial(self._compare_digests, payload)
+        if not self.worker.offer(partial(self._handle, query, _DAMAGED_COMPARISON, respond)):
             query.close()
 
     def on_tell(self, query: Query) -> None:
         """Handle writes of another replica on the ``tell`` key."""
         payload = query.payload or b""
-        if not self.worker.offer(lambda: self._receive(query, payload)):
+        respond = partial(self._receive, query.key, payload)
+        if not self.worker.offer(partial(self._handle, query, _DAMAGED_WRITES, respond)):
             with query:
                 query.reply_error("this replica has too many queries; send the writes again later")
 
@@ -200,25 +204,29 @@ class Synchroniser:
         self.busy.add(zid)
         _Comparison(self, zid, done).start()
 
-    def _answer(self, query: Query, payload: bytes) -> None:
+    def _handle(self, query: Query, damage: str, respond: Callable[[], SyncReply]) -> None:
         with query:
             try:
-                request = decode(payload, SyncRequest)
-                with self.state.locked as history:
-                    digest = history.digest()
-                    writes = list(history.writes()) if request.digest == EMPTY_DIGEST else []
-                reply = SyncReply(digest, self.ready, [Record.of(write) for write in writes])
-                if request.index is not None:
-                    self._fill_differences(request.index, reply)
+                reply = respond()
             except DecodeError as error:
-                self.state.damage.report("a replica sent a damaged comparison", error)
+                self.state.damage.report(damage, error)
                 query.reply_error(str(error))
                 return
             query.reply(query.key, encode(reply))
 
+    def _compare_digests(self, payload: bytes) -> SyncReply:
+        request = decode(payload, SyncRequest)
+        with self.state as history:
+            digest = history.digest()
+            writes = list(history.writes()) if request.digest == EMPTY_DIGEST else []
+        reply = SyncReply(digest, self.ready, [Record.of(write) for write in writes])
+        if request.index is not None:
+            self._fill_differences(request.index, reply)
+        return reply
+
     def _fill_differences(self, index: Index, reply: SyncReply) -> None:
         theirs = {path: (time_, clock) for path, time_, clock in index.entries}
-        with self.state.locked as history:
+        with self.state as history:
             ours = [write for bucket in index.buckets for write in history.bucket(bucket)]
         for write in ours:
             known = theirs.get(join_path(write.path))
@@ -226,25 +234,18 @@ class Synchroniser:
                 reply.records.append(Record.of(write))
         for path, (time_, clock) in theirs.items():
             write = Write(split_path(path), time_, clock, DELETED)
-            with self.state.locked as history:
+            with self.state as history:
                 hidden = history.hides(write)
             if not hidden:
                 reply.wanted.append(path)
 
-    def _receive(self, query: Query, payload: bytes) -> None:
-        with query:
-            try:
-                reach = self.keys.reach(query.key, self.keys.of(self.session.zid, "tell"))
-                writes = [record.write() for record in decode(payload, SyncRequest).records]
-                check_reach((write.path for write in writes), reach)
-                self.state.apply(writes)
-            except DecodeError as error:
-                self.state.damage.report("a replica sent damaged writes", error)
-                query.reply_error(str(error))
-                return
-            with self.state.locked as history:
-                reply = SyncReply(digest=history.digest())
-            query.reply(query.key, encode(reply))
+    def _receive(self, key: str, payload: bytes) -> SyncReply:
+        reach = self.keys.reach(key, self.keys.of(self.session.zid, "tell"))
+        writes = [record.write() for record in decode(payload, SyncRequest).records]
+        check_reach((write.path for write in writes), reach)
+        self.state.apply(writes)
+        with self.state as history:
+            return SyncReply(digest=history.digest())
 
 
 class _Comparison:
@@ -259,13 +260,13 @@ class _Comparison:
         self._parts: list[list[Write]] = []
 
     def start(self) -> None:
-        with self._state.locked as history:
+        with self._state as history:
             digest = history.digest()
         self._request(SyncRequest(digest=digest), self._on_digest)
 
     def _on_digest(self, reply: SyncReply) -> None:
         self._ready = reply.ready
-        with self._state.locked as history:
+        with self._state as history:
             buckets = history.differing(reply.digest)
             writes = [write for bucket in buckets for write in history.bucket(bucket)]
         if not buckets:
@@ -275,7 +276,7 @@ class _Comparison:
         self._request(SyncRequest(index=Index(buckets, entries)), self._on_differences)
 
     def _on_differences(self, reply: SyncReply) -> None:
-        with self._state.locked as history:
+        with self._state as history:
             found = [history.find(split_path(path)) for path in reply.wanted]
         refused = self._owner.refused
         wanted = [
@@ -417,7 +418,7 @@ class _RefusedWrites:
 
     def trim(self, state: State) -> None:
         """Forget writes that have left the history."""
-        with state.locked as history:
+        with state as history:
             for key in list(self._sent):
                 _, path, time_, clock = key
                 write = history.find(path)
