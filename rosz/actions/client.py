@@ -21,6 +21,9 @@ _FOREVER = threading.TIMEOUT_MAX / 2
 _CHECK_PERIOD = 0.1
 """Seconds after which a wait looks at the node's clock, which may be simulated."""
 
+_ACTIVE_TIMEOUT = 1.0
+"""Seconds that `on_done` waits for `on_active` to return."""
+
 _EXECUTED = frozenset({GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.PREEMPTED})
 """Terminal states of goals that were executed."""
 
@@ -54,6 +57,9 @@ class ClientGoal:
         self._on_active = on_active
         self._on_feedback = on_feedback
         self._lock = threading.RLock()
+        self._active_thread = 0
+        self._active_over = threading.Event()
+        self._active_over.set()
         self._listed = False
         self._finished = False
         self._done = threading.Event()
@@ -72,6 +78,10 @@ class ClientGoal:
         Returns:
             Whether the goal has ended.
         """
+        if threading.get_ident() == self._active_thread:
+            if self._finished:
+                return True  # this thread calls `on_done` next
+            self._active_over.set()  # else `finish` would wait for this very callback
         node = self._client.node
         limit = round((timeout or _FOREVER) * 1e9)
         began = node.now()
@@ -106,13 +116,23 @@ class ClientGoal:
             if self._finished or status.status in TERMINAL:
                 return  # the end comes with the result message
             self.status = status
-            self._start(status.status in RUNNING)
+            starts = self._starts(status.status in RUNNING)
+        if starts:
+            self._activate()
 
-    def _start(self, running: bool) -> None:
-        """Call `on_active` once, with the lock held, so that it returns before `on_done`."""
-        if running and not self.started:
-            self.started = True
-            self._call(self._on_active)
+    def _starts(self, running: bool) -> bool:
+        """Return whether this state is the first one in which the goal is executed."""
+        if self.started or not running:
+            return False
+        self.started = True
+        self._active_over.clear()
+        return True
+
+    def _activate(self) -> None:
+        self._active_thread = threading.get_ident()
+        self._call(self._on_active)
+        self._active_thread = 0
+        self._active_over.set()
 
     def receive_feedback(self, feedback: Any) -> None:
         """Pass feedback on."""
@@ -126,7 +146,11 @@ class ClientGoal:
                 return
             self._finished = True
             self.status, self.result = status, result
-            self._start(status.status in _EXECUTED)
+            starts = self._starts(status.status in _EXECUTED)
+        if starts:
+            self._activate()
+        # `on_done` comes after `on_active`, but never hangs on what that waits for.
+        self._active_over.wait(_ACTIVE_TIMEOUT)
         self._call(self._on_done, self)
         self._done.set()
         self.forget()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import Network
+from network import Network, eventually
 
 from rosz.actions import ActionClient, ActionServer, ActionTypes, ClientGoal
 from rosz.errors import UsageError
@@ -225,3 +226,29 @@ def test_waiting_has_limits(world: World) -> None:
 def test_only_actions_are_accepted() -> None:
     with pytest.raises(UsageError, match="String is not an action"):
         ActionTypes.of(String)
+
+
+@pytest.mark.parametrize("quick", [True, False], ids=["quick", "slow"])
+def test_on_active_may_wait_for_the_end(world: World, quick: bool) -> None:
+    count = world.count
+    begun = threading.Event()
+    events: list[str] = []
+
+    def execute(_: Any) -> None:
+        if not quick:
+            assert begun.wait(TIMEOUT)
+        server.set_succeeded(count.result(1))
+
+    server = world.server(execute)
+
+    def on_active() -> None:
+        begun.set()
+        events.append(f"active {sent.get().wait(TIMEOUT)}")
+
+    sent: SimpleQueue[ClientGoal] = SimpleQueue()
+    goal = world.client().send(
+        count.goal(1), on_done=lambda _: events.append("done"), on_active=on_active
+    )
+    sent.put(goal)
+    assert goal.wait(TIMEOUT)
+    eventually(lambda: sorted(events) == ["active True", "done"], "both callbacks")
