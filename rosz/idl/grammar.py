@@ -24,6 +24,7 @@ from rosz.idl.spec import (
     Shape,
     Value,
 )
+from rosz.message import INTEGER_RANGES
 
 __all__ = ("parse_action", "parse_message", "parse_service")
 
@@ -44,9 +45,7 @@ _BARE_TEXT = re.compile(r"[^#]*[^#\s]")
 _ESCAPE = re.compile(r"\\(?:u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|(.))")
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "a": "\a", "b": "\b", "f": "\f", "v": "\v"}
 _BOOLEANS = {"true": True, "false": False, "1": True, "0": False}
-_RANGES = {f"int{n}": (-(1 << (n - 1)), (1 << (n - 1)) - 1) for n in (8, 16, 32, 64)}
-_RANGES |= {f"uint{n}": (0, (1 << n) - 1) for n in (8, 16, 32, 64)}
-_RANGES |= {"byte": (-0x80, 0xFF), "char": (0, 0xFF)}
+_STRINGS = ("string", "wstring")
 
 _MEANING = {
     "time": "builtin_interfaces/msg/Time",
@@ -70,12 +69,8 @@ def parse_message(name: str, text: str, path: str = "<string>") -> MessageSpec:
     lines = _lines(text)
     for number, line in enumerate(lines, 1):
         if line.startswith(_SEPARATOR):
-            raise DefinitionError(
-                "'---' has no meaning in a message; a service belongs in a .srv file",
-                path,
-                number,
-                1,
-            )
+            reason = "'---' has no meaning in a message; a service belongs in a .srv file"
+            raise DefinitionError(reason, path, number, 1)
     return _message(name, lines, 1, text, path)
 
 
@@ -90,9 +85,8 @@ def parse_service(name: str, text: str, path: str = "<string>") -> ServiceSpec:
     Raises:
         DefinitionError: The text does not follow the grammar.
     """
-    first, second = _split(text, path, 1, "a service", "a request and a response")
-    request = _message(f"{name}_Request", first[1], first[0], "\n".join(first[1]), path)
-    response = _message(f"{name}_Response", second[1], second[0], "\n".join(second[1]), path)
+    what = "a service has a request and a response"
+    request, response = _split(name, ("Request", "Response"), text, path, what)
     return ServiceSpec(name, request, response, text, path)
 
 
@@ -107,11 +101,8 @@ def parse_action(name: str, text: str, path: str = "<string>") -> ActionSpec:
     Raises:
         DefinitionError: The text does not follow the grammar.
     """
-    parts = _split(text, path, 2, "an action", "a goal, a result and a feedback")
-    goal, result, feedback = (
-        _message(f"{name}_{role}", lines, start, "\n".join(lines), path)
-        for role, (start, lines) in zip(("Goal", "Result", "Feedback"), parts, strict=True)
-    )
+    what = "an action has a goal, a result and a feedback"
+    goal, result, feedback = _split(name, ("Goal", "Result", "Feedback"), text, path, what)
     return ActionSpec(name, goal, result, feedback, text, path)
 
 
@@ -119,22 +110,23 @@ def _lines(text: str) -> list[str]:
     return text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
 
 
-def _split(
-    text: str, path: str, separators: int, what: str, parts: str
-) -> list[tuple[int, list[str]]]:
-    """Cut a text at its ``---`` lines into (number of the first line, lines)."""
-    found: list[tuple[int, list[str]]] = [(1, [])]
+def _split(name: str, roles: tuple[str, ...], text: str, path: str, what: str) -> list[MessageSpec]:
+    """Return the messages in a text, which ``---`` lines separate."""
+    parts: list[tuple[int, list[str]]] = [(1, [])]
     for number, line in enumerate(_lines(text), 1):
         if not line.startswith(_SEPARATOR):
-            found[-1][1].append(line)
+            parts[-1][1].append(line)
             continue
-        if len(found) > separators:
-            raise DefinitionError(f"one '---' too many: {what} has {parts}", path, number, 1)
-        found.append((number + 1, []))
-    if len(found) <= separators:
-        last = len(found[-1][1]) + found[-1][0] - 1
-        raise DefinitionError(f"expected '---': {what} has {parts}", path, last, 1)
-    return found
+        if len(parts) == len(roles):
+            raise DefinitionError(f"one '---' too many: {what}", path, number, 1)
+        parts.append((number + 1, []))
+    if len(parts) < len(roles):
+        start, lines = parts[-1]
+        raise DefinitionError(f"expected '---': {what}", path, start + len(lines) - 1, 1)
+    return [
+        _message(f"{name}_{role}", lines, start, "\n".join(lines), path)
+        for role, (start, lines) in zip(roles, parts, strict=True)
+    ]
 
 
 def _message(name: str, lines: list[str], start: int, text: str, path: str) -> MessageSpec:
@@ -150,7 +142,7 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
                 f"'{parsed.name}' is already declared in line {taken[parsed.name]}",
                 path,
                 number,
-                _name_column(line, parsed.name),
+                _column(line, parsed.name),
             )
         taken[parsed.name] = number
         if isinstance(parsed, Constant):
@@ -160,7 +152,7 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
     return MessageSpec(name, tuple(fields), tuple(constants), text, path)
 
 
-def _name_column(line: str, name: str) -> int:
+def _column(line: str, name: str) -> int:
     """Return the 1-based column of the name that a line declares."""
     found = re.search(rf"[ \t]({re.escape(name)})\b", line)
     return found.start(1) + 1 if found else 0
@@ -253,7 +245,7 @@ class _Line:
     def _bound(self, base: str) -> int:
         if not self._text.startswith("<", self._at):
             return 0
-        if base not in ("string", "wstring"):
+        if base not in _STRINGS:
             self._fail(f"only strings have a bound '<=N'; write '{base}[<=N]' for a sequence")
         if not self._text.startswith("<=", self._at):
             self._fail(f"expected '<=' and a number, got '{self._rest()}'")
@@ -313,155 +305,118 @@ class _Line:
                 f"a constant has a primitive type; '{kind.written}{kind.suffix}' is not one",
                 column - 1,
             )
-        try:
-            value, text = _read_constant(kind.base, self._text, self._at + 1)
-        except _LiteralError as error:
-            self._fail(str(error), error.offset)
-        return Constant(name, kind.base, value, text)
+        self._at += 1
+        text = self._text[self._at :]
+        if kind.base in _STRINGS:
+            # ROS 1 takes the rest of the line, quotes and # included; ROS 2 quotes its strings.
+            text = text.strip()
+            quoted = _QUOTED.match(text)
+            if quoted and text[quoted.end() :].lstrip()[:1] in ("", "#"):
+                return Constant(name, kind.base, _unquote(quoted[0]), text)
+            return Constant(name, kind.base, text, text)
+        text = text.partition("#")[0]
+        self._at += len(text) - len(text.lstrip())
+        text = text.strip()
+        return Constant(name, kind.base, self._scalar(kind.base, text), text)
 
-    def _default(
-        self, kind: FieldType
-    ) -> bool | int | float | str | tuple[bool | int | float | str, ...]:
+    def _default(self, kind: FieldType) -> Value:
         if not kind.primitive:
             self._fail(
                 f"only fields of primitive types have defaults; '{kind.written}' is a message"
             )
-        try:
-            value, self._at = _read_default(kind, self._text, self._at)
-        except _LiteralError as error:
-            self._fail(str(error), error.offset)
+        value = self._one_default(kind) if kind.shape == "one" else self._list(kind)
         self._skip()
         if not self._done():
             self._fail(f"expected the end of the line after the default, got '{self._rest()}'")
         return value
 
-
-class _LiteralError(Exception):
-    """A value that does not fit its type; it becomes a DefinitionError with a place.
-
-    Attributes:
-        offset: Offset of the value in the line.
-    """
-
-    def __init__(self, offset: int, reason: str) -> None:
-        self.offset = offset
-        super().__init__(reason)
-
-
-class _RangeError(_LiteralError):
-    """A number of the right kind that is too large or too small."""
-
-
-def _read_constant(kind: str, line: str, start: int) -> tuple[Scalar, str]:
-    """Read the value of a constant: what is right of its ``=``.
-
-    Args:
-        kind: Name of the constant's type.
-        line: The whole line.
-        start: Offset of the value.
-
-    Returns:
-        The value, and its text, which ROS 1 hashes.
-
-    Raises:
-        _LiteralError: The text is not a value of the type.
-    """
-    if kind in ("string", "wstring"):
-        # ROS 1 takes the rest of the line, quotes and # included; ROS 2 quotes its strings.
-        text = line[start:].strip()
-        quoted = _QUOTED.match(text)
-        if quoted and (quoted.end() == len(text) or text[quoted.end() :].lstrip().startswith("#")):
-            return _unquote(quoted[0]), text
-        return text, text
-    text = line[start:].partition("#")[0]
-    lead = len(text) - len(text.lstrip())
-    text = text.strip()
-    return _scalar(kind, text, start + lead), text
-
-
-def _read_default(field: FieldType, line: str, start: int) -> tuple[Value, int]:
-    """Read the default of a field.
-
-    Returns:
-        The value, and the offset of its end.
-
-    Raises:
-        _LiteralError: The text is not a value of the type.
-    """
-    if field.shape != "one":
-        return _list(field, line, start)
-    if field.base in ("string", "wstring"):
-        value, end = _text(line, start, _BARE_TEXT)
-        _check_bound(field, value, start)
-        return value, end
-    bare = _BARE.match(line, start)
-    if bare is None:
-        raise _LiteralError(start, f"expected a default of type {field.base}")
-    try:
-        return _scalar(field.base, bare[0], start), bare.end()
-    except _RangeError:
-        raise
-    except _LiteralError as error:
-        reason = f"expected a default of type {field.base}, or a comment after '#', got '{bare[0]}'"
-        raise _LiteralError(start, reason) from error
-
-
-def _list(field: FieldType, line: str, start: int) -> tuple[Value, int]:
-    if not line.startswith("[", start):
-        raise _LiteralError(
-            start, f"expected a list '[…]' as default of an array, got '{line[start:].strip()}'"
+    def _one_default(self, kind: FieldType) -> Scalar:
+        if kind.base in _STRINGS:
+            return self._string(kind, _BARE_TEXT)
+        bare = _BARE.match(self._text, self._at)
+        expected = f"expected a default of type {kind.base}"
+        if bare is None:
+            self._fail(expected)
+        value = self._scalar(
+            kind.base, bare[0], f"{expected}, or a comment after '#', got '{bare[0]}'"
         )
-    values: list[Scalar] = []
-    at = _skip(line, start + 1)
-    while not line.startswith("]", at):
-        if values:
-            if not line.startswith(",", at):
-                _unclosed(line, start, at)
-            at = _skip(line, at + 1)
-        value, end = _element(field, line, at)
-        values.append(value)
-        at = _skip(line, end)
-    if field.shape == "fixed" and len(values) != field.size:
-        raise _LiteralError(start, f"expected {field.size} elements, got {len(values)}")
-    if field.shape == "bounded" and len(values) > field.size:
-        raise _LiteralError(start, f"expected at most {field.size} elements, got {len(values)}")
-    return tuple(values), at + 1
+        self._at = bare.end()
+        return value
 
+    def _list(self, kind: FieldType) -> Value:
+        start = self._at
+        if not self._text.startswith("[", start):
+            got = self._text[start:].strip()
+            self._fail(f"expected a list '[…]' as default of an array, got '{got}'")
+        values: list[Scalar] = []
+        self._at += 1
+        self._skip()
+        while not self._text.startswith("]", self._at):
+            if values:
+                if self._done():
+                    self._fail("the list is not closed; expected ']'", start)
+                if self._text[self._at] != ",":
+                    self._fail(f"expected ',' or ']' in the list, got '{self._text[self._at]}'")
+                self._at += 1
+                self._skip()
+            values.append(self._element(kind))
+            self._skip()
+        if kind.shape == "fixed" and len(values) != kind.size:
+            self._fail(f"expected {kind.size} elements, got {len(values)}", start)
+        if kind.shape == "bounded" and len(values) > kind.size:
+            self._fail(f"expected at most {kind.size} elements, got {len(values)}", start)
+        self._at += 1
+        return tuple(values)
 
-def _unclosed(line: str, start: int, at: int) -> NoReturn:
-    if at >= len(line) or line[at] == "#":
-        raise _LiteralError(start, "the list is not closed; expected ']'")
-    raise _LiteralError(at, f"expected ',' or ']' in the list, got '{line[at]}'")
+    def _element(self, kind: FieldType) -> Scalar:
+        if kind.base in _STRINGS:
+            return self._string(kind, _BARE)
+        bare = _BARE.match(self._text, self._at)
+        if bare is None:
+            if self._done():
+                self._fail("the list is not closed; expected ']'")
+            self._fail(f"expected a value of type {kind.base}, got '{self._text[self._at]}'")
+        value = self._scalar(kind.base, bare[0])
+        self._at = bare.end()
+        return value
 
+    def _string(self, kind: FieldType, bare: re.Pattern[str]) -> str:
+        quote = self._text[self._at : self._at + 1]
+        if quote in ("'", '"'):
+            found = _QUOTED.match(self._text, self._at)
+            if found is None:
+                self._fail(f"the string is not closed; expected {quote}")
+            value = _unquote(found[0])
+        else:
+            found = bare.match(self._text, self._at)
+            if found is None:
+                self._fail("expected a string")
+            value = found[0]
+        if kind.bound and len(value.encode()) > kind.bound:
+            self._fail(f"'{value}' is longer than the {kind.bound} bytes of its type")
+        self._at = found.end()
+        return value
 
-def _element(field: FieldType, line: str, at: int) -> tuple[Scalar, int]:
-    if field.base in ("string", "wstring"):
-        value, end = _text(line, at, _BARE)
-        _check_bound(field, value, at)
-        return value, end
-    bare = _BARE.match(line, at)
-    if bare is None:
-        if at >= len(line) or line[at] == "#":
-            raise _LiteralError(at, "the list is not closed; expected ']'")
-        raise _LiteralError(at, f"expected a value of type {field.base}, got '{line[at]}'")
-    return _scalar(field.base, bare[0], at), bare.end()
-
-
-def _text(line: str, at: int, bare: re.Pattern[str]) -> tuple[str, int]:
-    if line[at : at + 1] in ("'", '"'):
-        quoted = _QUOTED.match(line, at)
-        if quoted is None:
-            raise _LiteralError(at, f"the string is not closed; expected {line[at]}")
-        return _unquote(quoted[0]), quoted.end()
-    plain = bare.match(line, at)
-    if plain is None:
-        raise _LiteralError(at, "expected a string")
-    return plain[0], plain.end()
-
-
-def _check_bound(field: FieldType, value: str, at: int) -> None:
-    if field.bound and len(value.encode()) > field.bound:
-        raise _LiteralError(at, f"'{value}' is longer than the {field.bound} bytes of its type")
+    def _scalar(self, kind: str, text: str, wrong: str = "") -> Scalar:
+        """Return the value of a text; ``wrong`` is the error for a value of another kind."""
+        if not text:
+            self._fail(f"expected a value of type {kind}")
+        if kind == "bool":
+            if text.lower() not in _BOOLEANS:
+                self._fail(wrong or f"expected true or false, got '{text}'")
+            return _BOOLEANS[text.lower()]
+        is_integer = _INTEGER.fullmatch(text)
+        if kind in ("float32", "float64"):
+            if not is_integer and not _FLOAT.fullmatch(text):
+                self._fail(wrong or f"expected a number of type {kind}, got '{text}'")
+            return float(_integer(text) if is_integer else text)
+        if not is_integer:
+            self._fail(wrong or f"expected an integer of type {kind}, got '{text}'")
+        value = _integer(text)
+        low, high = INTEGER_RANGES[kind]
+        if not low <= value <= high:
+            self._fail(f"{text} is outside the range of {kind} ({low} to {high})")
+        return value
 
 
 def _unquote(text: str) -> str:
@@ -472,35 +427,6 @@ def _unquote(text: str) -> str:
     return _ESCAPE.sub(replace, text[1:-1])
 
 
-def _skip(line: str, at: int) -> int:
-    while line[at : at + 1] in (" ", "\t"):
-        at += 1
-    return at
-
-
-def _scalar(kind: str, text: str, at: int) -> Scalar:
-    if not text:
-        raise _LiteralError(at, f"expected a value of type {kind}")
-    if kind == "bool":
-        if text.lower() not in _BOOLEANS:
-            raise _LiteralError(at, f"expected true or false, got '{text}'")
-        return _BOOLEANS[text.lower()]
-    if kind in ("float32", "float64"):
-        if _INTEGER.fullmatch(text):
-            return float(_integer(text))
-        if not _FLOAT.fullmatch(text):
-            raise _LiteralError(at, f"expected a number of type {kind}, got '{text}'")
-        return float(text)
-    if not _INTEGER.fullmatch(text):
-        raise _LiteralError(at, f"expected an integer of type {kind}, got '{text}'")
-    value = _integer(text)
-    low, high = _RANGES[kind]
-    if not low <= value <= high:
-        raise _RangeError(at, f"{text} is outside the range of {kind} ({low} to {high})")
-    return value
-
-
 def _integer(text: str) -> int:
-    digits = text.lstrip("+-")
-    base = {"x": 16, "b": 2, "o": 8}.get(digits[1:2].lower(), 10)
+    base = {"x": 16, "b": 2, "o": 8}.get(text.lstrip("+-")[1:2].lower(), 10)
     return int(text, base)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from rosz.message.base import (
     ARRAY_CODES,
+    INTEGER_RANGES,
     OCTETS,
     SCALAR_CODES,
     Array,
@@ -25,6 +26,7 @@ from rosz.message.base import (
 
 __all__ = (
     "ARRAY_CODES",
+    "INTEGER_RANGES",
     "OCTETS",
     "SCALAR_CODES",
     "Array",

@@ -27,6 +27,7 @@ import msgspec
 
 __all__ = (
     "ARRAY_CODES",
+    "INTEGER_RANGES",
     "OCTETS",
     "SCALAR_CODES",
     "SCALAR_SIZES",
@@ -66,6 +67,14 @@ SCALAR_CODES = {
 
 SCALAR_SIZES = {name: calcsize(f"<{code}") for name, code in SCALAR_CODES.items()}
 """Sizes of these types in bytes, which are their alignments too."""
+
+INTEGER_RANGES = {
+    **{f"int{n}": (-(1 << (n - 1)), (1 << (n - 1)) - 1) for n in (8, 16, 32, 64)},
+    **{f"uint{n}": (0, (1 << n) - 1) for n in (8, 16, 32, 64)},
+    "byte": (-0x80, 0xFF),  # an int8 in ROS 1, a uint8 in ROS 2
+    "char": (0, 0xFF),
+}
+"""Smallest and largest values of the integer types."""
 
 OCTETS = frozenset({"byte", "char", "uint8"})
 """Types whose sequences are ``bytes``."""

@@ -18,7 +18,7 @@ from typing import Any, NoReturn, TypeAlias, TypeVar
 import yaml
 
 from rosz.errors import EncodeError, near_miss
-from rosz.message.base import ARRAY_CODES, OCTETS, SCALAR_SIZES, Message, Sequenced, Slot, slots
+from rosz.message.base import ARRAY_CODES, INTEGER_RANGES, OCTETS, Message, Sequenced, Slot, slots
 from rosz.message.sequences import numbers
 from rosz.message.text import strify_message
 from rosz.time import DurationValue, TimeValue, normal
@@ -174,10 +174,7 @@ class _Filler:
         if not hasattr(value, "__index__"):
             self._refuse(path, kind, value)
         number: int = value.__index__()
-        bits = 8 * SCALAR_SIZES[kind]
-        signed = kind.startswith("int") or kind == "byte"
-        low = -(1 << bits - 1) if signed else 0
-        high = (1 << (bits if kind[0] == "u" or kind in OCTETS else bits - 1)) - 1
+        low, high = INTEGER_RANGES[kind]
         if not low <= number <= high:
             self._refuse(path, f"{kind} ({low} to {high})", value)
         return number

@@ -12,7 +12,15 @@ from array import array
 from typing import Any, NoReturn, TypeVar
 
 from rosz.errors import DecodeError, EncodeError
-from rosz.message.base import ARRAY_CODES, OCTETS, SCALAR_CODES, SCALAR_SIZES, Slot, slots
+from rosz.message.base import (
+    ARRAY_CODES,
+    INTEGER_RANGES,
+    OCTETS,
+    SCALAR_CODES,
+    SCALAR_SIZES,
+    Slot,
+    slots,
+)
 from rosz.message.sequences import flags, numbers, octets, pack_wide, put_text, read_wide
 
 __all__ = ("decode_plainly", "encode_plainly")
@@ -23,7 +31,6 @@ _HEADER = b"\0\1\0\0"
 _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
 _BYTES = frozenset({"byte", "char"})
 _FEW = 60
-_LEAST_BYTE = -0x80
 
 _FAULTS = (struct.error, AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
 
@@ -204,16 +211,13 @@ def _number(kind: str, value: Any) -> Any:
         return float(value)
     if kind in _BYTES and isinstance(value, bytes) and len(value) == 1:
         return value[0]
-    number = value.__index__() if hasattr(value, "__index__") else None
-    if number is None:
+    if not hasattr(value, "__index__"):
         raise TypeError(f"'{type(value).__name__}' is not an integer")
-    if kind == "byte" and _LEAST_BYTE <= number < 0:  # ROS 1's byte is an int8
-        number += 0x100
-    bits = 8 * SCALAR_SIZES[kind]
-    low, high = (-1 << bits - 1, (1 << bits - 1) - 1) if kind[0] == "i" else (0, (1 << bits) - 1)
+    number = value.__index__()
+    low, high = INTEGER_RANGES[kind]
     if not low <= number <= high:
         raise OverflowError(f"the range of the type is {low} to {high}")
-    return number
+    return number & 0xFF if kind == "byte" else number
 
 
 class _Reader:
