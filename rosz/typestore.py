@@ -27,10 +27,7 @@ from rosz.idl import (
     Definition,
     Folders,
     full_name,
-    message_hash,
-    message_md5,
-    service_hash,
-    service_md5,
+    identity,
     split_definitions,
 )
 from rosz.idl.cache import SourceCache
@@ -41,6 +38,7 @@ from rosz.packages import PackageIndex
 __all__ = ("Kind", "TypeStore", "is_generated", "shipped_packages", "shipped_types")
 
 Kind: TypeAlias = Literal["msg", "srv"]
+_KINDS: tuple[Kind, ...] = ("msg", "srv")
 
 _BUILT_IN = frozenset(
     {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration", "std_msgs/msg/Header"}
@@ -114,7 +112,8 @@ class TypeStore:
             TypeNotFound: The name is not that of a message type.
             DefinitionError: A definition is not well-formed, or a type in it does not exist.
         """
-        return self._text_types(self._check_name(name, "msg"), text, others).message(name)
+        cls: type[Message] = self._from_text(self._check_name(name, "msg"), text, others)
+        return cls
 
     def service_from_text(
         self, name: str, text: str, others: Mapping[str, str] | None = None
@@ -130,7 +129,8 @@ class TypeStore:
             TypeNotFound: The name is not that of a service type.
             DefinitionError: A definition is not well-formed, or a type in it does not exist.
         """
-        return self._text_types(self._check_name(name, "srv"), text, others).service(name)
+        cls: type[Service] = self._from_text(self._check_name(name, "srv"), text, others)
+        return cls
 
     def names(self, kind: Kind, package: str | None = None) -> list[str]:
         """Return the names of all types of a kind, as ``std_msgs/String``, sorted.
@@ -153,7 +153,7 @@ class TypeStore:
         known = set(shipped_packages())
         if self._packages is not None:
             known |= set(self._packages.names())
-        kinds: tuple[Kind, ...] = ("msg", "srv") if kind is None else (kind,)
+        kinds = _KINDS if kind is None else (kind,)
         return sorted(p for p in known if any(self._bases(p, each) for each in kinds))
 
     def has(self, package: str, kind: Kind) -> bool:
@@ -213,16 +213,13 @@ class TypeStore:
             package = rest.pop(0)
             if package in done:
                 continue
-            messages, services = (self._own_names(package, kind) for kind in ("msg", "srv"))
+            messages, services = (self._own_names(package, kind) for kind in _KINDS)
             if self._folder(package) is None:
                 raise PackageNotFound(package, self.packages(), self._searched())
             if not messages and not services:
                 raise TypeNotFound(package, f"package '{package}' has no types of its own")
             done[package] = generate(package, messages, services, self._catalog, self._place)
-            specs = [self._catalog.message(name) for name in messages]
-            for name in services:
-                service = self._catalog.service(name)
-                specs += [service.request, service.response]
+            specs = [part for name in messages + services for part in self._catalog.parts(name)]
             below = {name for spec in specs for name in self._catalog.below(spec)}
             rest += sorted({name.partition("/")[0] for name in below if not _is_shipped(name)})
         return done
@@ -297,9 +294,10 @@ class TypeStore:
             compiled.__all__ = tuple(sorted({*ours.__all__, *compiled.__all__}))  # type: ignore[attr-defined]
         return compiled
 
-    def _text_types(self, name: str, text: str, others: Mapping[str, str] | None) -> _TextTypes:
+    def _from_text(self, name: str, text: str, others: Mapping[str, str] | None) -> Any:
         texts = {full_name(other, "msg"): one for other, one in (others or {}).items()}
-        return _TextTypes(self, self._compiler, texts | split_definitions(name, text))
+        texts |= split_definitions(name, text)
+        return _TextTypes(self, self._compiler, texts).find(name)
 
     def _compile(self, package: str, kind: Kind, names: list[str]) -> ModuleType:
         definitions = [(name, self.definition(name).text) for name in names]
@@ -398,40 +396,20 @@ class _TextTypes:
             return Definition(self._texts[name], f"<{name}>")
         return self._store.definition(name)
 
-    def message(self, name: str) -> type[Message]:
-        """Return a message class."""
-        name = full_name(name, "msg")
-        spec = self._catalog.message(name)
-        identity = message_hash(spec, self._catalog), message_md5(spec, self._catalog)
-        known: type[Message] | None = self._known(self._store.message, name, identity)
-        if known is not None:
-            return known
-        texts = {spec.name: spec.text}
-        texts |= {one.name: one.text for one in self._catalog.below(spec).values()}
-        cls: type[Message] = self._compile(name, texts)
-        return cls
-
-    def service(self, name: str) -> type[Service]:
-        """Return a service class."""
-        name = full_name(name, "srv")
-        spec = self._catalog.service(name)
-        identity = service_hash(spec, self._catalog), service_md5(spec, self._catalog)
-        known: type[Service] | None = self._known(self._store.service, name, identity)
-        if known is not None:
-            return known
-        texts = {spec.name: spec.text}
-        for half in (spec.request, spec.response):
-            texts |= {one.name: one.text for one in self._catalog.below(half).values()}
-        cls: type[Service] = self._compile(name, texts)
-        return cls
-
-    def _known(self, find: Callable[[str], Any], name: str, identity: tuple[str, str]) -> Any:
-        """Return the store's own class if its definition is the same."""
+    def find(self, name: str) -> Any:
+        """Return a message or service class; the store's own if its definition is the same."""
+        wanted = identity(name, self._catalog)
+        look = self._store.message if name.split("/")[1] == "msg" else self._store.service
         try:
-            cls = find(name)
+            known = look(name)
         except (TypeNotFound, DefinitionError):
-            return None
-        return cls if (cls._type_hash, cls._md5sum) == identity else None
+            known = None
+        if known is not None and (known._type_hash, known._md5sum) == wanted:
+            return known
+        texts = {name: self._find(name).text}
+        for part in self._catalog.parts(name):
+            texts |= {one.name: one.text for one in self._catalog.below(part).values()}
+        return self._compile(name, texts)
 
     def _compile(self, name: str, texts: dict[str, str]) -> Any:
         package, kind, base = name.split("/")
@@ -440,7 +418,7 @@ class _TextTypes:
             f"rosz.msgs.{package}.{kind}.{stem}",
             stem,
             [base],
-            self.message,
+            self.find,
             lambda: _source([name], self._catalog),
         )
         return getattr(module, base)

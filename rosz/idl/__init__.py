@@ -19,6 +19,7 @@ from rosz.idl.catalog import (
 from rosz.idl.grammar import parse_action, parse_message, parse_service
 from rosz.idl.hashes import (
     describe,
+    identity,
     message_hash,
     message_md5,
     service_hash,
@@ -39,6 +40,7 @@ __all__ = (
     "ServiceSpec",
     "describe",
     "full_name",
+    "identity",
     "message_hash",
     "message_md5",
     "parse_action",

@@ -111,6 +111,18 @@ class Catalog:
             self._services[name] = spec
         return self._services[name]
 
+    def parts(self, name: str) -> list[MessageSpec]:
+        """Return the message, or the request and the response, of a full name.
+
+        Raises:
+            TypeNotFound: There is no such type.
+            DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
+        """
+        if name.split("/")[1] == "msg":
+            return [self.message(name)]
+        service = self.service(name)
+        return [service.request, service.response]
+
     def below(self, spec: MessageSpec) -> dict[str, MessageSpec]:
         """Return all message types that a message holds, at any depth, by name."""
         found: dict[str, MessageSpec] = {}

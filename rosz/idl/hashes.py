@@ -21,9 +21,9 @@ from rosz.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
 
 __all__ = (
     "describe",
+    "identity",
     "message_hash",
     "message_md5",
-    "service_event",
     "service_hash",
     "service_md5",
     "service_parts",
@@ -96,6 +96,15 @@ def service_hash(spec: ServiceSpec, catalog: Catalog) -> str:
     return _type_hash(whole, below.values())
 
 
+def identity(name: str, catalog: Catalog) -> tuple[str, str]:
+    """Return the type hash and the md5 of a message or a service by its full name."""
+    if name.split("/")[1] == "srv":
+        service = catalog.service(name)
+        return service_hash(service, catalog), service_md5(service, catalog)
+    spec = catalog.message(name)
+    return message_hash(spec, catalog), message_md5(spec, catalog)
+
+
 def service_parts(
     spec: ServiceSpec, catalog: Catalog
 ) -> tuple[MessageSpec, dict[str, MessageSpec]]:
@@ -103,7 +112,14 @@ def service_parts(
 
     That type holds the request, the response and the event.
     """
-    event = service_event(spec)
+    event = MessageSpec(
+        f"{spec.name}_Event",
+        (
+            Field("info", FieldType(_EVENT_INFO)),
+            Field("request", FieldType(spec.request.name, shape="bounded", size=1)),
+            Field("response", FieldType(spec.response.name, shape="bounded", size=1)),
+        ),
+    )
     info = catalog.message(_EVENT_INFO)
     below = {spec.request.name: spec.request, spec.response.name: spec.response, event.name: event}
     below[info.name] = info
@@ -118,18 +134,6 @@ def service_parts(
         ),
     )
     return whole, below
-
-
-def service_event(spec: ServiceSpec) -> MessageSpec:
-    """Return the message type that service introspection publishes."""
-    return MessageSpec(
-        f"{spec.name}_Event",
-        (
-            Field("info", FieldType(_EVENT_INFO)),
-            Field("request", FieldType(spec.request.name, shape="bounded", size=1)),
-            Field("response", FieldType(spec.response.name, shape="bounded", size=1)),
-        ),
-    )
 
 
 def describe(spec: MessageSpec) -> dict[str, Any]:

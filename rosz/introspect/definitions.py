@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from rosz.errors import TypeNotFound, UsageError, near_miss
-from rosz.idl import Catalog, MessageSpec, message_hash, message_md5, service_hash, service_md5
+from rosz.idl import Catalog, MessageSpec, full_name, identity
 from rosz.names import short_type
 from rosz.typestore import Kind, TypeStore
 
@@ -75,7 +75,7 @@ class Definitions:
             if not found:
                 bases = {one.rpartition("/")[2] for one in known}
                 raise TypeNotFound(name, f"no package has it{near_miss(name, bases)}")
-            return [self._full(one) for one in found]
+            return [full_name(one, self._kind) for one in found]
         package, _, rest = name.partition("/")
         full = f"{package}/{self._kind}/{rest.removeprefix(f'{self._kind}/')}"
         try:
@@ -86,25 +86,11 @@ class Definitions:
             look(name)
         return [full]
 
-    def _full(self, name: str) -> str:
-        package, _, base = name.partition("/")
-        return f"{package}/{self._kind}/{base}"
-
-    def parts(self, name: str) -> list[MessageSpec]:
-        """Return the message, or the request and the response, of a full name.
-
-        Raises:
-            RoszError: The definition, or one that it refers to, is missing or not well-formed.
-        """
-        if self._kind == "msg":
-            return [self._catalog.message(name)]
-        service = self._catalog.service(name)
-        return [service.request, service.response]
-
     def show(self, name: str) -> str:
         """Return a definition with the fields of the types in it, as ``rosmsg show`` prints it."""
         return "---\n".join(
-            "".join(f"{line}\n" for line in self._lines(part, "")) for part in self.parts(name)
+            "".join(f"{line}\n" for line in self._lines(part, ""))
+            for part in self._catalog.parts(name)
         )
 
     def _lines(self, spec: MessageSpec, indent: str) -> Iterator[str]:
@@ -127,15 +113,11 @@ class Definitions:
 
     def md5(self, name: str) -> str:
         """Return the hash of a type in ROS 1."""
-        if self._kind == "msg":
-            return message_md5(self._catalog.message(name), self._catalog)
-        return service_md5(self._catalog.service(name), self._catalog)
+        return identity(name, self._catalog)[1]
 
     def hash(self, name: str) -> str:
         """Return the hash of a type in ROS 2."""
-        if self._kind == "msg":
-            return message_hash(self._catalog.message(name), self._catalog)
-        return service_hash(self._catalog.service(name), self._catalog)
+        return identity(name, self._catalog)[0]
 
     def summary(self, name: str) -> TypeSummary:
         """Return a type with its hashes and fields.
@@ -143,12 +125,13 @@ class Definitions:
         Raises:
             RoszError: The definition, or one that it refers to, is missing or not well-formed.
         """
-        parts = self.parts(name)
+        parts = self._catalog.parts(name)
+        type_hash, md5 = identity(name, self._catalog)
         return TypeSummary(
             name=short_type(name),
             type_name=name,
-            md5=self.md5(name),
-            hash=self.hash(name),
+            md5=md5,
+            hash=type_hash,
             parts=[{field.name: _written(field.type) for field in part.fields} for part in parts],
             constants=[{one.name: one.value for one in part.constants} for part in parts],
             text=self.text(name),

@@ -106,6 +106,14 @@ class _TimeMeter:
         """Whether anything has been measured."""
         return bool(self._times)
 
+    def _add(self, value: int, now: int) -> None:
+        """Add a value, or start again where there is no earlier time than now."""
+        last, self._last = self._last, now
+        if 0 <= last <= now:
+            self._times.append(value)
+        else:
+            self._times.clear()
+
     def _summary(self) -> tuple[float, float, float, float, int] | None:
         """Return mean, minimum, maximum, deviation and count, if anything is new."""
         last = self._last
@@ -133,11 +141,7 @@ class RateMeter(_TimeMeter):
         Args:
             now: Time in nanoseconds, of any clock; when it goes back, counting starts again.
         """
-        last, self._last = self._last, now
-        if 0 <= last <= now:
-            self._times.append(now - last)
-        else:
-            self._times.clear()
+        self._add(now - self._last, now)
 
     def stats(self) -> RateStats | None:
         """Return the rate; None if no message has arrived since the last call."""
@@ -161,11 +165,7 @@ class DelayMeter(_TimeMeter):
             stamp: Time in the header, in nanoseconds.
             now: ROS time in nanoseconds; when it goes back, counting starts again.
         """
-        last, self._last = self._last, now
-        if 0 <= last <= now:
-            self._times.append(now - stamp)
-        else:
-            self._times.clear()
+        self._add(now - stamp, now)
 
     def stats(self) -> DelayStats | None:
         """Return the delay; None if no message has arrived since the last call."""
@@ -230,12 +230,7 @@ def read_stamp(payload: bytes, type_name: str) -> int:
 
 def format_rate(stats: RateStats | None) -> str:
     """Return what ``rostopic hz`` prints about one topic."""
-    if stats is None:
-        return "no new messages"
-    return (
-        f"average rate: {stats.rate:.3f}\n\tmin: {stats.min_delta:.3f}s"
-        f" max: {stats.max_delta:.3f}s std dev: {stats.std_dev:.5f}s window: {stats.window}"
-    )
+    return _format_times("rate", stats)
 
 
 def format_rates(found: Mapping[str, RateStats | None]) -> str:
@@ -255,11 +250,16 @@ def format_rates(found: Mapping[str, RateStats | None]) -> str:
 
 def format_delay(stats: DelayStats | None) -> str:
     """Return what ``rostopic delay`` prints."""
+    return _format_times("delay", stats)
+
+
+def _format_times(what: str, stats: RateStats | DelayStats | None) -> str:
     if stats is None:
         return "no new messages"
+    mean, low, high, deviation, window = msgspec.structs.astuple(stats)
     return (
-        f"average delay: {stats.mean:.3f}\n\tmin: {stats.min_delay:.3f}s"
-        f" max: {stats.max_delay:.3f}s std dev: {stats.std_dev:.5f}s window: {stats.window}"
+        f"average {what}: {mean:.3f}\n\tmin: {low:.3f}s"
+        f" max: {high:.3f}s std dev: {deviation:.5f}s window: {window}"
     )
 
 

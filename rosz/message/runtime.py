@@ -10,10 +10,9 @@ from __future__ import annotations
 import struct
 from array import array
 from collections.abc import Callable
-from struct import Struct
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
-from rosz.message.schema_codec import decode_plainly, encode_plainly
+from rosz.message.schema_codec import FAULTS, decode_plainly, encode_plainly
 from rosz.message.sequences import StringList, Texts, flags, numbers, octets, pack_wide, read_wide
 
 __all__ = (
@@ -36,17 +35,6 @@ __all__ = (
     "zeros",
 )
 
-FAULTS = (
-    struct.error,
-    AttributeError,
-    TypeError,
-    ValueError,
-    LookupError,
-    ArithmeticError,
-    BufferError,
-)
-"""Exceptions that wrong values and damaged bytes raise in generated code."""
-
 _T = TypeVar("_T")
 
 PADDING = tuple(bytes(n) for n in range(8))
@@ -58,7 +46,7 @@ _MOST_SHAPES = 4096
 _LONGEST_SHAPE = 1024
 
 
-class _Shapes(dict[Any, _T]):
+class _Packers(dict[Any, _T]):
     """Packers of one run of fields with strings in it, by the lengths of these strings.
 
     Once the lengths are known, the run has a fixed layout, so that one call of ``struct`` packs it.
@@ -68,17 +56,17 @@ class _Shapes(dict[Any, _T]):
             ``|4`` for padding.
         start: Offset of the run from the end of the header modulo 8, -4 for the header itself, or
             None where it varies; then it is the first part of the key.
+        full: Largest alignment in the message, where the offset behind the run is needed: each
+            packer comes with that offset modulo this.
     """
 
-    __slots__ = ("_codes", "_start")
+    __slots__ = ("_codes", "_full", "_start")
 
-    def __init__(self, codes: str, start: int | None) -> None:
+    def __init__(self, codes: str, start: int | None, full: int = 0) -> None:
         super().__init__()
         self._codes = codes.split()
         self._start = start
-
-    def _entry(self, pack: Callable[..., bytes], end: int) -> _T:
-        raise NotImplementedError(end)
+        self._full = full
 
     def __missing__(self, key: Any) -> _T:
         numbers = list(key) if isinstance(key, tuple) else [key]
@@ -93,40 +81,21 @@ class _Shapes(dict[Any, _T]):
             padding = -offset % alignment
             offset += padding + struct.calcsize("<" + one)
             layout.append(f"{padding}x{one}" if padding else one)
-        entry = self._entry(Struct("".join(layout)).pack, offset)
+        pack = struct.Struct("".join(layout)).pack
+        entry: Any = (pack, offset % self._full) if self._full else pack
         if offset <= _LONGEST_SHAPE:
             if len(self) >= _MOST_SHAPES:
                 self.clear()
             self[key] = entry
-        return entry
+        found: _T = entry
+        return found
 
 
-class Template(_Shapes[Callable[..., bytes]]):
-    """Packers alone, where the offset behind the run is known or does not matter."""
+Template: TypeAlias = _Packers[Callable[..., bytes]]
+"""Packers alone, where the offset behind the run is known or does not matter."""
 
-    __slots__ = ()
-
-    def _entry(self, pack: Callable[..., bytes], end: int) -> Callable[..., bytes]:  # noqa: ARG002
-        return pack
-
-
-class Stride(_Shapes[tuple[Callable[..., bytes], int]]):
-    """Packers with the offset behind the run, modulo the largest alignment in the message.
-
-    Args:
-        codes: Codes of the run, as in `_Shapes`.
-        start: Offset of the run, as in `_Shapes`.
-        full: Largest alignment in the message.
-    """
-
-    __slots__ = ("_full",)
-
-    def __init__(self, codes: str, start: int | None, full: int) -> None:
-        super().__init__(codes, start)
-        self._full = full
-
-    def _entry(self, pack: Callable[..., bytes], end: int) -> tuple[Callable[..., bytes], int]:
-        return pack, end % self._full
+Stride: TypeAlias = _Packers[tuple[Callable[..., bytes], int]]
+"""Packers with the offset behind the run."""
 
 
 def read_flags(octets: bytes) -> list[bool]:

@@ -23,7 +23,7 @@ from rosz.message.base import (
 )
 from rosz.message.sequences import flags, numbers, octets, pack_wide, put_text, read_wide
 
-__all__ = ("decode_plainly", "encode_plainly")
+__all__ = ("FAULTS", "decode_plainly", "encode_plainly")
 
 _T = TypeVar("_T")
 
@@ -32,7 +32,16 @@ _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
 _BYTES = frozenset({"byte", "char"})
 _FEW = 60
 
-_FAULTS = (struct.error, AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
+FAULTS = (
+    struct.error,
+    AttributeError,
+    TypeError,
+    ValueError,
+    LookupError,
+    ArithmeticError,
+    BufferError,
+)
+"""Exceptions that wrong values and damaged bytes raise in generated code, and in this one."""
 
 
 def encode_plainly(message: Any, cls: type[Any]) -> bytes:
@@ -117,7 +126,7 @@ class _Writer:
         else:
             try:
                 self._put(SCALAR_CODES[kind], _number(kind, value))
-            except _FAULTS as error:
+            except FAULTS as error:
                 self._refuse(path, kind, value, "" if isinstance(error, TypeError) else str(error))
 
     def _text(self, slot: Slot, value: Any, path: str) -> None:
@@ -154,7 +163,7 @@ class _Writer:
                 block = octets(value)
             else:
                 block = numbers(value, ARRAY_CODES[kind])
-        except _FAULTS as error:
+        except FAULTS as error:
             block = self._by_number(kind, value, path, error)
         self._count(slot, value, len(block), path)
         if len(block):
@@ -173,7 +182,7 @@ class _Writer:
         for index, number in enumerate(given):
             try:
                 packed.append(struct.pack("<" + SCALAR_CODES[kind], _number(kind, number)))
-            except _FAULTS as fault:
+            except FAULTS as fault:
                 why = "" if isinstance(fault, TypeError) else str(fault)
                 self._refuse(f"{path}[{index}]", kind, number, why)
         if kind not in OCTETS:
