@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import msgspec
@@ -47,8 +47,6 @@ from rosz.wire import Kind
 
 __all__ = ("Examination", "examine")
 
-_LISTEN_SECONDS = 1.0
-
 
 class Examination(msgspec.Struct, kw_only=True):
     """The settings and the size of an examination.
@@ -62,7 +60,7 @@ class Examination(msgspec.Struct, kw_only=True):
     """
 
     environment: Environment
-    listen: float = _LISTEN_SECONDS
+    listen: float = 1.0
     memory: Path = SEGMENTS
     least_free: int = LEAST_FREE
     nodes: int = 0
@@ -106,7 +104,7 @@ def _examine_network(session: Session, examination: Examination) -> Iterator[Fin
     yield from check_hashless(survey, environment.distro)
     yield from check_types(survey)
     yield from check_hashes(survey)
-    yield from check_packages(survey, _Hashes(environment).find, environment.distro)
+    yield from check_packages(survey, _type_hashes(environment), environment.distro)
     yield from check_clock(survey)
     yield from check_one_sided(survey)
     replies = query_nodes(session, environment.domain) if survey.processes else {}
@@ -117,23 +115,13 @@ def _examine_network(session: Session, examination: Examination) -> Iterator[Fin
     yield from check_stamps(session, survey, examination.listen)
 
 
-class _Hashes:
-    """The hashes of the types that are known here.
+def _type_hashes(environment: Environment) -> Callable[[Kind, str], str]:
+    """Return a function that looks up the hash of a type known here; see `check_packages`."""
+    types = TypeStore(package_index(environment), environment.home / "rosz")
 
-    Args:
-        environment: Settings, which name the package path.
-    """
+    def find(kind: Kind, type_name: str) -> str:
+        is_topic = kind in {Kind.PUBLISHER, Kind.SUBSCRIPTION}
+        cls = types.message(type_name) if is_topic else types.service(type_name)
+        return cls._type_hash
 
-    def __init__(self, environment: Environment) -> None:
-        self._types = TypeStore(package_index(environment), environment.home / "rosz")
-
-    def find(self, kind: Kind, type_name: str) -> str:
-        """Return the hash of a type.
-
-        Raises:
-            TypeNotFound: The type is not known.
-            DefinitionError: A definition in its package is not well-formed.
-        """
-        if kind in {Kind.PUBLISHER, Kind.SUBSCRIPTION}:
-            return self._types.message(type_name)._type_hash
-        return self._types.service(type_name)._type_hash
+    return find

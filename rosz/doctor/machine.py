@@ -78,7 +78,7 @@ def check_segments(folder: Path = SEGMENTS, born: float = _LOCK_SECONDS) -> Iter
     with suppress(OSError):
         for path in sorted(folder.glob("*.zenoh")):
             with suppress(OSError):  # removed meanwhile, or not readable
-                if path.stat().st_ctime < time.time() - born and _is_unused(path):
+                if path.stat().st_ctime < time.time() - born and _is_unlocked(path, "rb"):
                     left.append(f"{path}, {path.stat().st_size} bytes")
     if left:
         count = "1 segment" if len(left) == 1 else f"{len(left)} segments"
@@ -90,8 +90,9 @@ def check_segments(folder: Path = SEGMENTS, born: float = _LOCK_SECONDS) -> Iter
         )
 
 
-def _is_unused(path: Path) -> bool:
-    with path.open("rb") as file:
+def _is_unlocked(path: Path, mode: str) -> bool:
+    """Return whether nobody holds a lock on a file, which is opened in a mode for that."""
+    with path.open(mode) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -218,15 +219,8 @@ def _is_socket(path: Path) -> bool:
 
 def _is_free(lock: Path) -> bool:
     try:
-        file = os.open(lock, os.O_RDWR)
+        return _is_unlocked(lock, "r+b")
     except FileNotFoundError:
         return True
     except OSError:
         return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    finally:
-        os.close(file)
-    return True

@@ -43,6 +43,8 @@ _AGAIN = 0.4
 _CLOCK_SECONDS = 0.1
 """Offset of a clock from which transforms and synchronised topics begin to fail."""
 
+_SYNCHRONISE = "synchronise the clocks of all machines (chrony, or 'timedatectl set-ntp true')"
+
 _Node = tuple[str, int]
 _Pairs = set[tuple[str, str]]
 
@@ -105,7 +107,7 @@ def check_silent(
         yield error(
             "unreachable-node",
             f"{len(silent)} nodes are listed and do not answer",
-            sorted(_name(survey, node) + _state(survey, node) for node in silent),
+            sorted(_name(survey, node) + stopped_note(survey.processes[node]) for node in silent),
             "they hang, are stopped (Ctrl-Z: 'fg' lets them go on), or the link to their machine"
             " is broken: check it with ping, and end them with 'rosz node kill'",
         )
@@ -130,21 +132,18 @@ def check_sight(
     if not _blind(survey, replies, stopped):
         return
     time.sleep(_AGAIN)
-    survey, replies = (
-        take_survey(session, survey.domain, processes=True),
-        query_nodes(session, survey.domain),
-    )
+    survey = take_survey(session, survey.domain, processes=True)
+    replies = query_nodes(session, survey.domain)
     blind = _blind(survey, replies, stopped)
     if not blind:
         return
     lines: list[str] = []
-    for here, there in sorted(blind):
-        if (there, here) not in blind:
-            lines.append(f"{_names(survey, here)} does not see {_names(survey, there)}: one way")
-        elif here < there:
-            lines.append(
-                f"{_names(survey, here)} and {_names(survey, there)} do not see each other"
-            )
+    for pair in sorted(blind):
+        here, there = (_names(survey, zid) for zid in pair)
+        if pair[::-1] not in blind:
+            lines.append(f"{here} does not see {there}: one way")
+        elif pair[0] < pair[1]:
+            lines.append(f"{here} and {there} do not see each other")
     yield error(
         "unreachable-peer",
         "nodes that are there do not see each other",
@@ -155,23 +154,15 @@ def check_sight(
     )
 
 
-def _blind(
-    survey: Survey, replies: dict[_Node, _NodeReply], stopped: set[str]
-) -> set[tuple[str, str]]:
+def _blind(survey: Survey, replies: dict[_Node, _NodeReply], stopped: set[str]) -> _Pairs:
     """Return pairs of sessions of which one does not see the other, stopped ones aside."""
     there = {zid for zid, _ in survey.processes} - stopped
-    sees = {zid: {zid, *reply.info.sees} for (zid, _), reply in replies.items() if zid in there}
-    return {
-        (zid, other)
-        for zid, seen in sees.items()
-        for other in there - seen
-        if _tells_sight(replies, zid)
+    sees = {
+        zid: {zid, *reply.info.sees}
+        for (zid, _), reply in replies.items()
+        if zid in there and reply.info.sees  # older releases do not say whom they see
     }
-
-
-def _tells_sight(replies: dict[_Node, _NodeReply], zid: str) -> bool:
-    """Return whether the nodes of a session reply whom they see; older releases do not."""
-    return any(reply.info.sees for (each, _), reply in replies.items() if each == zid)
+    return {(zid, other) for zid, seen in sees.items() for other in there - seen}
 
 
 def check_clocks(survey: Survey, replies: dict[_Node, _NodeReply]) -> Iterator[Finding]:
@@ -195,7 +186,7 @@ def check_clocks(survey: Survey, replies: dict[_Node, _NodeReply]) -> Iterator[F
             "clock-offset",
             f"the clock of {host} is not the one here: transforms and stamps do not match",
             sorted(evidence),
-            "synchronise the clocks of all machines (chrony, or 'timedatectl set-ntp true')",
+            _SYNCHRONISE,
         )
 
 
@@ -204,11 +195,6 @@ def _name(survey: Survey, node: _Node) -> str:
     return (
         f"session {node[0]}" if process is None else f"{process.node} ({process_address(process)})"
     )
-
-
-def _state(survey: Survey, node: _Node) -> str:
-    process = survey.processes.get(node)
-    return "" if process is None else stopped_note(process)
 
 
 def _names(survey: Survey, zid: str) -> str:
@@ -263,7 +249,7 @@ def check_stamps(session: Session, survey: Survey, seconds: float) -> Iterator[F
             "clock-offset",
             "clocks of nodes are not the one here: transforms and stamps do not match",
             sorted(off),
-            "synchronise the clocks of all machines (chrony, or 'timedatectl set-ntp true')",
+            _SYNCHRONISE,
         )
     old = [f"{_who(survey, token)}: {first.damage}" for token, first in heard if first.damage]
     if old:
@@ -287,7 +273,11 @@ def _listen(
     }
 
     def receive(key: str, sample: Sample) -> None:
-        first = _look(sample)
+        now = time.time_ns()
+        try:
+            first = _First(age=now - unpack_attachment(sample.attachment).source_time)
+        except DecodeError as fault:
+            first = _First(damage=fault.reason)
         with arrived:
             found.setdefault(key, (topics[key], first))
             arrived.notify_all()
@@ -300,14 +290,6 @@ def _listen(
     finally:
         for subscriber in subscribers:
             subscriber.close()
-
-
-def _look(sample: Sample) -> _First:
-    now = time.time_ns()
-    try:
-        return _First(age=now - unpack_attachment(sample.attachment).source_time)
-    except DecodeError as fault:
-        return _First(damage=fault.reason)
 
 
 def _who(survey: Survey, token: Token) -> str:
@@ -363,16 +345,13 @@ def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
 def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, bytes]:
     """Query all replicas at once, and return their digests by session."""
     request = encode(SyncRequest())
-    asked = [
-        (
-            member.zid,
-            session.query(keys.of(member.zid, "sync"), timeout=_TIMEOUT, payload=request),
-        )
+    asked = {
+        member.zid: session.query(keys.of(member.zid, "sync"), timeout=_TIMEOUT, payload=request)
         for member in members
-    ]
+    }
     return {
         zid: decode(reply.payload, SyncReply).digest
-        for zid, replies in asked
+        for zid, replies in asked.items()
         for reply in replies
         if reply.ok
     }

@@ -28,11 +28,12 @@ __all__ = (
 _BOTH_SIDES = ((Kind.PUBLISHER, Kind.SUBSCRIPTION), (Kind.SERVICE, Kind.CLIENT))
 _HASH_SHOWN = 15
 _REPLY_TIMEOUT = 1.0
-_OTHER = {
-    Kind.PUBLISHER: Kind.SUBSCRIPTION,
-    Kind.SUBSCRIPTION: Kind.PUBLISHER,
-    Kind.SERVICE: Kind.CLIENT,
-    Kind.CLIENT: Kind.SERVICE,
+_OTHER = {one: other for pair in _BOTH_SIDES for one, other in (pair, pair[::-1])}
+_VERBS = {
+    Kind.PUBLISHER: "publishes",
+    Kind.SUBSCRIPTION: "subscribes",
+    Kind.SERVICE: "serves",
+    Kind.CLIENT: "calls",
 }
 _CLOCK = "/clock"
 # Topics that nodes publish whether or not anybody subscribes.
@@ -50,13 +51,7 @@ def _by_name(survey: Survey) -> Iterator[tuple[str, str, list[Token]]]:
 
 
 def _end(survey: Survey, token: Token) -> str:
-    verb = {
-        Kind.PUBLISHER: "publishes",
-        Kind.SUBSCRIPTION: "subscribes",
-        Kind.SERVICE: "serves",
-        Kind.CLIENT: "calls",
-    }[token.kind]
-    return f"{token.node_name} ({survey.address(token)}) {verb}"
+    return f"{token.node_name} ({survey.address(token)}) {_VERBS[token.kind]}"
 
 
 def check_types(survey: Survey) -> Iterator[Finding]:
@@ -247,13 +242,14 @@ def check_domains(session: Session, survey: Survey) -> Iterator[Finding]:
         f"set ROS_DOMAIN_ID to one number for all that belong together; here it is {survey.domain}"
     )
     if not survey.view.tokens:
-        yield error(
-            "wrong-domain",
-            f"no node is in domain {survey.domain}, but there are nodes in others",
-            _by_domain(others),
-            remedy,
-        )
+        text = f"no node is in domain {survey.domain}, but there are nodes in others"
+        names: defaultdict[int, set[str]] = defaultdict(set)
+        for token in others:
+            names[token.domain].add(token.node_name)
+        lines = [f"domain {one}: {', '.join(sorted(names[one]))}" for one in sorted(names)]
+        yield error("wrong-domain", text, lines, remedy)
         return
+    text = "nodes of another domain are what nodes of this one wait for"
     lines = [
         f"{token.name}: {token.node_name} of domain {token.domain} is what"
         f" {mate.node_name} of domain {survey.domain} lacks"
@@ -262,19 +258,7 @@ def check_domains(session: Session, survey: Survey) -> Iterator[Finding]:
         for mate in _lacking(survey, token)
     ]
     if lines:
-        yield error(
-            "wrong-domain",
-            "nodes of another domain are what nodes of this one wait for",
-            sorted(set(lines)),
-            remedy,
-        )
-
-
-def _by_domain(tokens: list[Token]) -> list[str]:
-    names: dict[int, set[str]] = {}
-    for token in tokens:
-        names.setdefault(token.domain, set()).add(token.node_name)
-    return [f"domain {domain}: {', '.join(sorted(names[domain]))}" for domain in sorted(names)]
+        yield error("wrong-domain", text, sorted(set(lines)), remedy)
 
 
 def _lacking(survey: Survey, token: Token) -> list[Token]:

@@ -29,6 +29,7 @@ _LOOK: Final = ("liveliness_query", "declare_liveliness_subscriber")
 _MESSAGES: Final = (*_DATA, *_LISTEN, *_ASK, *_ANSWER, *_TOKEN, *_LOOK)
 
 _OWN: Final = f"{OWN_SPACE}/*"
+_BOTH: Final[tuple[Flow, Flow]] = ("ingress", "egress")
 _ANY_KEY: Final = ["**", "**/@adv/**", f"{SPACE}/**", f"{OWN_SPACE}/**"]
 """All keys; wildcards do not match chunks that begin with ``@``."""
 
@@ -40,20 +41,28 @@ def access_control(rules: Rules | None, loopback: Sequence[str]) -> dict[str, An
         rules: What each holder of a key may do; everything when not given.
         loopback: The network interfaces of links within the machine.
     """
-    everything = [_rule("all", flow, _MESSAGES, _ANY_KEY) for flow in ("ingress", "egress")]
+    everything = [_rule("all", flow, _MESSAGES, _ANY_KEY) for flow in _BOTH]
     table = list(everything)
     subjects: list[dict[str, Any]] = [
         {"id": "interfaces of this machine", "interfaces": list(loopback)},
         {"id": "sockets of this machine", "link_protocols": ["unixsock-stream"]},
     ]
-    policies = [_policy(everything, *(subject["id"] for subject in subjects))]
+    policies = [_policy(everything, *(one["id"] for one in subjects))]
     permits = {ANYBODY: Permit.all()} if rules is None else rules.permits
     for holder, permit in permits.items():
-        subjects.append(_holder(holder))
-        own = everything if permit.is_all else list(_rules(holder, permit))
+        subject: dict[str, Any] = {"id": f"holder {holder}", "link_protocols": ["tls"]}
+        if holder != ANYBODY:
+            subject["cert_common_names"] = [holder]
+        subjects.append(subject)
+        own = everything
         if not permit.is_all:
+            own = [
+                _rule(f"{holder} {number}", *grant)
+                for number, grant in enumerate(_grants(permit))
+                if grant[2]
+            ]
             table += own
-        policies.append(_policy(own, subjects[-1]["id"]))
+        policies.append(_policy(own, subject["id"]))
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -63,21 +72,8 @@ def access_control(rules: Rules | None, loopback: Sequence[str]) -> dict[str, An
     }
 
 
-def _holder(name: str) -> dict[str, Any]:
-    subject: dict[str, Any] = {"id": f"holder {name}", "link_protocols": ["tls"]}
-    if name != ANYBODY:
-        subject["cert_common_names"] = [name]
-    return subject
-
-
 def _policy(rules: Iterable[dict[str, Any]], *subjects: str) -> dict[str, Any]:
     return {"rules": [rule["id"] for rule in rules], "subjects": list(subjects)}
-
-
-def _rules(holder: str, permit: Permit) -> Iterator[dict[str, Any]]:
-    for number, (flow, messages, keys) in enumerate(_grants(permit)):
-        if keys:
-            yield _rule(f"{holder} {number}", flow, messages, keys)
 
 
 def _rule(name: str, flow: Flow, messages: Sequence[str], keys: Sequence[str]) -> dict[str, Any]:
@@ -116,7 +112,7 @@ def _presence() -> Iterator[_Grant]:
     Watching is unrestricted, because each token that could be seen is restricted itself.
     """
     yield "egress", _TOKEN, [f"{_OWN}/node/**"]
-    for flow in _both():
+    for flow in _BOTH:
         yield flow, _LOOK, _ANY_KEY
         yield flow, _TOKEN, [f"{SPACE}/*/*/*/*/{Kind.NODE.value}/**"]
         yield flow, (*_ASK, *_ANSWER), [f"{OWN_SPACE}/links/**"]
@@ -152,7 +148,7 @@ def _services(names: Sequence[str], asked: Flow, answered: Flow) -> Iterator[_Gr
 
 def _reading() -> Iterator[_Grant]:
     """Yield the messages of a replica that only receives, and of a client of a replica."""
-    for flow in _both():
+    for flow in _BOTH:
         yield flow, _TOKEN, [f"{_OWN}/replica/**"]
         yield flow, _DATA, [f"{_OWN}/ack/*"]
         yield flow, _LISTEN, [f"{_OWN}/ack/*", f"{_OWN}/change/**"]
@@ -167,16 +163,16 @@ def _reading() -> Iterator[_Grant]:
 
 def _setting(names: Sequence[str]) -> Iterator[_Grant]:
     """Yield the messages that set parameters; the key of a write says which ones it sets."""
-    places = [_chunks(name) for name in names]
-    yield "ingress", _DATA, [key for at in places for key in _below(f"{_OWN}/change", at)]
-    writes = [key for at in places for key in _below(f"{_OWN}/store/*/write", at)]
-    sets = [key for at in places for key in _below(f"{_OWN}/store/*/set", at)]
-    tells = [key for at in places for key in _below(f"{_OWN}/store/*/tell", at)]
-    yield "ingress", _ASK, writes + sets + tells
+    # A name, and all names below it.
+    places = [at if at.endswith("**") else f"{at}/**" for at in map(_chunks, names)]
+    yield "ingress", _DATA, [f"{_OWN}/change/{at}" for at in places]
+    verbs = ("write", "set", "tell")
+    yield "ingress", _ASK, [f"{_OWN}/store/*/{verb}/{at}" for verb in verbs for at in places]
     if EVERYTHING in names:
         # Only a holder that may set everything is queried for writes that others have missed.
-        yield "ingress", _ANSWER, [f"{_OWN}/store/*/{verb}" for verb in ("sync", "tell/**")]
-        yield "egress", _ASK, [f"{_OWN}/store/*/{verb}" for verb in ("sync", "tell/**")]
+        missed = [f"{_OWN}/store/*/sync", f"{_OWN}/store/*/tell/**"]
+        yield "ingress", _ANSWER, missed
+        yield "egress", _ASK, missed
         yield "ingress", _ANSWER, [f"{_OWN}/param/**"]
         yield "egress", _ASK, [f"{_OWN}/param/**"]
 
@@ -203,11 +199,6 @@ def _chunks(name: str) -> str:
     return "/".join(part if part in {"*", "**"} else part.replace("*", "$*") for part in parts)
 
 
-def _below(head: str, chunks: str) -> list[str]:
-    """Return the keys of a name and of all names below it."""
-    return [f"{head}/{chunks}"] if chunks.endswith("**") else [f"{head}/{chunks}/**"]
-
-
 def _canonical(key: str) -> str:
     """Return a key expression in canonical form, as Zenoh requires: ``**`` comes after ``*``."""
     chunks: list[str] = []
@@ -217,7 +208,3 @@ def _canonical(key: str) -> str:
         elif chunk == "*":
             chunks.insert(-1, chunk)
     return "/".join(chunks)
-
-
-def _both() -> tuple[Flow, Flow]:
-    return "ingress", "egress"

@@ -120,22 +120,16 @@ class Authority:
 def _sign(
     subject: Name, public: Any, days: float, issuer: Name, key: Any, places: Sequence[str] = ()
 ) -> Certificate:
-    """Sign a certificate.
-
-    Args:
-        subject: The name of the holder.
-        public: The public key of the holder.
-        days: The lifetime in days.
-        issuer: The name of the authority.
-        key: The private key of the authority.
-        places: The host names and addresses of the holder; none for the authority itself.
-    """
+    """Sign a certificate; the authority's own has no places, those of holders have some."""
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes
 
     authority = not places
     now = dt.datetime.now(dt.UTC)
-    end = _end(now, days)
+    try:
+        end = now + dt.timedelta(days=days)
+    except OverflowError as error:
+        raise UsageError(f"{days:g} days from now is no date; expected fewer") from error
     usage = x509.KeyUsage(
         digital_signature=not authority,
         content_commitment=False,
@@ -198,13 +192,6 @@ def _new_key() -> EllipticCurvePrivateKey:
     from cryptography.hazmat.primitives.asymmetric import ec
 
     return ec.generate_private_key(ec.SECP256R1())
-
-
-def _end(now: dt.datetime, days: float) -> dt.datetime:
-    try:
-        return now + dt.timedelta(days=days)
-    except OverflowError as error:
-        raise UsageError(f"{days:g} days from now is no date; expected fewer") from error
 
 
 def _subject(name: str) -> Name:

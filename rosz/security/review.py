@@ -20,7 +20,7 @@ from rosz.security.folder import (
     check_trusted,
     load_rules,
 )
-from rosz.security.rules import ANYBODY, NAME_VERBS, Permit, Rules
+from rosz.security.rules import ANYBODY, NAME_VERBS, Permit
 
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate
@@ -136,7 +136,8 @@ def _review_rules(file: Path, found: Review, *, complete: bool) -> None:
     except RoszError as error:
         found.wrong.append(str(error))
         return
-    found.rules.append(RuleFile(str(file), _in_words(rules)))
+    allowed = {name: _allowed(permit) for name, permit in rules.permits.items()}
+    found.rules.append(RuleFile(str(file), allowed))
     known = {holder.name for holder in found.holders} | {ANYBODY}
     if complete:
         found.wrong += [
@@ -144,10 +145,6 @@ def _review_rules(file: Path, found: Review, *, complete: bool) -> None:
             for name in rules.permits
             if name not in known
         ]
-
-
-def _in_words(rules: Rules) -> dict[str, list[str]]:
-    return {name: _allowed(permit) for name, permit in rules.permits.items()}
 
 
 def _allowed(permit: Permit) -> list[str]:

@@ -162,11 +162,8 @@ class _Reader:
                 given[verb] = self._flag(value)
             else:
                 known = (*NAME_VERBS, *_FLAGS)
-                raise self._error(
-                    key,
-                    f"'{verb}' is no permission{near_miss(verb, known)}; expected one of"
-                    f" {', '.join(known)}",
-                )
+                hint = f"{near_miss(verb, known)}; expected one of {', '.join(known)}"
+                raise self._error(key, f"'{verb}' is no permission{hint}")
         return msgspec.convert(given, Permit)
 
     def _patterns(self, node: yaml.Node) -> tuple[str, ...]:
