@@ -28,6 +28,8 @@ from rosz.idl.hashes import (
 )
 from rosz.idl.spec import ActionSpec, Constant, Field, FieldType, MessageSpec, ServiceSpec
 
+PUBLIC_MODULES = ("cache", "generate")
+
 __all__ = (
     "ActionSpec",
     "Catalog",

@@ -7,4 +7,20 @@ tools do. ``subscribe``, ``fields``, ``echo``, ``measure`` and ``rosout`` follow
 imported alone, since a command has to start fast; nothing is imported here.
 """
 
+PUBLIC_MODULES = (
+    "arguments",
+    "connect",
+    "definitions",
+    "echo",
+    "fields",
+    "measure",
+    "nodes",
+    "publish",
+    "rosout",
+    "services",
+    "subscribe",
+    "survey",
+    "topics",
+)
+
 __all__: tuple[str, ...] = ()

@@ -114,23 +114,19 @@ def _open_client(
         TransportError: All processes are stopped, or the one at the rendezvous does not answer.
     """
     peers = LocalPeers.read(environment.rendezvous)
-    if not _reaches_beyond(environment) and not peers.is_anybody_there and peers.why_unanswered:
+    beyond = _reaches_beyond(environment)
+    if not beyond and not peers.is_anybody_there and peers.why_unanswered:
         raise TransportError(peers.why_unanswered)
-    if allowed and _may_answer(environment, peers):
+    if allowed and (
+        beyond
+        or environment.mode == "client"
+        or (is_listening(environment.rendezvous) and not peers.is_router_stopped)
+    ):
         try:
             return open_client(command_config(environment, peers), peers)
         except TransportError as error:
             _check_free(environment, error)
     return None
-
-
-def _may_answer(environment: Environment, peers: LocalPeers) -> bool:
-    """Return whether a client may get an answer."""
-    return bool(
-        _reaches_beyond(environment)
-        or environment.mode == "client"
-        or (is_listening(environment.rendezvous) and not peers.is_router_stopped)
-    )
 
 
 def _check_free(environment: Environment, error: TransportError) -> None:
@@ -155,17 +151,11 @@ def _wait_for_peers(session: Session, environment: Environment) -> None:
     deadline = time.monotonic() + _PEER_TIMEOUT
     while not session.peers():
         if time.monotonic() > deadline:
-            raise _nobody(environment)
+            where = ", ".join((environment.rendezvous, *environment.connect))
+            raise TransportError(
+                LocalPeers.read(environment.rendezvous).why_unanswered
+                or f"nobody answers at {where}: start 'rosz core', a launch or a node, or set"
+                " ROSZ_CONNECT to the endpoint of a machine where one runs"
+            )
         time.sleep(_LOOK_SECONDS)
     MeshReadiness(session, _READY_TIMEOUT, threading.Event()).ready.wait(_READY_TIMEOUT)
-
-
-def _nobody(environment: Environment) -> TransportError:
-    stopped = LocalPeers.read(environment.rendezvous).why_unanswered
-    if stopped:
-        return TransportError(stopped)
-    where = ", ".join((environment.rendezvous, *environment.connect))
-    return TransportError(
-        f"nobody answers at {where}: start 'rosz core', a launch or a node, or set ROSZ_CONNECT to"
-        " the endpoint of a machine where one runs"
-    )

@@ -165,10 +165,7 @@ class Echo:
                 yield from self._columns(getattr(value, field), f"{name}.{field}")
         elif isinstance(value, list | tuple | array):
             for number, one in enumerate(value):
-                if isinstance(one, Message) and not isinstance(one, TimeValue | DurationValue):
-                    yield from self._columns(one, f"{name}{number}")
-                else:
-                    yield f"{name}{number}"
+                yield from self._columns(one, f"{name}{number}")
         elif not isinstance(value, bytes):
             yield name
 

@@ -75,11 +75,8 @@ def list_nodes(survey: Survey) -> list[NodeEntry]:
     found: dict[tuple[str, int], NodeEntry] = {}
     for token in survey.view.tokens:
         process = survey.process(token)
-        found[token.zid, token.node_id] = (
-            NodeEntry(token.node_name, token.zid)
-            if process is None
-            else NodeEntry(token.node_name, token.zid, process.host, process.pid, process.started)
-        )
+        known = () if process is None else (process.host, process.pid, process.started)
+        found[token.zid, token.node_id] = NodeEntry(token.node_name, token.zid, *known)
     return sorted(found.values(), key=lambda node: (node.name, node.started, node.session))
 
 

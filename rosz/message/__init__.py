@@ -24,6 +24,8 @@ from rosz.message.base import (
     slots,
 )
 
+PUBLIC_MODULES = ("convert", "runtime", "text")
+
 __all__ = (
     "ARRAY_CODES",
     "INTEGER_RANGES",

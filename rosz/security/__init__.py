@@ -12,6 +12,8 @@ from rosz.security.access import access_control
 from rosz.security.folder import CERTIFICATE, KeyFolder, LocalPermissions
 from rosz.security.rules import Permit, Rules, read_rules
 
+PUBLIC_MODULES = ("authority", "handshake", "review")
+
 __all__ = (
     "CERTIFICATE",
     "KeyFolder",

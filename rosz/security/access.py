@@ -11,8 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final, Literal
 
 from rosz.security.rules import ANYBODY, EVERYTHING, Permit, Rules
-from rosz.wire import OWN_SPACE, Kind
-from rosz.wire.tokens import SPACE
+from rosz.wire import OWN_SPACE, SPACE, Kind
 
 __all__ = ("access_control",)
 

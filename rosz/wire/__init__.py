@@ -11,6 +11,7 @@ from rosz.wire.gid import gid
 from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, entity_key, own_key, ros_type
 from rosz.wire.qos import format_qos, parse_qos
 from rosz.wire.tokens import (
+    SPACE,
     Kind,
     ProcessToken,
     Token,
@@ -25,6 +26,7 @@ from rosz.wire.tokens import (
 __all__ = (
     "NO_HASH",
     "OWN_SPACE",
+    "SPACE",
     "Attachment",
     "Endpoint",
     "Kind",
