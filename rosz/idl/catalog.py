@@ -23,6 +23,7 @@ __all__ = (
 )
 
 _NEXT_DEFINITION = re.compile(r"^=+[ \t]*\r?\nMSG:[ \t]*(\S+)[ \t]*\r?\n", re.MULTILINE)
+_DASHES = re.compile(r"^[ \t]*---[ \t\r]*(?:\n|\Z)", re.MULTILINE)
 _PARTS = ("Goal", "Result", "Feedback")
 _ENVELOPES = {
     "ActionGoal": "Header header\nactionlib_msgs/GoalID goal_id\n{name}Goal goal\n",
@@ -51,14 +52,8 @@ def action_messages(name: str, text: str) -> dict[str, str]:
         name: Name of the action, ``Do``.
         text: Text of the file; missing parts are empty.
     """
-    parts: list[list[str]] = [[]]
-    for line in text.splitlines(keepends=True):
-        if line.strip() == "---":
-            parts.append([])
-        else:
-            parts[-1].append(line)
     # Text after a third line of dashes stays in the last part, whose parser refuses it.
-    texts = ["".join(part) for part in parts[:2]] + ["---\n".join(map("".join, parts[2:]))]
+    texts = _DASHES.split(text, maxsplit=2)
     found = {name + suffix: part for suffix, part in zip(_PARTS, texts, strict=False)}
     found |= {name + suffix: form.format(name=name) for suffix, form in _ENVELOPES.items()}
     return {one: found.get(one, "") for one in _action_parts(name)}

@@ -130,7 +130,7 @@ def _assemble(
     origin: str,
 ) -> str:
     body = "\n".join(blocks)
-    used = _words(body)
+    used = set(re.findall(r"\w+", body))
     imports = [line for name, line in _ALWAYS.items() if name in used]
     imports += (
         f"from rosz.message.runtime import {name} as _{name}" for name in sorted(module.runtime)
@@ -150,10 +150,6 @@ def _assemble(
     head += ["from __future__ import annotations", "", *sorted(imports), ""]
     head += ["__all__ = (", *(f'    "{name}",' for name in names), ")", *([""] * bool(late)), *late]
     return re.sub(r"\n{4,}", "\n\n\n", "\n".join(head) + "\n" + body)
-
-
-def _words(text: str) -> set[str]:
-    return set(re.findall(r"\w+", text))
 
 
 def shipped_module(name: str) -> str:

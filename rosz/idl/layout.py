@@ -7,6 +7,7 @@ everything behind an aligned double.
 
 from __future__ import annotations
 
+import re
 import struct
 from typing import TypeAlias
 
@@ -144,16 +145,10 @@ def in_run(kind: FieldType) -> bool:
 def join_codes(layout: list[str]) -> str:
     """Return a format with equal neighbours as a count: ``<ddd`` becomes ``<3d``."""
     merged: list[tuple[int, str]] = []
-    for part in layout:
-        number = ""
-        for character in part:
-            if character.isdigit():
-                number += character
-                continue
-            count = int(number or 1)
-            number = ""
-            if merged and merged[-1][1] == character and character not in "sx<":
-                merged[-1] = (merged[-1][0] + count, character)
-            else:
-                merged.append((count, character))
+    for number, code in re.findall(r"(\d*)(\D)", "".join(layout)):
+        count = int(number or 1)
+        if merged and merged[-1][1] == code and code not in "sx<":
+            merged[-1] = (merged[-1][0] + count, code)
+        else:
+            merged.append((count, code))
     return "".join(c if n == 1 and c != "s" else f"{n}{c}" for n, c in merged)

@@ -117,13 +117,9 @@ class Slot(msgspec.Struct, frozen=True):
         return self.shape in ("bounded", "sequence")
 
 
+@lru_cache(maxsize=4096)
 def slots(cls: Any) -> tuple[Slot, ...]:
     """Return the fields of a message class in the order of the wire."""
-    return _slots(cls)
-
-
-@lru_cache(maxsize=4096)
-def _slots(cls: Any) -> tuple[Slot, ...]:
     return tuple(_slot(*entry) for entry in cls._schema)
 
 
@@ -132,14 +128,10 @@ def _slot(name: str, kind: str | type[Any], suffix: str) -> Slot:
     if isinstance(kind, str) and "<=" in kind:
         kind, _, limit = kind.partition("<=")
         bound = int(limit)
-    inside = suffix[1:-1]
-    if not suffix:
-        return Slot(name, kind, bound, "one", 0)
-    if not inside:
-        return Slot(name, kind, bound, "sequence", 0)
-    if inside.startswith("<="):
-        return Slot(name, kind, bound, "bounded", int(inside[2:]))
-    return Slot(name, kind, bound, "fixed", int(inside))
+    if suffix in ("", "[]"):
+        return Slot(name, kind, bound, "sequence" if suffix else "one", 0)
+    size = int(suffix.strip("[<=]"))
+    return Slot(name, kind, bound, "bounded" if "<" in suffix else "fixed", size)
 
 
 def slot_type(slot: Slot) -> str:

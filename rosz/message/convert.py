@@ -19,6 +19,7 @@ import yaml
 
 from rosz.errors import EncodeError, near_miss
 from rosz.message.base import ARRAY_CODES, INTEGER_RANGES, OCTETS, Message, Sequenced, Slot, slots
+from rosz.message.schema_codec import shown
 from rosz.message.sequences import numbers
 from rosz.message.text import strify_message
 from rosz.time import DurationValue, TimeValue, normal
@@ -39,7 +40,6 @@ __all__ = (
 _NOT_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 _FLOATS = frozenset({"float32", "float64"})
 _TEXTS = frozenset({"string", "wstring"})
-_FEW = 60
 _SEQ = Slot("seq", "uint32", 0, "one", 0)
 
 
@@ -76,9 +76,7 @@ class _Filler:
         self._keys = keys
 
     def _refuse(self, path: str, expected: str, value: Any) -> NoReturn:
-        text = repr(value)
-        text = text if len(text) <= _FEW else text[: _FEW - 1] + "…"
-        given = f"{type(value).__name__} {text}" if value is not None else "nothing"
+        given = shown(value) if value is not None else "nothing"
         raise EncodeError(self._type, path, f"expected {expected}, got {given}")
 
     def fill(self, message: Message, value: Any, path: str) -> None:
@@ -128,9 +126,13 @@ class _Filler:
         if slot.shape == "one":
             return self._one(slot, value, path, getattr(owner, slot.name))
         if isinstance(slot.kind, str) and slot.kind in OCTETS and isinstance(value, str):
-            value = self._base64(value, path)
+            try:
+                value = base64.b64decode(value, validate=True)
+            except binascii.Error:
+                self._refuse(path, "a list of octets, or Base64", value)
         if not isinstance(value, list | tuple | bytes | bytearray) and not hasattr(value, "tolist"):
-            self._refuse(path, f"a list of {_kind(slot)}", value)
+            kind = slot.kind if isinstance(slot.kind, str) else slot.kind._type
+            self._refuse(path, f"a list of {kind}", value)
         if slot.shape == "fixed" and len(value) != slot.size:
             self._refuse(path, f"{slot.size} elements", value)
         if slot.shape == "bounded" and len(value) > slot.size:
@@ -192,13 +194,6 @@ class _Filler:
         except OverflowError:
             self._refuse(path, f"{kind} in its range", value)
 
-    def _base64(self, value: str, path: str) -> bytes:
-        try:
-            octets = base64.b64decode(value, validate=True)
-        except binascii.Error:
-            self._refuse(path, "a list of octets, or Base64", value)
-        return octets
-
     def _message(self, cls: Any, value: Any, path: str, before: Any) -> Message:
         if isinstance(value, Message):
             return value
@@ -236,11 +231,6 @@ class _Filler:
     def _build(self, cls: Any, *members: Any) -> Message:
         message: Message = cls(*members)
         return message
-
-
-def _kind(slot: Slot) -> str:
-    kind: str = slot.kind if isinstance(slot.kind, str) else slot.kind._type
-    return kind
 
 
 _M = TypeVar("_M", bound=Message)

@@ -23,7 +23,7 @@ from rosz.message.base import (
 )
 from rosz.message.sequences import flags, numbers, octets, pack_wide, put_text, read_wide
 
-__all__ = ("FAULTS", "decode_plainly", "encode_plainly")
+__all__ = ("FAULTS", "decode_plainly", "encode_plainly", "shown")
 
 _T = TypeVar("_T")
 
@@ -77,7 +77,8 @@ def decode_plainly(data: bytes, cls: type[_T]) -> _T:
     return message
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
+    """Return the type and the beginning of a value, for errors."""
     text = repr(value)
     return f"{type(value).__name__} {text if len(text) <= _FEW else text[: _FEW - 1] + '…'}"
 
@@ -90,7 +91,7 @@ class _Writer:
         self.data = bytearray()
 
     def _refuse(self, path: str, expected: str, value: object, why: str = "") -> NoReturn:
-        reason = f"expected {expected}, got {_shown(value)}{': ' + why if why else ''}"
+        reason = f"expected {expected}, got {shown(value)}{': ' + why if why else ''}"
         raise EncodeError(self._type, path, reason) from None
 
     def _put(self, code: str, *values: object) -> None:

@@ -86,15 +86,6 @@ def _flat(values: Any) -> list[Any]:
     return plain
 
 
-def _listed(value: Any) -> list[Any]:
-    """Return the elements of a buffer of another element type."""
-    try:
-        numbers: list[Any] = value.tolist()
-    except NotImplementedError as error:  # a memoryview of a format that only numpy reads
-        raise TypeError(str(error)) from None
-    return numbers
-
-
 def _refuse_iterator(value: Any) -> None:
     """Refuse an iterator: a message may be encoded more than once."""
     if not hasattr(value, "__len__"):
@@ -131,7 +122,10 @@ def octets(value: Any, size: int = -1) -> bytes | memoryview:
             if view.format in _OCTET_FORMATS and view.c_contiguous:
                 found = view.cast("B") if view.nbytes else b""
             else:
-                found = bytes(_flat(_listed(value)))
+                try:
+                    found = bytes(_flat(value.tolist()))
+                except NotImplementedError as error:  # a format that only numpy reads
+                    raise TypeError(str(error)) from None
     if len(found) != size >= 0:
         raise ValueError(f"expected {size} elements, got {len(found)}")
     return found
@@ -153,9 +147,8 @@ def flags(value: Any, size: int = -1) -> bytes:
     return found
 
 
-_count = Struct("<I")
-_pack_count = _count.pack
-_read_count = _count.unpack_from
+_pack_count = Struct("<I").pack
+_read_count = Struct("<I").unpack_from
 
 _MOST_TEXTS = 4096
 _LONGEST_TEXT = 128
@@ -216,7 +209,9 @@ class StringList:
     def put(self, values: list[str]) -> bytes:
         """Return the bytes of a list that starts at a multiple of four."""
         if type(values) is not list:
-            values = list(_strings(values))
+            if isinstance(values, str | bytes):
+                raise TypeError("a string is not a list of strings")
+            values = list(values)
         self._check(len(values))
         parts = [] if self._size >= 0 else [_pack_count(len(values))]
         length = 0
@@ -258,12 +253,6 @@ class StringList:
     def _check(self, count: int) -> None:
         if (self._size >= 0 and count != self._size) or count > self._most >= 0:
             raise ValueError(f"{count} strings are not what the type holds")
-
-
-def _strings(values: Any) -> Any:
-    if isinstance(values, str | bytes):
-        raise TypeError("a string is not a list of strings")
-    return values
 
 
 def pack_wide(value: Any) -> bytes:

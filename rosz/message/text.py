@@ -64,7 +64,7 @@ class _Writer:
         if hasattr(value, "_schema"):
             return self._message(value, indent)
         if isinstance(value, bytes | bytearray | array | list | tuple) or hasattr(value, "tolist"):
-            return self._list(_plain_list(value), indent)
+            return self._list(value.tolist() if hasattr(value, "tolist") else list(value), indent)
         return str(value)
 
     def _number(self, value: float) -> str:
@@ -105,11 +105,6 @@ class _Writer:
             f"{indent}{name}: {self.value(getattr(value, name), '  ' + indent)}" for name in names
         )
         return ("\n" if indent else "") + "\n".join(lines)
-
-
-def _plain_list(value: Any) -> list[Any]:
-    plain: list[Any] = value.tolist() if hasattr(value, "tolist") else list(value)
-    return plain
 
 
 def _quoted(value: str) -> str:

@@ -111,11 +111,6 @@ class Authority:
         _create(folder / AUTHORITY, (self.folder / _HOME / CERTIFICATE).read_bytes())
         return folder
 
-    def holders(self) -> list[Path]:
-        """Return the folders of all holders of keys, sorted."""
-        found = (file.parent for file in self.folder.glob(f"*/{CERTIFICATE}"))
-        return sorted(folder for folder in found if folder.name != _HOME)
-
 
 def _sign(
     subject: Name, public: Any, days: float, issuer: Name, key: Any, places: Sequence[str] = ()
