@@ -117,9 +117,13 @@ class Slot(msgspec.Struct, frozen=True):
         return self.shape in ("bounded", "sequence")
 
 
-@lru_cache(maxsize=4096)
 def slots(cls: Any) -> tuple[Slot, ...]:
     """Return the fields of a message class in the order of the wire."""
+    return _slots(cls)
+
+
+@lru_cache(maxsize=4096)
+def _slots(cls: Any) -> tuple[Slot, ...]:
     return tuple(_slot(*entry) for entry in cls._schema)
 
 
