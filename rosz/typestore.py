@@ -361,9 +361,7 @@ class _Compiler:
             return cls
 
         namespace = {"_type_of": type_of, "_made_of": (stem, needs)}
-        module = self._cache.load(module_name, stem, namespace, members)
-        if module is None:
-            module = self._cache.add(module_name, stem, namespace, write())
+        module = self._cache.load(module_name, stem, namespace, members, write)
         sys.modules.setdefault(module_name, module)
         return module
 

@@ -7,8 +7,9 @@ the folder cannot be written, the source stays in memory; tracebacks show its li
 from __future__ import annotations
 
 import linecache
+from collections.abc import Callable
 from importlib.abc import Loader
-from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from types import ModuleType
@@ -28,48 +29,50 @@ class SourceCache:
         self._folder = folder
 
     def load(
-        self, name: str, stem: str, namespace: dict[str, Any], members: list[str]
-    ) -> ModuleType | None:
-        """Run a cached source and return its module; None where there is none that works.
+        self,
+        name: str,
+        stem: str,
+        namespace: dict[str, Any],
+        members: list[str],
+        write: Callable[[], str],
+    ) -> ModuleType:
+        """Run a source and return its module; write the source if there is none that works.
 
         Args:
             name: Name of the module.
             stem: Name of the source in the cache.
             namespace: Values that the source finds in its module.
             members: Names that the module must have afterwards.
+            write: Function that generates the source.
         """
         file = self._folder / f"{stem}.py" if self._folder is not None else None
-        if file is None or not file.is_file():
-            return None
-        try:
-            module = _run(name, SourceFileLoader(name, str(file)), namespace)
-        except Exception:  # noqa: BLE001  # a damaged file is generated again
-            return None
-        return module if all(hasattr(module, member) for member in members) else None
+        if file is not None and file.is_file():
+            try:
+                module = _run(name, SourceFileLoader(name, str(file)), namespace)
+                if all(hasattr(module, member) for member in members):
+                    return module
+            except Exception:  # noqa: BLE001, S110  # a damaged file is generated again
+                pass
+        source = write()
+        if file is not None and _write(file, source):
+            return _run(name, SourceFileLoader(name, str(file)), namespace)
+        return _run(name, _TextLoader(source, f"<{stem}>"), namespace)
 
-    def add(self, name: str, stem: str, namespace: dict[str, Any], source: str) -> ModuleType:
-        """Run a source and keep it; arguments as `load`."""
-        file = self._write(stem, source)
-        loader = SourceFileLoader(name, str(file)) if file else _TextLoader(source, f"<{stem}>")
-        return _run(name, loader, namespace)
 
-    def _write(self, stem: str, source: str) -> Path | None:
-        """Write a source atomically, since other processes may write the same one."""
-        if self._folder is None:
-            return None
-        import tempfile
+def _write(file: Path, source: str) -> bool:
+    """Write a source atomically, since other processes may write the same one."""
+    import tempfile
 
-        file = self._folder / f"{stem}.py"
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(
-                "w", encoding="utf-8", dir=self._folder, suffix=".tmp", delete=False
-            ) as temporary:
-                temporary.write(source)
-            Path(temporary.name).replace(file)
-        except OSError:
-            return None  # a read-only home: the source stays in memory
-        return file
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", dir=file.parent, suffix=".tmp", delete=False
+        ) as temporary:
+            temporary.write(source)
+        Path(temporary.name).replace(file)
+    except OSError:
+        return False  # a read-only home: the source stays in memory
+    return True
 
 
 def _run(name: str, loader: Loader, namespace: dict[str, Any]) -> ModuleType:
@@ -88,9 +91,6 @@ class _TextLoader(Loader):
     def __init__(self, source: str, name: str) -> None:
         self._source = source
         self._name = name
-
-    def create_module(self, spec: ModuleSpec) -> None:
-        """Let the import system make the module."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Run the source in the module."""

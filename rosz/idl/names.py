@@ -37,12 +37,11 @@ class LocalNames:
 
     def name(self, base: str) -> str:
         """Return a new name that resembles the name of a field."""
+        if base[0].isupper():  # classes have such names
+            base = f"the_{base}"
         name = base
         number = 1
-        while name in self._taken or name[0].isupper() or _RESERVED.fullmatch(name):
-            if name[0].isupper():  # classes have such names
-                base = name = f"the_{base}"
-                continue
+        while name in self._taken or _RESERVED.fullmatch(name):
             number += 1
             name = f"{base}_{number}"
         self._taken.add(name)
