@@ -72,19 +72,25 @@ def create_package(
     ] = False,
 ) -> None:
     """Create a package in the working folder, with a message, a talker and a launch file."""
-    from rosz.workspace import create, create_bare
+    from rosz.workspace import create
 
-    facts = {"description": description, "maintainer": maintainer, "license_name": license_name}
+    made = create(
+        Path.cwd(),
+        name,
+        dependencies or [],
+        bare=bare,
+        description=description,
+        maintainer=maintainer,
+        license_name=license_name,
+    )
     if bare:
-        made = create_bare(Path.cwd(), name, dependencies or [], **facts)
         _print_created(made, Path.cwd())
-    else:
-        folder = create(Path.cwd(), name, dependencies or [], **facts)
     index = _index()
     for dependency in dependencies or []:
         if dependency not in index.names() and dependency not in _BUILT_IN:
             warn(f"dependency '{dependency}' is not on the package path")
     if not bare:
+        folder = made[0].parent
         sys.stdout.write(
             f"created {folder}\nrun it with: rosz launch {folder / 'launch' / 'talker.launch'}\n"
         )

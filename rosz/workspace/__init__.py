@@ -5,7 +5,7 @@ to ``rosz.ros1``.
 """
 
 from rosz.workspace.check import Checked, check, find_packages
-from rosz.workspace.create import create, create_bare, write_setup
+from rosz.workspace.create import create, write_setup
 from rosz.workspace.problem import Problem
 
 __all__ = (
@@ -13,7 +13,8 @@ __all__ = (
     "Problem",
     "check",
     "create",
-    "create_bare",
     "find_packages",
     "write_setup",
 )
+
+PUBLIC_MODULES = ("generate",)

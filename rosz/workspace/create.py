@@ -1,7 +1,7 @@
 """Create packages, and the setup scripts of a workspace.
 
 `create` makes a package that can be run at once: a message, a node that publishes it and a launch
-file that starts the node. `create_bare` makes the two files that catkin's tutorials begin with.
+file that starts the node. A bare package has the two files that catkin's tutorials begin with.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from xml.sax.saxutils import escape
 
 from rosz.errors import LaunchError, UsageError
 
-__all__ = ("create", "create_bare", "write_setup")
+__all__ = ("create", "write_setup")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
+
+_SCRIPT = "scripts/talker.py"
 
 _MANIFEST = """\
 <?xml version="1.0"?>
@@ -89,76 +91,49 @@ def create(
     name: str,
     dependencies: Sequence[str] = (),
     *,
-    description: str = "",
-    maintainer: str = "",
-    license_name: str = "",
-) -> Path:
-    """Create a package that can be run at once.
-
-    Args:
-        parent: Folder to create the package in.
-        name: Name of the package.
-        dependencies: Names of packages that it needs.
-        description: Description for package.xml.
-        maintainer: Name of the maintainer.
-        license_name: Name of the license.
-
-    Returns:
-        The folder of the package.
-
-    Raises:
-        UsageError: If the name is not valid.
-        LaunchError: If the folder exists, or cannot be written.
-    """
-    files = {
-        "package.xml": _manifest(name, dependencies, description, maintainer, license_name),
-        "msg/Number.msg": _MESSAGE,
-        "scripts/talker.py": _TALKER.format(name=name),
-        "launch/talker.launch": _LAUNCH.format(name=name),
-    }
-    folder = _write(parent / name, files)
-    (folder / "scripts/talker.py").chmod(0o755)
-    return folder
-
-
-def create_bare(
-    parent: Path,
-    name: str,
-    dependencies: Sequence[str] = (),
-    *,
+    bare: bool = False,
     description: str = "",
     maintainer: str = "",
     license_name: str = "",
 ) -> list[Path]:
-    """Create a package as catkin_create_pkg does: two files, and empty folders.
+    """Create a package that can be run at once, or a bare one as catkin_create_pkg does.
 
     Args:
         parent: Folder to create the package in.
         name: Name of the package.
         dependencies: Names of packages that it needs.
+        bare: Whether to create only two files, and empty folders.
         description: Description for package.xml.
         maintainer: Name of the maintainer.
         license_name: Name of the license.
 
     Returns:
-        The files, then the folders.
+        The files, of which the first is package.xml, then the empty folders.
 
     Raises:
         UsageError: If the name is not valid.
         LaunchError: If the folder exists, or cannot be written.
     """
-    components = f" COMPONENTS {' '.join(dependencies)}" if dependencies else ""
-    files = {
-        "package.xml": _manifest(name, dependencies, description, maintainer, license_name),
-        "CMakeLists.txt": _BUILD.format(name=name, components=components),
-    }
-    folder = _write(parent / name, files)
-    folders = [folder / "include" / name] if "roscpp" in dependencies else []
-    if {"roscpp", "rospy"} & {*dependencies}:
-        folders.append(folder / "src")
-    for inner in folders:
+    folder = parent / name
+    files = {"package.xml": _manifest(name, dependencies, description, maintainer, license_name)}
+    empty: list[Path] = []
+    if bare:
+        components = f" COMPONENTS {' '.join(dependencies)}" if dependencies else ""
+        files["CMakeLists.txt"] = _BUILD.format(name=name, components=components)
+        if "roscpp" in dependencies:
+            empty.append(folder / "include" / name)
+        if {"roscpp", "rospy"} & {*dependencies}:
+            empty.append(folder / "src")
+    else:
+        files["msg/Number.msg"] = _MESSAGE
+        files[_SCRIPT] = _TALKER.format(name=name)
+        files["launch/talker.launch"] = _LAUNCH.format(name=name)
+    _write(folder, files)
+    for inner in empty:
         inner.mkdir(parents=True)
-    return [*(folder / path for path in files), *folders]
+    if not bare:
+        (folder / _SCRIPT).chmod(0o755)
+    return [*(folder / path for path in files), *empty]
 
 
 def _manifest(
@@ -178,7 +153,7 @@ def _manifest(
     )
 
 
-def _write(folder: Path, files: Mapping[str, str]) -> Path:
+def _write(folder: Path, files: Mapping[str, str]) -> None:
     try:
         folder.mkdir()
         for path, text in files.items():
@@ -189,7 +164,6 @@ def _write(folder: Path, files: Mapping[str, str]) -> Path:
         raise LaunchError(f"'{error.filename}' exists already; choose another name") from error
     except OSError as error:
         raise LaunchError(f"cannot create '{error.filename}': {error.strerror}") from error
-    return folder
 
 
 def write_setup(workspace: Path, scripts: Mapping[str, str]) -> list[Path]:

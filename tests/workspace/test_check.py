@@ -189,7 +189,7 @@ def test_a_broken_package_keeps_no_other_from_being_checked(workspace: Path) -> 
 
 
 def test_two_packages_of_one_name(workspace: Path) -> None:
-    folder = create(workspace / "src", "twin")
+    folder = create(workspace / "src", "twin")[0].parent
     text = (folder / "package.xml").read_text().replace("<name>twin", "<name>demo")
     (folder / "package.xml").write_text(text)
     found = [
@@ -199,7 +199,7 @@ def test_two_packages_of_one_name(workspace: Path) -> None:
 
 
 def test_what_is_meant(workspace: Path) -> None:
-    other = create(workspace / "src", "other")
+    other = create(workspace / "src", "other")[0].parent
     demo = workspace / "src" / "demo"
     index = PackageIndex([workspace / "src"])
     assert find_packages([], workspace, index) == [demo, other]

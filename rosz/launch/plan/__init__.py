@@ -62,3 +62,5 @@ __all__ = (
     "parse_arguments",
     "plan",
 )
+
+PUBLIC_MODULES = ("report",)

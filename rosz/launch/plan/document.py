@@ -34,6 +34,7 @@ _ATTRIBUTE = re.compile(r"""([^\s=/<>"']+)\s*=\s*("[^"]*"|'[^']*')""")
 _REFERENCE = re.compile(r"&[^;\s]+;")
 _NESTED_ENTITY = re.compile(r"&(?!amp;|lt;|gt;|quot;|apos;)[^;]*;")
 _CURLY_QUOTES = frozenset("\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u201f")
+_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*""")
 _CLOSING_TAG = re.compile(rb"</\s*([^\s>]+)")
 
 _HINTS = {
@@ -183,17 +184,6 @@ class Element:
         chunks: (text, line, column) of each piece of text, for elements whose text is kept.
     """
 
-    __slots__ = (
-        "_document",
-        "_offset",
-        "attributes",
-        "children",
-        "chunks",
-        "column",
-        "line",
-        "tag",
-    )
-
     def __init__(
         self, document: Document, tag: str, attributes: dict[str, str], place: tuple[int, int, int]
     ) -> None:
@@ -269,22 +259,10 @@ class Document:
 
         That is the case for UTF-16, whose bytes are not searched here.
         """
-        if (
-            self.data.startswith((b"\xff\xfe", b"\xfe\xff"))
-            or self.data[offset : offset + 1] != b"<"
-        ):
+        if self.data.startswith((b"\xff\xfe", b"\xfe\xff")):
             return ""
-        end = offset
-        quote = 0
-        for end in range(offset, len(self.data)):
-            byte = self.data[end]
-            if quote:
-                quote = 0 if byte == quote else quote
-            elif byte in b"\"'":
-                quote = byte
-            elif byte == ord(">"):
-                break
-        return self.data[offset : end + 1].decode("utf-8", "replace")
+        tag = _TAG.match(self.data, offset)
+        return tag[0].decode("utf-8", "replace") if tag else ""
 
 
 class _Handlers:
@@ -304,19 +282,10 @@ class _Handlers:
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         parser = self.parser
-        place = (
-            parser.CurrentLineNumber,
-            parser.CurrentColumnNumber + 1,
-            parser.CurrentByteIndex,
-        )
-        if " " in name:
-            name = _qualified(name)
-        element = Element(
-            self.document,
-            name,
-            {_qualified(key): value for key, value in attributes.items()},
-            place,
-        )
+        place = (parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex)
+        name = _qualified(name)
+        values = {_qualified(key): value for key, value in attributes.items()}
+        element = Element(self.document, name, values, place)
         if self.open:
             self.open[-1].children.append(element)
         else:
@@ -335,16 +304,7 @@ class _Handlers:
                 (text, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
             )
 
-    def entity(
-        self,
-        name: str,
-        is_parameter: bool,
-        value: str | None,
-        _base: str | None,
-        _system: str | None,
-        _public: str | None,
-        _notation: str | None,
-    ) -> None:
+    def entity(self, name: str, is_parameter: bool, value: str | None, *_: str | None) -> None:
         if is_parameter or value is None:
             self.refuse(f"entity '{name}' is external; launch files read others by <include>")
         elif len(value) > _MAX_ENTITY:

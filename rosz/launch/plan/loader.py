@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+import msgspec
+
 from rosz.errors import LaunchFileError, RoszError, near_miss
 from rosz.launch.plan.context import LaunchContext, LaunchText
 from rosz.launch.plan.document import Document, Element, TagError, TextError, misplaced, parse
@@ -78,25 +80,14 @@ def describe_args(
     return tuple(loader.docs.values())
 
 
-class _Frame:
+class _Frame(msgspec.Struct):
     """A position in a list of sibling tags."""
 
-    __slots__ = ("chain", "children", "leave", "root", "scope")
-
-    def __init__(
-        self,
-        children: Sequence[Element],
-        scope: Scope,
-        chain: tuple[tuple[str, str], ...],
-        *,
-        root: str = "launch",
-        leave: Callable[[], None] | None = None,
-    ) -> None:
-        self.children: Iterator[Element] = iter(children)
-        self.scope = scope
-        self.chain = chain
-        self.root = root
-        self.leave = leave
+    children: Iterator[Element]
+    scope: Scope
+    chain: tuple[tuple[str, str], ...]
+    root: str = "launch"
+    leave: Callable[[], None] | None = None
 
 
 class _Loader:
@@ -147,7 +138,7 @@ class _Loader:
         scope.args = dict(self._given)
         self.docs = {}
         self._launch(document.launch, scope)
-        self._stack = [_Frame(document.launch.children, scope, ())]
+        self._stack = [_Frame(iter(document.launch.children), scope, ())]
         self._walk()
 
     def _document(self, path: str) -> Document:
@@ -227,7 +218,7 @@ class _Loader:
         scope = self._open(tag, read_namespace(tag))
         scope.private = list(scope.private)
         scope.waits = (*scope.waits, *read_wait(tag, scope.ns))
-        self._stack.append(_Frame(tag.element.children, scope, self._chain, root="group"))
+        self._stack.append(_Frame(iter(tag.element.children), scope, self._chain, root="group"))
 
     def _open(self, tag: Tag, ns: str | None, *, include: bool = False) -> Scope:
         try:
@@ -276,7 +267,7 @@ class _Loader:
                 reason = f"'{path}' declares no arg '{unknown[0]}'{hint or takes}"
                 self._refuse(TagError(tag.element, reason))
 
-        self._stack.append(_Frame(document.launch.children, scope, self._chain, leave=leave))
+        self._stack.append(_Frame(iter(document.launch.children), scope, self._chain, leave=leave))
 
     def _read_passed(self, tag: Tag, scope: Scope) -> None:
         """Read the ``<arg>`` and ``<env>`` tags inside an ``<include>``."""

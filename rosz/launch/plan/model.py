@@ -343,7 +343,7 @@ class PlanBuilder:
         self._machines: dict[str, MachinePlan] = {}
         self._nodes: dict[str, NodePlan] = {}
         self._tests: list[TestPlan] = []
-        self._used: dict[tuple[object, ...], str] = {}
+        self._used: dict[MachinePlan, str] = {}
 
     def clear(self, ns: str) -> None:
         """Add a parameter namespace to clear."""
@@ -469,19 +469,10 @@ class PlanBuilder:
         return replace(node, machine=self._used.setdefault(_config(machine), machine.name))
 
     def _parent_cleared(self, ns: str) -> bool:
-        parents = ns.split("/")[1:-1]
-        above = {"/"} if ns != "/" else set()
-        above |= {"/" + "/".join(parents[: count + 1]) for count in range(len(parents))}
-        return any(parent in self._clear for parent in above)
+        above = (f"{other.rstrip('/')}/" for other in self._clear if other != ns)
+        return any(ns.startswith(parent) for parent in above)
 
 
-def _config(machine: MachinePlan) -> tuple[object, ...]:
+def _config(machine: MachinePlan) -> MachinePlan:
     """Return the settings by which two machines are the same one."""
-    return (
-        machine.address,
-        machine.env_loader,
-        machine.ssh_port,
-        machine.user,
-        machine.password,
-        machine.timeout,
-    )
+    return replace(machine, name="", assignable=True, place=Place(""))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Literal
 
 from rosz import names
@@ -27,18 +28,11 @@ def _parse_bool(text: str) -> bool:
     return lower in {"true", "1"}
 
 
-def _parse_int(text: str) -> int:
+def _parse_number(convert: Callable[[str], float], noun: str, text: str) -> float:
     try:
-        return int(text)
+        return convert(text)
     except ValueError:
-        raise ValueError(f"'{text}' is not an int") from None
-
-
-def _parse_double(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"'{text}' is not a double") from None
+        raise ValueError(f"'{text}' is not {noun}") from None
 
 
 def _load_yaml(text: str) -> Any:
@@ -59,8 +53,8 @@ _TYPES: Mapping[str, Callable[[str], Any]] = {
     "auto": guess_type,
     "bool": _parse_bool,
     "boolean": _parse_bool,
-    "double": _parse_double,
-    "int": _parse_int,
+    "double": partial(_parse_number, float, "a double"),
+    "int": partial(_parse_number, int, "an int"),
     "str": str,
     "string": str,
     "yaml": _load_yaml,

@@ -11,6 +11,7 @@ Two substitutions of ROS 2 are understood too: ``$(var x)`` is ``$(arg x)``, and
 from __future__ import annotations
 
 import os.path
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,6 +24,7 @@ __all__ = ("Substitution", "guess_type")
 
 _EVAL = "$(eval "
 _SUGGESTED = ("anon", "arg", "dirname", "env", "eval", "find", "optenv")
+_SUBSTITUTION = re.compile(r"\$\(([^$()]*)([$()])?")
 _COMMANDS = ("anon", "arg", "dirname", "env", "find", "find-pkg-share", "optenv", "var")
 
 
@@ -201,30 +203,14 @@ def _split(inner: str, index: int) -> tuple[str, list[str]]:
     raise TextError(f"unknown substitution '$({inner})'{hint}", index)
 
 
-_NEXT = {
-    ("", "$"): "$",
-    ("$", "$"): "$",
-    ("$", "("): "$(",
-}
-
-
 def _collect(text: str) -> list[tuple[str, int]]:
     """Return the content and the start of every substitution in a text."""
     found: list[tuple[str, int]] = []
-    state = ""
-    start = 0
-    for index, character in enumerate(text):
-        if state in {"$(", "in"}:
-            if character in "$(":
-                reason = "they do not nest, $(eval …) can combine values"
-                raise TextError(f"'{character}' inside a substitution; {reason}", index)
-            if character == ")":
-                if state == "in":
-                    found.append((text[start + 2 : index], start))
-                state = ""
-            else:
-                state = "in"
-        else:
-            state = _NEXT.get((state, character), "")
-            start = index if state == "$" else start
+    for match in _SUBSTITUTION.finditer(text):
+        content, end = match.groups()
+        if end in {"$", "("}:
+            reason = "they do not nest, $(eval …) can combine values"
+            raise TextError(f"'{end}' inside a substitution; {reason}", match.start(2))
+        if content and end:
+            found.append((content, match.start()))
     return found

@@ -1,8 +1,8 @@
 """Run launch plans: parameters, processes, their output and their end.
 
 `Runner` takes a plan and a `Network`; a `StatusClient` sends requests to running launches. May
-import floors 0 to 5. Public modules, which start-up needs alone: `command`, `agent`, `control`,
-`host` and `network`. `relay` is a program, which runs beside the launch.
+import floors 0 to 5. `relay` is a program, which runs beside the launch. The public modules are
+those that start-up needs alone.
 """
 
 from rosz.launch.run.command import Command, Workplace, run_command
@@ -42,3 +42,5 @@ __all__ = (
     "run_command",
     "write_params",
 )
+
+PUBLIC_MODULES = ("agent", "command", "network")

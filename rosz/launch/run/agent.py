@@ -21,7 +21,7 @@ import msgspec
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.run.command import Workplace
-from rosz.launch.run.host import Child, LocalHost, ProcessTree, Usage
+from rosz.launch.run.host import Child, LocalHost, ProcessTree
 from rosz.launch.run.loop import Loop, Timer
 from rosz.launch.run.output import Output, RunFolder
 from rosz.launch.run.protocol import (
@@ -54,7 +54,7 @@ _CONNECT_TIMEOUT = 1.0
 _CLOSE_TIMEOUT = 1.0
 
 
-class Agent:
+class _Agent:
     """The processes of one launch on this machine.
 
     Args:
@@ -144,7 +144,8 @@ class Agent:
             if child is not None:
                 child.signal(request.number)
         elif isinstance(request, Measure):
-            self._measure()
+            assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
+            self._host.measure(lambda used: self._writer.send(Measured(used)))
 
     def _set_up(self, setup: Setup) -> None:
         self._setup = setup
@@ -202,14 +203,6 @@ class Agent:
         self._writer.send(Gone(serial))
         if self._ending and not self._children:
             self._loop.stop()
-
-    def _measure(self) -> None:
-        assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
-
-        def send(used: dict[int, Usage]) -> None:
-            self._writer.send(Measured(used))
-
-        self._host.measure(send)
 
     def _end(self) -> None:
         """End all processes, then the loop; a second call has no effect."""
@@ -281,4 +274,4 @@ def serve() -> None:
         os.dup2(theirs, sink)
         os.close(theirs)
         screens[ours] = sink
-    Agent(LineReader(requests), reports, screens, dict(os.environ)).run()
+    _Agent(LineReader(requests), reports, screens, dict(os.environ)).run()

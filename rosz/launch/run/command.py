@@ -21,7 +21,15 @@ from rosz.launch.plan import report
 from rosz.launch.plan.model import NodePlan
 from rosz.packages import Package, PackageIndex
 
-__all__ = ("TAG", "Command", "Workplace", "is_python", "run_command")
+__all__ = (
+    "TAG",
+    "Command",
+    "Workplace",
+    "base_environ",
+    "is_python",
+    "locate",
+    "run_command",
+)
 
 TAG = "ROSZ_LAUNCH"
 """Environment variable with the tag by which descendants of a launched process are found."""

@@ -31,6 +31,7 @@ from rosz.launch.run.output import Output, RunFolder, Streams
 __all__ = (
     "Child",
     "Host",
+    "LocalChild",
     "LocalHost",
     "OnExit",
     "OnStart",

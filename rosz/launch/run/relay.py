@@ -28,6 +28,8 @@ import time
 from collections import deque
 from typing import Any
 
+__all__ = ("Relay", "Source", "main")
+
 CHUNK = 65536
 MAX_LINE = 65536
 PARTIAL_SECONDS = 0.05
@@ -150,23 +152,22 @@ class Relay:
             self._drain(request["id"])
         else:
             for source in list(self.sources.values()):
-                self._finish(source)
+                self._read_all(source)
+                if source.fd in self.sources:
+                    self._drop(source)
             self._detach()
 
     def _drain(self, owner: int) -> None:
         for source in [s for s in self.sources.values() if s.owner == owner]:
-            while source.fd in self.sources and self._read(source):
-                pass
+            self._read_all(source)
             self._show(source, source.rest())
         tail = list(self.tails.get(owner, ()))
         with contextlib.suppress(OSError):  # the launch has ended and needs no reply
             self.requests.sendall(json.dumps({"id": owner, "tail": tail}).encode() + b"\n")
 
-    def _finish(self, source: Source) -> None:
+    def _read_all(self, source: Source) -> None:
         while source.fd in self.sources and self._read(source):
             pass
-        if source.fd in self.sources:
-            self._drop(source)
 
     def _read(self, source: Source) -> bool:
         """Read once, and return whether there may be more to read."""
