@@ -52,7 +52,7 @@ class Client(Entity):
             node, Kind.CLIENT, name, service_type._type_name, service_type._type_hash, qos
         )
         self.service_type = service_type
-        self.timeout = clamp_timeout(timeout)
+        self.timeout: float = clamp_timeout(timeout)
         self._numbers = itertools.count(1)
         self._cancel = Cancellation()
         self._known: tuple[View | None, bool] = None, False

@@ -70,25 +70,25 @@ class Context:
         argv: Sequence[str] = (),
         config: SessionConfig | None = None,
     ) -> None:
-        self.environment = environment or Environment.read()
-        self.arguments = remap.parse(argv)
-        self.domain = self.environment.domain
+        self.environment: Environment = environment or Environment.read()
+        self.arguments: remap.Arguments = remap.parse(argv)
+        self.domain: int = self.environment.domain
         config = config or SessionConfig.node(self.environment)
-        self.passing = config.must_connect
-        self.permissions = _permissions(config)
+        self.passing: bool = config.must_connect
+        self.permissions: LocalPermissions | None = _permissions(config)
         peers = LocalPeers.read(config.rendezvous)
         alone = config.mode == "peer" and not (
             config.connect or config.listen or config.multicast or peers.is_anybody_there
         )
-        self.clock = Clock()
+        self.clock: Clock = Clock()
         self._ids = itertools.count()
         self._making = threading.RLock()
         self._params: Replica | None = None
         self._types: TypeStore | None = None
         self._flushed = threading.Event()
         self._lifecycle = Lifecycle("the context", log=_log, on_fork=self._forked)
-        self.cooperative = False
-        self.session = Session.open(config, peers)
+        self.cooperative: bool = False
+        self.session: Session = Session.open(config, peers)
         try:
             self._join_network(config, alone=alone)
         except BaseException:  # Ctrl-C comes anywhere
@@ -97,10 +97,10 @@ class Context:
         atexit.register(self.close)
 
     def _join_network(self, config: SessionConfig, *, alone: bool) -> None:
-        self.graph = Graph(self.session, self.domain)
-        self.incompatible = IncompatibleEntities(self.graph, self.session.zid)
-        self.direct_delivery = DirectDelivery(self.session, self.domain)
-        self.mesh = MeshReadiness(
+        self.graph: Graph = Graph(self.session, self.domain)
+        self.incompatible: IncompatibleEntities = IncompatibleEntities(self.graph, self.session.zid)
+        self.direct_delivery: DirectDelivery = DirectDelivery(self.session, self.domain)
+        self.mesh: MeshReadiness = MeshReadiness(
             self.session,
             0 if alone or self.passing else self.MESH_TIMEOUT,
             self._flushed,

@@ -10,13 +10,14 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from rosz import names
 from rosz.errors import ClosedError
 from rosz.lifecycle import Closable, Hook, Lifecycle, Registration
+from rosz.node.clock import Clock
 from rosz.node.context import Context
 from rosz.node.log import NodeLog
 from rosz.node.log_handlers import DEFAULT_FORMAT
@@ -62,7 +63,7 @@ class NodeCore:
             # ROS 1 counts milliseconds, but has one node in a process.
             name = names.anonymous(name, socket.gethostname(), os.getpid(), time.time_ns())
         names.check_base(name)
-        self.context = context or Context(argv=sys.argv[1:] if argv is None else argv)
+        self.context: Context = context or Context(argv=sys.argv[1:] if argv is None else argv)
         self._params: Params | None = None
         try:
             self._identify(name, namespace)
@@ -75,13 +76,13 @@ class NodeCore:
         context = self.context
         environment, arguments = context.environment, context.arguments
         default = environment.namespace if namespace is None else namespace
-        self.name = arguments.node_name(name, default)
-        self.namespace = names.namespace(self.name).rstrip("/") or "/"
-        self.base_name = names.basename(self.name)
-        self.remaps = arguments.resolved_remaps(self.name)
-        self.node_id = context.next_id()
-        self.began = time.monotonic()
-        self.process = ProcessToken(
+        self.name: str = arguments.node_name(name, default)
+        self.namespace: str = names.namespace(self.name).rstrip("/") or "/"
+        self.base_name: str = names.basename(self.name)
+        self.remaps: Mapping[str, str] = arguments.resolved_remaps(self.name)
+        self.node_id: int = context.next_id()
+        self.began: float = time.monotonic()
+        self.process: ProcessToken = ProcessToken(
             context.domain,
             context.session.zid,
             self.node_id,
@@ -90,8 +91,8 @@ class NodeCore:
             socket.gethostname(),
             self.name,
         )
-        self.clock = context.clock.branch()
-        self.log = NodeLog(
+        self.clock: Clock = context.clock.branch()
+        self.log: NodeLog = NodeLog(
             self.name,
             clock=self.clock,
             log_dir=environment.log_dir,

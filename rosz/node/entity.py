@@ -58,11 +58,12 @@ class Entity:
         context = node.context
         self.node = node
         self.name = name
-        self.qos = qos = _with_depth(qos)
+        qos = _with_depth(qos)
+        self.qos: QoS = qos
         without_hash = context.environment.distro == "humble" and type_hash != ANY
         wire_hash = NO_HASH if without_hash else type_hash
-        self.key = entity_key(context.domain, names.check_resource(name), type_name, wire_hash)
-        self.token = Token(
+        self.key: str = entity_key(context.domain, names.check_resource(name), type_name, wire_hash)
+        self.token: Token = Token(
             domain=context.domain,
             zid=context.session.zid,
             node_id=node.node_id,
@@ -76,7 +77,7 @@ class Entity:
             qos=qos,
         )
         self._token_key = format_token(self.token)
-        self.gid = gid(self._token_key)
+        self.gid: bytes = gid(self._token_key)
         what = f"the {kind.name.lower()} of '{name}'"
         self._lifecycle = Lifecycle(what, log=node.log, on_fork=self._forked)
 

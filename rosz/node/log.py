@@ -100,6 +100,11 @@ class NodeLogger(logging.Logger):
         if self.isEnabledFor(logging.WARNING):
             self._log(logging.WARNING, msg, args, **options)
 
+    def warn(self, msg: object, *args: object, **options: Unpack[LogOptions]) -> None:
+        """Log something unexpected that does not stop the work."""
+        if self.isEnabledFor(logging.WARNING):
+            self._log(logging.WARNING, msg, args, **options)
+
     def error(self, msg: object, *args: object, **options: Unpack[LogOptions]) -> None:
         """Log a failure."""
         if self.isEnabledFor(logging.ERROR):
@@ -110,7 +115,6 @@ class NodeLogger(logging.Logger):
         if self.isEnabledFor(logging.CRITICAL):
             self._log(logging.CRITICAL, msg, args, **options)
 
-    warn = warning
     fatal = critical
 
     def exception(self, msg: object, *args: object, **options: Unpack[LogOptions]) -> None:
@@ -212,7 +216,7 @@ class LoggerTree(logging.Manager):
         super().__init__(root)  # type: ignore[arg-type]  # only its own tree needs a RootLogger
         self.clock = clock
         self.base = root
-        self.loggerClass = NodeLogger
+        self.loggerClass: type[NodeLogger] = NodeLogger
         self.loggerDict[root.name] = root
         self.problems: deque[str] = deque()
 
@@ -295,7 +299,7 @@ class NodeLog(NodeLogger):
         backups: int = BACKUPS,
     ) -> None:
         super().__init__(_BASE, level)
-        self.manager = LoggerTree(self, clock)
+        self.manager: LoggerTree = LoggerTree(self, clock)
         self.node = node
         self._ros_name = node.strip("/").replace("/", ".")
         self._file: FileHandler | None = None

@@ -40,7 +40,7 @@ class SubscriberLink(Generic[M]):
     def __init__(self, publisher: Publisher[M], token: Token) -> None:
         self._publisher = publisher
         self._token = token
-        self.node = token.node_name
+        self.node: str = token.node_name
 
     def publish(self, message: M) -> None:
         """Send one message to this subscription alone.

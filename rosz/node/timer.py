@@ -189,7 +189,7 @@ class Timer:
         if period_ns <= 0:
             raise UsageError(f"timer period is '{period_ns}' ns: expected above 0")
         self.period_ns = period_ns
-        self.name = name or getattr(callback, "__qualname__", repr(callback))
+        self.name: str = name or getattr(callback, "__qualname__", repr(callback))
         self._callback = callback
         self._clock = clock.branch()
         self._on_error = on_error

@@ -73,7 +73,7 @@ class History:
 
     def __init__(self) -> None:
         self.root: Tree = {}
-        self.latest = 0
+        self.latest: int = 0
         self._top = _Node()
         self._buckets = [0] * BUCKETS
         # Writes come and go far more often than the digest is read: they are only listed here, and

@@ -78,7 +78,7 @@ class Draft:
     """
 
     def __init__(self, root: Tree) -> None:
-        self.root = root
+        self.root: Value = root
         self._own: dict[int, Tree] = {}
 
     def change(self, path: Path, value: Value | Deleted) -> None:

@@ -119,10 +119,10 @@ class Keys:
 
     def __init__(self, domain: int, *, scoped: bool = False) -> None:
         self.scoped = scoped
-        self.params = own_key(domain, "param")
-        self.all_params = f"{self.params}/**"
-        self.change = own_key(domain, "change")
-        self.tokens = own_key(domain, "replica", "**")
+        self.params: str = own_key(domain, "param")
+        self.all_params: str = f"{self.params}/**"
+        self.change: str = own_key(domain, "change")
+        self.tokens: str = own_key(domain, "replica", "**")
         self._domain = domain
 
     def param(self, path: Path) -> str:

@@ -56,8 +56,8 @@ class PendingWrite:
     __slots__ = ("_done", "number", "waiting")
 
     def __init__(self, number: int, waiting: set[str]) -> None:
-        self.number = number
-        self.waiting = waiting
+        self.number: int = number
+        self.waiting: set[str] = waiting
         # A bare lock is the fastest thing to wait on: it is acquired here and released at the end.
         self._done = threading.Lock()
         if waiting:
@@ -151,7 +151,7 @@ class WriteBroadcaster:
         worker: Worker[Any],
         storage: Storage | None,
     ) -> None:
-        self.pending = PendingWrites()
+        self.pending: PendingWrites = PendingWrites()
         self._session = session
         self._keys = keys
         self._state = state

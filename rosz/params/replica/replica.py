@@ -147,8 +147,8 @@ class Replica(_Copy):
         storage: Storage | None = None,
     ) -> None:
         super().__init__(session, domain)
-        self.label = label or process_label()
-        self.zid = session.zid
+        self.label: str = label or process_label()
+        self.zid: str = session.zid
         self._own = Member(session.stamp().time, session.zid, self.label)
         self._lifecycle = Lifecycle("the parameter store of this process", log=_log)
         self._storage = storage

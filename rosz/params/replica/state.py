@@ -94,8 +94,8 @@ class State:
     """
 
     def __init__(self, clock: HybridClock) -> None:
-        self.watchers = Watchers()
-        self.damage = DamageLog()
+        self.watchers: Watchers = Watchers()
+        self.damage: DamageLog = DamageLog()
         self._root: Tree = {}
         self._clock = clock
         self._history = History()

@@ -91,14 +91,14 @@ class Synchroniser:
     def __init__(
         self, session: Session, keys: Keys, state: State, members: Members, worker: Worker[Any]
     ) -> None:
-        self.ready = False
+        self.ready: bool = False
         self.session = session
         self.keys = keys
         self.state = state
         self.members = members
         self.worker = worker
         self.busy: set[str] = set()
-        self.refused = _RefusedWrites()
+        self.refused: _RefusedWrites = _RefusedWrites()
         self._appeared: set[str] = set()
 
     def join(self) -> None:

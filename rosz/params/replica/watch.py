@@ -74,7 +74,7 @@ class Watch:
     """
 
     def __init__(self, owner: Watchers, path: Path, callback: Callback) -> None:
-        self.name = joined(path)
+        self.name: str = joined(path)
         self.path = path
         self.callback = callback
         self._owner = owner
