@@ -93,11 +93,7 @@ class Lifecycle:
     """
 
     def __init__(
-        self,
-        what: str,
-        *,
-        log: logging.Logger = _log,
-        on_fork: Callable[[], object] | None = None,
+        self, what: str, *, log: logging.Logger = _log, on_fork: Callable[[], object] | None = None
     ) -> None:
         self.closing: bool = False
         self.closed: bool = False

@@ -170,17 +170,16 @@ class Client(Entity):
         if self._is_served():
             return
         view = context.graph.refresh(min(limit, _GRACE))
+        if not any(map(self.matches, view.servers(self.name))):
+            why = self._why_not_served(view) or "; nobody serves that name"
+            raise ServiceNotFound(f"service [{self.name}] is not available{why}")
+
+    def _why_not_served(self, view: View) -> str:
+        """Return the end of an error text, with its ``: `` or ``; ``; empty if nothing is known."""
         others = view.servers(self.name)
-        if any(map(self.matches, others)):
-            return
         if others:
-            why = explain_incompatible(self.token, others[0])
-            raise ServiceNotFound(f"service [{self.name}] is not available: {why}")
-        known = view.services()
-        raise ServiceNotFound(
-            f"service [{self.name}] is not available"
-            f"{near_miss(self.name, known) or '; nobody serves that name'}"
-        )
+            return f": {explain_incompatible(self.token, others[0])}"
+        return near_miss(self.name, view.services())
 
     def wait_for_service(self, timeout: float = 10.0) -> None:
         """Wait until a node serves the service with this type.
@@ -201,14 +200,8 @@ class Client(Entity):
                 lambda view: any(map(self.matches, view.servers(self.name))), timeout, what
             )
         except WaitTimeout as error:
-            view = graph.view()
-            others = view.servers(self.name)
-            hint = (
-                explain_incompatible(self.token, others[0])
-                if others
-                else near_miss(self.name, view.services()).removeprefix("; ")
-            )
-            raise WaitTimeout(what, timeout, hint) from error
+            why = self._why_not_served(graph.view())
+            raise WaitTimeout(what, timeout, why[2:]) from error
 
     def _finish(self) -> None:
         self._cancel.cancel()

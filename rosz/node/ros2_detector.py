@@ -55,7 +55,11 @@ class Ros2PeerDetector:
             del self._tokens[token.zid]
         if not alive:
             return
-        if token.kind is Kind.CLIENT and self._is_wanted(token):
+        if (
+            token.kind is Kind.CLIENT
+            and token.type_name.startswith(_PACKAGES)
+            and token.name.rpartition("/")[0] == self._node.name
+        ):
             self._wanted = True
             self._start()
         elif count == 1 and token.zid != self._own:
@@ -64,10 +68,6 @@ class Ros2PeerDetector:
                 self._suspects.add(token.zid)
             if idle:
                 self._start()
-
-    def _is_wanted(self, token: Token) -> bool:
-        below = token.name.rpartition("/")[0]
-        return below == self._node.name and token.type_name.startswith(_PACKAGES)
 
     def _start(self) -> None:
         name = f"rosz-ros2{self._node.name}"

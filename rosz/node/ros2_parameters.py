@@ -313,11 +313,7 @@ class _SharedService(Service):
     """A service whose requests arrive at the queryable of its package."""
 
     def __init__(
-        self,
-        owner: Ros2ParameterServices,
-        name: str,
-        kind: type[ServiceType],
-        handler: _Handler,
+        self, owner: Ros2ParameterServices, name: str, kind: type[ServiceType], handler: _Handler
     ) -> None:
         self._owner = owner
         qos = PARAMETERS if kind._type_name.startswith("rcl_interfaces/") else SERVICES

@@ -86,7 +86,10 @@ class Service(Entity):
         except TransportError as error:
             self.node.log.warning("cannot respond to a call of '%s': %s", self.name, error)
         except (ServiceError, DecodeError) as error:
-            self._refuse(query, str(error))
+            try:
+                query.reply_error(str(error))
+            except RoszError as unsent:
+                self.node.log.warning("cannot respond to a call of '%s': %s", self.name, unsent)
         finally:
             query.close()
 
@@ -114,12 +117,6 @@ class Service(Entity):
         except EncodeError as error:
             self.node.log.exception("handler of service '%s' returned no response", self.name)
             raise ServiceError(f"handler returned invalid value: {error}") from error
-
-    def _refuse(self, query: Query, text: str) -> None:
-        try:
-            query.reply_error(text)
-        except RoszError as error:
-            self.node.log.warning("cannot respond to a call of '%s': %s", self.name, error)
 
 
 def to_response(response: type[Message], result: Any) -> Message:

@@ -57,10 +57,6 @@ class _Pace:
         if now - self.last > _MISSED_PERIODS * self.period_ns:
             self.last = now
 
-    def restart(self, now: int) -> None:
-        """Begin a period now."""
-        self.last = now
-
 
 class Rate:
     """Run a loop at a rate.
@@ -99,7 +95,7 @@ class Rate:
 
     def restart(self) -> None:
         """Begin a period now."""
-        self._pace.restart(self._clock.steady())
+        self._pace.last = self._clock.steady()
 
     def sleep(self) -> None:
         """Sleep until the next turn is due.
@@ -268,7 +264,7 @@ class Timer:
                 if not self._reset:
                     self._on_error(f"timer '{self.name}' stopped", error)
                     return
-                pace.restart(clock.steady())
+                pace.last = clock.steady()
                 expected = clock.now()
             real = clock.now()
             began = time.monotonic_ns()

@@ -8,14 +8,7 @@ from typing import Any
 import msgspec
 
 from rosz.errors import RoszError, TypeNotFound
-from rosz.idl import (
-    Catalog,
-    MessageSpec,
-    describe,
-    message_hash,
-    service_hash,
-    service_parts,
-)
+from rosz.idl import Catalog, MessageSpec, describe, message_hash, service_hash, service_parts
 from rosz.msgs.type_description_interfaces.msg import (
     Field,
     FieldType,

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from rosz.ros1.importer import install
 
+PUBLIC_MODULES = ("__main__", "importer", "python2")
+
 __all__ = ("install",)
 
 install()

@@ -90,12 +90,10 @@ def explain(error: SyntaxError, path: str) -> SourceError | None:
 
 
 def _match(error: SyntaxError) -> str | None:
-    for pattern, what in _MESSAGES:
-        if pattern.search(error.msg):
-            return what
-    for pattern, what in _LINES:
-        if pattern.search(error.text or ""):
-            return what
+    for table, text in ((_MESSAGES, error.msg), (_LINES, error.text or "")):
+        for pattern, what in table:
+            if pattern.search(text):
+                return what
     return None
 
 

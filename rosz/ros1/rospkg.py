@@ -138,9 +138,6 @@ class Depend:
         self.name = name
         self.type = type_
 
-    def __str__(self) -> str:
-        return self.name
-
     def __repr__(self) -> str:
         return self.name
 

@@ -41,6 +41,17 @@ class SimulatedClock(Clock):
         """Wait until one more sleep has begun."""
         assert self.beds.taken.acquire(timeout=PATIENCE), "nobody fell asleep"
 
+    def tick(self, time_ns: int) -> None:
+        """Advance to a time once one more sleep has begun."""
+        self.wait_for_sleeper()
+        self.advance(time_ns)
+
+    def asleep(self, function: Callable[[], object]) -> Task:
+        """Call a function on a thread, and wait until it sleeps."""
+        task = Task(function)
+        self.wait_for_sleeper()
+        return task
+
 
 class Task:
     """A call on a thread of its own, and its result."""

@@ -46,16 +46,6 @@ class Changed(AddTwoInts):
 
 
 @pytest.fixture
-def server(network: Network) -> Node:
-    return network.node("server")
-
-
-@pytest.fixture
-def caller(network: Network) -> Node:
-    return network.node("caller")
-
-
-@pytest.fixture
 def add(server: Node, caller: Node) -> Client:
     server.service("add", AddTwoInts, lambda request: request.a + request.b)
     client = caller.client("add", AddTwoInts)

@@ -97,8 +97,7 @@ def test_closed_clock_does_not_sleep() -> None:
 
 def test_simulated_sleep_wakes_when_its_time_comes() -> None:
     clock = SimulatedClock()
-    task = Task(lambda: clock.sleep(10 * SECOND))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: clock.sleep(10 * SECOND))
     clock.advance(START + 10 * SECOND - 1)
     assert not task.done
     assert len(clock.beds) == 1
@@ -109,10 +108,8 @@ def test_simulated_sleep_wakes_when_its_time_comes() -> None:
 
 def test_tick_wakes_only_those_whose_time_has_come() -> None:
     clock = SimulatedClock()
-    early = Task(lambda: clock.sleep_until(START + 1))
-    clock.wait_for_sleeper()
-    late = Task(lambda: clock.sleep_until(START + 3))
-    clock.wait_for_sleeper()
+    early = clock.asleep(lambda: clock.sleep_until(START + 1))
+    late = clock.asleep(lambda: clock.sleep_until(START + 3))
     clock.advance(START + 2)
     assert early.result() is True
     assert len(clock.beds) == 1
@@ -122,16 +119,14 @@ def test_tick_wakes_only_those_whose_time_has_come() -> None:
 
 def test_leap_forward_ends_a_sleep() -> None:
     clock = SimulatedClock()
-    task = Task(lambda: clock.sleep(SECOND))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: clock.sleep(SECOND))
     clock.advance(START * 1000)
     assert task.result() is True
 
 
 def test_sleep_before_the_first_tick_counts_from_it() -> None:
     clock = SimulatedClock(0)
-    task = Task(lambda: clock.sleep(SECOND))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: clock.sleep(SECOND))
     clock.advance(0)
     assert len(clock.beds) == 1
     clock.advance(START)
@@ -145,16 +140,14 @@ def test_waiting_for_the_first_tick() -> None:
     assert Clock().wait_started()
     assert SimulatedClock().wait_started()
     clock = SimulatedClock(0)
-    task = Task(clock.wait_started)
-    clock.wait_for_sleeper()
+    task = clock.asleep(clock.wait_started)
     clock.advance(1)
     assert task.result() is True
 
 
 def test_time_that_moves_back_ends_a_sleep_with_an_error() -> None:
     clock = SimulatedClock()
-    task = Task(lambda: clock.sleep(SECOND))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: clock.sleep(SECOND))
     clock.advance(START - 5 * SECOND)
     with pytest.raises(TimeMovedBackwards, match="backwards by 5 s") as caught:
         task.result()
@@ -163,8 +156,7 @@ def test_time_that_moves_back_ends_a_sleep_with_an_error() -> None:
 
 def test_moving_back_to_no_earlier_than_the_start_of_a_sleep_is_not_noticed() -> None:
     clock = SimulatedClock()
-    task = Task(lambda: clock.sleep(10 * SECOND))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: clock.sleep(10 * SECOND))
     clock.advance(START + 9 * SECOND)
     clock.advance(START)
     assert len(clock.beds) == 1
@@ -175,8 +167,7 @@ def test_moving_back_to_no_earlier_than_the_start_of_a_sleep_is_not_noticed() ->
 @pytest.mark.parametrize("start", [0, START])
 def test_closing_ends_a_simulated_sleep_at_once(start: int) -> None:
     clock = SimulatedClock(start)
-    task = Task(lambda: clock.sleep(SECOND))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: clock.sleep(SECOND))
     clock.close()
     assert task.result() is False
 
@@ -195,10 +186,8 @@ def test_many_sleepers_are_all_woken() -> None:
 def test_branch_shares_time_and_closes_alone() -> None:
     clock = SimulatedClock()
     branch, sibling = clock.branch(), clock.branch()
-    ended = Task(lambda: branch.sleep(SECOND))
-    clock.wait_for_sleeper()
-    spared = Task(lambda: sibling.sleep(SECOND))
-    clock.wait_for_sleeper()
+    ended = clock.asleep(lambda: branch.sleep(SECOND))
+    spared = clock.asleep(lambda: sibling.sleep(SECOND))
     branch.close()
     assert ended.result() is False
     assert branch.closed
@@ -212,8 +201,7 @@ def test_branch_shares_time_and_closes_alone() -> None:
 def test_closing_ends_the_sleeps_of_branches_of_branches() -> None:
     clock = SimulatedClock()
     twig = clock.branch().branch()
-    task = Task(lambda: twig.sleep(SECOND))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: twig.sleep(SECOND))
     clock.close()
     assert task.result() is False
     assert twig.closed

@@ -151,10 +151,7 @@ def test_console_and_file_are_rospys(tmp_path: Path, monkeypatch: pytest.MonkeyP
             for kind in (io.StringIO, Terminal):
                 options = {} if text_format is None else {"console_format": text_format}
                 log = console(
-                    clock_at(ros_time),
-                    level=logging.DEBUG,
-                    log_dir=tmp_path / "ours",
-                    **options,
+                    clock_at(ros_time), level=logging.DEBUG, log_dir=tmp_path / "ours", **options
                 )
                 out, err = kind(), kind()
                 monkeypatch.setattr(sys, "stdout", out)

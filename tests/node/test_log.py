@@ -240,11 +240,7 @@ def test_levels_of_parts() -> None:
     joint = arm.child("joint")
     assert isinstance(joint, NodeLogger)
     assert log.child("arm") is log.getChild("arm") is arm
-    assert log.get_levels() == {
-        "rosout": "INFO",
-        "rosout.arm": "INFO",
-        "rosout.arm.joint": "INFO",
-    }
+    assert log.get_levels() == {"rosout": "INFO", "rosout.arm": "INFO", "rosout.arm.joint": "INFO"}
     log.set_level("arm", "debug")
     joint.debug("joint")
     log.debug("node")

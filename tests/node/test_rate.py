@@ -142,8 +142,7 @@ def test_period_and_what_remains_of_it() -> None:
 def test_sleep_in_simulated_time() -> None:
     clock = SimulatedClock()
     rate = Rate(1, clock)
-    task = Task(rate.sleep)
-    clock.wait_for_sleeper()
+    task = clock.asleep(rate.sleep)
     clock.advance(START + SECOND)
     task.result()
     assert rate.remaining() == SECOND
@@ -152,8 +151,7 @@ def test_sleep_in_simulated_time() -> None:
 def test_sleep_of_a_closed_clock_raises() -> None:
     clock = SimulatedClock()
     rate = Rate(1, clock)
-    task = Task(rate.sleep)
-    clock.wait_for_sleeper()
+    task = clock.asleep(rate.sleep)
     clock.close()
     with pytest.raises(ClosedError, match="shut down"):
         task.result()
@@ -163,11 +161,9 @@ def test_sleep_of_a_closed_clock_raises() -> None:
 
 def test_time_that_moves_back_in_a_sleep() -> None:
     clock = SimulatedClock()
-    strict = Task(Rate(1, clock).sleep)
-    clock.wait_for_sleeper()
+    strict = clock.asleep(Rate(1, clock).sleep)
     lenient_rate = Rate(1, clock, reset=True)
-    lenient = Task(lenient_rate.sleep)
-    clock.wait_for_sleeper()
+    lenient = clock.asleep(lenient_rate.sleep)
     clock.advance(START - 60 * SECOND)
     with pytest.raises(TimeMovedBackwards):
         strict.result()
@@ -185,15 +181,13 @@ def test_iteration_sleeps_between_turns() -> None:
     clock.advance(START + 10 * SECOND)
     task = Task(lambda: [(tick, clock.now()) for tick in islice(rate, 3)])
     for count in (1, 2):
-        clock.wait_for_sleeper()
-        clock.advance(START + 10 * SECOND + count * SECOND)
+        clock.tick(START + 10 * SECOND + count * SECOND)
     assert task.result() == [(count, START + (10 + count) * SECOND) for count in range(3)]
 
 
 def test_iteration_ends_when_the_clock_closes() -> None:
     clock = SimulatedClock()
-    task = Task(lambda: list(Rate(1, clock)))
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: list(Rate(1, clock)))
     clock.close()
     assert task.result() == [0]
     assert list(Rate(1, clock)) == []
@@ -201,11 +195,9 @@ def test_iteration_ends_when_the_clock_closes() -> None:
 
 def test_iteration_goes_on_when_time_moves_back() -> None:
     clock = SimulatedClock()
-    task = Task(lambda: [clock.now() for _ in islice(Rate(1, clock), 3)])
-    clock.wait_for_sleeper()
+    task = clock.asleep(lambda: [clock.now() for _ in islice(Rate(1, clock), 3)])
     clock.advance(SECOND)
-    clock.wait_for_sleeper()
-    clock.advance(2 * SECOND)
+    clock.tick(2 * SECOND)
     assert task.result() == [START, SECOND, 2 * SECOND]
 
 

@@ -24,6 +24,17 @@ class Bench:
     def publish(self, *line: object) -> None:
         self.lines.put(line)
 
+    def logged(self) -> list[str]:
+        """Return a list that what is logged from now on is added to."""
+        texts: list[str] = []
+
+        def collect(record: logging.LogRecord) -> bool:
+            texts.append(record.getMessage())
+            return True
+
+        self.log.addFilter(collect)
+        return texts
+
     def messages(self) -> list[object]:
         """Return the messages published so far, all that is logged included."""
         self.log.flush()
@@ -105,13 +116,7 @@ def test_severity_is_one_that_ros_knows(bench: Bench, level: int, severity: int)
 
 
 def test_publishing_may_log_without_publishing_that(bench: Bench) -> None:
-    console: list[str] = []
-
-    class Collect(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            console.append(record.getMessage())
-
-    bench.log.addHandler(Collect())
+    console = bench.logged()
 
     def publish(*line: object) -> None:
         bench.log.info("publishing %s", line[2])
@@ -165,13 +170,7 @@ def test_publishing_may_wait_for_a_thread_that_logs(bench: Bench) -> None:
 
 
 def test_failing_publisher_is_told_once_and_not_to_itself(bench: Bench) -> None:
-    told: list[str] = []
-
-    class Collect(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            told.append(record.getMessage())
-
-    bench.log.addHandler(Collect())
+    told = bench.logged()
     tried: queue.Queue[object] = queue.Queue()
 
     def publish(*line: object) -> None:
@@ -188,13 +187,7 @@ def test_failing_publisher_is_told_once_and_not_to_itself(bench: Bench) -> None:
 
 
 def test_a_publisher_that_ended_first_is_no_trouble(bench: Bench) -> None:
-    told: list[str] = []
-
-    class Collect(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            told.append(record.getMessage())
-
-    bench.log.addHandler(Collect())
+    told = bench.logged()
     tried: queue.Queue[object] = queue.Queue()
 
     def publish(*line: object) -> None:

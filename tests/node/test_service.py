@@ -14,16 +14,6 @@ from rosz.node import Node
 from rosz.node.service import to_response
 
 
-@pytest.fixture
-def server(network: Network) -> Node:
-    return network.node("server")
-
-
-@pytest.fixture
-def caller(network: Network) -> Node:
-    return network.node("caller")
-
-
 @pytest.mark.parametrize(
     "result",
     [

@@ -15,16 +15,6 @@ from rosz.node import MessageInfo, Node, Publisher
 from rosz.qos import LATCHED, QoS
 
 
-@pytest.fixture
-def talker(network: Network) -> Node:
-    return network.node("talker")
-
-
-@pytest.fixture
-def listener(network: Network) -> Node:
-    return network.node("listener")
-
-
 def meet(talker: Node, listener: Node) -> None:
     """Wait until the talker knows what the listener has declared so far."""
     listener.subscription("meet", String)
@@ -35,11 +25,17 @@ def chatter(talker: Node, **options: Any) -> Publisher[String]:
     return talker.publisher("chatter", String, **options)
 
 
+def connected(talker: Node) -> Publisher[String]:
+    """Return a publisher that has a subscription."""
+    publisher = chatter(talker)
+    publisher.wait_for_subscribers()
+    return publisher
+
+
 def test_callback(talker: Node, listener: Node) -> None:
     got: SimpleQueue[String] = SimpleQueue()
     listener.subscription("chatter", String, got.put)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
     for text in ("one", "two"):
         publisher.publish(text)
     assert [got.get(timeout=PATIENCE).data for _ in range(2)] == ["one", "two"]
@@ -124,8 +120,7 @@ def test_what_is_pushed_out_is_not_decoded(
 def test_info(talker: Node, listener: Node) -> None:
     got: SimpleQueue[tuple[String, MessageInfo]] = SimpleQueue()
     listener.subscription("chatter", String, lambda *both: got.put(both), with_info=True)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
     for count in (1, 2):
         publisher.publish("hello")
         message, info = got.get(timeout=PATIENCE)
@@ -172,8 +167,7 @@ def test_header_gets_the_sequence_number(talker: Node, listener: Node) -> None:
 
 def test_raw(talker: Node, listener: Node) -> None:
     subscription = listener.subscription("chatter", String, raw=True)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
     publisher.publish("hello")
     assert subscription.get() == String("hello").to_cdr()  # type: ignore[comparison-overlap]
 
@@ -182,8 +176,7 @@ def test_get(talker: Node, listener: Node) -> None:
     subscription = listener.subscription("chatter", String)
     with pytest.raises(WaitTimeout, match=r"no message on '/chatter' within 0\.01 s"):
         subscription.get(0.01)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
     publisher.publish("hello")
     assert subscription.get() == String("hello")
 
@@ -198,8 +191,7 @@ def test_several_may_wait(network: Network, talker: Node, listener: Node) -> Non
             got.put(message.data)
 
     waiting = [network.thread(take) for _ in range(4)]
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
     for number in range(10):
         publisher.publish(str(number))
     assert sorted(got.get(timeout=PATIENCE) for _ in range(10)) == [str(n) for n in range(10)]
@@ -229,8 +221,7 @@ def test_closing_ends_a_wait(network: Network, listener: Node) -> None:
 
 def test_async_iteration(talker: Node, listener: Node) -> None:
     subscription = listener.subscription("chatter", String)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
 
     async def collect() -> list[str]:
         found = []
@@ -260,8 +251,7 @@ def test_async_iteration_ends_with_the_node(listener: Node) -> None:
 def test_two_loops_and_a_sample_after_them(talker: Node, listener: Node) -> None:
     """A loop that ended while a sample was on its way does no harm."""
     subscription = listener.subscription("chatter", String)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
 
     async def first() -> str:
         publisher.publish("hello")
@@ -290,8 +280,7 @@ def test_exception_in_callback(
             raise ValueError(f"cannot stand '{message.data}'")
 
     listener.subscription("chatter", String, callback)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
     for text in ("one", "exit", "stop", "two", "end"):
         publisher.publish(text)
         assert got.get(timeout=PATIENCE) == text
@@ -309,8 +298,7 @@ def test_closed_in_its_own_callback(talker: Node, listener: Node) -> None:
         closed.set()
 
     subscription = listener.subscription("chatter", String, callback)
-    publisher = chatter(talker)
-    publisher.wait_for_subscribers()
+    publisher = connected(talker)
     publisher.publish("hello")
     assert closed.wait(PATIENCE)
     eventually(lambda: not publisher.subscribers(), "the subscription is gone from the graph")

@@ -39,8 +39,7 @@ class Bench:
 
     def tick(self, time_ns: int) -> TimerEvent:
         """Advance the clock for a sleeping timer, and return the event of its call."""
-        self.clock.wait_for_sleeper()
-        self.clock.advance(time_ns)
+        self.clock.tick(time_ns)
         return self.events.get(timeout=PATIENCE)
 
 
@@ -80,8 +79,7 @@ def test_late_timer_makes_up_then_gives_up_what_it_missed(bench: Bench) -> None:
 def test_timer_starts_with_the_first_tick() -> None:
     bench = Bench(0)
     bench.timer()
-    bench.clock.wait_for_sleeper()
-    bench.clock.advance(START)
+    bench.clock.tick(START)
     assert bench.tick(START + SECOND).current_expected == START + SECOND
     assert bench.tick(START + 2 * SECOND).current_expected == START + 2 * SECOND
     bench.clock.close()
@@ -126,8 +124,7 @@ def test_timer_may_be_closed_and_joined_in_its_own_callback(bench: Bench) -> Non
 
     timer = Timer(SECOND, stop, bench.clock, on_error=bench.report)
     timers.put(timer)
-    bench.clock.wait_for_sleeper()
-    bench.clock.advance(START + SECOND)
+    bench.clock.tick(START + SECOND)
     assert answers.get(timeout=PATIENCE) is False
     assert timer.join(PATIENCE)
     assert bench.errors.empty()
@@ -142,8 +139,7 @@ def test_error_in_the_callback_is_reported_and_the_timer_goes_on(
 
     Timer(SECOND, fail, bench.clock, on_error=bench.report, name="beat")
     for count in (1, 2):
-        bench.clock.wait_for_sleeper()
-        bench.clock.advance(START + count * SECOND)
+        bench.clock.tick(START + count * SECOND)
         text, error = bench.errors.get(timeout=PATIENCE)
         assert text == "callback of timer 'beat' failed"
         assert isinstance(error, kind)
@@ -156,8 +152,7 @@ def test_use_of_closed_things_in_a_callback_during_shutdown_is_no_error(bench: B
         raise ClosedError("the publisher is closed")
 
     timer = Timer(SECOND, fail, bench.clock, on_error=bench.report)
-    bench.clock.wait_for_sleeper()
-    bench.clock.advance(START + SECOND)
+    bench.clock.tick(START + SECOND)
     assert timer.join(PATIENCE)
     assert bench.errors.empty()
 
@@ -167,15 +162,13 @@ def test_use_of_closed_things_in_a_callback_is_an_error_otherwise(bench: Bench) 
         raise ClosedError("the publisher is closed")
 
     Timer(SECOND, fail, bench.clock, on_error=bench.report)
-    bench.clock.wait_for_sleeper()
-    bench.clock.advance(START + SECOND)
+    bench.clock.tick(START + SECOND)
     assert isinstance(bench.errors.get(timeout=PATIENCE)[1], ClosedError)
 
 
 def test_timer_stops_with_an_error_when_time_moves_back(bench: Bench) -> None:
     timer = bench.timer()
-    bench.clock.wait_for_sleeper()
-    bench.clock.advance(1)
+    bench.clock.tick(1)
     text, error = bench.errors.get(timeout=PATIENCE)
     assert text == "timer 'beat' stopped"
     assert isinstance(error, TimeMovedBackwards)

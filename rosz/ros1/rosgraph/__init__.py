@@ -2,6 +2,8 @@
 
 There is no master. `Master` returns what the live graph and the parameter store have; it lacks
 the calls that register something, since nodes declare themselves.
+
+Programs also import its modules, as in ROS 1.
 """
 
 from rosz.ros1.rosgraph import masterapi, names, network, rosenv
@@ -21,6 +23,8 @@ from rosz.ros1.rosgraph.rosenv import (
     ROS_NAMESPACE,
     get_master_uri,
 )
+
+PUBLIC_MODULES = ("masterapi", "names", "network", "rosenv")
 
 __all__ = (
     "ROS_HOSTNAME",

@@ -1,6 +1,6 @@
 """rospy: ROS 1's Python client library over `rosz.node` (ROS wiki, rospy).
 
-One process is one node.
+One process is one node. Programs also import its modules, as in ROS 1.
 """
 
 from __future__ import annotations
@@ -69,17 +69,24 @@ from rosz.ros1.rospy.core import (
     signal_shutdown,
 )
 from rosz.ros1.rospy.msg import AnyMsg
-from rosz.ros1.rospy.names import (
-    get_caller_id,
-    get_name,
-    get_namespace,
-    remap_name,
-    resolve_name,
-)
+from rosz.ros1.rospy.names import get_caller_id, get_name, get_namespace, remap_name, resolve_name
 from rosz.ros1.rospy.rostime import Duration, Time, get_rostime, get_time
 from rosz.ros1.rospy.service import Service, ServiceException, ServiceProxy, wait_for_service
 from rosz.ros1.rospy.timer import Rate, Timer, TimerEvent, sleep
 from rosz.ros1.rospy.topics import Publisher, SubscribeListener, Subscriber
+
+PUBLIC_MODULES = (
+    "client",
+    "core",
+    "msg",
+    "msproxy",
+    "names",
+    "numpy_msg",
+    "rostime",
+    "service",
+    "timer",
+    "topics",
+)
 
 __all__ = (
     "DEBUG",

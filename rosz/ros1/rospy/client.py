@@ -37,15 +37,7 @@ from rosz.ros1.rospy.core import (
 )
 from rosz.ros1.rospy.names import get_namespace
 from rosz.ros1.rospy.topics import Subscriber
-from rosz.ros1.state import (
-    NO_NODE,
-    arguments,
-    context,
-    params,
-    run_hooks,
-    set_arguments,
-    state,
-)
+from rosz.ros1.state import NO_NODE, arguments, context, params, run_hooks, set_arguments, state
 from rosz.time import DurationValue
 
 if TYPE_CHECKING:

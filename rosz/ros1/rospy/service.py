@@ -32,7 +32,6 @@ _REFUSED = "responded with an error: "
 _MISMATCH = "is not available: "
 
 ErrorHandler = Callable[[BaseException, Any, Any, Any], object]
-_Responder = Callable[[Any, bytes], bytes]
 
 
 class ServiceException(Exception):
@@ -76,14 +75,44 @@ class _ServiceBase:
 class _Server(NodeService):
     """A server of the node that responds as rospy does."""
 
-    def __init__(self, node: Node, service: Service, respond: _Responder) -> None:
-        self._respond = respond
+    def __init__(self, node: Node, service: Service) -> None:
+        self._service = service
         name, kind = service.resolved_name, service.service_class
         super().__init__(node, name, kind, service.handler, SERVICES, _THREADS)
 
     def respond(self, request: Any, caller: bytes) -> bytes:
-        """Return the encoded response to a request."""
-        return self._respond(request, caller)
+        """Return the encoded response to a request; see `rosz.node.Service.respond`."""
+        service = self._service
+        state.local.delivery = (request, service, caller)
+        try:
+            return encode(self._response(service.handler(request)))
+        except ServiceException as error:
+            raise ServiceError(f"service cannot process request: {error}") from error
+        except BaseException as error:  # it must not end the thread
+            if service.error_handler is not None:
+                service.error_handler(error, type(error), error, error.__traceback__)
+            else:
+                trace = traceback.format_exception(error)
+                self.node.log.error(  # noqa: TRY400  # the text is rospy's
+                    "Error processing request: %s\n%s", error, trace
+                )
+            raise ServiceError(f"error processing request: {error}") from error
+
+    def _response(self, value: Any) -> Any:
+        kind = self._service.response_class
+        if isinstance(value, kind):
+            return value
+        if value is None:
+            raise ServiceException("service handler returned None")
+        args, fields, fault = [value], {}, "returned invalid value"
+        if isinstance(value, dict):
+            args, fields = [], value
+        elif isinstance(value, list | tuple):
+            args, fault = list(value), "returned wrong number of values"
+        try:
+            return args_kwds_to_message(kind, args, fields)
+        except (AttributeError, TypeError) as error:
+            raise ServiceException(f"handler {fault}: {error}") from error
 
 
 class Service(_ServiceBase):
@@ -126,7 +155,7 @@ class Service(_ServiceBase):
 
     def _open(self, node: Node) -> None:
         if not self._shut_down.is_set():
-            self._service = node.keep(_Server(node, self, self._respond))
+            self._service = node.keep(_Server(node, self))
 
     def connection_header(self, caller: bytes) -> dict[str, str]:
         """Return the connection header of a request, in the terms of rospy.
@@ -151,49 +180,6 @@ class Service(_ServiceBase):
         known = self._service.node.context.graph.view().clients(self.resolved_name)
         names = (token.node_name for token in known if gid(format_token(token)) == caller)
         return next(names, "")
-
-    def _respond(self, request: Any, caller: bytes) -> bytes:
-        """Return the encoded response to a request.
-
-        Args:
-            request: The request.
-            caller: GID of the client.
-
-        Raises:
-            ServiceError: The handler failed; the text is sent to the caller.
-        """
-        state.local.delivery = (request, self, caller)
-        try:
-            return encode(self._response(self.handler(request)))
-        except ServiceException as error:
-            raise ServiceError(f"service cannot process request: {error}") from error
-        except BaseException as error:  # it must not end the thread
-            self._report(error)
-            raise ServiceError(f"error processing request: {error}") from error
-
-    def _response(self, value: Any) -> Any:
-        kind = self.response_class
-        if isinstance(value, kind):
-            return value
-        if value is None:
-            raise ServiceException("service handler returned None")
-        if isinstance(value, dict):
-            args, fields, fault = [], value, "returned invalid value"
-        elif isinstance(value, list | tuple):
-            args, fields, fault = list(value), {}, "returned wrong number of values"
-        else:
-            args, fields, fault = [value], {}, "returned invalid value"
-        try:
-            return args_kwds_to_message(kind, args, fields)
-        except (AttributeError, TypeError) as error:
-            raise ServiceException(f"handler {fault}: {error}") from error
-
-    def _report(self, error: BaseException) -> None:
-        if self.error_handler is not None:
-            self.error_handler(error, type(error), error, error.__traceback__)
-        elif state.node is not None:
-            trace = traceback.format_exception(error)
-            state.node.log.error("Error processing request: %s\n%s", error, trace)
 
     def shutdown(self, reason: str = "") -> None:
         """Shut the service down; again is not an error.

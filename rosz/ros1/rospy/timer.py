@@ -47,19 +47,14 @@ def sleep(duration: float | DurationValue) -> None:
     elif is_shutdown():
         _finish_sleep(seconds)
     else:
-        _sleep_ns(round(seconds * _SECOND))
-
-
-def _sleep_ns(nanoseconds: int) -> None:
-    cooperate()
-    began = time.monotonic_ns()
-    try:
-        slept = clock().sleep(nanoseconds)
-    except TimeMovedBackwards as error:
-        raise ROSTimeMovedBackwardsException((error.after - error.before) / _SECOND) from error
-    if slept:
-        return
-    _finish_sleep((nanoseconds - (time.monotonic_ns() - began)) / _SECOND)
+        cooperate()
+        began = time.monotonic()
+        try:
+            slept = clock().sleep(round(seconds * _SECOND))
+        except TimeMovedBackwards as error:
+            raise ROSTimeMovedBackwardsException((error.after - error.before) / _SECOND) from error
+        if not slept:
+            _finish_sleep(seconds - (time.monotonic() - began))
 
 
 def _finish_sleep(seconds: float) -> None:

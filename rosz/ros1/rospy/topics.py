@@ -102,10 +102,7 @@ class SubscribeListener:
     """Base class of objects that a publisher notifies of subscribers."""
 
     def peer_subscribe(
-        self,
-        topic_name: str,
-        topic_publish: Callable[..., None],
-        peer_publish: Callable[..., None],
+        self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
         """Handle a new subscriber.
 

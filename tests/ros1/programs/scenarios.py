@@ -46,11 +46,7 @@ _MISMATCH = ("Could not process inbound connection: topic types", "they do not r
 
 
 def _alone(
-    script: str,
-    *arguments: str,
-    name: str = "",
-    ignored: tuple[str, ...] = (),
-    **variables: str,
+    script: str, *arguments: str, name: str = "", ignored: tuple[str, ...] = (), **variables: str
 ) -> Scenario:
     part = Part(f"{script}.py", arguments, tuple(variables.items()))
     return Scenario(name or script, (part,), ignored)
@@ -95,8 +91,7 @@ SCENARIOS = (
         ),
     ),
     Scenario(
-        "topics_two_nodes",
-        (Part("topics_listener.py"), Part("topics_talker.py", after="ready")),
+        "topics_two_nodes", (Part("topics_listener.py"), Part("topics_talker.py", after="ready"))
     ),
     Scenario(
         "topics_remapped",
@@ -149,10 +144,7 @@ SCENARIOS = (
     _alone("time_timers"),
     _alone("time_timer_fails"),
     _alone("time_rate"),
-    Scenario(
-        "time_simulated",
-        (Part("time_clock.py"), Part("time_simulated.py", after="ready")),
-    ),
+    Scenario("time_simulated", (Part("time_clock.py"), Part("time_simulated.py", after="ready"))),
     _alone("time_no_clock"),
     _alone("time_backwards"),
     _alone("shutdown_hooks", ignored=("] [TIME]: shutdown hook ",)),

@@ -278,6 +278,7 @@ def test_hooks_may_use_the_node(network: Network) -> None:
         rospy.on_shutdown(lambda: 1 / 0)
         rospy.on_shutdown(lambda: sys.exit("in a hook"))
         rospy.on_shutdown(lambda: print("last", flush=True))
+        rospy.is_shutdown()
         print("ready", flush=True)
         rospy.spin()
         """,

@@ -108,11 +108,7 @@ def test_invalid_topics(network: Network) -> None:
 
 
 def test_a_missing_queue_size_warns(network: Network) -> None:
-    lines = run(
-        network,
-        BEGIN + "\n    rospy.Publisher('x', String)\n",
-        PYTHONWARNINGS="always",
-    )
+    lines = run(network, BEGIN + "\n    rospy.Publisher('x', String)\n", PYTHONWARNINGS="always")
     assert "SyntaxWarning: The publisher should be created with an explicit keyword" in lines[0]
     assert lines[1].strip() == "rospy.Publisher('x', String)"
 
