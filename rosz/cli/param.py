@@ -25,10 +25,9 @@ from rosz.cli.limits import at_least
 from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, YamlError
 
 if TYPE_CHECKING:
-    from rosz.params import Value
+    from rosz.params import Difference, Value
     from rosz.params.remote import ParamClient
     from rosz.params.replica import Changed, Outcome
-    from rosz.params.tree import Difference
 
 __all__ = ("app",)
 
@@ -192,8 +191,7 @@ def load_command(
     """Set parameters from a YAML file; if one of them is wrong, set none."""
     if json and not dry_run:
         raise UsageError("--json is for --dry-run: loading prints nothing")
-    from rosz.params import condense, spread
-    from rosz.params.tree import preview
+    from rosz.params import condense, preview, spread
     from rosz.params.yaml import load_documents
 
     if file == "-":
@@ -272,7 +270,7 @@ def _client(call: Call, *, lasting: bool = False) -> Iterator[ParamClient]:
 
 
 def _resolve(call: Call, name: str) -> str:
-    from rosz.params.paths import resolve
+    from rosz.params import resolve
 
     return resolve(name, call.node_name(_TOOL))
 

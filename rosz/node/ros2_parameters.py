@@ -30,9 +30,18 @@ from rosz.msgs.rcl_interfaces.srv import (
 )
 from rosz.node.core import NodeCore
 from rosz.node.service import Service
-from rosz.params.paths import Path, joined, split
-from rosz.params.values import Value, normalise, type_name
-from rosz.params.writes import DELETED, Change, Deleted, condense
+from rosz.params import (
+    DELETED,
+    Change,
+    Deleted,
+    Path,
+    Value,
+    condense,
+    joined,
+    normalise,
+    split,
+    type_name,
+)
 from rosz.qos import PARAMETERS, SERVICES
 from rosz.session import Query
 from rosz.worker import Worker

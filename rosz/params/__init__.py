@@ -4,10 +4,10 @@ The modules exported here are pure. They know what parameters are, and nothing o
 values (`values`), names (`paths`), writes and batches of them (`writes`), the tree that writes give
 (`tree`) and the set of writes behind it (`history`). They import nothing above the first floor.
 
-These modules are public as well. They are not imported here, because start-up needs them alone:
+`PUBLIC_MODULES` are imported by name, because start-up needs one of them at a time:
 
 - `wire`: keys and messages of the store on the network (pure);
-- `yaml`: parameters as YAML text, and `yaml_nodes`: any YAML text, read safely (pure, need PyYAML);
+- `yaml`: parameters as YAML text, and any YAML text read safely (pure, needs PyYAML);
 - `replica`: the replicated store of one process (fourth floor);
 - `remote`: the store as seen by a process that has no replica (fourth floor);
 - `api`: the store as seen by a node (fifth floor).
@@ -18,6 +18,8 @@ from rosz.params.paths import Path, climb, joined, resolve, split
 from rosz.params.tree import MISSING, Difference, Missing, leaves, lookup, preview
 from rosz.params.values import Value, normalise, type_name
 from rosz.params.writes import DELETED, Change, Deleted, Write, condense, spread
+
+PUBLIC_MODULES = ("api", "remote", "replica", "wire", "yaml")
 
 __all__ = (
     "DELETED",

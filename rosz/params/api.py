@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final, TypeVar, overload
 
 from rosz.params.paths import Path, climb, joined, resolve, split
-from rosz.params.replica import ACK_TIMEOUT, Changed, Replica, Watch
-from rosz.params.replica.state import not_found
+from rosz.params.replica import ACK_TIMEOUT, Changed, Replica, Watch, not_found
 from rosz.params.tree import MISSING
 from rosz.params.values import convert, copy, normalise
 from rosz.params.writes import Change, condense
@@ -125,7 +124,7 @@ class Params:
         changes: list[Change] = []
         for name, value in values.items():
             path = self._path(name)
-            changes.append((path, normalise(value, path)))
+            changes.append((path, normalise(value, joined(path))))
         self._replica.write(condense(changes), origin=self._origin, timeout=timeout)
 
     def delete(self, name: str, *, timeout: float = ACK_TIMEOUT) -> None:

@@ -141,10 +141,8 @@ class History:
 
     def find(self, path: Path) -> Write | None:
         """Return the write at exactly this path."""
-        node: _Node | None = self._top
-        for part in path:
-            node = node.below.get(part) if node is not None else None
-        return node.write if node is not None else None
+        found = self.source(path)
+        return found if found is not None and found.path == path else None
 
     def hides(self, write: Write) -> bool:
         """Tell whether a write is known, or a newer one at its path or above is."""
@@ -269,9 +267,7 @@ class History:
     def _shapes_tree(self, deletion: Write) -> bool:
         """Tell whether the tree would differ without a deletion."""
         path = deletion.path
-        cover = None
-        for cover in self._above(path[:-1]):  # noqa: B007  # the last one is used
-            pass
+        cover = self.source(path[:-1])
         beneath: Value | Missing = MISSING
         if cover is not None and cover.value is not DELETED:
             depth = len(cover.path)

@@ -63,18 +63,6 @@ class ParamClient:
         """
         return normalise(self._get(name).value)
 
-    def origin(self, name: str) -> str:
-        """Return the writer of the value of a global name; raises as `get` does."""
-        return self._get(name).origin
-
-    def has(self, name: str) -> bool:
-        """Tell whether a global name is set."""
-        try:
-            self.get(name)
-        except ParamNotFound:
-            return False
-        return True
-
     def names(self) -> list[str]:
         """Return the sorted global names of all parameters that are not dicts."""
         return [str(name) for name in self._request(ClientRequest("names")).value]
@@ -184,7 +172,12 @@ class ParamClient:
                 key = self._keys.scope(key, (path for path, _ in batch))
                 reply = self._request_from(member, key, payload, timeout)
                 if reply is not None and reply.status != "joining":
-                    return _checked(request, reply)
+                    if reply.status == "missing":
+                        beside = reply.value if isinstance(reply.value, list) else ()
+                        raise ParamNotFound(request.name, beside)
+                    if reply.status != "ok":
+                        raise ParamError(reply.text)
+                    return reply
                 if time.monotonic() >= deadline:
                     who = ", ".join(self.silent) or "those there are have not joined yet"
                     if self._session.secured:
@@ -203,11 +196,3 @@ class ParamClient:
         if replies:  # an error reply means that the time is over; no reply, that it is gone
             self._silent[member.zid] = member
         return None
-
-
-def _checked(request: ClientRequest, reply: ClientReply) -> ClientReply:
-    if reply.status == "missing":
-        raise ParamNotFound(request.name, reply.value if isinstance(reply.value, list) else ())
-    if reply.status != "ok":
-        raise ParamError(reply.text)
-    return reply

@@ -72,7 +72,7 @@ def unsound_text(text: str) -> str:
     return ""
 
 
-def normalise(value: object, name: str | tuple[str, ...] = "") -> Value:
+def normalise(value: object, name: str = "") -> Value:
     """Return a private copy of a value in the store's own types.
 
     Tuples become lists, and instances of subclasses become instances of the base class. Objects
@@ -80,7 +80,7 @@ def normalise(value: object, name: str | tuple[str, ...] = "") -> Value:
 
     Args:
         value: Value to set.
-        name: Name or path of the parameter, for the error message.
+        name: Name of the parameter, for the error message.
 
     Raises:
         ParamError: A parameter cannot hold the value, or a part of it; the message names the place.
@@ -88,8 +88,7 @@ def normalise(value: object, name: str | tuple[str, ...] = "") -> Value:
     try:
         return _normalise(value, 0)
     except _RefusedError as refused:
-        shown = name if isinstance(name, str) else f"/{'/'.join(name)}"
-        start = f"'{shown}' cannot be set: " if shown else ""
+        start = f"'{name}' cannot be set: " if name else ""
         inside = f"at {''.join(reversed(refused.trail))}: " if refused.trail else ""
         raise ParamError(f"{start}{inside}{refused.reason}") from None
 

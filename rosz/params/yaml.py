@@ -74,10 +74,6 @@ _UNARY_OPERATORS: Final[dict[str, Callable[[Any], Any]]] = {
 }
 
 
-class _Loader(_Base):  # type: ignore[misc]  # either of two base classes
-    """PyYAML's safe loader with rosparam's tags."""
-
-
 class _PlainLoader(_Base):  # type: ignore[misc]  # either of two base classes
     """PyYAML's safe loader that names the position of a scalar that does not fit its tag."""
 
@@ -91,6 +87,10 @@ class _PlainLoader(_Base):  # type: ignore[misc]  # either of two base classes
             raise yaml.constructor.ConstructorError(
                 problem=reason, problem_mark=node.start_mark
             ) from error
+
+
+class _Loader(_PlainLoader):
+    """PyYAML's safe loader with rosparam's tags."""
 
 
 class _Dumper(yaml.SafeDumper):
@@ -275,9 +275,6 @@ class _Builder:
             raise self._error(node, str(error.problem)) from error
         except ParamError as error:
             raise self._error(node, str(error)) from error
-        except _SCALAR_FAULTS as error:
-            reason = f"'{node.value}' is not a {_shown_tag(node)}: {error}"
-            raise self._error(node, reason) from error
 
     def _mapping(self, node: Any) -> dict[str, Value]:
         merged: dict[str, Value] = {}

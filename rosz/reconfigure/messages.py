@@ -153,7 +153,14 @@ def _setting_of(given: Mapping[str, Any]) -> Setting:
 
 def extract_params(group: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the parameters of a group, then those of the groups in it."""
-    return [*group["parameters"], *(p for one in _inner_groups(group) for p in extract_params(one))]
+    return [one for inner in _groups_of(group) for one in inner["parameters"]]
+
+
+def _groups_of(group: Any) -> Iterator[Any]:
+    """Yield a group, then all groups in it."""
+    yield group
+    for inner in _inner_groups(group):
+        yield from _groups_of(inner)
 
 
 def _inner_groups(group: Mapping[str, Any]) -> list[Any]:
@@ -247,13 +254,6 @@ def decode_description(msg: ConfigDescription) -> Config:
             for one in messages[group["id"]].parameters
         ]
     return root
-
-
-def _groups_of(group: Any) -> Iterator[Any]:
-    """Yield a group, then all groups in it."""
-    yield group
-    for inner in _inner_groups(group):
-        yield from _groups_of(inner)
 
 
 def get_tree(m: Any, group: Any = None) -> Config:

@@ -79,7 +79,8 @@ class Server:
         self.node = node
         self.description = description
         self.callback = callback
-        self.name: str = node.resolve(_private(namespace)).rstrip("/")
+        below = "" if namespace.startswith(("/", "~")) else "~"
+        self.name: str = node.resolve(f"{below}{namespace}").rstrip("/")
         self._lock = threading.RLock()
         self._values = description.clamp(description.defaults() | self._stored())
         self._states = description.states()
@@ -204,10 +205,3 @@ class Server:
 
     def __repr__(self) -> str:
         return f"<Server {self.name} of {', '.join(self.description.settings)}>"
-
-
-def _private(namespace: str) -> str:
-    """Return a namespace as a name for the node to resolve; a relative one lies below the node."""
-    if namespace.startswith(("/", "~")):
-        return namespace
-    return f"~{namespace}"

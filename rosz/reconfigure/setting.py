@@ -198,15 +198,18 @@ def _choices(edit_method: str) -> tuple[Choice, ...]:
         return ()  # some other edit method
 
 
-def _plain(value: object) -> object:
-    """Return a numpy scalar as a Python value."""
+def _plain(value: object) -> Scalar:
+    """Return a value of a setting, such as a numpy scalar, as a Python value."""
     item = getattr(value, "item", None)
-    return item() if callable(item) else value
+    found = item() if callable(item) else value
+    if not isinstance(found, Scalar):
+        raise TypeError
+    return found
 
 
 def _bool(value: Any) -> bool:
     if not isinstance(value, str):
-        return bool(_number(value))
+        return bool(value)
     word = value.strip().lower()
     if word not in _TRUE | _FALSE:
         raise ValueError
@@ -215,30 +218,16 @@ def _bool(value: Any) -> bool:
 
 def _int(value: Any) -> int:
     if not isinstance(value, str):
-        return int(_number(value))
+        return int(value)
     try:
         return int(value)
     except ValueError:
         return int(value, 0)  # as 0x1f
 
 
-def _double(value: Any) -> float:
-    return float(value if isinstance(value, str) else _number(value))
-
-
-def _str(value: Any) -> str:
-    return str(value if isinstance(value, str) else _number(value))
-
-
-def _number(value: Any) -> Any:
-    if not isinstance(value, bool | int | float):
-        raise TypeError
-    return value
-
-
 _CONVERTERS: Final[dict[Kind, Callable[[Any], Scalar]]] = {
     "bool": _bool,
     "int": _int,
-    "str": _str,
-    "double": _double,
+    "str": str,
+    "double": float,
 }

@@ -42,6 +42,19 @@ NEW = """
         for tick in node.rate(20):
             out.publish(name)
 """
+SLOW = """
+    import time
+    from rosz.session import opening
+
+    connect = opening.connect_to_running
+
+    def connect_late(*arguments):
+        print("registered")
+        time.sleep(12)
+        connect(*arguments)
+
+    opening.connect_to_running = connect_late
+"""
 PASSING = """
     import time
     import rosz
@@ -225,6 +238,17 @@ def test_the_only_other_one_is_stopped(network: Network) -> None:
     one.wait_for("heard a")
     code, output = rosz(network, "node", "list")
     assert output.split() == ["/a", "/m", "/n"]
+
+
+def test_one_that_opens_slowly_is_met_soon(network: Network) -> None:
+    """On a busy machine it listens long after the other one has found out that it will."""
+    victim = old(network, "a")
+    victim.send(signal.SIGSTOP)
+    slow = network.program(SLOW + NEW, "m")
+    slow.wait_for("registered")
+    other = network.program(NEW, "n")
+    other.wait_for("heard m", 25)
+    slow.wait_for("heard n")
 
 
 @pytest.mark.parametrize("first", ["victim", "publisher"])

@@ -5,7 +5,7 @@ and their acknowledgements, `sync` joining, comparing and anti-entropy, `members
 are alive, `serve` what a replica does for programs that have none, and `watch` the notification of
 changes. The keys and messages are those of `rosz.params.wire`.
 
-`storage` is public as well, but not imported here, because only a replica with a file needs SQLite.
+`PUBLIC_MODULES`: `storage` is imported by name, because only a replica with a file needs SQLite.
 """
 
 from rosz.params.replica.replica import (
@@ -16,7 +16,10 @@ from rosz.params.replica.replica import (
     Replica,
     process_label,
 )
+from rosz.params.replica.state import not_found
 from rosz.params.replica.watch import Changed, Watch
+
+PUBLIC_MODULES = ("storage",)
 
 __all__ = (
     "ACK_TIMEOUT",
@@ -26,5 +29,6 @@ __all__ = (
     "Outcome",
     "Replica",
     "Watch",
+    "not_found",
     "process_label",
 )

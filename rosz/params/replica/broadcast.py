@@ -15,17 +15,16 @@ import threading
 import time
 from collections.abc import Callable, Collection
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from rosz.errors import DecodeError, RoszError
 from rosz.lifecycle import Closable
 from rosz.params.paths import Path, joined
-from rosz.params.replica.members import Members
-from rosz.params.replica.state import NOT_A_PARAMETER, State
-from rosz.params.wire import Batch, Keys, add_header, encode, read_header
+from rosz.params.replica.members import Core
+from rosz.params.replica.state import NOT_A_PARAMETER
+from rosz.params.wire import Batch, add_header, encode, read_header
 from rosz.params.writes import Change
-from rosz.session import Query, RawPublisher, Reply, Sample, Session, Stamp
-from rosz.worker import Worker
+from rosz.session import Query, RawPublisher, Reply, Sample, Stamp
 
 if TYPE_CHECKING:
     from rosz.params.replica.storage import Storage
@@ -131,32 +130,20 @@ class WriteBroadcaster:
     """Sends the writes of one replica, and receives and acknowledges those of others.
 
     Args:
-        session: Session of the replica.
-        keys: Keys of the domain.
-        state: State that the writes of others are applied to.
-        members: Replicas that acknowledge writes.
-        worker: Worker that applies large messages.
+        core: Core of the replica.
         storage: Storage; with it, a write is acknowledged when it is stored.
 
     Attributes:
         pending: Writes that are not yet acknowledged by all.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        keys: Keys,
-        state: State,
-        members: Members,
-        worker: Worker[Any],
-        storage: Storage | None,
-    ) -> None:
+    def __init__(self, core: Core, storage: Storage | None) -> None:
         self.pending: PendingWrites = PendingWrites()
-        self._session = session
-        self._keys = keys
-        self._state = state
-        self._members = members
-        self._worker = worker
+        self._session = session = core.session
+        self._keys = keys = core.keys
+        self._state = core.state
+        self._members = core.members
+        self._worker = core.worker
         self._storage = storage
         self._own = session.zid.encode()
         self._ack_publishers: dict[str, RawPublisher] = {}

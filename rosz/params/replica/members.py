@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from typing import Any
 
 from rosz.errors import DecodeError
 from rosz.lifecycle import Closable
+from rosz.params.replica.state import State
 from rosz.params.wire import Keys, Member
 from rosz.session import Session
+from rosz.worker import Worker
 
-__all__ = ("Members",)
+__all__ = ("Core", "Members")
 
 _log = logging.getLogger("rosz.params")
 
@@ -104,3 +107,27 @@ class Members:
         self.zids = frozenset(self._found.copy())
         if self._on_change is not None:
             self._on_change(member, alive)
+
+
+class Core:
+    """What the parts of one copy of the store share.
+
+    Args:
+        session: Session of the copy.
+        domain: ROS domain.
+        worker: Worker that all tasks of the copy run on.
+
+    Attributes:
+        session: The argument.
+        worker: The argument.
+        keys: Keys of the domain.
+        state: State of the copy.
+        members: Other replicas.
+    """
+
+    def __init__(self, session: Session, domain: int, worker: Worker[Any]) -> None:
+        self.session = session
+        self.worker = worker
+        self.keys: Keys = Keys(domain, scoped=session.secured)
+        self.state: State = State(session.clock)
+        self.members: Members = Members(session, self.keys)

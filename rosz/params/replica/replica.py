@@ -21,15 +21,15 @@ import msgspec
 
 from rosz.errors import ClosedError, DecodeError, NoReplica, ParamError
 from rosz.lifecycle import Closable, Lifecycle
-from rosz.params.paths import Path, to_path
+from rosz.params.paths import Path, joined, to_path
 from rosz.params.replica.broadcast import WriteBroadcaster
-from rosz.params.replica.members import Members
+from rosz.params.replica.members import Core
 from rosz.params.replica.serve import ClientServer, ParameterKeys
-from rosz.params.replica.state import NOT_A_PARAMETER, State, TreeReader, not_found
+from rosz.params.replica.state import NOT_A_PARAMETER, TreeReader, not_found
 from rosz.params.replica.sync import AntiEntropy, Synchroniser
 from rosz.params.tree import MISSING
 from rosz.params.values import normalise
-from rosz.params.wire import Keys, Member
+from rosz.params.wire import Member
 from rosz.params.writes import DELETED, Change, Write
 from rosz.session import Sample, Session, Stamp, clamp_timeout
 from rosz.worker import Worker
@@ -92,14 +92,14 @@ class _Copy(TreeReader):
     """
 
     def __init__(self, session: Session, domain: int) -> None:
-        super().__init__(State(session.clock))
-        self._session = session
-        self._keys = Keys(domain, scoped=session.secured)
         self._worker: Worker[Callable[[], object]] = Worker(
             "rosz-params", _run, capacity=_MAX_WAITING, logger=_log
         )
-        self._members = Members(session, self._keys)
-        self._sync = Synchroniser(session, self._keys, self._state, self._members, self._worker)
+        self._core = Core(session, domain, self._worker)
+        super().__init__(self._core.state)
+        self._keys = self._core.keys
+        self._members = self._core.members
+        self._sync = Synchroniser(self._core)
 
     def close(self) -> None:
         """Leave the other copies; a second call has no effect."""
@@ -156,14 +156,14 @@ class Replica(_Copy):
             if self._state.restore(storage.load()):
                 storage.compact(self._writes)
             self._state.on_new(storage.save)
-        keys, state, sync, worker = self._keys, self._state, self._sync, self._worker
-        self._broadcaster = WriteBroadcaster(session, keys, state, self._members, worker, storage)
-        self._parameter_keys = ParameterKeys(session, keys, state, worker)
+        keys, sync = self._keys, self._sync
+        self._broadcaster = WriteBroadcaster(self._core, storage)
+        self._parameter_keys = ParameterKeys(self._core)
         tell_key = keys.of(session.zid, "tell")
         self._declared: list[Closable] = [
             session.queryable(keys.of(session.zid, "sync"), sync.on_sync, complete=True),
             session.queryable(f"{tell_key}/**", sync.on_tell, complete=True),
-            ClientServer(session, keys, state, self.write, worker, lambda: sync.ready),
+            ClientServer(self._core, self.write, lambda: sync.ready),
         ]
         if settled is not None:
             settled.wait(_MESH_TIMEOUT)
@@ -189,7 +189,7 @@ class Replica(_Copy):
             ClosedError: The replica or the session is closed.
         """
         path = to_path(name)
-        return self.write([(path, normalise(value, path))], origin=origin, timeout=timeout)
+        return self.write([(path, normalise(value, joined(path)))], origin=origin, timeout=timeout)
 
     def delete(
         self, name: str | Path, *, origin: str = "", timeout: float = ACK_TIMEOUT

@@ -21,14 +21,14 @@ from typing import Any, Final
 
 from rosz.errors import DecodeError, ParamError, ParamNotFound, RoszError
 from rosz.params.paths import Path, split
-from rosz.params.replica.state import State, TreeReader, names_beside
+from rosz.params.replica.members import Core
+from rosz.params.replica.state import TreeReader, names_beside
 from rosz.params.replica.watch import TreeChange
 from rosz.params.tree import MISSING, lookup
 from rosz.params.values import Value
 from rosz.params.wire import (
     ClientReply,
     ClientRequest,
-    Keys,
     check_reach,
     decode,
     decode_value,
@@ -37,8 +37,7 @@ from rosz.params.wire import (
     pack_value,
 )
 from rosz.params.writes import Change, Write, put
-from rosz.session import Query, Reply, Session, Stamp
-from rosz.worker import Worker
+from rosz.session import Query, Reply, Stamp
 
 __all__ = ("ClientServer", "ParameterKeys", "is_key_in")
 
@@ -59,27 +58,17 @@ class ClientServer:
     """Reads on the replica's worker, and writes on a thread for each write, for clients.
 
     Args:
-        session: Session of the replica.
-        keys: Keys of the domain.
-        state: State of the replica.
+        core: Core of the replica.
         write: `Replica.write`.
-        worker: Worker of the replica.
         is_ready: Function that tells whether the replica has joined.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        keys: Keys,
-        state: State,
-        write: Callable[..., Any],
-        worker: Worker[Any],
-        is_ready: Callable[[], bool],
-    ) -> None:
-        self._state = state
-        self._reader = TreeReader(state)
+    def __init__(self, core: Core, write: Callable[..., Any], is_ready: Callable[[], bool]) -> None:
+        session, keys = core.session, core.keys
+        self._state = core.state
+        self._reader = TreeReader(core.state)
         self._write_batch = write
-        self._worker = worker
+        self._worker = core.worker
         self._is_ready = is_ready
         self._slots = threading.BoundedSemaphore(_MAX_WRITES)
         self._keys = keys
@@ -185,17 +174,14 @@ class ParameterKeys:
     """Writes one key for each parameter, and answers queries on the keys.
 
     Args:
-        session: Session of the replica.
-        keys: Keys of the domain.
-        state: State of the replica.
-        worker: Worker of the replica.
+        core: Core of the replica.
     """
 
-    def __init__(self, session: Session, keys: Keys, state: State, worker: Worker[Any]) -> None:
-        self._session = session
-        self._keys = keys
-        self._state = state
-        self._worker = worker
+    def __init__(self, core: Core) -> None:
+        self._session = session = core.session
+        self._keys = keys = core.keys
+        self._state = core.state
+        self._worker = core.worker
         self._publisher = session.publisher(keys.all_params)
         self._queryable = session.queryable(keys.all_params, self._on_query, complete=True)
 

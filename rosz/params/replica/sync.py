@@ -13,17 +13,16 @@ import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from queue import Empty, SimpleQueue
-from typing import Any, Final
+from typing import Final
 
 from rosz.errors import DecodeError, RoszError
 from rosz.params.history import EMPTY_DIGEST
 from rosz.params.paths import Path, common_path, joined
-from rosz.params.replica.members import Members
+from rosz.params.replica.members import Core
 from rosz.params.replica.serve import ParameterKeys
 from rosz.params.replica.state import State
 from rosz.params.wire import (
     Index,
-    Keys,
     Member,
     Record,
     SyncReply,
@@ -35,8 +34,8 @@ from rosz.params.wire import (
     split_path,
 )
 from rosz.params.writes import DELETED, Write
-from rosz.session import Query, Session
-from rosz.worker import Worker, start_thread
+from rosz.session import Query, Reply
+from rosz.worker import start_thread
 
 __all__ = ("AntiEntropy", "Synchroniser")
 
@@ -76,11 +75,7 @@ class Synchroniser:
     """Keeps one replica the same as the others.
 
     Args:
-        session: Session of the replica.
-        keys: Keys of the domain.
-        state: State of the replica.
-        members: Other replicas.
-        worker: Worker of the replica.
+        core: Core of the replica.
 
     Attributes:
         ready: Whether the replica has everything that the others had when it started.
@@ -88,15 +83,13 @@ class Synchroniser:
         refused: Writes that others refuse.
     """
 
-    def __init__(
-        self, session: Session, keys: Keys, state: State, members: Members, worker: Worker[Any]
-    ) -> None:
+    def __init__(self, core: Core) -> None:
         self.ready: bool = False
-        self.session = session
-        self.keys = keys
-        self.state = state
-        self.members = members
-        self.worker = worker
+        self.session = core.session
+        self.keys = core.keys
+        self.state = core.state
+        self.members = core.members
+        self.worker = core.worker
         self.busy: set[str] = set()
         self.refused: _RefusedWrites = _RefusedWrites()
         self._appeared: set[str] = set()
@@ -296,21 +289,17 @@ class _Comparison:
             self._end()
 
     def _send(self, writes: list[Write]) -> None:
-        keys, worker = self._owner.keys, self._owner.worker
-        accepted: list[bool] = []
-        self._query(
-            keys.scope(keys.of(self._zid, "tell"), (write.path for write in writes)),
-            SyncRequest(records=[Record.of(write) for write in writes]),
-            lambda reply: accepted.append(reply.ok),
-            lambda: worker.submit(lambda: self._on_sent(writes, accepted)),
-        )
+        keys = self._owner.keys
+        key = keys.scope(keys.of(self._zid, "tell"), (write.path for write in writes))
+        request = SyncRequest(records=[Record.of(write) for write in writes])
+        self._query(key, request, partial(self._on_sent, writes))
 
-    def _on_sent(self, writes: list[Write], accepted: list[bool]) -> None:
+    def _on_sent(self, writes: list[Write], replies: list[Reply]) -> None:
         # A query stays without a reply if rules forbid it, or if the link is gone.
-        if False in accepted or self._zid not in self._owner.members.zids:
+        if not all(reply.ok for reply in replies) or self._zid not in self._owner.members.zids:
             self._end(failed=True)
             return
-        if not accepted and self._owner.keys.scoped:
+        if not replies and self._owner.keys.scoped:
             # Rules judge by the common path of all writes in a message: parts of it may pass.
             if len(writes) > 1:
                 self._parts += _split(writes)
@@ -319,31 +308,23 @@ class _Comparison:
         self._send_next()
 
     def _request(self, request: SyncRequest, then: Callable[[SyncReply], None]) -> None:
-        payloads: list[bytes] = []
-        worker = self._owner.worker
-        self._query(
-            self._owner.keys.of(self._zid, "sync"),
-            request,
-            lambda reply: payloads.append(reply.payload) if reply.ok else None,
-            lambda: worker.submit(lambda: self._on_reply(payloads, then)),
-        )
+        key = self._owner.keys.of(self._zid, "sync")
+        self._query(key, request, partial(self._on_reply, then))
 
-    def _query(
-        self,
-        key: str,
-        request: SyncRequest,
-        on_reply: Callable[[Any], None],
-        on_done: Callable[[], None],
-    ) -> None:
+    def _query(self, key: str, request: SyncRequest, then: Callable[[list[Reply]], None]) -> None:
+        """Send a request, and call a function on the worker with the replies to it."""
+        replies: list[Reply] = []
+        done = partial(self._owner.worker.submit, partial(then, replies))
         try:
             self._owner.session.get_async(
-                key, on_reply, on_done, payload=encode(request), timeout=_TIMEOUT
+                key, replies.append, done, payload=encode(request), timeout=_TIMEOUT
             )
         except RoszError:
             self._end(failed=True)
             raise
 
-    def _on_reply(self, payloads: list[bytes], then: Callable[[SyncReply], None]) -> None:
+    def _on_reply(self, then: Callable[[SyncReply], None], replies: list[Reply]) -> None:
+        payloads = [reply.payload for reply in replies if reply.ok]
         if not payloads:
             self._end(failed=True)
             return

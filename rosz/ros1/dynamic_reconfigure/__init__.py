@@ -3,6 +3,8 @@
 ``.cfg`` files run unchanged, and the modules that catkin generates from them can be imported
 without a build: ``from my_pkg.cfg import TutorialsConfig`` (ROS wiki, dynamic_reconfigure). May
 import what rospy is built on, and rospy's own modules.
+
+`PUBLIC_MODULES` are those that the importer of ``.cfg`` files needs alone.
 """
 
 from rosz.ros1.dynamic_reconfigure.exceptions import (
@@ -11,6 +13,8 @@ from rosz.ros1.dynamic_reconfigure.exceptions import (
     DynamicReconfigureParameterException,
 )
 from rosz.ros1.dynamic_reconfigure.search import find_reconfigure_services, get_parameter_names
+
+PUBLIC_MODULES = ("cfgfile", "search")
 
 __all__ = (
     "DynamicReconfigureCallbackException",

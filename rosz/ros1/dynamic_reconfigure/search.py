@@ -1,10 +1,13 @@
-"""Finding servers, and the parameters that they have."""
+"""Finding servers, the parameters that they have, and the files that describe them."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
-__all__ = ("find_reconfigure_services", "get_parameter_names")
+__all__ = ("find_files", "find_reconfigure_services", "get_parameter_names")
+
+_MARK = b"dynamic_reconfigure"
 
 
 def find_reconfigure_services() -> list[str]:
@@ -18,3 +21,19 @@ def find_reconfigure_services() -> list[str]:
 def get_parameter_names(descr: Any) -> list[str]:
     """Return the names of the parameters of a module such as ``my_pkg.cfg.TutorialsConfig``."""
     return list(descr.defaults)
+
+
+def find_files(folder: Path) -> list[Path]:
+    """Return the sorted ``.cfg`` files of a package that describe parameters.
+
+    Args:
+        folder: Folder of the package; other files with such names (``setup.cfg``) are left out.
+    """
+    return [file for file in sorted(folder.rglob("*.cfg")) if _describes_parameters(file)]
+
+
+def _describes_parameters(file: Path) -> bool:
+    try:
+        return _MARK in file.read_bytes()
+    except OSError:  # a folder, or a broken link
+        return False

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, ParameterValue, SetParametersResult
-from rosz.params.values import type_name
+from rosz.params import type_name
 from rosz.params.yaml import read_plain
 from rosz.ros2.rclpy.exceptions import (
     InvalidParameterTypeException,
