@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
+
+from network import free_port
 
 ROOT = Path(__file__).parents[2]
 ROSZ = [sys.executable, "-P", "-m", "rosz"]
@@ -14,9 +15,7 @@ ROSZ = [sys.executable, "-P", "-m", "rosz"]
 
 def free_endpoint() -> str:
     """Return a rendezvous that nobody uses."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 def environ(folder: Path, **more: str) -> dict[str, str]:

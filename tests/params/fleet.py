@@ -15,6 +15,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Any
 
+from network import free_port
+
 ROOT = Path(__file__).parents[2]
 PATIENCE = 50.0
 
@@ -234,12 +236,6 @@ class Cable:
         finally:
             source.close()
             sink.close()
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:

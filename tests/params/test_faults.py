@@ -12,8 +12,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
+from network import free_port
 
-from .fleet import Cable, Fleet, Process, free_port, until_known, until_same
+from .fleet import Cable, Fleet, Process, until_known, until_same
 
 FULL = os.environ.get("ROSZ_FAULTS", "") == "full"
 WRITES = 10_000 if FULL else 1_500

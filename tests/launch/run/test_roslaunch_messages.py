@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -15,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from network import free_port
 
 from rosz.launch.plan import SystemContext, plan
 from rosz.packages import PackageIndex
@@ -151,13 +151,6 @@ def started(command: list[str], folder: Path, packages: Path) -> Iterator[Stream
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
             streams.finish()
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def ours(folder: Path, packages: Path, options: str) -> list[str]:
