@@ -24,7 +24,7 @@ from rosz.introspect.survey import Survey, process_address, take_survey
 from rosz.node import NodeInfo, Request, control_key
 from rosz.params.wire import Keys, Member, SyncReply, SyncRequest, decode, encode
 from rosz.session import Sample, Session
-from rosz.wire import Kind, Token, entity_key, unpack_attachment
+from rosz.wire import Kind, Token, entity_key, read_attachment
 
 __all__ = (
     "check_clocks",
@@ -275,7 +275,7 @@ def _listen(
     def receive(key: str, sample: Sample) -> None:
         now = time.time_ns()
         try:
-            first = _First(age=now - unpack_attachment(sample.attachment).source_time)
+            first = _First(age=now - read_attachment(sample.attachment)[1])
         except DecodeError as fault:
             first = _First(damage=fault.reason)
         with arrived:

@@ -1,25 +1,26 @@
 """The keys, tokens and attachments of ROS 2's rmw_zenoh, and the endpoints of Zenoh; pure."""
 
-from rosz.wire.attachment import (
-    Attachment,
-    pack_attachment,
-    read_attachment,
-    unpack_attachment,
-)
+from rosz.wire.attachment import pack_attachment, read_attachment
 from rosz.wire.endpoint import Endpoint
 from rosz.wire.gid import gid
-from rosz.wire.keys import NO_HASH, OWN_SPACE, dds_type, entity_key, own_key, ros_type
-from rosz.wire.qos import format_qos, parse_qos
 from rosz.wire.tokens import (
+    NO_HASH,
+    OWN_SPACE,
     SPACE,
     Kind,
     ProcessToken,
     Token,
+    dds_type,
+    entity_key,
     format_process,
+    format_qos,
     format_token,
+    own_key,
     parse_process,
+    parse_qos,
     parse_token,
     processes_key,
+    ros_type,
     tokens_key,
 )
 
@@ -27,7 +28,6 @@ __all__ = (
     "NO_HASH",
     "OWN_SPACE",
     "SPACE",
-    "Attachment",
     "Endpoint",
     "Kind",
     "ProcessToken",
@@ -47,5 +47,4 @@ __all__ = (
     "read_attachment",
     "ros_type",
     "tokens_key",
-    "unpack_attachment",
 )

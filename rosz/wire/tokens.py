@@ -1,42 +1,105 @@
-"""Liveliness tokens, by which nodes and their entities announce themselves.
+"""Keys of topics and services, and the liveliness tokens of nodes and entities (rmw_zenoh).
+
+``<domain>/<name>/<type>/<hash>`` carries the data of a topic or service. The keys of rosz begin
+with ``@rosz/<domain>``, a verbatim chunk that the wildcards of ROS 2 tools never match.
 
 rmw_zenoh declares ``@ros2_lv/<domain>/<zid>/<nid>/<eid>/<kind>/<enclave>/<namespace>/<node>`` for a
 node, and for an entity the same with ``/<name>/<type>/<hash>/<qos>`` after it. rosz nodes also
 declare which process they are, and since when:
 ``@rosz/<domain>/node/<zid>/<nid>/<started>/<pid>/<host>/<full name>``. Every ``/`` inside a chunk
-is written ``%``.
+is written ``%``. The QoS is
+``<reliability>:<durability>:<history>,<depth>:<deadline>:<lifespan>:<liveliness>,<lease>`` with
+durations as ``seconds,nanoseconds``; a value that is the default is left empty.
 """
 
 from __future__ import annotations
 
 import re
 from enum import Enum
-from typing import Literal
+from typing import Literal, TypeVar
 
 import msgspec
 
 from rosz.errors import DecodeError
-from rosz.qos import QoS
-from rosz.wire import qos as qos_text
-from rosz.wire.keys import dds_type, own_key, ros_type
+from rosz.qos import FOREVER, QoS
 
 __all__ = (
+    "NO_HASH",
+    "OWN_SPACE",
+    "SPACE",
     "Kind",
     "ProcessToken",
     "Token",
+    "dds_type",
+    "entity_key",
     "format_process",
+    "format_qos",
     "format_token",
+    "own_key",
     "parse_process",
+    "parse_qos",
     "parse_token",
     "processes_key",
+    "ros_type",
     "tokens_key",
 )
 
+T = TypeVar("T")
+
 SPACE = "@ros2_lv"
+"""The first chunk of rmw_zenoh's tokens."""
+NO_HASH = "TypeHashNotSupported"
+"""The text that rmw_zenoh of ROS 2 Humble writes in place of a type hash."""
+
+OWN_SPACE = "@rosz"
 _NODE_CHUNKS = 9
 _ENTITY_CHUNKS = 13
 _PROCESS_CHUNKS = 9
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+_DEFAULT_DEPTH = 42
+_SECOND = 1_000_000_000
+_FOREVER = divmod(FOREVER, _SECOND)
+_RELIABLE, _BEST_EFFORT = 1, 2
+_TRANSIENT_LOCAL, _VOLATILE = 1, 2
+_KEEP_LAST, _KEEP_ALL = 1, 2
+_AUTOMATIC, _MANUAL_BY_TOPIC = 1, 3
+_FIELDS_PER_PART = (1, 1, 2, 2, 2, 3)
+
+
+def dds_type(type_name: str) -> str:
+    """Return ``std_msgs::msg::dds_::String_`` for ``std_msgs/msg/String``."""
+    *space, base = type_name.split("/")
+    return f"{'::'.join(space)}::dds_::{base}_"
+
+
+def ros_type(dds: str) -> str:
+    """Return ``std_msgs/msg/String`` for ``std_msgs::msg::dds_::String_``.
+
+    Raises:
+        DecodeError: The text has another form.
+    """
+    space, separator, base = dds.rpartition("::dds_::")
+    if not separator or not base.endswith("_"):
+        raise DecodeError("type chunk", 0, f"'{dds}', expected 'package::msg::dds_::Name_'")
+    return f"{space.replace('::', '/')}/{base[:-1]}"
+
+
+def entity_key(domain: int, name: str, type_name: str, type_hash: str) -> str:
+    """Return the key expression of the samples of a topic, or of the queries of a service.
+
+    Args:
+        domain: The ROS domain.
+        name: The global name, such as ``/robot1/scan``, or ``/**`` for all topics.
+        type_name: The full type name, ``pkg/msg/Name`` or ``pkg/srv/Name``, or ``*`` for any.
+        type_hash: The type hash ``RIHS01_…``, `NO_HASH`, or ``*`` for any.
+    """
+    kind = "*" if type_name == "*" else dds_type(type_name)
+    return f"{domain}/{name.strip('/')}/{kind}/{type_hash}"
+
+
+def own_key(domain: int, *chunks: str) -> str:
+    """Return a key of rosz itself."""
+    return "/".join((OWN_SPACE, str(domain), *chunks))
 
 
 class Kind(Enum):
@@ -109,7 +172,7 @@ def format_token(token: Token) -> str:
             _mangle(token.name),
             dds_type(token.type_name),
             token.type_hash,
-            qos_text.format_qos(token.qos),
+            format_qos(token.qos),
         ]
     return "/".join(chunks)
 
@@ -127,33 +190,31 @@ def parse_token(key: str) -> Token:
         )
     if "" in chunks:
         raise DecodeError("liveliness token", 0, f"'{key}' has an empty chunk")
-    _, domain, zid, node_id, entity_id, kind_text, enclave, namespace, node = chunks[:_NODE_CHUNKS]
+    _, domain, zid, node_id, entity_id, kind, enclave, namespace, node = chunks[:_NODE_CHUNKS]
     try:
-        kind = Kind(kind_text)
-        numbers = int(domain), int(node_id), int(entity_id)
+        token = Token(
+            domain=int(domain),
+            zid=zid,
+            node_id=int(node_id),
+            entity_id=int(entity_id),
+            kind=Kind(kind),
+            namespace=_demangle(namespace),
+            node=node,
+            enclave=_demangle(enclave),
+        )
     except ValueError as error:
         raise DecodeError("liveliness token", 0, f"'{key}': {error}") from error
-    node_token = Token(
-        numbers[0],
-        zid,
-        numbers[1],
-        numbers[2],
-        kind,
-        _demangle(namespace),
-        node,
-        _demangle(enclave),
-    )
-    if kind is Kind.NODE:
-        return node_token
+    if token.kind is Kind.NODE:
+        return token
     if len(chunks) < _ENTITY_CHUNKS:
         raise DecodeError("liveliness token", 0, f"'{key}' has {len(chunks)} chunks, expected 13")
     name, type_text, type_hash, qos = chunks[_NODE_CHUNKS:_ENTITY_CHUNKS]
     return msgspec.structs.replace(
-        node_token,
+        token,
         name="/" + _demangle(name).removeprefix("/"),  # some participants leave the slash out
         type_name=ros_type(type_text),
         type_hash=type_hash,
-        qos=qos_text.parse_qos(qos),
+        qos=parse_qos(qos),
     )
 
 
@@ -228,3 +289,85 @@ def _mangle(text: str) -> str:
 
 def _demangle(text: str) -> str:
     return text.replace("%", "/")
+
+
+def format_qos(qos: QoS) -> str:
+    """Return the chunk of a QoS, without default values."""
+    lease = _duration(qos.lease)
+    return ":".join(
+        (
+            "" if qos.reliable else str(_BEST_EFFORT),
+            str(_TRANSIENT_LOCAL) if qos.latched else "",
+            ("" if qos.history == "keep_last" else str(_KEEP_ALL))
+            + ","
+            + ("" if qos.depth in {0, _DEFAULT_DEPTH} else str(qos.depth)),
+            _duration(qos.deadline),
+            _duration(qos.lifespan),
+            ("" if qos.liveliness == "automatic" else str(_MANUAL_BY_TOPIC)) + "," + lease,
+        )
+    )
+
+
+def parse_qos(chunk: str) -> QoS:
+    """Parse a chunk; values that mean "the system's choice" become the defaults.
+
+    Raises:
+        DecodeError: The chunk has another form, or a number without a meaning.
+    """
+    parts = [part.split(",") for part in chunk.split(":")]
+    if tuple(map(len, parts)) != _FIELDS_PER_PART:
+        raise DecodeError(
+            "QoS chunk", 0, f"'{chunk}', expected the form 'r:d:h,n:s,ns:s,ns:l,s,ns'"
+        )
+    (rel,), (dur,), (hist, depth), deadline, lifespan, (live, *lease) = parts
+    try:
+        return QoS(
+            depth=_number(depth, _DEFAULT_DEPTH),
+            reliability=_RELIABILITY[_number(rel, _RELIABLE)],
+            durability=_DURABILITY[_number(dur, _VOLATILE)],
+            history=_HISTORY[_number(hist, _KEEP_LAST)],
+            deadline=_nanoseconds(deadline),
+            lifespan=_nanoseconds(lifespan),
+            liveliness=_LIVELINESS[_number(live, _AUTOMATIC)],
+            lease=_nanoseconds(lease),
+        )
+    except (ValueError, KeyError) as error:
+        raise DecodeError(
+            "QoS chunk", 0, f"'{chunk}' has a value that is not known: {error}"
+        ) from error
+
+
+def _codes(default: T, codes: tuple[int, ...], others: dict[int, T]) -> dict[int, T]:
+    return dict.fromkeys(codes, default) | others
+
+
+# 0 is the system's default, 3 unknown, 4 and 5 best available: all of them mean the default.
+_RELIABILITY: dict[int, Literal["reliable", "best_effort"]] = _codes(
+    "reliable", (0, _RELIABLE, 3, 4), {_BEST_EFFORT: "best_effort"}
+)
+_DURABILITY: dict[int, Literal["volatile", "transient_local"]] = _codes(
+    "volatile", (0, _VOLATILE, 3, 4), {_TRANSIENT_LOCAL: "transient_local"}
+)
+_HISTORY: dict[int, Literal["keep_last", "keep_all"]] = _codes(
+    "keep_last", (0, _KEEP_LAST, 3), {_KEEP_ALL: "keep_all"}
+)
+_LIVELINESS: dict[int, Literal["automatic", "manual_by_topic"]] = _codes(
+    "automatic", (0, _AUTOMATIC, 4, 5), {_MANUAL_BY_TOPIC: "manual_by_topic"}
+)
+
+
+def _number(text: str, default: int) -> int:
+    return int(text) if text else default
+
+
+def _duration(nanoseconds: int) -> str:
+    seconds, rest = _FOREVER if nanoseconds == 0 else divmod(nanoseconds, _SECOND)
+    return ",".join(
+        "" if value == forever else str(value)
+        for value, forever in zip((seconds, rest), _FOREVER, strict=True)
+    )
+
+
+def _nanoseconds(fields: list[str]) -> int:
+    seconds, rest = (_number(text, forever) for text, forever in zip(fields, _FOREVER, strict=True))
+    return seconds * _SECOND + rest

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from rosz.errors import DecodeError
-from rosz.wire import Attachment, pack_attachment, unpack_attachment
+from rosz.wire import pack_attachment, read_attachment
 
 GID = bytes(range(1, 17))
 BYTES = bytes.fromhex("010000000000000015cd853dfe9c9717100102030405060708090a0b0c0d0e0f10")
@@ -15,7 +15,7 @@ OLD_LAYOUT = bytes.fromhex(
 
 def test_both_ways() -> None:
     assert pack_attachment(1, 1700000000123456789, GID) == BYTES
-    assert unpack_attachment(BYTES) == Attachment(1, 1700000000123456789, GID)
+    assert read_attachment(BYTES) == (1, 1700000000123456789, GID)
 
 
 def test_equals_zenohs_own_serialization() -> None:
@@ -36,4 +36,4 @@ def test_equals_zenohs_own_serialization() -> None:
 )
 def test_damage(data: bytes | None, reason: str) -> None:
     with pytest.raises(DecodeError, match=reason):
-        unpack_attachment(data)
+        read_attachment(data)
