@@ -1,23 +1,32 @@
 """The network: sessions, and what is declared on them. No other package imports zenoh.
 
-Public modules beside the names exported here, because few programs need them:
-`rosz.session.router`, the session of ``rosz core``.
+Only ``rosz core`` needs the module `rosz.session.router`, which is public as well.
 """
 
 from rosz.session import at_exit as at_exit  # registers what waits at the exit
-from rosz.session.config import SessionConfig, keys_of
+from rosz.session.config import SessionConfig, connect_endpoint, keys_of, listen_endpoints
 from rosz.session.declared import PullSubscriber, RawPublisher
-from rosz.session.endpoints import connect_endpoint, listen_endpoints
-from rosz.session.local_peers import LocalPeer, LocalPeers
+from rosz.session.local_peers import LocalPeer, LocalPeers, describe_process, is_stopped
 from rosz.session.mesh import MeshReadiness, serve_links
 from rosz.session.opening import places_of
 from rosz.session.probe import first_listening, is_listening, why_refused
-from rosz.session.processes import describe_process, is_stopped
-from rosz.session.queries import Cancellation, Querier, Query, Queryable, Replies, Reply, Target
+from rosz.session.queries import (
+    LONGEST_WAIT,
+    Cancellation,
+    Querier,
+    Query,
+    Queryable,
+    Replies,
+    Reply,
+    Target,
+    clamp_timeout,
+)
 from rosz.session.samples import HybridClock, Sample, Stamp
 from rosz.session.session import Session
-from rosz.session.timeouts import LONGEST_WAIT, clamp_timeout
 from rosz.session.zenoh_workarounds import SEGMENTS
+
+PUBLIC_MODULES = ("router",)
+"""Modules that few programs need, and that others may import as they are."""
 
 __all__ = (
     "LONGEST_WAIT",

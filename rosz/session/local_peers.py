@@ -1,10 +1,14 @@
-"""The other sessions of this machine, known before there is a link to any of them.
+"""The other sessions of this machine, and what Linux says about their processes.
 
 A process that finds nobody at the rendezvous may be the first one. But the process that held the
 rendezvous may also have just died, before its peers could find the newcomer, or it may be stopped,
 so that it introduces nobody to anybody. So each session registers itself with a socket in Linux's
 abstract namespace, which disappears with the process. Nothing is ever sent to it. Its name contains
 the process id and the loopback port where the session can be reached directly.
+
+A process is stopped by Ctrl-Z or a debugger. The kernel still accepts connections for it, but
+nothing ever answers, so checking first avoids a long wait. A process that cannot be examined, for
+example in another container, counts as running.
 """
 
 from __future__ import annotations
@@ -12,9 +16,10 @@ from __future__ import annotations
 import errno
 import os
 import socket
+import struct
 import sys
-from collections.abc import Container, Iterator
-from functools import cached_property
+from collections.abc import Container, Iterable, Iterator
+from functools import cache, cached_property
 from pathlib import Path
 from zlib import crc32
 
@@ -22,20 +27,28 @@ import msgspec
 
 from rosz.errors import TransportError
 from rosz.session.probe import is_listening
-from rosz.session.processes import (
-    describe_process,
-    how_to_resume,
-    is_stopped,
-    pid_namespace,
-    which_listens,
-)
 from rosz.wire import Endpoint
 
-__all__ = ("LocalPeer", "LocalPeers", "LocalRegistration")
+__all__ = (
+    "LocalPeer",
+    "LocalPeers",
+    "LocalRegistration",
+    "describe_process",
+    "how_to_resume",
+    "is_stopped",
+    "pid_of_peer",
+    "tcp_ports",
+    "which_listens",
+)
 
-_SOCKETS = Path("/proc/net/unix")
 _LOOPBACK = "127.0.0.1"
 _FIELDS = 4
+_PROC = Path("/proc")
+_STOPPED = frozenset("Tt")
+"""The states of a process stopped by a signal, and by a debugger."""
+_LISTENS = "0A"
+_CREDENTIALS = struct.Struct("3i")
+_MAX_COMMAND = 60
 
 
 class LocalPeer(msgspec.Struct, frozen=True):
@@ -56,7 +69,7 @@ class LocalPeer(msgspec.Struct, frozen=True):
     @property
     def is_stopped(self) -> bool:
         """Whether its process is stopped; false if that is unknown."""
-        return self.namespace == pid_namespace() and is_stopped(self.pid)
+        return self.namespace == _pid_namespace() and is_stopped(self.pid)
 
     @property
     def endpoint(self) -> str:
@@ -86,7 +99,7 @@ class LocalPeers:
         """
         prefix = f"@{_prefix(rendezvous)}"
         try:
-            lines = _SOCKETS.read_text(errors="replace").splitlines()
+            lines = (_PROC / "net/unix").read_text(errors="replace").splitlines()
         except OSError:  # not Linux
             lines = []
         found: dict[tuple[str, int, int], LocalPeer] = {}
@@ -181,7 +194,7 @@ class LocalRegistration:
     """
 
     def __init__(self, rendezvous: str, *, reachable: bool = True) -> None:
-        self.peer: LocalPeer = LocalPeer(pid_namespace(), os.getpid(), 0)
+        self.peer: LocalPeer = LocalPeer(_pid_namespace(), os.getpid(), 0)
         self._rendezvous = rendezvous
         self._sockets: list[socket.socket] = []
         self._reserved: socket.socket | None = None
@@ -232,3 +245,109 @@ class LocalRegistration:
 
 def _prefix(rendezvous: str) -> str:
     return f"rosz/{crc32(rendezvous.encode()):08x}/"
+
+
+def is_stopped(pid: int) -> bool:
+    """Tell whether a process of this machine is stopped; false if that is unknown."""
+    try:
+        line = (_PROC / str(pid) / "stat").read_text(errors="replace")
+    except OSError:
+        return False
+    return line.rpartition(")")[2].split()[0] in _STOPPED
+
+
+@cache
+def _pid_namespace() -> str:
+    """Return the id of the namespace of this process's id; empty if unknown."""
+    try:
+        return str((_PROC / "self/ns/pid").stat().st_ino)
+    except OSError:  # not Linux
+        return ""
+
+
+def describe_process(pid: int) -> str:
+    """Return the command line of a process as a user would type it, and its id."""
+    try:
+        words = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
+    except OSError:
+        words = []
+    words = [word for word in words if word]
+    if len(words) > 1 and "python" in Path(words[0]).name and not words[1].startswith("-"):
+        del words[0]
+    if not words:
+        return f"process {pid}"
+    line = " ".join((Path(words[0]).name, *words[1:])).replace("\n", " ")
+    return f"'{line if len(line) <= _MAX_COMMAND else line[: _MAX_COMMAND - 1] + '…'}' (pid {pid})"
+
+
+def how_to_resume(pid: int) -> str:
+    """Return the advice for a process that is stopped."""
+    return (
+        f"let it go on with 'fg' in its terminal or 'kill -CONT {pid}', or end it with"
+        f" 'kill -9 {pid}'"
+    )
+
+
+def which_listens(endpoint: Endpoint, candidates: Iterable[int]) -> int | None:
+    """Return the process that listens at an endpoint of this machine, if it is a candidate.
+
+    Args:
+        endpoint: The endpoint.
+        candidates: The ids of the processes to consider.
+    """
+    if endpoint.is_unix:
+        pid = _unix_listener(endpoint.address)
+        return pid if pid in candidates else None
+    if not endpoint.is_tcp or endpoint.port is None:
+        return None
+    wanted = {
+        name for name, port, state in _tcp_sockets() if state == _LISTENS and port == endpoint.port
+    }
+    return next((pid for pid in candidates if not wanted.isdisjoint(_open_files(pid))), None)
+
+
+def _unix_listener(path: str) -> int:
+    """Return the process that listens at a unix socket; 0 if that is unknown."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.setblocking(False)
+        if probe.connect_ex(path):
+            return 0
+        return pid_of_peer(probe)
+
+
+def pid_of_peer(connection: socket.socket) -> int:
+    """Return the process at the other end of a connected unix socket."""
+    credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    pid: int = _CREDENTIALS.unpack(credentials)[0]
+    return pid
+
+
+def tcp_ports(pid: int) -> set[int]:
+    """Return the TCP ports of a process's sockets, as far as they may be read."""
+    own = set(_open_files(pid))
+    return {port for name, port, _ in _tcp_sockets() if name in own}
+
+
+def _tcp_sockets() -> Iterator[tuple[str, int, str]]:
+    """Yield the name (as in links of open files), local port and state of each TCP socket."""
+    for table in ("net/tcp", "net/tcp6"):
+        try:
+            lines = (_PROC / table).read_text().splitlines()[1:]
+        except OSError:
+            continue
+        for line in lines:
+            address, _, state, *rest = line.split()[1:]
+            yield f"socket:[{rest[5]}]", int(address.rpartition(":")[2], 16), state
+
+
+def _open_files(pid: int) -> Iterator[str]:
+    """Yield what the open files of a process link to, as far as they may be read."""
+    try:
+        files = list((_PROC / str(pid) / "fd").iterdir())
+    except OSError:
+        return
+    for file in files:
+        try:
+            yield str(file.readlink())
+        except OSError:
+            continue

@@ -15,13 +15,13 @@ from rosz.errors import TransportError
 from rosz.session.config import (
     EPHEMERAL,
     SessionConfig,
+    connect_endpoint,
     key_settings,
     new_id,
     overrides,
     zenoh_settings,
 )
 from rosz.session.declared import translate_errors
-from rosz.session.endpoints import connect_endpoint
 from rosz.session.zenoh_workarounds import (
     SEGMENTS,
     connect_to_running,

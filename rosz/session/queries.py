@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from typing import Any, Final, Literal, Self, TypedDict
 
 import zenoh
 
-from rosz.errors import TransportError
+from rosz.errors import TransportError, UsageError
 from rosz.session.at_exit import ENDING, ClosedSession, leak_at_exit
 from rosz.session.declared import Declared, open_channel, translate_errors
 from rosz.session.samples import Sample, Stamp, to_timestamp
 
 __all__ = (
+    "LONGEST_WAIT",
     "TARGETS",
     "Cancellation",
     "Querier",
@@ -22,6 +24,7 @@ __all__ = (
     "Replies",
     "Reply",
     "Target",
+    "clamp_timeout",
 )
 
 Target = Literal["all", "all_complete", "best"]
@@ -32,7 +35,24 @@ TARGETS: Final = {
     "all_complete": zenoh.QueryTarget.ALL_COMPLETE,
     "best": zenoh.QueryTarget.BEST_MATCHING,
 }
+LONGEST_WAIT = threading.TIMEOUT_MAX / 2
+"""Seconds that stand for "forever": more than a century, and the longest wait of the system."""
+
 _CLOSED_QUERY: Final = ClosedSession("the query is closed")
+
+
+def clamp_timeout(timeout: float) -> float:
+    """Return a timeout between 0 and `LONGEST_WAIT`.
+
+    Args:
+        timeout: Time limit in seconds; may be infinite.
+
+    Raises:
+        UsageError: The timeout is not a number, with which a wait would never end.
+    """
+    if timeout != timeout:  # noqa: PLR0124  # nan
+        raise UsageError(f"timeout is '{timeout}': expected a number of seconds")
+    return min(max(timeout, 0.0), LONGEST_WAIT)
 
 
 class QueryOptions(TypedDict, total=False):

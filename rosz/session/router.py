@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import logging
 import re
+import socket
+import threading
 from collections.abc import Sequence
 from typing import Final, Self
 
+import msgspec
+
 from rosz.environment import Environment
-from rosz.errors import TransportError
+from rosz.errors import RoszError, TransportError
 from rosz.lifecycle import Lifecycle
 from rosz.session.config import SessionConfig, keys_of
 from rosz.session.opening import places_of
 from rosz.session.session import Session
-from rosz.session.zenoh_workarounds.new_interfaces import NewInterfaces
 from rosz.wire import Endpoint
 
 __all__ = ("Router",)
@@ -27,6 +30,8 @@ _OCCUPIED: Final = re.compile(
     re.IGNORECASE,
 )
 """What Zenoh says about a TCP endpoint, and about a unix socket, that another process holds."""
+_POLL_SECONDS: Final = 2.0
+_ON_INTERFACE: Final = "#iface="
 _log = logging.getLogger("rosz.core")
 
 
@@ -71,7 +76,7 @@ class Router:
             self.session: Session = self._lifecycle.keep(Session.open(config))
         except TransportError as error:
             raise _explain(error, self.endpoints) from error
-        self._lifecycle.keep(NewInterfaces(config, Session.open))
+        self._lifecycle.keep(_NewInterfaces(config))
 
     def close(self) -> None:
         """Close the router; a second call has no effect."""
@@ -103,3 +108,63 @@ def _explain(error: TransportError, endpoints: Sequence[str]) -> TransportError:
         f"'{endpoint}' is occupied: another core, or a node that the others meet at, holds it; all"
         " goes on as it is, or end that one and start the core then"
     )
+
+
+class _NewInterfaces:
+    """Listens on network interfaces, such as a VPN's, that appear while a router runs.
+
+    Seen with eclipse-zenoh 1.10.2: the endpoints that a session listens at are fixed when it opens,
+    and with keys each interface has an endpoint of its own. So a further router, linked to the
+    first one within the machine, listens on later interfaces. Not reported upstream yet.
+    """
+
+    def __init__(self, config: SessionConfig) -> None:
+        self._config = config
+        self._known = set(socket.if_nameindex())
+        self._sessions: dict[tuple[int, str], Session] = {}
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        if any(_ON_INTERFACE in place for place in places_of(config)[0]):
+            self._thread = threading.Thread(target=self._watch, name="rosz-interfaces", daemon=True)
+            self._thread.start()
+
+    def _watch(self) -> None:
+        while not self._closing.wait(_POLL_SECONDS):
+            # An interface that disappeared and came back has another number.
+            found = set(socket.if_nameindex())
+            for interface in self._known - found:
+                if interface in self._sessions:
+                    self._sessions.pop(interface).close()
+            for interface in sorted(found - self._known):
+                self._listen(interface)
+            self._known = found
+
+    def _listen(self, interface: tuple[int, str]) -> None:
+        name = interface[1]
+        listen, _ = places_of(self._config)
+        places = [place for place in listen if place.rpartition(_ON_INTERFACE)[2] == name]
+        if not places:
+            return
+        further = msgspec.structs.replace(
+            self._config,
+            rendezvous=places[0],
+            hold_rendezvous=False,
+            listen=tuple(places[1:]),
+            connect=(self._config.rendezvous,),
+            multicast=False,
+        )
+        try:
+            self._sessions[interface] = Session.open(further)
+        except RoszError as error:
+            _log.warning("cannot listen on '%s', which has come up: %s", name, error)
+            return
+        for place in places:
+            _log.warning("listening on %s, which has come up", place)
+
+    def close(self) -> None:
+        """Stop listening there; a second call has no effect."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+        while self._sessions:
+            self._sessions.popitem()[1].close()

@@ -40,9 +40,9 @@ from rosz.session.queries import (
     Replies,
     Reply,
     Target,
+    clamp_timeout,
 )
 from rosz.session.samples import HybridClock, Sample, Stamp, to_timestamp
-from rosz.session.timeouts import clamp_timeout
 from rosz.session.zenoh_workarounds import (
     close_links,
     close_links_at_once,

@@ -13,8 +13,7 @@ from network import Network, Program, eventually
 
 from rosz.errors import TransportError
 from rosz.session import LocalPeers, Session, SessionConfig, describe_process, is_stopped
-from rosz.session.local_peers import LocalRegistration
-from rosz.session.processes import which_listens
+from rosz.session.local_peers import LocalRegistration, which_listens
 from rosz.wire import Endpoint
 
 LISTEN = """

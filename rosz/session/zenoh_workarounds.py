@@ -1,0 +1,386 @@
+"""Workarounds for Zenoh's behaviour, seen with eclipse-zenoh 1.10.2; none is reported upstream yet.
+
+What happens without them:
+
+- `prepare_process`: Zenoh receives on several threads, which hand the data of a link from one core
+  to another, so a round trip takes a quarter longer. In a router, though, a link that is given up
+  blocks its thread for seconds, and with it all links of that thread; so a router gets more. The C
+  library returns freed memory to the kernel, so each image is written into new pages, which takes
+  longer than to send it.
+- `reachable_config`: A client connects to the first of its endpoints only, whether anybody answers
+  there or not, and fails although another one answers.
+- `connect_to_running`: Peers hear of each other from the one at the rendezvous, so a newcomer finds
+  nobody while that process is stopped.
+- `open_and_listen`: Of two processes that begin to listen at one port at the same moment, Linux may
+  refuse both, because each finds the other one about to. Zenoh does not try again, so they would
+  never meet.
+- `close_links_at_once`: When Zenoh closes a TCP connection, it makes the system wait up to ten
+  seconds until the other end has received what was sent (SO_LINGER, socket(7)), and that on the
+  thread that receives for the whole session. A new link to a machine that was cut off would be up
+  long before any data came through it. Nothing is lost by not waiting: the system goes on sending.
+- `close_links`: Closing a session waits until the links that it is about to open have come about or
+  failed, and until all that is queued for its links is sent. That takes ten seconds next to a
+  process that is stopped. Ending the connection below makes either fail at once. What the system
+  has accepted for the process is there when it resumes.
+- `remove_abandoned_segments`: Zenoh removes abandoned segments of shared memory only when a session
+  with shared memory opens, so the memory of a process that was killed stays allocated until then.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import logging
+import os
+import re
+import socket
+import stat
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import zenoh
+
+from rosz.errors import TransportError
+from rosz.lifecycle import Closable
+from rosz.session.config import SessionConfig
+from rosz.session.declared import CallbackThread, open_channel
+from rosz.session.local_peers import (
+    LocalPeers,
+    describe_process,
+    how_to_resume,
+    pid_of_peer,
+    tcp_ports,
+)
+from rosz.session.probe import first_listening, is_listening
+from rosz.wire import Endpoint
+from rosz.worker import start_thread
+
+__all__ = (
+    "SEGMENTS",
+    "close_links",
+    "close_links_at_once",
+    "connect_to_running",
+    "open_and_listen",
+    "prepare_process",
+    "reachable_config",
+    "remove_abandoned_segments",
+)
+
+_RUNTIME = "ZENOH_RUNTIME"
+_ROUTER_RECEIVERS = 16
+_KEPT_BYTES = 31 << 20
+"""Just below the largest block that glibc adapts to."""
+_RARE_RETRIES = (
+    "retry_period_init_ms=100;retry_period_max_ms=86400000;retry_period_increase_factor=1.25"
+)
+"""Options of an endpoint where a session listens soon, or never.
+
+A session that opens slowly is registered seconds before it listens. The small factor finds it after
+a quarter more of that time.
+"""
+_ATTEMPTS = 8
+_PAUSE = 0.02
+_OPEN_FILES: Final = Path("/dev/fd")
+_TCP: Final = re.compile(r"(?:tcp|tls)/([^%#?\]]+)(?:%\w+)?(\]?:\d+)")
+_NO_WAIT: Final = struct.pack("ii", 0, 0)
+_GRACE_SECONDS: Final = 0.1
+_AGAIN_SECONDS: Final = 0.01
+"""The pause between attempts: after one address of a process, Zenoh tries the next."""
+SEGMENTS = Path("/dev/shm")  # noqa: S108  # the place on Linux
+"""The folder of the segments."""
+_SUFFIX = ".zenoh"
+_MIN_AGE = 2.0
+"""Seconds that the maker of a segment has between creating and locking it."""
+
+_log = logging.getLogger("rosz.session")
+
+
+@contextmanager
+def prepare_process(mode: str) -> Iterator[None]:
+    """Set the number of receiving threads, unless the user does, and keep freed memory.
+
+    Zenoh reads the number once, when the first session of the process opens. Measured with images
+    of 1 MB, two and a half times as many per second come through when memory is kept. glibc keeps
+    twice the size of the largest block that was ever mapped on its own and freed, so that is 62 MB;
+    no page of this block is touched. Other C libraries ignore it.
+    """
+    bytes(_KEPT_BYTES)
+    given = _RUNTIME in os.environ
+    if not given:
+        count = _ROUTER_RECEIVERS if mode == "router" else 1
+        os.environ[_RUNTIME] = f"(rx: (worker_threads: {count}))"
+    try:
+        yield
+    finally:
+        if not given:
+            os.environ.pop(_RUNTIME, None)
+
+
+def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig | None:
+    """Return the configuration of a client, reduced to the first endpoint that answers.
+
+    A command prefers the endpoints that it was given to this machine. A node is a client of the
+    router of this machine first.
+
+    Returns:
+        The configuration, unchanged if it is not of a client; ``None`` if nobody answers anywhere.
+
+    Raises:
+        TransportError: The process at the rendezvous is stopped, and there is no other endpoint.
+    """
+    if config.mode != "client" or config.config_file:
+        return config
+    local = _local_endpoints(config, peers)
+    wanted = (*config.connect, *local) if config.must_connect else (*local, *config.connect)
+    if wanted == (config.rendezvous,):
+        return config
+    endpoint = first_listening(wanted, config.open_timeout)
+    return msgspec.structs.replace(config, rendezvous=endpoint, connect=()) if endpoint else None
+
+
+def _local_endpoints(config: SessionConfig, peers: LocalPeers) -> tuple[str, ...]:
+    """Return the rendezvous, or the endpoints of running sessions if its holder is stopped."""
+    if peers.stopped_holder is None:
+        return (config.rendezvous,)
+    running = tuple(peer.endpoint for peer in peers if peer.port and not peer.is_stopped)
+    if not running and not config.connect:
+        raise TransportError(peers.why_unanswered)
+    return running
+
+
+def connect_to_running(settings: zenoh.Config, peers: LocalPeers) -> None:
+    """Connect a peer to all running sessions directly if the rendezvous is held by a stopped one.
+
+    They are tried ever more rarely, because nobody knows who will listen there in an hour.
+    """
+    pid = peers.stopped_holder
+    if pid is None:
+        return
+    _log.warning(
+        "%s holds the meeting point %s and is stopped: it is not reached until it goes on (%s)",
+        describe_process(pid),
+        peers.rendezvous,
+        how_to_resume(pid),
+    )
+    running = [
+        f"{peer.endpoint}#{_RARE_RETRIES}" for peer in peers if peer.port and not peer.is_stopped
+    ]
+    connect = [*running, *json.loads(settings.get_json("connect/endpoints"))]
+    settings.insert_json5("connect/endpoints", json.dumps(connect))
+    settings.insert_json5("connect/timeout_ms", "-1")  # in the background
+
+
+def open_and_listen(settings: zenoh.Config, rendezvous: str, opened: Callable[[], Any]) -> Any:
+    """Open a session, and make sure that somebody listens at the rendezvous afterwards.
+
+    Args:
+        settings: The configuration.
+        rendezvous: The endpoint of the rendezvous. Nothing is checked if it is on another machine,
+            or if the configuration does not listen at it.
+        opened: Function that opens a session by the configuration, with a new id each time.
+
+    Raises:
+        zenoh.ZError: The session cannot be opened.
+    """
+    raw: Any = opened()
+    endpoint = Endpoint(rendezvous)
+    if _can_be_refused(endpoint) and _listens_at(endpoint, settings):
+        for _ in range(_ATTEMPTS):
+            if is_listening(rendezvous):
+                break
+            raw.close()
+            # Two processes that were refused together must not try again together.
+            time.sleep(_PAUSE * os.urandom(1)[0] / 256)
+            raw = opened()
+    return raw
+
+
+def _can_be_refused(endpoint: Endpoint) -> bool:
+    return endpoint.is_local and (endpoint.is_unix or endpoint.protocol == "tcp")
+
+
+def _listens_at(endpoint: Endpoint, settings: zenoh.Config) -> bool:
+    """Tell whether a configuration listens at an endpoint, also under another host name."""
+    endpoints = settings.get_json("listen/endpoints")
+    return str(endpoint) in endpoints or f":{endpoint.port}" in endpoints
+
+
+class _StoppedPeers(msgspec.Struct, frozen=True):
+    """How to recognise the connections to stopped processes.
+
+    Attributes:
+        ports: The loopback ports of the processes.
+        path: The unix socket where all sessions meet; empty if they meet elsewhere.
+        pids: The ids of the processes.
+    """
+
+    ports: set[int]
+    path: str
+    pids: set[int]
+
+    def is_other_end(self, connection: socket.socket) -> bool:
+        """Tell whether a connection leads to one of the processes.
+
+        Raises:
+            OSError: The connection has ended.
+        """
+        there = connection.getpeername()
+        if connection.family == socket.AF_UNIX:
+            ends = (there, connection.getsockname())
+            return bool(self.path) and self.path in ends and pid_of_peer(connection) in self.pids
+        return (
+            connection.family in {socket.AF_INET, socket.AF_INET6}
+            and there[1] in self.ports
+            and ip_address(there[0].partition("%")[0]).is_loopback
+        )
+
+    def change(self, change: Callable[[socket.socket], None]) -> None:
+        """Change all connections of this process to the stopped ones."""
+        for connection, _, _ in _connections():
+            with suppress(OSError):  # it has ended meanwhile
+                if self.is_other_end(connection):
+                    change(connection)
+
+
+def close_links_at_once(raw: Any) -> Closable:
+    """Return a watch that makes a session close its TCP links at once, now and in the future."""
+    listener = raw.info.declare_link_events_listener(open_channel(), history=True)
+    return CallbackThread("watch of links", listener, _set_no_wait)
+
+
+def _set_no_wait(event: Any) -> None:
+    ends = [_TCP.match(locator) for locator in (event.link.src, event.link.dst)]
+    if event.kind != zenoh.SampleKind.PUT or None in ends:
+        return
+    wanted = ["".join(end.groups()) for end in ends if end is not None]
+    with suppress(OSError):  # no file can be opened any more: closing the link will take long
+        for connection, *addresses in _connections():
+            if addresses == wanted:
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_WAIT)
+                return
+
+
+def close_links(raw: Any, rendezvous: str) -> AbstractContextManager[None]:
+    """Return a context in which links to stopped processes are closed if they delay its end."""
+    peers = LocalPeers.read(rendezvous)
+    return _cut_if_late(_stopped_peers(raw, peers)) if peers.stopped else nullcontext()
+
+
+@contextmanager
+def _cut_if_late(stopped: _StoppedPeers) -> Iterator[None]:
+    stopped.change(lambda one: one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_WAIT))
+    over = threading.Event()
+
+    def cut() -> None:
+        stopped.change(lambda one: one.shutdown(socket.SHUT_RDWR))
+
+    def cut_repeatedly() -> None:
+        pause = _GRACE_SECONDS
+        while not over.wait(pause):
+            cut()
+            pause = _AGAIN_SECONDS
+
+    thread = threading.Thread(target=cut_repeatedly, name="rosz-close-links", daemon=True)
+    runs = start_thread(thread)
+    if not runs:
+        cut()
+    try:
+        yield
+    finally:
+        over.set()
+        if runs:
+            thread.join()
+
+
+def _stopped_peers(raw: Any, peers: LocalPeers) -> _StoppedPeers:
+    sessions = {peer.zid for peer in peers.stopped}
+    ports = {peer.port for peer in peers.stopped}
+    ports = ports.union(*(tcp_ports(peer.pid) for peer in peers.stopped))
+    links = [link for link in raw.info.links() if str(link.zid) in sessions]
+    ports |= {Endpoint(link.dst).port or 0 for link in links}
+    meeting = Endpoint(peers.rendezvous)
+    if peers.stopped_holder is not None:
+        ports.add(meeting.port or 0)
+    return _StoppedPeers(
+        ports=ports - {0},
+        path=meeting.address if meeting.is_unix else "",
+        pids={peer.pid for peer in peers.stopped},
+    )
+
+
+def _connections() -> Iterator[tuple[socket.socket, str, str]]:
+    """Yield each connected socket of this process with its own and the other address.
+
+    Zenoh does not hand out its sockets. The newest comes first. Addresses are written as in
+    endpoints: ``127.0.0.1:7447``, ``[::1]:7447``, ``/run/z.sock``. A socket is a copy, which is
+    valid until the next one is yielded.
+
+    Raises:
+        OSError: No file can be opened any more.
+    """
+    for number in sorted((int(file.name) for file in _OPEN_FILES.iterdir()), reverse=True):
+        # Not all sockets are connected, and any file may be closed meanwhile.
+        with suppress(OSError):
+            # Closing the copy of a file would release all locks of this process on it (fcntl(2)).
+            if not stat.S_ISSOCK(os.fstat(number).st_mode):
+                continue
+            with socket.socket(fileno=os.dup(number)) as found:
+                yield found, _address(found.getsockname()), _address(found.getpeername())
+
+
+def _address(address: Any) -> str:
+    if not isinstance(address, tuple):
+        return str(address)
+    return Endpoint.of("tcp", str(address[0]).partition("%")[0], address[1]).address
+
+
+def remove_abandoned_segments(folder: Path = SEGMENTS, *, min_age: float = _MIN_AGE) -> list[str]:
+    """Remove the segments that this user's processes made and that nobody uses any more.
+
+    Each process that uses a segment holds a shared lock on its file, which the kernel releases when
+    the process ends, in whatever way. So whoever gets the exclusive lock knows that no process uses
+    the segment, not even in another container.
+
+    Args:
+        folder: The folder of the segments.
+        min_age: Age in seconds below which a segment is left alone, because it may be in the
+            making.
+
+    Returns:
+        The names of the files removed.
+    """
+    return [path.name for path in _old_segments(folder, time.time() - min_age) if _remove(path)]
+
+
+def _old_segments(folder: Path, before: float) -> Iterator[Path]:
+    """Yield the segments of this user that were made before a time."""
+    with suppress(OSError):  # no such folder: not Linux
+        for path in folder.iterdir():
+            if path.suffix == _SUFFIX:
+                with suppress(FileNotFoundError):  # its owner was faster
+                    found = path.stat()
+                    if found.st_uid == os.getuid() and found.st_ctime < before:
+                        yield path
+
+
+def _remove(path: Path) -> bool:
+    """Remove a segment if nobody holds a lock on it; return whether it was removed."""
+    try:
+        file = os.open(path, os.O_RDWR)
+    except OSError:  # gone meanwhile, or of another user
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        path.unlink()
+    except OSError:  # in use, or gone meanwhile
+        return False
+    finally:
+        os.close(file)
+    return True
