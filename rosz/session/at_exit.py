@@ -18,7 +18,7 @@ from typing import Any
 
 from rosz.errors import ClosedError
 
-__all__ = ("ENDING", "ClosedSession", "leak_at_exit", "still_open", "wait_for_calls")
+__all__ = ("ENDING", "ClosedSession", "leak_at_exit", "wait_for_calls")
 
 ENDING = threading.Event()
 """Set when the interpreter is about to end: from then on nobody may start to wait inside Zenoh.
@@ -83,17 +83,6 @@ class ClosedSession:
 
     def __getattr__(self, name: str) -> Any:
         raise ClosedError(f"no {name.replace('_', ' ')} any more: {self._why}")
-
-
-def still_open(raw: Any) -> Any:
-    """Return Zenoh's session, to pass it to a function of Zenoh that takes one.
-
-    Raises:
-        ClosedError: The session is closed.
-    """
-    if isinstance(raw, ClosedSession):
-        raw.declare()
-    return raw
 
 
 # Registered before everything that uses a session, and so called after all of that is closed.

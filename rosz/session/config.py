@@ -118,20 +118,32 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
         return self.multicast or told or not local
 
     @classmethod
+    def of(cls, env: Environment, **settings: Any) -> SessionConfig:
+        """Return the settings that each session of this process has, with some more.
+
+        Args:
+            env: The settings of the process.
+            settings: Attributes of the result.
+        """
+        shared: dict[str, Any] = {
+            "rendezvous": env.rendezvous,
+            "connect": env.connect,
+            "multicast": env.multicast,
+            "keys": keys_of(env),
+            "config_file": env.zenoh_config,
+            "override": env.zenoh_override,
+        }
+        return cls(**(shared | settings))
+
+    @classmethod
     def node(cls, env: Environment) -> SessionConfig:
         """Return the settings of a node's session."""
-        client = env.mode == "client"
-        return cls(
+        return cls.of(
+            env,
             mode=env.mode,
-            rendezvous=env.rendezvous,
-            connect=env.connect,
-            listen=() if client else env.listen,
-            multicast=env.multicast,
+            listen=() if env.mode == "client" else env.listen,
             shared_memory=env.shared_memory,
-            keys=keys_of(env),
             open_timeout=_ROUTER_TIMEOUT,
-            config_file=env.zenoh_config,
-            override=env.zenoh_override,
         )
 
     @classmethod
@@ -142,17 +154,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
             env: The settings of the process.
             timeout: Time limit for connecting, in seconds.
         """
-        return cls(
-            mode="client",
-            rendezvous=env.rendezvous,
-            connect=env.connect,
-            must_connect=True,
-            open_timeout=timeout,
-            multicast=env.multicast,
-            keys=keys_of(env),
-            config_file=env.zenoh_config,
-            override=env.zenoh_override,
-        )
+        return cls.of(env, mode="client", must_connect=True, open_timeout=timeout)
 
 
 def keys_of(env: Environment) -> KeyFolder | None:
@@ -192,6 +194,7 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
         connect = [connect_endpoint(endpoint) for endpoint in connect]
     listen = _listen(config)
     local = not config.reaches_beyond
+    sharing = {"enabled": True, "message_size_threshold": config.shared_memory}
     must_listen = config.mode == "router"
     must_connect = config.must_connect or config.mode == "client"
     return {
@@ -207,19 +210,16 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             },
         },
         "listen": {"endpoints": listen, "exit_on_failure": must_listen, "timeout_ms": 0},
-        "open": {
-            "return_conditions": {
-                "connect_scouted": must_connect,
-                "declares": must_connect,
-            }
-        },
+        "open": {"return_conditions": dict.fromkeys(("connect_scouted", "declares"), must_connect)},
         "scouting": {
             "multicast": {"enabled": config.multicast, "autoconnect": _AUTOCONNECT},
             "gossip": {"enabled": True} | (_ONE_DIALS if local else {}),
         },
         "timestamping": {"enabled": True},
         "transport": {
-            "shared_memory": _shared_memory(config.shared_memory),
+            "shared_memory": {"enabled": True, "transport_optimization": sharing}
+            if config.shared_memory
+            else {"enabled": False},
             "unicast": _LOCAL_LINKS if local else {"open_timeout": _OPEN_BEYOND_MS},
             "link": {"tx": {"lease": _LEASE_MS if local else _LEASE_BEYOND_MS, "keep_alive": 4}},
         },
@@ -271,15 +271,6 @@ def _tls(keys: KeyFolder) -> dict[str, Any]:
         "root_ca_certificate": str(keys.authority),
         **{f"{end}_certificate": str(keys.certificate) for end in ("listen", "connect")},
         **{f"{end}_private_key": str(keys.key) for end in ("listen", "connect")},
-    }
-
-
-def _shared_memory(threshold: int) -> dict[str, Any]:
-    if not threshold:
-        return {"enabled": False}
-    return {
-        "enabled": True,
-        "transport_optimization": {"enabled": True, "message_size_threshold": threshold},
     }
 
 

@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 import zenoh
-import zenoh.ext
 
 from rosz.errors import ClosedError, TransportError
 from rosz.session.at_exit import ENDING, leak_at_exit
@@ -20,15 +19,12 @@ __all__ = (
     "Declared",
     "PullSubscriber",
     "RawPublisher",
-    "caching_publisher",
-    "history_subscriber",
     "open_channel",
     "translate_errors",
 )
 
 _CHANNEL_SIZE = 1 << 20
 """Capacity of a channel: more items than ever arrive before a thread of Python receives them."""
-_HEARTBEAT_SECONDS = 0.5
 
 _log = logging.getLogger("rosz.session")
 
@@ -201,49 +197,3 @@ class RawPublisher(Declared):
             raise ClosedError(f"nobody hears '{self.key}': the publisher is closed")
         with translate_errors(f"look for subscribers of '{self.key}'"):
             return bool(self._entity.matching_status.matching)
-
-
-def caching_publisher(raw: Any, key: str, cache: int, **qos: Any) -> Any:
-    """Declare a publisher that keeps its newest samples for late joiners, as rmw_zenoh does.
-
-    Args:
-        raw: The session of Zenoh.
-        key: The key expression to publish on.
-        cache: The number of samples to keep.
-        qos: The options ``congestion_control`` and ``reliability`` of Zenoh.
-    """
-    # Zenoh requires both arguments.
-    heartbeat = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_SECONDS)
-    return zenoh.ext.declare_advanced_publisher(
-        raw,
-        key,
-        cache=zenoh.ext.CacheConfig(cache),
-        publisher_detection=True,
-        sample_miss_detection=heartbeat
-        if qos.get("reliability") == zenoh.Reliability.RELIABLE
-        else None,
-        **qos,
-    )
-
-
-def history_subscriber(raw: Any, key: str, handler: Any, history: int, **options: Any) -> Any:
-    """Declare a subscriber that queries the caches of publishers, as rmw_zenoh does.
-
-    Args:
-        raw: The session of Zenoh.
-        key: The key expression to subscribe to.
-        handler: A channel. A callback would run while Zenoh holds a lock that closing needs.
-        history: The number of samples to ask each publisher for.
-        options: Zenoh's ``allowed_origin``, and ``recover``: whether to notice and fetch samples
-            that were missed.
-    """
-    recovery = zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
-    return zenoh.ext.declare_advanced_subscriber(
-        raw,
-        key,
-        handler,
-        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history),
-        recovery=recovery if options.pop("recover") else None,
-        subscriber_detection=True,
-        **options,
-    )

@@ -92,7 +92,10 @@ class MeshReadiness:
                 self.ready.set()
                 callbacks, self._callbacks = self._callbacks, []
             for callback in callbacks:
-                _call(callback)
+                try:
+                    callback()
+                except RoszError as error:
+                    _log.warning("cannot send what was held: %s", error)
 
     def _wait(self) -> None:
         deadline = time.monotonic() + self._timeout
@@ -101,12 +104,7 @@ class MeshReadiness:
                 return
 
     def _missing(self, timeout: float) -> set[str]:
-        """Return the neighbours that the session is not linked to yet."""
-        missing = self._neighbours(timeout) - {self._session.zid, *self._session.peers()}
-        return missing - self._session.out_of_reach() if missing else missing
-
-    def _neighbours(self, timeout: float) -> set[str]:
-        """Return all sessions that those linked to this one are linked to."""
+        """Return the sessions that neighbours are linked to, and that this one is not yet."""
         found: set[str] = set()
         for reply in self._session.get(self._key, timeout=min(timeout, _QUERY_TIMEOUT)):
             if reply.ok:
@@ -114,14 +112,8 @@ class MeshReadiness:
                     found.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
                 except msgspec.DecodeError as error:
                     _log.warning("no list of links from '%.100s': %s", reply.key, error)
-        return found
-
-
-def _call(callback: Callable[[], None]) -> None:
-    try:
-        callback()
-    except RoszError as error:
-        _log.warning("cannot send what was held: %s", error)
+        missing = found - {self._session.zid, *self._session.peers()}
+        return missing - self._session.out_of_reach() if missing else missing
 
 
 def serve_links(session: Session) -> Closable:

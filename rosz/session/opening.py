@@ -6,7 +6,8 @@ import json
 import logging
 import os
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import msgspec
 import zenoh
@@ -22,6 +23,7 @@ from rosz.session.config import (
     zenoh_settings,
 )
 from rosz.session.declared import translate_errors
+from rosz.session.local_peers import LocalPeer, LocalPeers
 from rosz.session.zenoh_workarounds import (
     SEGMENTS,
     connect_to_running,
@@ -31,10 +33,6 @@ from rosz.session.zenoh_workarounds import (
     remove_abandoned_segments,
 )
 from rosz.wire import Endpoint
-
-if TYPE_CHECKING:
-    from rosz.security import KeyFolder
-    from rosz.session.local_peers import LocalPeer, LocalPeers
 
 __all__ = ("open_raw", "places_of")
 
@@ -59,14 +57,23 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
             is refused.
         UsageError: The override text is malformed.
     """
-    config = _wait_for_busy_router(config, peers)
+    if config.mode == "client" and not config.must_connect and peers.is_any_running:
+        # When many nodes start at once, some come last.
+        longer = max(config.open_timeout, _BUSY_TIMEOUT)
+        config = msgspec.structs.replace(config, open_timeout=longer)
     reachable = reachable_config(config, peers)
     if reachable is None:
         raise _nobody(config)
-    config = _without_impossible_sharing(reachable)
+    config = reachable
+    if config.shared_memory and SEGMENTS.exists() and not os.access(SEGMENTS, os.W_OK):
+        _log.warning("no shared memory, for %s cannot be written to: samples go by links", SEGMENTS)
+        config = msgspec.structs.replace(config, shared_memory=0)
     settings = _settings(config)
     if own is not None:
-        _listen_as_registered(settings, own)
+        listen = json.loads(settings.get_json("listen/endpoints"))
+        if own.endpoint and EPHEMERAL in listen:
+            listen[listen.index(EPHEMERAL)] = own.endpoint
+            settings.insert_json5("listen/endpoints", json.dumps(listen))
         connect_to_running(settings, peers)
     remove_abandoned_segments()
     _log_refused_links(config)
@@ -89,16 +96,13 @@ def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
         UsageError: The override text is malformed, or a protocol cannot use keys.
     """
     settings = _settings(config)
+    found = [json.loads(settings.get_json(f"{way}/endpoints")) for way in ("listen", "connect")]
     listen, connect = (
-        json.loads(settings.get_json(f"{way}/endpoints")) for way in ("listen", "connect")
+        # A configuration file may list them by mode.
+        tuple((endpoints.get(config.mode) if isinstance(endpoints, dict) else endpoints) or ())
+        for endpoints in found
     )
-    return _of_mode(listen, config.mode), _of_mode(connect, config.mode)
-
-
-def _of_mode(endpoints: Any, mode: str) -> tuple[str, ...]:
-    """Return the endpoints of a mode; a configuration file may list them by mode."""
-    found = endpoints.get(mode) if isinstance(endpoints, dict) else endpoints
-    return tuple(found or ())
+    return listen, connect
 
 
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
@@ -120,29 +124,6 @@ def _settings(config: SessionConfig) -> zenoh.Config:
     return settings
 
 
-def _without_impossible_sharing(config: SessionConfig) -> SessionConfig:
-    """Turn shared memory off where it cannot be used, as in some containers."""
-    if not config.shared_memory or not SEGMENTS.exists() or os.access(SEGMENTS, os.W_OK):
-        return config
-    _log.warning("no shared memory, for %s cannot be written to: samples go by links", SEGMENTS)
-    return msgspec.structs.replace(config, shared_memory=0)
-
-
-def _wait_for_busy_router(config: SessionConfig, peers: LocalPeers) -> SessionConfig:
-    """Give a node more time to connect: when many start at once, some come last."""
-    if config.mode != "client" or config.must_connect or not peers.is_any_running:
-        return config
-    return msgspec.structs.replace(config, open_timeout=max(config.open_timeout, _BUSY_TIMEOUT))
-
-
-def _listen_as_registered(settings: zenoh.Config, own: LocalPeer) -> None:
-    """Listen at the port that others read in the registration."""
-    listen = json.loads(settings.get_json("listen/endpoints"))
-    if own.endpoint and EPHEMERAL in listen:
-        listen[listen.index(EPHEMERAL)] = own.endpoint
-        settings.insert_json5("listen/endpoints", json.dumps(listen))
-
-
 def _nobody(config: SessionConfig) -> TransportError:
     reasons = "".join(f"; no link to {reason}" for reason in _refused_links(config))
     return TransportError(
@@ -155,26 +136,25 @@ def _quoted(config: SessionConfig) -> str:
     return ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
 
 
-def _refused_links(config: SessionConfig) -> list[str]:
-    """Return the endpoints that refuse links for want of the right keys, each with the reason.
+def _refused_links(config: SessionConfig) -> Iterator[str]:
+    """Yield the endpoints that refuse links for want of the right keys, each with the reason.
 
     This connects to each endpoint, which takes seconds where nobody answers.
     """
-    endpoints = list(dict.fromkeys((config.rendezvous, *config.connect)))
-    if config.keys is not None:
-        endpoints = [connect_endpoint(endpoint) for endpoint in endpoints]
-    reasons = {endpoint: _why_refused(Endpoint(endpoint), config.keys) for endpoint in endpoints}
-    return [f"'{endpoint}': {reason}" for endpoint, reason in reasons.items() if reason]
+    for text in dict.fromkeys((config.rendezvous, *config.connect)):
+        endpoint = Endpoint(text if config.keys is None else connect_endpoint(text))
+        if endpoint.is_local or not endpoint.is_tcp:
+            continue
+        from rosz.security.handshake import refusal, wants_keys
 
-
-def _why_refused(endpoint: Endpoint, keys: KeyFolder | None) -> str:
-    if endpoint.is_local or not endpoint.is_tcp:
-        return ""
-    from rosz.security.handshake import refusal, wants_keys
-
-    if keys is not None:
-        return refusal(endpoint, keys)
-    return "it wants keys, and there are none here: set ROSZ_KEYS" if wants_keys(endpoint) else ""
+        if config.keys is not None:
+            reason = refusal(endpoint, config.keys)
+        elif wants_keys(endpoint):
+            reason = "it wants keys, and there are none here: set ROSZ_KEYS"
+        else:
+            reason = ""
+        if reason:
+            yield f"'{endpoint}': {reason}"
 
 
 def _log_refused_links(config: SessionConfig) -> None:
@@ -182,15 +162,13 @@ def _log_refused_links(config: SessionConfig) -> None:
 
     Zenoh decides which links this machine accepts, and its own log says which it refuses.
     """
+
+    def log_refusals_of_others() -> None:
+        for reason in _refused_links(config):
+            _log.warning("no link to %s", reason)
+
     if config.keys is not None and config.listen:
         zenoh.init_log_from_env_or("zenoh_link_tls=warn")
     if config.connect and not config.must_connect and config.mode != "client":
-        thread = threading.Thread(
-            target=_log_refusals_of_others, args=(config,), name="rosz-refusals", daemon=True
-        )
-        thread.start()
-
-
-def _log_refusals_of_others(config: SessionConfig) -> None:
-    for reason in _refused_links(config):
-        _log.warning("no link to %s", reason)
+        name = "rosz-refusals"
+        threading.Thread(target=log_refusals_of_others, name=name, daemon=True).start()

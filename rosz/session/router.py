@@ -18,7 +18,7 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import RoszError, TransportError
 from rosz.lifecycle import Lifecycle
-from rosz.session.config import SessionConfig, keys_of
+from rosz.session.config import SessionConfig
 from rosz.session.opening import places_of
 from rosz.session.session import Session
 from rosz.wire import Endpoint
@@ -58,16 +58,8 @@ class Router:
         listen = (*environment.listen, *listen)
         if environment.multicast and all(Endpoint(text).is_local for text in listen):
             listen += _reachable_endpoints(environment.rendezvous)
-        config = SessionConfig(
-            mode="router",
-            rendezvous=environment.rendezvous,
-            listen=listen,
-            connect=(*environment.connect, *connect),
-            multicast=environment.multicast,
-            keys=keys_of(environment),
-            config_file=environment.zenoh_config,
-            override=environment.zenoh_override,
-        )
+        both = (*environment.connect, *connect)
+        config = SessionConfig.of(environment, mode="router", listen=listen, connect=both)
         self.endpoints: tuple[str, ...]
         self.connect: tuple[str, ...]
         self.endpoints, self.connect = places_of(config)

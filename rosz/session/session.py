@@ -14,17 +14,16 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Self, Unpack
 
 import zenoh
+import zenoh.ext
 
 from rosz.lifecycle import Closable, Lifecycle
-from rosz.session.at_exit import ENDING, ClosedSession, still_open
+from rosz.session.at_exit import ENDING, ClosedSession
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
     CallbackThread,
     Declared,
     PullSubscriber,
     RawPublisher,
-    caching_publisher,
-    history_subscriber,
     open_channel,
     translate_errors,
 )
@@ -54,6 +53,7 @@ __all__ = ("Session",)
 
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 """What to do when a link is full, by whether to wait for it."""
+_HEARTBEAT_SECONDS = 0.5
 
 _log = logging.getLogger("rosz.session")
 
@@ -100,20 +100,21 @@ class Session:
                 is occupied or malformed, or a configuration value is refused.
             UsageError: The override text is malformed.
         """
-        registration = _register(config)
-        own = None if registration is None else registration.peer
-        try:
-            if peers is None or own is not None:
-                peers = LocalPeers.read(config.rendezvous, own)
-            raw = open_raw(config, peers, own)
-        except BaseException:
-            if registration is not None:
+        if config.mode == "client" or not config.hold_rendezvous:
+            raw = open_raw(config, peers or LocalPeers.read(config.rendezvous))
+            registration = None
+        else:
+            reachable = config.mode == "peer"
+            registration = LocalRegistration(config.rendezvous, reachable=reachable)
+            try:
+                others = LocalPeers.read(config.rendezvous, registration.peer)
+                raw = open_raw(config, others, registration.peer)
+            except BaseException:
                 registration.close()
-            raise
+                raise
+            registration.opened(str(raw.zid()))
         session = cls(raw, secured=config.keys is not None, rendezvous=config.rendezvous)
-        if registration is not None:
-            registration.opened(session.zid)
-            session._registration = registration
+        session._registration = registration
         if config.mode != "client" or config.reaches_beyond:
             session._link_watch = close_links_at_once(raw)
         return session
@@ -177,17 +178,27 @@ class Session:
             block: Whether a full link makes ``put`` wait instead of dropping the sample.
             cache: The number of samples kept for late joiners (transient local); 0 for none.
         """
-        congestion = _CONGESTION[block]
-        reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
+        qos = {
+            "congestion_control": _CONGESTION[block],
+            "reliability": zenoh.Reliability.RELIABLE
+            if reliable
+            else zenoh.Reliability.BEST_EFFORT,
+        }
+        self._lifecycle.check_open(f"publish on '{key}'")
         with translate_errors(f"publish on '{key}'"):
             if not cache:
-                plain = self._raw.declare_publisher(
-                    key, congestion_control=congestion, reliability=reliability
-                )
-                return RawPublisher(key, plain)
-            raw = still_open(self._raw)
-            caching = caching_publisher(
-                raw, key, cache, congestion_control=congestion, reliability=reliability
+                return RawPublisher(key, self._raw.declare_publisher(key, **qos))
+            # As rmw_zenoh does it. Zenoh requires both arguments of the detection.
+            detection = zenoh.ext.MissDetectionConfig(
+                heartbeat=None, sporadic_heartbeat=_HEARTBEAT_SECONDS
+            )
+            caching = zenoh.ext.declare_advanced_publisher(
+                self._raw,
+                key,
+                cache=zenoh.ext.CacheConfig(cache),
+                publisher_detection=True,
+                sample_miss_detection=detection if reliable else None,
+                **qos,
             )
             return RawPublisher(key, caching)
 
@@ -238,11 +249,20 @@ class Session:
         recover: bool,
         origin: zenoh.Locality | None,
     ) -> Any:
+        self._lifecycle.check_open(f"subscribe to '{key}'")
         with translate_errors(f"subscribe to '{key}'"):
             if not history:
                 return self._raw.declare_subscriber(key, handler, allowed_origin=origin)
-            return history_subscriber(
-                still_open(self._raw), key, handler, history, recover=recover, allowed_origin=origin
+            # As rmw_zenoh does it.
+            recovery = zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
+            return zenoh.ext.declare_advanced_subscriber(
+                self._raw,
+                key,
+                handler,
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history),
+                recovery=recovery if recover else None,
+                subscriber_detection=True,
+                allowed_origin=origin,
             )
 
     def queryable(
@@ -451,10 +471,3 @@ class Session:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _register(config: SessionConfig) -> LocalRegistration | None:
-    """Register a session that others may want to meet."""
-    if config.mode == "client" or not config.hold_rendezvous:
-        return None
-    return LocalRegistration(config.rendezvous, reachable=config.mode == "peer")
