@@ -13,7 +13,6 @@ import socket
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -243,7 +242,14 @@ def key_settings(config: SessionConfig) -> dict[str, Any]:
     from rosz.security import access_control
 
     return {
-        "transport/link/tls": _tls(config.keys),
+        "transport/link/tls": {
+            "enable_mtls": True,
+            "verify_name_on_connect": True,
+            "close_link_on_expiration": True,
+            "root_ca_certificate": str(config.keys.authority),
+            **{f"{end}_certificate": str(config.keys.certificate) for end in ("listen", "connect")},
+            **{f"{end}_private_key": str(config.keys.key) for end in ("listen", "connect")},
+        },
         "access_control": access_control(config.keys.rules, _loopback_interfaces()),
     }
 
@@ -261,17 +267,6 @@ def overrides(text: str) -> Mapping[str, str]:
             raise UsageError(f"ZENOH_CONFIG_OVERRIDE has '{part}'; expected 'path/to/key=json'")
         found[key.strip()] = value.strip()
     return found
-
-
-def _tls(keys: KeyFolder) -> dict[str, Any]:
-    return {
-        "enable_mtls": True,
-        "verify_name_on_connect": True,
-        "close_link_on_expiration": True,
-        "root_ca_certificate": str(keys.authority),
-        **{f"{end}_certificate": str(keys.certificate) for end in ("listen", "connect")},
-        **{f"{end}_private_key": str(keys.key) for end in ("listen", "connect")},
-    }
 
 
 def connect_endpoint(text: str) -> str:
@@ -313,22 +308,30 @@ def listen_endpoints(
     meeting, others = Endpoint(rendezvous), [Endpoint(text) for text in listen]
     if keys:
         meeting, others = meeting.secured(), [endpoint.secured() for endpoint in others]
-    wide = [endpoint for endpoint in others if _covers(endpoint, meeting.port)]
-    held = _tcp_endpoints(meeting) if wide and meeting.protocol == "tcp" else []
+    wide = [
+        endpoint
+        for endpoint in others
+        if endpoint.is_tcp and endpoint.is_any_address and endpoint.port == meeting.port
+        if not endpoint.configuration
+    ]
+    held = []
+    if wide and meeting.protocol == "tcp" and meeting.port is not None:
+        addresses = _addresses(meeting.host)
+        held = [Endpoint.of("tcp", address, meeting.port) for address in addresses]
     if not held:
-        return _texts(meeting, *others)
-    if any(endpoint.protocol == "tls" for endpoint in wide) and sys.platform == "linux":
-        split = [
-            one
-            for endpoint in others
-            for one in (_on_each_interface(endpoint) if endpoint in wide else [endpoint])
-        ]
-        own = [one.on_interface(name) for one in held for name in _loopback_interfaces()]
-        return _texts(*split, *own)
-    all_v4 = any(endpoint.host == "0.0.0.0" for endpoint in wide)  # noqa: S104
-    all_v6 = any(endpoint.host == "::" for endpoint in wide)  # on Linux, it serves IPv4 as well
-    rest = [one for one in held if not (all_v6 or (all_v4 and one.host.startswith("127.")))]
-    return _texts(*others, *rest)
+        found = [meeting, *others]
+    elif any(endpoint.protocol == "tls" for endpoint in wide) and sys.platform == "linux":
+        found = []
+        for endpoint in others:
+            found += _on_each_interface(endpoint) if endpoint in wide else [endpoint]
+        found += [one.on_interface(name) for one in held for name in _loopback_interfaces()]
+    else:
+        hosts = {endpoint.host for endpoint in wide}
+        all_v4, all_v6 = "0.0.0.0" in hosts, "::" in hosts  # noqa: S104
+        # On Linux, :: serves IPv4 as well.
+        rest = [one for one in held if not (all_v6 or (all_v4 and one.host.startswith("127.")))]
+        found = [*others, *rest]
+    return tuple(dict.fromkeys(map(str, found)))
 
 
 def _loopback_interfaces() -> list[str]:
@@ -337,20 +340,6 @@ def _loopback_interfaces() -> list[str]:
     if not _INTERFACES.is_dir():
         return [name for name in names if name.startswith("lo0")]
     return [name for name in names if _interface_type(name) == _LOOPBACK]
-
-
-def _texts(*endpoints: Endpoint) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(map(str, endpoints)))
-
-
-def _covers(endpoint: Endpoint, port: int | None) -> bool:
-    """Tell whether an endpoint is a port at all addresses of this machine."""
-    return (
-        endpoint.is_tcp
-        and endpoint.is_any_address
-        and endpoint.port == port
-        and not endpoint.configuration
-    )
 
 
 def _on_each_interface(endpoint: Endpoint) -> Iterator[Endpoint]:
@@ -368,13 +357,6 @@ def _interface_type(name: str) -> str:
         return ""
 
 
-def _tcp_endpoints(endpoint: Endpoint) -> list[Endpoint]:
-    """Return an endpoint once for each address of its host name."""
-    if (port := endpoint.port) is None:
-        return []
-    return [Endpoint.of("tcp", address, port) for address in _addresses(endpoint.host)]
-
-
 def _addresses(host: str) -> list[str]:
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
@@ -386,12 +368,11 @@ def _addresses(host: str) -> list[str]:
 def _is_own(host: str) -> bool:
     """Tell whether all addresses of a host name belong to this machine."""
     addresses = _addresses(host)
-    return bool(addresses) and all(map(_can_bind, addresses))
-
-
-def _can_bind(address: str) -> bool:
-    family = socket.AF_INET6 if ":" in address else socket.AF_INET
-    with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
-        probe.bind((address, 0))
-        return True
-    return False
+    for address in addresses:
+        family = socket.AF_INET6 if ":" in address else socket.AF_INET
+        try:
+            with socket.socket(family, socket.SOCK_DGRAM) as probe:
+                probe.bind((address, 0))
+        except OSError:
+            return False
+    return bool(addresses)

@@ -74,7 +74,7 @@ class LocalPeer(msgspec.Struct, frozen=True):
     @property
     def endpoint(self) -> str:
         """The endpoint where it can be reached directly; empty if there is none."""
-        return str(Endpoint.of("tcp", _LOOPBACK, self.port)) if self.port else ""
+        return f"tcp/{_LOOPBACK}:{self.port}" if self.port else ""
 
 
 class LocalPeers:
@@ -123,6 +123,11 @@ class LocalPeers:
     def stopped(self) -> tuple[LocalPeer, ...]:
         """The sessions whose processes are stopped."""
         return tuple(peer for peer in self._peers if peer.is_stopped)
+
+    @property
+    def running(self) -> list[str]:
+        """The endpoints of the sessions whose processes are not stopped."""
+        return [peer.endpoint for peer in self._peers if peer.port and not peer.is_stopped]
 
     @cached_property
     def is_any_running(self) -> bool:

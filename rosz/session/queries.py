@@ -210,12 +210,7 @@ class Query:
         """
         _check_not_ending()
         try:
-            self._raw.reply(
-                key,
-                payload,
-                attachment=attachment,
-                timestamp=None if stamp is None else to_timestamp(stamp),
-            )
+            self._raw.reply(key, payload, attachment=attachment, timestamp=to_timestamp(stamp))
         except zenoh.ZError as error:
             raise TransportError(f"cannot reply on '{key}': {error}") from error
 

@@ -67,8 +67,10 @@ def stamp_of(timestamp: zenoh.Timestamp | None) -> Stamp | None:
     return Stamp(seconds * _SECOND + nanoseconds, str(timestamp.get_id()))
 
 
-def to_timestamp(stamp: Stamp) -> zenoh.Timestamp:
+def to_timestamp(stamp: Stamp | None) -> zenoh.Timestamp | None:
     """Return a stamp as a Zenoh timestamp."""
+    if stamp is None:
+        return None
     seconds, nanoseconds = divmod(stamp.time, _SECOND)
     digits = stamp.id if len(stamp.id) % 2 == 0 else "0" + stamp.id
     # Zenoh prints an id as one number, but takes it as little-endian bytes.

@@ -146,7 +146,7 @@ class Session:
                 key,
                 payload,
                 attachment=attachment,
-                timestamp=None if stamp is None else to_timestamp(stamp),
+                timestamp=to_timestamp(stamp),
                 congestion_control=_CONGESTION[block],
             )
 
@@ -158,7 +158,7 @@ class Session:
             self._raw.delete(
                 key,
                 attachment=attachment,
-                timestamp=None if stamp is None else to_timestamp(stamp),
+                timestamp=to_timestamp(stamp),
                 congestion_control=_CONGESTION[True],
             )
 
@@ -178,12 +178,8 @@ class Session:
             block: Whether a full link makes ``put`` wait instead of dropping the sample.
             cache: The number of samples kept for late joiners (transient local); 0 for none.
         """
-        qos = {
-            "congestion_control": _CONGESTION[block],
-            "reliability": zenoh.Reliability.RELIABLE
-            if reliable
-            else zenoh.Reliability.BEST_EFFORT,
-        }
+        reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
+        qos: Any = {"congestion_control": _CONGESTION[block], "reliability": reliability}
         self._lifecycle.check_open(f"publish on '{key}'")
         with translate_errors(f"publish on '{key}'"):
             if not cache:

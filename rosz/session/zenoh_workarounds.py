@@ -137,22 +137,16 @@ def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig 
     """
     if config.mode != "client" or config.config_file:
         return config
-    local = _local_endpoints(config, peers)
-    wanted = (*config.connect, *local) if config.must_connect else (*local, *config.connect)
-    if wanted == (config.rendezvous,):
+    local = [config.rendezvous]
+    if peers.stopped_holder is not None:
+        local = peers.running
+        if not local and not config.connect:
+            raise TransportError(peers.why_unanswered)
+    wanted = [*config.connect, *local] if config.must_connect else [*local, *config.connect]
+    if wanted == [config.rendezvous]:
         return config
     endpoint = first_listening(wanted, config.open_timeout)
     return msgspec.structs.replace(config, rendezvous=endpoint, connect=()) if endpoint else None
-
-
-def _local_endpoints(config: SessionConfig, peers: LocalPeers) -> tuple[str, ...]:
-    """Return the rendezvous, or the endpoints of running sessions if its holder is stopped."""
-    if peers.stopped_holder is None:
-        return (config.rendezvous,)
-    running = tuple(peer.endpoint for peer in peers if peer.port and not peer.is_stopped)
-    if not running and not config.connect:
-        raise TransportError(peers.why_unanswered)
-    return running
 
 
 def connect_to_running(settings: zenoh.Config, peers: LocalPeers) -> None:
@@ -163,15 +157,9 @@ def connect_to_running(settings: zenoh.Config, peers: LocalPeers) -> None:
     pid = peers.stopped_holder
     if pid is None:
         return
-    _log.warning(
-        "%s holds the meeting point %s and is stopped: it is not reached until it goes on (%s)",
-        describe_process(pid),
-        peers.rendezvous,
-        how_to_resume(pid),
-    )
-    running = [
-        f"{peer.endpoint}#{_RARE_RETRIES}" for peer in peers if peer.port and not peer.is_stopped
-    ]
+    what = f"{describe_process(pid)} holds the meeting point {peers.rendezvous} and is stopped"
+    _log.warning("%s: it is not reached until it goes on (%s)", what, how_to_resume(pid))
+    running = [f"{endpoint}#{_RARE_RETRIES}" for endpoint in peers.running]
     connect = [*running, *json.loads(settings.get_json("connect/endpoints"))]
     settings.insert_json5("connect/endpoints", json.dumps(connect))
     settings.insert_json5("connect/timeout_ms", "-1")  # in the background
@@ -191,25 +179,19 @@ def open_and_listen(settings: zenoh.Config, rendezvous: str, opened: Callable[[]
     """
     raw: Any = opened()
     endpoint = Endpoint(rendezvous)
-    if _can_be_refused(endpoint) and _listens_at(endpoint, settings):
-        for _ in range(_ATTEMPTS):
-            if is_listening(rendezvous):
-                break
-            raw.close()
-            # Two processes that were refused together must not try again together.
-            time.sleep(_PAUSE * os.urandom(1)[0] / 256)
-            raw = opened()
+    listen = settings.get_json("listen/endpoints")
+    if not endpoint.is_local or not (endpoint.is_unix or endpoint.protocol == "tcp"):
+        return raw
+    if rendezvous not in listen and f":{endpoint.port}" not in listen:  # also by another host name
+        return raw
+    for _ in range(_ATTEMPTS):
+        if is_listening(rendezvous):
+            break
+        raw.close()
+        # Two processes that were refused together must not try again together.
+        time.sleep(_PAUSE * os.urandom(1)[0] / 256)
+        raw = opened()
     return raw
-
-
-def _can_be_refused(endpoint: Endpoint) -> bool:
-    return endpoint.is_local and (endpoint.is_unix or endpoint.protocol == "tcp")
-
-
-def _listens_at(endpoint: Endpoint, settings: zenoh.Config) -> bool:
-    """Tell whether a configuration listens at an endpoint, also under another host name."""
-    endpoints = settings.get_json("listen/endpoints")
-    return str(endpoint) in endpoints or f":{endpoint.port}" in endpoints
 
 
 class _StoppedPeers(msgspec.Struct, frozen=True):
@@ -356,31 +338,16 @@ def remove_abandoned_segments(folder: Path = SEGMENTS, *, min_age: float = _MIN_
     Returns:
         The names of the files removed.
     """
-    return [path.name for path in _old_segments(folder, time.time() - min_age) if _remove(path)]
-
-
-def _old_segments(folder: Path, before: float) -> Iterator[Path]:
-    """Yield the segments of this user that were made before a time."""
-    with suppress(OSError):  # no such folder: not Linux
-        for path in folder.iterdir():
-            if path.suffix == _SUFFIX:
-                with suppress(FileNotFoundError):  # its owner was faster
-                    found = path.stat()
-                    if found.st_uid == os.getuid() and found.st_ctime < before:
-                        yield path
-
-
-def _remove(path: Path) -> bool:
-    """Remove a segment if nobody holds a lock on it; return whether it was removed."""
-    try:
-        file = os.open(path, os.O_RDWR)
-    except OSError:  # gone meanwhile, or of another user
-        return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        path.unlink()
-    except OSError:  # in use, or gone meanwhile
-        return False
-    finally:
-        os.close(file)
-    return True
+    before = time.time() - min_age
+    removed: list[str] = []
+    for path in folder.glob("*" + _SUFFIX):
+        # Another process may remove it first, use it, or own it.
+        with suppress(OSError):
+            found = path.stat()
+            if found.st_uid != os.getuid() or found.st_ctime >= before:
+                continue
+            with path.open("r+b") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                path.unlink()
+                removed.append(path.name)
+    return removed
