@@ -89,10 +89,9 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         home = Path(env.get("ROS_HOME") or Path(env.get("HOME") or "/") / ".ros")
         connect = _endpoints("ROSZ_CONNECT", env)
         listen = _endpoints("ROSZ_LISTEN", env)
-        rendezvous = env.get("ROSZ_RENDEZVOUS", "")
         return cls(
             domain=_number("ROS_DOMAIN_ID", env, f"a number from 0 to {_MAX_DOMAIN}", _MAX_DOMAIN),
-            rendezvous=_endpoint("ROSZ_RENDEZVOUS", rendezvous) or DEFAULT_RENDEZVOUS,
+            rendezvous=_endpoint("ROSZ_RENDEZVOUS", env.get("ROSZ_RENDEZVOUS", "")),
             connect=connect,
             listen=listen,
             mode=_mode(env.get("ROSZ_MODE", ""), dials=bool(connect and not listen)),
@@ -126,10 +125,9 @@ def package_index(environment: Environment) -> PackageIndex:
 
 def _shipped_roots() -> list[Path]:
     """Return the folders of the packages that are part of rosz."""
-    package = Path(__file__).parent
-    share = package / "share"
-    source_tree = package.parent / "interfaces"
-    return [share, *([source_tree] if not (share / "interfaces").is_dir() else [])]
+    share = Path(__file__).parent / "share"
+    source_tree = share.parent.parent / "interfaces"
+    return [share] if (share / "interfaces").is_dir() else [share, source_tree]
 
 
 def _registered_roots() -> list[Path]:
@@ -177,13 +175,13 @@ def _working_folder() -> Path:
 
 
 def _endpoints(name: str, env: Mapping[str, str]) -> tuple[str, ...]:
-    parts = env.get(name, "").split(",")
-    return tuple(_endpoint(name, part.strip()) for part in parts if part.strip())
+    parts = [part.strip() for part in env.get(name, "").split(",")]
+    return tuple(_endpoint(name, part) for part in parts if part)
 
 
 def _endpoint(name: str, text: str) -> str:
     if not text:
-        return ""
+        return DEFAULT_RENDEZVOUS
     from rosz.wire import Endpoint  # unset in most processes, which can do without the import
 
     return str(Endpoint.parse(text, name))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import socket
 import threading
-import time
 from collections.abc import Sequence
+from itertools import takewhile
 
 from rosz.wire import Endpoint
 
@@ -26,7 +26,6 @@ def first_listening(endpoints: Sequence[str], timeout: float) -> str:
         endpoints: The endpoints, the most preferred one first.
         timeout: Time limit in seconds.
     """
-    began = time.monotonic()
     answers: dict[str, bool] = {}
     changed = threading.Condition()
     over = threading.Event()
@@ -41,21 +40,17 @@ def first_listening(endpoints: Sequence[str], timeout: float) -> str:
                 return
             over.wait(_AGAIN_SECONDS)
 
-    def first() -> str:
-        late = time.monotonic() - began > _GRACE_SECONDS
-        for endpoint in endpoints:
-            if answers.get(endpoint):
-                return endpoint
-            if endpoint not in answers and not late:
-                return ""
-        return ""
+    def preferred() -> bool:
+        """Tell whether an endpoint answered, and all that are preferred to it have been tried."""
+        known = list(takewhile(answers.__contains__, endpoints))
+        return any(answers[endpoint] for endpoint in known)
 
     for endpoint in endpoints:
         name = f"rosz-probe {endpoint}"
         threading.Thread(target=try_endpoint, args=(endpoint,), name=name, daemon=True).start()
     with changed:
-        changed.wait_for(first, min(_GRACE_SECONDS, timeout))
-        changed.wait_for(first, max(0.0, timeout - _GRACE_SECONDS))
+        if not changed.wait_for(preferred, min(_GRACE_SECONDS, timeout)):
+            changed.wait_for(lambda: any(answers.values()), max(0.0, timeout - _GRACE_SECONDS))
         over.set()
         return next((endpoint for endpoint in endpoints if answers.get(endpoint)), "")
 

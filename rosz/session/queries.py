@@ -152,12 +152,10 @@ class Querier(Declared):
         Raises:
             ClosedError: The session is closed, or ``cancel`` was cancelled.
         """
+        token = cancel.token
         try:
             handler = self._get(
-                open_channel(),
-                payload=payload,
-                attachment=attachment,
-                cancellation_token=cancel.token,
+                open_channel(), payload=payload, attachment=attachment, cancellation_token=token
             )
         except zenoh.ZError:
             with translate_errors(f"query '{self._key}'"):

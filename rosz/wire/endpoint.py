@@ -57,12 +57,13 @@ class Endpoint(msgspec.Struct, frozen=True):
     @property
     def protocol(self) -> str:
         """The protocol, such as ``tcp``."""
-        return self._locator.partition("/")[0]
+        return self.text.partition("/")[0]
 
     @property
     def address(self) -> str:
         """The address, such as ``robot1:7447`` or the path of a unix socket."""
-        return self._locator.partition("/")[2]
+        locator = self.text.partition("#")[0].partition("?")[0]
+        return locator.partition("/")[2]
 
     @property
     def host(self) -> str:
@@ -94,12 +95,8 @@ class Endpoint(msgspec.Struct, frozen=True):
     @property
     def is_local(self) -> bool:
         """Whether the text says that links to it stay on this machine."""
-        host = self.host
-        return (
-            self.protocol.startswith("unix")
-            or host in {"localhost", "::1"}
-            or host.startswith("127.")
-        )
+        local = self.host in {"localhost", "::1"} or self.host.startswith("127.")
+        return local or self.protocol.startswith("unix")
 
     @property
     def is_any_address(self) -> bool:
@@ -112,15 +109,13 @@ class Endpoint(msgspec.Struct, frozen=True):
         Raises:
             UsageError: The protocol cannot use keys.
         """
-        _, _, rest = self.text.partition("/")
-        if self.protocol in {"tls", "unixsock-stream"} or (
-            self.protocol == "tcp" and self.is_local
-        ):
+        if self.protocol == "tls" or self.is_unix or (self.protocol == "tcp" and self.is_local):
             return self
+        tls = f"tls/{self.text.partition('/')[2]}"
         if self.protocol == "tcp":
-            return Endpoint(f"tls/{rest}")
+            return Endpoint(tls)
         raise UsageError(
-            f"'{self}': with ROSZ_KEYS, links beyond this machine are tls; expected 'tls/{rest}'"
+            f"'{self}': with ROSZ_KEYS, links beyond this machine are tls; expected '{tls}'"
         )
 
     def on_interface(self, name: str) -> Endpoint:
@@ -130,7 +125,3 @@ class Endpoint(msgspec.Struct, frozen=True):
     def __str__(self) -> str:
         """Return the text."""
         return self.text
-
-    @property
-    def _locator(self) -> str:
-        return self.text.partition("#")[0].partition("?")[0]
