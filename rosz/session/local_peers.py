@@ -202,11 +202,10 @@ class LocalRegistration:
         self.peer: LocalPeer = LocalPeer(_pid_namespace(), os.getpid(), 0)
         self._rendezvous = rendezvous
         self._sockets: list[socket.socket] = []
-        self._reserved: socket.socket | None = None
+        self._reserved = socket.socket()
         if sys.platform != "linux":
             return
         if reachable:
-            self._reserved = socket.socket()
             # Two sockets with this option may have one port, as long as only one of them listens.
             self._reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             self._reserved.bind((_LOOPBACK, 0))
@@ -215,28 +214,22 @@ class LocalRegistration:
         self._bind()
 
     def opened(self, zid: str) -> None:
-        """Add the id of the session, which is open now."""
+        """Add the id of the session, which is open now, and release its port."""
         self.peer = msgspec.structs.replace(self.peer, zid=zid)
         if self._sockets:
             self._bind()
-        self._release_port()
+        self._reserved.close()
 
     def close(self) -> None:
         """Remove the registration; a second call has no effect."""
-        self._release_port()
-        for one in self._sockets:
+        for one in (self._reserved, *self._sockets):
             one.close()
-
-    def _release_port(self) -> None:
-        if self._reserved is not None:
-            self._reserved.close()
 
     def _bind(self) -> None:
         made = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        peer = self.peer
-        parts = (peer.namespace, peer.pid, peer.port, peer.zid)
+        parts = map(str, msgspec.structs.astuple(self.peer))
         try:
-            made.bind(f"\0{_prefix(self._rendezvous)}{'/'.join(map(str, parts))}")
+            made.bind(f"\0{_prefix(self._rendezvous)}{'/'.join(parts)}")
         except OSError as error:
             made.close()
             if error.errno != errno.EADDRINUSE:
@@ -301,7 +294,9 @@ def which_listens(endpoint: Endpoint, candidates: Iterable[int]) -> int | None:
         candidates: The ids of the processes to consider.
     """
     if endpoint.is_unix:
-        pid = _unix_listener(endpoint.address)
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+            probe.setblocking(False)
+            pid = 0 if probe.connect_ex(endpoint.address) else pid_of_peer(probe)
         return pid if pid in candidates else None
     if not endpoint.is_tcp or endpoint.port is None:
         return None
@@ -309,15 +304,6 @@ def which_listens(endpoint: Endpoint, candidates: Iterable[int]) -> int | None:
         name for name, port, state in _tcp_sockets() if state == _LISTENS and port == endpoint.port
     }
     return next((pid for pid in candidates if not wanted.isdisjoint(_open_files(pid))), None)
-
-
-def _unix_listener(path: str) -> int:
-    """Return the process that listens at a unix socket; 0 if that is unknown."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-        probe.setblocking(False)
-        if probe.connect_ex(path):
-            return 0
-        return pid_of_peer(probe)
 
 
 def pid_of_peer(connection: socket.socket) -> int:

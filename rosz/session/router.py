@@ -57,7 +57,10 @@ class Router:
     ) -> None:
         listen = (*environment.listen, *listen)
         if environment.multicast and all(Endpoint(text).is_local for text in listen):
-            listen += _reachable_endpoints(environment.rendezvous)
+            # Sessions that find this router by multicast have to reach it.
+            meeting = Endpoint(environment.rendezvous)
+            if meeting.protocol == "tcp" and meeting.port is not None:
+                listen += (f"tcp/0.0.0.0:{meeting.port}",)
         both = (*environment.connect, *connect)
         config = SessionConfig.of(environment, mode="router", listen=listen, connect=both)
         self.endpoints: tuple[str, ...]
@@ -68,7 +71,8 @@ class Router:
             self.session: Session = self._lifecycle.keep(Session.open(config))
         except TransportError as error:
             raise _explain(error, self.endpoints) from error
-        self._lifecycle.keep(_NewInterfaces(config))
+        if any(_ON_INTERFACE in place for place in self.endpoints):
+            self._lifecycle.keep(_NewInterfaces(config))
 
     def close(self) -> None:
         """Close the router; a second call has no effect."""
@@ -79,14 +83,6 @@ class Router:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _reachable_endpoints(rendezvous: str) -> tuple[str, ...]:
-    """Return where sessions that find this router by multicast can connect to it."""
-    endpoint = Endpoint(rendezvous)
-    if endpoint.protocol != "tcp" or endpoint.port is None:
-        return ()
-    return (str(Endpoint.of("tcp", "0.0.0.0", endpoint.port)),)  # noqa: S104  # as multicast needs
 
 
 def _explain(error: TransportError, endpoints: Sequence[str]) -> TransportError:
@@ -115,10 +111,8 @@ class _NewInterfaces:
         self._known = set(socket.if_nameindex())
         self._sessions: dict[tuple[int, str], Session] = {}
         self._closing = threading.Event()
-        self._thread: threading.Thread | None = None
-        if any(_ON_INTERFACE in place for place in places_of(config)[0]):
-            self._thread = threading.Thread(target=self._watch, name="rosz-interfaces", daemon=True)
-            self._thread.start()
+        self._thread = threading.Thread(target=self._watch, name="rosz-interfaces", daemon=True)
+        self._thread.start()
 
     def _watch(self) -> None:
         while not self._closing.wait(_POLL_SECONDS):
@@ -156,7 +150,6 @@ class _NewInterfaces:
     def close(self) -> None:
         """Stop listening there; a second call has no effect."""
         self._closing.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._thread.join()
         while self._sessions:
             self._sessions.popitem()[1].close()

@@ -39,7 +39,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any, Final
@@ -194,41 +194,39 @@ def open_and_listen(settings: zenoh.Config, rendezvous: str, opened: Callable[[]
     return raw
 
 
-class _StoppedPeers(msgspec.Struct, frozen=True):
-    """How to recognise the connections to stopped processes.
+class _StoppedPeers:
+    """The stopped processes that a session may be linked to."""
 
-    Attributes:
-        ports: The loopback ports of the processes.
-        path: The unix socket where all sessions meet; empty if they meet elsewhere.
-        pids: The ids of the processes.
-    """
-
-    ports: set[int]
-    path: str
-    pids: set[int]
-
-    def is_other_end(self, connection: socket.socket) -> bool:
-        """Tell whether a connection leads to one of the processes.
-
-        Raises:
-            OSError: The connection has ended.
-        """
-        there = connection.getpeername()
-        if connection.family == socket.AF_UNIX:
-            ends = (there, connection.getsockname())
-            return bool(self.path) and self.path in ends and pid_of_peer(connection) in self.pids
-        return (
-            connection.family in {socket.AF_INET, socket.AF_INET6}
-            and there[1] in self.ports
-            and ip_address(there[0].partition("%")[0]).is_loopback
-        )
+    def __init__(self, raw: Any, peers: LocalPeers) -> None:
+        meeting = Endpoint(peers.rendezvous)
+        sessions = {peer.zid for peer in peers.stopped}
+        links = [link for link in raw.info.links() if str(link.zid) in sessions]
+        self._pids = {peer.pid for peer in peers.stopped}
+        self._path = meeting.address if meeting.is_unix else ""
+        self._ports = {Endpoint(link.dst).port for link in links}
+        self._ports.update(peer.port for peer in peers.stopped)
+        self._ports.update(*(tcp_ports(pid) for pid in self._pids))
+        if peers.stopped_holder is not None:
+            self._ports.add(meeting.port)
+        self._ports -= {0, None}
 
     def change(self, change: Callable[[socket.socket], None]) -> None:
         """Change all connections of this process to the stopped ones."""
         for connection, _, _ in _connections():
             with suppress(OSError):  # it has ended meanwhile
-                if self.is_other_end(connection):
+                if self._is_other_end(connection):
                     change(connection)
+
+    def _is_other_end(self, connection: socket.socket) -> bool:
+        there = connection.getpeername()
+        if connection.family == socket.AF_UNIX:
+            ends = (there, connection.getsockname())
+            return bool(self._path) and self._path in ends and pid_of_peer(connection) in self._pids
+        return (
+            connection.family in {socket.AF_INET, socket.AF_INET6}
+            and there[1] in self._ports
+            and ip_address(there[0].partition("%")[0]).is_loopback
+        )
 
 
 def close_links_at_once(raw: Any) -> Closable:
@@ -249,14 +247,14 @@ def _set_no_wait(event: Any) -> None:
                 return
 
 
-def close_links(raw: Any, rendezvous: str) -> AbstractContextManager[None]:
+@contextmanager
+def close_links(raw: Any, rendezvous: str) -> Iterator[None]:
     """Return a context in which links to stopped processes are closed if they delay its end."""
     peers = LocalPeers.read(rendezvous)
-    return _cut_if_late(_stopped_peers(raw, peers)) if peers.stopped else nullcontext()
-
-
-@contextmanager
-def _cut_if_late(stopped: _StoppedPeers) -> Iterator[None]:
+    if not peers.stopped:
+        yield
+        return
+    stopped = _StoppedPeers(raw, peers)
     stopped.change(lambda one: one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_WAIT))
     over = threading.Event()
 
@@ -281,22 +279,6 @@ def _cut_if_late(stopped: _StoppedPeers) -> Iterator[None]:
             thread.join()
 
 
-def _stopped_peers(raw: Any, peers: LocalPeers) -> _StoppedPeers:
-    sessions = {peer.zid for peer in peers.stopped}
-    ports = {peer.port for peer in peers.stopped}
-    ports = ports.union(*(tcp_ports(peer.pid) for peer in peers.stopped))
-    links = [link for link in raw.info.links() if str(link.zid) in sessions]
-    ports |= {Endpoint(link.dst).port or 0 for link in links}
-    meeting = Endpoint(peers.rendezvous)
-    if peers.stopped_holder is not None:
-        ports.add(meeting.port or 0)
-    return _StoppedPeers(
-        ports=ports - {0},
-        path=meeting.address if meeting.is_unix else "",
-        pids={peer.pid for peer in peers.stopped},
-    )
-
-
 def _connections() -> Iterator[tuple[socket.socket, str, str]]:
     """Yield each connected socket of this process with its own and the other address.
 
@@ -314,13 +296,13 @@ def _connections() -> Iterator[tuple[socket.socket, str, str]]:
             if not stat.S_ISSOCK(os.fstat(number).st_mode):
                 continue
             with socket.socket(fileno=os.dup(number)) as found:
-                yield found, _address(found.getsockname()), _address(found.getpeername())
+                yield found, _format(found.getsockname()), _format(found.getpeername())
 
 
-def _address(address: Any) -> str:
+def _format(address: Any) -> str:
     if not isinstance(address, tuple):
         return str(address)
-    return Endpoint.of("tcp", str(address[0]).partition("%")[0], address[1]).address
+    return Endpoint.of("tcp", address[0].partition("%")[0], address[1]).address
 
 
 def remove_abandoned_segments(folder: Path = SEGMENTS, *, min_age: float = _MIN_AGE) -> list[str]:
