@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -161,10 +162,8 @@ def _workspace(cwd: Path) -> list[Path]:
             return [folder]
         if (folder / "src").is_dir() and not (folder / "package.xml").is_file():
             return [folder / "src"]
-    for folder in [cwd, *cwd.parents]:
-        if (folder / "package.xml").is_file():
-            return [folder]
-    return []
+    packages = (folder for folder in [cwd, *cwd.parents] if (folder / "package.xml").is_file())
+    return list(islice(packages, 1))
 
 
 def _working_folder() -> Path:

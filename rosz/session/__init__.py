@@ -6,19 +6,15 @@ Only ``rosz core`` needs the module `rosz.session.router`, which is public as we
 from rosz.session import at_exit as at_exit  # registers what waits at the exit
 from rosz.session.config import SessionConfig, connect_endpoint, keys_of, listen_endpoints
 from rosz.session.declared import PullSubscriber, RawPublisher
-from rosz.session.local_peers import LocalPeer, LocalPeers, describe_process, is_stopped
+from rosz.session.local_peers import LocalPeers, describe_process, is_stopped
 from rosz.session.mesh import MeshReadiness, serve_links
 from rosz.session.opening import places_of
 from rosz.session.probe import first_listening, is_listening, why_refused
 from rosz.session.queries import (
     LONGEST_WAIT,
     Cancellation,
-    Querier,
     Query,
-    Queryable,
-    Replies,
     Reply,
-    Target,
     clamp_timeout,
 )
 from rosz.session.samples import HybridClock, Sample, Stamp
@@ -33,21 +29,16 @@ __all__ = (
     "SEGMENTS",
     "Cancellation",
     "HybridClock",
-    "LocalPeer",
     "LocalPeers",
     "MeshReadiness",
     "PullSubscriber",
-    "Querier",
     "Query",
-    "Queryable",
     "RawPublisher",
-    "Replies",
     "Reply",
     "Sample",
     "Session",
     "SessionConfig",
     "Stamp",
-    "Target",
     "clamp_timeout",
     "connect_endpoint",
     "describe_process",

@@ -29,9 +29,9 @@ __all__ = (
     "EPHEMERAL",
     "SessionConfig",
     "connect_endpoint",
-    "key_settings",
     "keys_of",
     "listen_endpoints",
+    "loopback_interfaces",
     "new_id",
     "overrides",
     "zenoh_settings",
@@ -235,25 +235,6 @@ def _listen(config: SessionConfig) -> list[str]:
     return [str(Endpoint(place).secured()) for place in places] if keys else [*places]
 
 
-def key_settings(config: SessionConfig) -> dict[str, Any]:
-    """Return the parts of a Zenoh configuration that depend on keys, by path."""
-    if config.keys is None:
-        return {}
-    from rosz.security import access_control
-
-    return {
-        "transport/link/tls": {
-            "enable_mtls": True,
-            "verify_name_on_connect": True,
-            "close_link_on_expiration": True,
-            "root_ca_certificate": str(config.keys.authority),
-            **{f"{end}_certificate": str(config.keys.certificate) for end in ("listen", "connect")},
-            **{f"{end}_private_key": str(config.keys.key) for end in ("listen", "connect")},
-        },
-        "access_control": access_control(config.keys.rules, _loopback_interfaces()),
-    }
-
-
 def overrides(text: str) -> Mapping[str, str]:
     """Parse ``ZENOH_CONFIG_OVERRIDE`` into JSON texts by path.
 
@@ -324,7 +305,7 @@ def listen_endpoints(
         found = []
         for endpoint in others:
             found += _on_each_interface(endpoint) if endpoint in wide else [endpoint]
-        found += [one.on_interface(name) for one in held for name in _loopback_interfaces()]
+        found += [one.on_interface(name) for one in held for name in loopback_interfaces()]
     else:
         hosts = {endpoint.host for endpoint in wide}
         all_v4, all_v6 = "0.0.0.0" in hosts, "::" in hosts  # noqa: S104
@@ -334,7 +315,7 @@ def listen_endpoints(
     return tuple(dict.fromkeys(map(str, found)))
 
 
-def _loopback_interfaces() -> list[str]:
+def loopback_interfaces() -> list[str]:
     """Return the names of the network interfaces whose traffic stays on this machine."""
     names = [name for _, name in socket.if_nameindex()]
     if not _INTERFACES.is_dir():

@@ -91,8 +91,7 @@ class Declared:
 
     def __del__(self) -> None:
         """Undeclare what nobody closed."""
-        if self._entity is not None:
-            self.close()
+        self.close()
 
 
 class CallbackThread(Declared):
@@ -106,35 +105,30 @@ class CallbackThread(Declared):
 
     def __init__(self, what: str, entity: Any, callback: Callable[[Any], None]) -> None:
         super().__init__(what, entity)
-        # The thread must not refer to this object, else nobody would undeclare it.
-        items = _Items(what, entity.handler, callback)
-        Worker(f"rosz {what}", items.handle, receive=items.receive, logger=_log)
+        # The thread must not refer to this object, else nobody would undeclare it. And the items
+        # must not leave this package, not even as arguments: see `rosz.session.at_exit`.
+        recv = entity.handler.recv
+        item: Any = None
 
+        def receive() -> bool | None:
+            nonlocal item
+            if ENDING.is_set():
+                return None
+            try:
+                item = recv()
+            except zenoh.ZError:  # undeclared, or the session is closed
+                return None
+            return True
 
-class _Items:
-    """The items of a channel, which never leave this package: see `rosz.session.at_exit`."""
+        def handle(_: bool) -> None:
+            nonlocal item
+            try:
+                callback(item)
+            except Exception:  # noqa: BLE001  # the callback boundary: the next item may succeed
+                _log.exception("the callback of the %s failed", what)
+            item = None
 
-    def __init__(self, what: str, handler: Any, callback: Callable[[Any], None]) -> None:
-        self._what = what
-        self._recv = handler.recv
-        self._callback = callback
-        self._item: Any = None
-
-    def receive(self) -> bool | None:
-        if ENDING.is_set():
-            return None
-        try:
-            self._item = self._recv()
-        except zenoh.ZError:  # undeclared, or the session is closed
-            return None
-        return True
-
-    def handle(self, _: bool) -> None:
-        try:
-            self._callback(self._item)
-        except Exception:  # noqa: BLE001  # the callback boundary: the next item may succeed
-            _log.exception("the callback of the %s failed", self._what)
-        self._item = None
+        Worker(f"rosz {what}", handle, receive=receive, logger=_log)
 
 
 class PullSubscriber(Declared):

@@ -202,10 +202,11 @@ class LocalRegistration:
         self.peer: LocalPeer = LocalPeer(_pid_namespace(), os.getpid(), 0)
         self._rendezvous = rendezvous
         self._sockets: list[socket.socket] = []
-        self._reserved = socket.socket()
+        self._reserved: socket.socket | None = None
         if sys.platform != "linux":
             return
         if reachable:
+            self._reserved = socket.socket()
             # Two sockets with this option may have one port, as long as only one of them listens.
             self._reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             self._reserved.bind((_LOOPBACK, 0))
@@ -218,12 +219,14 @@ class LocalRegistration:
         self.peer = msgspec.structs.replace(self.peer, zid=zid)
         if self._sockets:
             self._bind()
-        self._reserved.close()
+        if self._reserved is not None:
+            self._reserved.close()
 
     def close(self) -> None:
         """Remove the registration; a second call has no effect."""
         for one in (self._reserved, *self._sockets):
-            one.close()
+            if one is not None:
+                one.close()
 
     def _bind(self) -> None:
         made = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)

@@ -7,7 +7,7 @@ import logging
 import os
 import threading
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import zenoh
@@ -17,7 +17,7 @@ from rosz.session.config import (
     EPHEMERAL,
     SessionConfig,
     connect_endpoint,
-    key_settings,
+    loopback_interfaces,
     new_id,
     overrides,
     zenoh_settings,
@@ -33,6 +33,9 @@ from rosz.session.zenoh_workarounds import (
     remove_abandoned_segments,
 )
 from rosz.wire import Endpoint
+
+if TYPE_CHECKING:
+    from rosz.security import KeyFolder
 
 __all__ = ("open_raw", "places_of")
 
@@ -117,11 +120,29 @@ def _settings(config: SessionConfig) -> zenoh.Config:
             settings = zenoh.Config.from_file(config.config_file)
         else:
             settings = zenoh.Config.from_json5(json.dumps(zenoh_settings(config)))
-        for path, part in key_settings(config).items():
-            settings.insert_json5(path, json.dumps(part))
+        if config.keys is not None:
+            from rosz.security import access_control
+
+            rules = access_control(config.keys.rules, loopback_interfaces())
+            settings.insert_json5("access_control", json.dumps(rules))
+            settings.insert_json5("transport/link/tls", json.dumps(_tls(config.keys)))
         for path, text in overrides(config.override).items():
             settings.insert_json5(path, text)
     return settings
+
+
+def _tls(keys: KeyFolder) -> dict[str, Any]:
+    certificate, key = str(keys.certificate), str(keys.key)
+    return {
+        "enable_mtls": True,
+        "verify_name_on_connect": True,
+        "close_link_on_expiration": True,
+        "root_ca_certificate": str(keys.authority),
+        "listen_certificate": certificate,
+        "listen_private_key": key,
+        "connect_certificate": certificate,
+        "connect_private_key": key,
+    }
 
 
 def _nobody(config: SessionConfig) -> TransportError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any, Final, Literal, Self, TypedDict
 
 import zenoh
@@ -89,19 +90,10 @@ class Reply(Sample):
     def __init__(self, raw: zenoh.Reply) -> None:
         sample: Any = raw.ok
         self.ok: bool = sample is not None
-        if sample is None:
-            sample = _Error(raw)
+        if not self.ok:
+            nothing = dict.fromkeys(("attachment", "timestamp", "kind"))
+            sample = SimpleNamespace(key_expr="", payload=raw.result.payload, **nothing)
         super().__init__(sample)
-
-
-class _Error:
-    """What a reply with an error has in place of a sample."""
-
-    key_expr = ""
-    attachment = timestamp = kind = None
-
-    def __init__(self, raw: zenoh.Reply) -> None:
-        self.payload = raw.result.payload
 
 
 class Replies:

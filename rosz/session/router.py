@@ -70,7 +70,15 @@ class Router:
         try:
             self.session: Session = self._lifecycle.keep(Session.open(config))
         except TransportError as error:
-            raise _explain(error, self.endpoints) from error
+            match = _OCCUPIED.search(str(error))
+            if match is None:
+                raise
+            place = match[1] or match[2]
+            endpoint = next((one for one in self.endpoints if one.endswith(place)), place)
+            raise TransportError(
+                f"'{endpoint}' is occupied: another core, or a node that the others meet at, holds"
+                " it; all goes on as it is, or end that one and start the core then"
+            ) from error
         if any(_ON_INTERFACE in place for place in self.endpoints):
             self._lifecycle.keep(_NewInterfaces(config))
 
@@ -83,19 +91,6 @@ class Router:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _explain(error: TransportError, endpoints: Sequence[str]) -> TransportError:
-    """Return a clearer error if an endpoint is occupied."""
-    match = _OCCUPIED.search(str(error))
-    if match is None:
-        return error
-    place = match[1] or match[2]
-    endpoint = next((one for one in endpoints if one.endswith(place)), place)
-    return TransportError(
-        f"'{endpoint}' is occupied: another core, or a node that the others meet at, holds it; all"
-        " goes on as it is, or end that one and start the core then"
-    )
 
 
 class _NewInterfaces:

@@ -163,13 +163,13 @@ def format_token(token: Token) -> str:
         str(token.node_id),
         str(token.entity_id),
         token.kind.value,
-        _mangle(token.enclave),
-        _mangle(token.namespace),
+        token.enclave.replace("/", "%"),
+        token.namespace.replace("/", "%"),
         token.node,
     ]
     if token.qos is not None:
         chunks += [
-            _mangle(token.name),
+            token.name.replace("/", "%"),
             dds_type(token.type_name),
             token.type_hash,
             format_qos(token.qos),
@@ -198,9 +198,9 @@ def parse_token(key: str) -> Token:
             node_id=int(node_id),
             entity_id=int(entity_id),
             kind=Kind(kind),
-            namespace=_demangle(namespace),
+            namespace=namespace.replace("%", "/"),
             node=node,
-            enclave=_demangle(enclave),
+            enclave=enclave.replace("%", "/"),
         )
     except ValueError as error:
         raise DecodeError("liveliness token", 0, f"'{key}': {error}") from error
@@ -211,7 +211,8 @@ def parse_token(key: str) -> Token:
     name, type_text, type_hash, qos = chunks[_NODE_CHUNKS:_ENTITY_CHUNKS]
     return msgspec.structs.replace(
         token,
-        name="/" + _demangle(name).removeprefix("/"),  # some participants leave the slash out
+        # Some participants leave the first slash out.
+        name="/" + name.replace("%", "/").removeprefix("/"),
         type_name=ros_type(type_text),
         type_hash=type_hash,
         qos=parse_qos(qos),
@@ -281,14 +282,6 @@ def parse_process(key: str) -> ProcessToken:
         )
     except ValueError as error:
         raise DecodeError("process token", 0, f"'{key}': {error}") from error
-
-
-def _mangle(text: str) -> str:
-    return text.replace("/", "%")
-
-
-def _demangle(text: str) -> str:
-    return text.replace("%", "/")
 
 
 def format_qos(qos: QoS) -> str:
