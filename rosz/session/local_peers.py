@@ -144,7 +144,8 @@ class LocalPeers:
     @cached_property
     def stopped_holder(self) -> int | None:
         """The id of the stopped process that listens at the rendezvous, if there is one."""
-        return self._holder(self.stopped)
+        pids = [peer.pid for peer in self.stopped]
+        return which_listens(Endpoint(self.rendezvous), pids) if pids else None
 
     @property
     def is_router_stopped(self) -> bool:
@@ -153,7 +154,7 @@ class LocalPeers:
         Peers ask their router about sessions beyond themselves, so a client of such a peer would
         wait for both.
         """
-        return self._holder(tuple(peer for peer in self.stopped if not peer.port)) is not None
+        return any(peer.pid == self.stopped_holder and not peer.port for peer in self.stopped)
 
     @property
     def why_unanswered(self) -> str:
@@ -174,11 +175,6 @@ class LocalPeers:
         return "; ".join(
             f"{describe_process(pid)} is stopped: {how_to_resume(pid)}" for pid in sorted(stopped)
         )
-
-    def _holder(self, peers: tuple[LocalPeer, ...]) -> int | None:
-        if not peers:
-            return None
-        return which_listens(Endpoint(self.rendezvous), [peer.pid for peer in peers])
 
 
 class LocalRegistration:

@@ -112,15 +112,15 @@ def prepare_process(mode: str) -> Iterator[None]:
     no page of this block is touched. Other C libraries ignore it.
     """
     bytes(_KEPT_BYTES)
-    given = _RUNTIME in os.environ
-    if not given:
-        count = _ROUTER_RECEIVERS if mode == "router" else 1
-        os.environ[_RUNTIME] = f"(rx: (worker_threads: {count}))"
+    if _RUNTIME in os.environ:
+        yield
+        return
+    count = _ROUTER_RECEIVERS if mode == "router" else 1
+    os.environ[_RUNTIME] = f"(rx: (worker_threads: {count}))"
     try:
         yield
     finally:
-        if not given:
-            os.environ.pop(_RUNTIME, None)
+        os.environ.pop(_RUNTIME, None)
 
 
 def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig | None:
