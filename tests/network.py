@@ -22,9 +22,9 @@ from rosz.environment import Environment
 from rosz.node import Context, Node
 from rosz.session import Session, SessionConfig
 
-__all__ = ("PATIENCE", "WHOLE_LINES", "Network", "Program", "eventually", "free_port", "repeats")
+__all__ = ("TIMEOUT", "WHOLE_LINES", "Network", "Program", "eventually", "free_port", "repeats")
 
-PATIENCE = 15.0
+TIMEOUT = 15.0
 """Seconds after which something that should happen at once counts as never happening."""
 
 T = TypeVar("T", bound="Any")
@@ -49,7 +49,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def eventually(condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> None:
+def eventually(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> None:
     """Wait for something that tells nobody when it comes about."""
     deadline = time.monotonic() + timeout
     pause = threading.Event()
@@ -101,7 +101,7 @@ class Program:
         with self._changed:
             return "\n".join(self.lines)
 
-    def wait_for(self, text: str, timeout: float = PATIENCE, *, after: int = 0) -> str:
+    def wait_for(self, text: str, timeout: float = TIMEOUT, *, after: int = 0) -> str:
         """Wait for a line with a text in it, and return the first such line.
 
         Args:
@@ -134,7 +134,7 @@ class Program:
         self.process.kill()
         self.process.wait()
 
-    def exit_code(self, timeout: float = PATIENCE) -> int:
+    def exit_code(self, timeout: float = TIMEOUT) -> int:
         """Wait for its end, and return its exit code."""
         try:
             code = self.process.wait(timeout)
@@ -150,7 +150,7 @@ class Program:
         if self.process.poll() is None:
             os.killpg(self.pid, signal.SIGKILL)
         self.process.wait()
-        self._reader.join(PATIENCE)
+        self._reader.join(TIMEOUT)
         for stream in (self.process.stdin, self.process.stdout):
             if stream is not None:
                 stream.close()
@@ -163,7 +163,7 @@ class _Joined:
         self._thread = thread
 
     def close(self) -> None:
-        self._thread.join(PATIENCE)
+        self._thread.join(TIMEOUT)
         assert not self._thread.is_alive(), "a thread of the test hangs"
 
 
@@ -217,7 +217,7 @@ class Network:
             "PYTHONWARNINGS": "error",
             "ROS_DOMAIN_ID": str(self.domain),
             "ROSZ_RENDEZVOUS": self.rendezvous,
-            "ROSZ_COMPLETION_TIMEOUT": f"{PATIENCE:g}",
+            "ROSZ_COMPLETION_TIMEOUT": f"{TIMEOUT:g}",
             **changes,
         }
 

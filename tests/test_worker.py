@@ -7,7 +7,7 @@ import threading
 from queue import SimpleQueue
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz import worker
 from rosz.errors import ClosedError
@@ -21,7 +21,7 @@ def test_items_are_handled_in_order_on_one_thread() -> None:
     )
     for number in range(100):
         numbers.submit(number)
-    assert numbers.flush(PATIENCE)
+    assert numbers.flush(TIMEOUT)
     numbers.close()
     assert handled == [(number, "numbers") for number in range(100)]
 
@@ -33,7 +33,7 @@ def test_a_failing_item_is_logged_and_the_next_one_handled(
     with caplog.at_level(logging.ERROR):
         tasks.submit(object())
         tasks.submit(object())
-        assert tasks.flush(PATIENCE)
+        assert tasks.flush(TIMEOUT)
     tasks.close()
     assert caplog.text.count("tasks: handling an item failed") == 2
 
@@ -43,15 +43,15 @@ def test_closed_errors_are_not_logged_once_it_is_closed(caplog: pytest.LogCaptur
 
     def task() -> None:
         entered.set()
-        release.wait(PATIENCE)
+        release.wait(TIMEOUT)
         raise ClosedError("the session is closed")
 
     tasks: Worker[object] = Worker("tasks")
     tasks.submit(task)
-    assert entered.wait(PATIENCE)
+    assert entered.wait(TIMEOUT)
     tasks.close(timeout=0)
     release.set()
-    tasks.close(PATIENCE)
+    tasks.close(TIMEOUT)
     assert "failed" not in caplog.text
 
 
@@ -61,8 +61,8 @@ def test_close_handles_what_is_queued_and_drops_the_rest() -> None:
     numbers.later(3600, -1)
     numbers.submit(1)
     numbers.submit(2)
-    numbers.close(PATIENCE)
-    numbers.close(PATIENCE)
+    numbers.close(TIMEOUT)
+    numbers.close(TIMEOUT)
     numbers.submit(3)
     assert not numbers.offer(4)
     assert handled == [1, 2]
@@ -74,7 +74,7 @@ def test_delayed_items_come_by_their_time() -> None:
     numbers.later(0.05, 2)
     numbers.later(0.01, 1)
     numbers.submit(0)
-    assert [handled.get(timeout=PATIENCE) for _ in range(3)] == [0, 1, 2]
+    assert [handled.get(timeout=TIMEOUT) for _ in range(3)] == [0, 1, 2]
     numbers.close()
 
 
@@ -83,19 +83,19 @@ def test_offer_refuses_beyond_the_capacity_and_tells_when_free() -> None:
 
     def handle(_text: str) -> None:
         entered.set()
-        gate.wait(PATIENCE)
+        gate.wait(TIMEOUT)
 
     texts: Worker[str] = Worker("texts", handle, capacity=10, size=len)
     texts.submit("x" * 6)
-    assert entered.wait(PATIENCE)
+    assert entered.wait(TIMEOUT)
     assert texts.offer("y" * 6)
     assert texts.full
     assert not texts.offer("z")
     texts.when_free(free.set)
     assert not free.is_set()
     gate.set()
-    assert free.wait(PATIENCE)
-    assert texts.flush(PATIENCE)
+    assert free.wait(TIMEOUT)
+    assert texts.flush(TIMEOUT)
     assert texts.waiting == 0
     texts.when_free(free.clear)
     assert not free.is_set()
@@ -105,11 +105,11 @@ def test_offer_refuses_beyond_the_capacity_and_tells_when_free() -> None:
 def test_flush_of_a_busy_worker_times_out() -> None:
     gate = threading.Event()
     tasks: Worker[object] = Worker("tasks")
-    tasks.submit(lambda: gate.wait(PATIENCE))
+    tasks.submit(lambda: gate.wait(TIMEOUT))
     assert not tasks.flush(0.01)
     gate.set()
-    assert tasks.flush(PATIENCE)
-    tasks.close(PATIENCE)
+    assert tasks.flush(TIMEOUT)
+    tasks.close(TIMEOUT)
 
 
 def test_a_task_may_flush_and_close_its_own_worker() -> None:
@@ -117,14 +117,14 @@ def test_a_task_may_flush_and_close_its_own_worker() -> None:
     tasks: Worker[object] = Worker("tasks")
 
     def task() -> None:
-        flushed.put(tasks.flush(PATIENCE))
+        flushed.put(tasks.flush(TIMEOUT))
         tasks.close()
         flushed.put(tasks.closed)
 
     tasks.submit(task)
-    assert flushed.get(timeout=PATIENCE)
-    assert flushed.get(timeout=PATIENCE)
-    tasks.close(PATIENCE)
+    assert flushed.get(timeout=TIMEOUT)
+    assert flushed.get(timeout=TIMEOUT)
+    tasks.close(TIMEOUT)
 
 
 def test_several_threads_handle_items_at_once() -> None:
@@ -132,14 +132,14 @@ def test_several_threads_handle_items_at_once() -> None:
     done: SimpleQueue[int] = SimpleQueue()
 
     def handle(item: int) -> None:
-        both.wait(PATIENCE)
+        both.wait(TIMEOUT)
         done.put(item)
 
     numbers: Worker[int] = Worker("numbers", handle, threads=2)
     numbers.submit(1)
     numbers.submit(2)
-    assert {done.get(timeout=PATIENCE) for _ in range(2)} == {1, 2}
-    numbers.close(PATIENCE)
+    assert {done.get(timeout=TIMEOUT) for _ in range(2)} == {1, 2}
+    numbers.close(TIMEOUT)
 
 
 def test_items_of_another_queue_are_received_until_none() -> None:
@@ -148,9 +148,9 @@ def test_items_of_another_queue_are_received_until_none() -> None:
     numbers: Worker[int] = Worker("numbers", done.put, receive=queue.get)
     queue.put(1)
     queue.put(2)
-    assert [done.get(timeout=PATIENCE) for _ in range(2)] == [1, 2]
+    assert [done.get(timeout=TIMEOUT) for _ in range(2)] == [1, 2]
     queue.put(None)
-    numbers.close(PATIENCE)
+    numbers.close(TIMEOUT)
     assert not [thread for thread in threading.enumerate() if thread.name == "numbers"]
 
 
@@ -177,15 +177,15 @@ def test_work_goes_on_where_the_system_has_no_more_threads(
         patched.setattr(worker, "start_thread", refuse_all_but_the_first)
         for number in range(3):
             numbers.submit(number)
-        handled = [done.get(timeout=PATIENCE) for _ in range(3)]
+        handled = [done.get(timeout=TIMEOUT) for _ in range(3)]
     assert [number for number, _ in handled] == [0, 1, 2]
     assert len({thread for _, thread in handled}) == 1
     both = threading.Barrier(2)
-    numbers._handle = lambda _: both.wait(PATIENCE)
+    numbers._handle = lambda _: both.wait(TIMEOUT)
     numbers.submit(3)
     numbers.submit(4)
-    assert numbers.flush(PATIENCE)
-    numbers.close(PATIENCE)
+    assert numbers.flush(TIMEOUT)
+    numbers.close(TIMEOUT)
     assert not both.broken
 
 

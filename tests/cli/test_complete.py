@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.cli.complete import complete, expand, split_line
 from rosz.cli.shells import ALIASES
@@ -223,7 +223,7 @@ class Terminal:
     def type(self, text: str) -> None:
         os.write(self._file, text.encode())
 
-    def wait_for(self, text: str, timeout: float = PATIENCE) -> str:
+    def wait_for(self, text: str, timeout: float = TIMEOUT) -> str:
         """Read until a text is there, and return all that came."""
         deadline = time.monotonic() + timeout
         while text.encode() not in self._said:

@@ -5,7 +5,7 @@ import signal
 from collections.abc import Iterator
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.node import Node
@@ -67,7 +67,7 @@ def test_a_killed_node_is_gone(shell: Shell, network: Network) -> None:
 
 def test_info(shell: Shell, talker: Node, network: Network) -> None:
     driver = network.node("driver")
-    driver.publisher("/cmd_vel", Twist).wait_for_subscribers(timeout=PATIENCE)
+    driver.publisher("/cmd_vel", Twist).wait_for_subscribers(timeout=TIMEOUT)
     text = shell("node", "info", "/talker").out
     assert text.startswith(
         f"{'-' * 80}\nNode [/talker]\nPublications: \n"

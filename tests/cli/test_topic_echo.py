@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.msgs.sensor_msgs.msg import LaserScan
 from rosz.msgs.std_msgs.msg import Bool, String, UInt8MultiArray
@@ -24,7 +24,7 @@ def test_a_latched_message(shell: Shell) -> None:
 def test_messages_as_they_come(shell: Shell, talker: Node) -> None:
     publisher = talker.publisher("/count", String)
     echo = shell.start("topic", "echo", "-n", "3", "/count")
-    publisher.wait_for_subscribers(timeout=PATIENCE)
+    publisher.wait_for_subscribers(timeout=TIMEOUT)
     for number in range(3):
         publisher.publish(data=str(number))
     assert echo.exit_code() == 0
@@ -149,7 +149,7 @@ def test_echo_outlives_the_meeting_point(shell: Shell, network: Network) -> None
     first = network.node("first")
     publisher = network.node("second").publisher("/count", String)
     echo = shell.start("topic", "echo", "/count")
-    publisher.wait_for_subscribers(timeout=PATIENCE)
+    publisher.wait_for_subscribers(timeout=TIMEOUT)
     first.context.close()
     publisher.publish(data="still here")
     echo.wait_for("still here")
@@ -171,4 +171,4 @@ def test_a_closed_pipe_ends_echo_quietly(network: Network) -> None:
         assert echo.stdout.readline() == b'data: "more"\n'
         echo.stdout.close()
         assert echo.stderr.read() == b""
-        assert echo.wait(PATIENCE) == 0
+        assert echo.wait(TIMEOUT) == 0

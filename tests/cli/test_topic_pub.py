@@ -4,7 +4,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.geometry_msgs.msg import PoseStamped, Twist
 from rosz.msgs.std_msgs.msg import String
@@ -47,7 +47,7 @@ def test_a_rate(shell: Shell, heard: list[Twist]) -> None:
 def test_a_latched_message_waits_for_late_subscribers(shell: Shell, talker: Node) -> None:
     pub = shell.start("topic", "pub", "/late", "std_msgs/String", "hello")
     pub.wait_for("latching")
-    assert talker.subscription("/late", String).get(PATIENCE) == String("hello")
+    assert talker.subscription("/late", String).get(TIMEOUT) == String("hello")
 
 
 def test_now_and_auto(shell: Shell, talker: Node) -> None:

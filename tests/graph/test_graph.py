@@ -8,7 +8,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.graph import Graph, View
@@ -44,7 +44,7 @@ def test_nodes_and_entities(network: Network, graph: Graph) -> None:
     node.client("/dock", Empty)
     view = graph.wait_for(
         lambda view: len(view.clients("/dock")) == 1 and len(view.publishers("/rosout")) == 1,
-        PATIENCE,
+        TIMEOUT,
         "client",
     )
     assert view.nodes() == ["/lab/robot"]
@@ -64,14 +64,14 @@ def test_nodes_come_and_go(network: Network, graph: Graph) -> None:
     events: SimpleQueue[tuple[str, bool]] = SimpleQueue()
     graph.listen(lambda token, alive: events.put((token.name or token.node_name, alive)))
     node = network.node("robot")
-    assert events.get(timeout=PATIENCE) == ("/robot", True)
+    assert events.get(timeout=TIMEOUT) == ("/robot", True)
     scan = node.publisher("scan", String)
-    seen = {events.get(timeout=PATIENCE) for _ in range(2)}
+    seen = {events.get(timeout=TIMEOUT) for _ in range(2)}
     assert seen == {("/scan", True), ("/rosout", True)}
     scan.close()
-    assert events.get(timeout=PATIENCE) == ("/scan", False)
+    assert events.get(timeout=TIMEOUT) == ("/scan", False)
     node.close()
-    assert {events.get(timeout=PATIENCE) for _ in range(2)} == {
+    assert {events.get(timeout=TIMEOUT) for _ in range(2)} == {
         ("/robot", False),
         ("/rosout", False),
     }
@@ -79,16 +79,16 @@ def test_nodes_come_and_go(network: Network, graph: Graph) -> None:
 
 def test_a_listener_gets_history_first_until_unregistered(network: Network, graph: Graph) -> None:
     network.node("robot")
-    graph.wait_for_topic("/rosout", PATIENCE)
+    graph.wait_for_topic("/rosout", TIMEOUT)
     told: SimpleQueue[str] = SimpleQueue()
     news: SimpleQueue[str] = SimpleQueue()
     withdraw = graph.listen(lambda token, _: told.put(token.node_name))
     graph.listen(lambda token, _: news.put(token.node_name), history=False)
-    assert told.get(timeout=PATIENCE) == "/robot"
+    assert told.get(timeout=TIMEOUT) == "/robot"
     withdraw()
     withdraw()
     network.node("second")
-    assert news.get(timeout=PATIENCE) == "/second"
+    assert news.get(timeout=TIMEOUT) == "/second"
     while not told.empty():
         assert told.get() == "/robot"
 
@@ -107,7 +107,7 @@ def test_a_failing_listener_does_not_stop_others(
     graph.listen(fail)
     graph.listen(lambda token, _: after.put(token.node_name))
     network.node("robot")
-    assert after.get(timeout=PATIENCE) == "/robot"
+    assert after.get(timeout=TIMEOUT) == "/robot"
     assert f"{kind.__name__}: no /robot True" in caplog.text
 
 
@@ -116,13 +116,13 @@ def test_a_listener_may_wait_for_the_graph(network: Network, graph: Graph) -> No
 
     def listener(token: Token, alive: bool) -> None:
         if token.name == "/scan" and alive:
-            graph.wait_for_node("/second", PATIENCE)
+            graph.wait_for_node("/second", TIMEOUT)
             seen.put("both")
 
     graph.listen(listener)
     network.node("robot").publisher("scan", String)
     network.node("second")
-    assert seen.get(timeout=PATIENCE) == "both"
+    assert seen.get(timeout=TIMEOUT) == "both"
 
 
 def test_order_holds_where_another_listener_waits(network: Network, graph: Graph) -> None:
@@ -132,7 +132,7 @@ def test_order_holds_where_another_listener_waits(network: Network, graph: Graph
     def wait(token: Token, alive: bool) -> None:
         if token.name == "/scan" and alive:
             waiting.set()
-            graph.wait_for(lambda view: not view.publishers("/scan"), PATIENCE, "end of '/scan'")
+            graph.wait_for(lambda view: not view.publishers("/scan"), TIMEOUT, "end of '/scan'")
             late.append(graph.listen(listen_late))
 
     def listen(token: Token, alive: bool) -> None:
@@ -146,22 +146,22 @@ def test_order_holds_where_another_listener_waits(network: Network, graph: Graph
     graph.listen(wait)
     graph.listen(listen)
     publisher = network.node("robot").publisher("scan", String)
-    assert waiting.wait(PATIENCE)
+    assert waiting.wait(TIMEOUT)
     publisher.close()
-    assert [told.get(timeout=PATIENCE) for _ in range(2)] == [True, False]
+    assert [told.get(timeout=TIMEOUT) for _ in range(2)] == [True, False]
     eventually(lambda: ("/rosout", True) in late, "what is there is told to who comes late")
     assert ("/scan", True) not in late
 
 
 def test_killed_process_is_gone_at_once(network: Network, graph: Graph) -> None:
     visitor = network.program(VISITOR)
-    graph.wait_for_service("/leave", PATIENCE)
+    graph.wait_for_service("/leave", TIMEOUT)
     visitor.kill()
     graph.wait_for(
         lambda view: (
             not ("/visitor" in view.nodes() or view.processes("/visitor") or view.services())
         ),
-        PATIENCE,
+        TIMEOUT,
         "death",
     )
 
@@ -169,10 +169,10 @@ def test_killed_process_is_gone_at_once(network: Network, graph: Graph) -> None:
 def test_stopped_process_is_not_gone(network: Network, graph: Graph) -> None:
     """It may resume: a node ends only with its link or its lease."""
     visitor = network.program(VISITOR)
-    graph.wait_for_service("/leave", PATIENCE)
+    graph.wait_for_service("/leave", TIMEOUT)
     visitor.send(signal.SIGSTOP)
     network.node("robot")
-    graph.wait_for_node("/robot", PATIENCE)
+    graph.wait_for_node("/robot", TIMEOUT)
     assert graph.view().nodes() == ["/robot", "/visitor"]
     visitor.send(signal.SIGCONT)
 
@@ -181,10 +181,10 @@ class TestWaiting:
     def test_for_things_that_come(self, network: Network, graph: Graph) -> None:
         arrived: SimpleQueue[View] = SimpleQueue()
         for wait in (
-            lambda: graph.wait_for_node("/robot", PATIENCE),
-            lambda: graph.wait_for_topic("/scan", PATIENCE),
-            lambda: graph.wait_for_service("/reset", PATIENCE),
-            lambda: graph.wait_for_subscribers("/cmd", 2, PATIENCE),
+            lambda: graph.wait_for_node("/robot", TIMEOUT),
+            lambda: graph.wait_for_topic("/scan", TIMEOUT),
+            lambda: graph.wait_for_service("/reset", TIMEOUT),
+            lambda: graph.wait_for_subscribers("/cmd", 2, TIMEOUT),
         ):
             network.thread(lambda wait=wait: arrived.put(wait()))  # type: ignore[misc]
         node = network.node("robot")
@@ -193,11 +193,11 @@ class TestWaiting:
         for _ in range(2):
             node.subscription("cmd", Int32)
         for _ in range(4):
-            arrived.get(timeout=PATIENCE)
+            arrived.get(timeout=TIMEOUT)
 
     def test_near_miss(self, network: Network, graph: Graph) -> None:
         network.node("robot").publisher("scanner", String)
-        graph.wait_for_topic("/scanner", PATIENCE)
+        graph.wait_for_topic("/scanner", TIMEOUT)
         with pytest.raises(
             WaitTimeout,
             match=r"no publisher of '/scaner' within 0\.01 s; did you mean '/scanner'\?",
@@ -213,17 +213,17 @@ class TestWaiting:
         def wait() -> None:
             begun.set()
             try:
-                graph.wait_for_node("/never", PATIENCE)
+                graph.wait_for_node("/never", TIMEOUT)
             except ClosedError as error:
                 ended.put(str(error))
 
         network.thread(wait)
-        assert begun.wait(PATIENCE)
+        assert begun.wait(TIMEOUT)
         graph.close()
         graph.close()
-        assert ended.get(timeout=PATIENCE) == "the wait for node '/never' ended: shutting down"
+        assert ended.get(timeout=TIMEOUT) == "the wait for node '/never' ended: shutting down"
         with pytest.raises(ClosedError):
-            graph.wait_for_node("/never", PATIENCE)
+            graph.wait_for_node("/never", TIMEOUT)
 
 
 def test_refresh(network: Network) -> None:
@@ -231,12 +231,12 @@ def test_refresh(network: Network) -> None:
     node = network.node("robot")
     scan = node.publisher("scan", String)
     graph = network.context().graph
-    view = graph.refresh(PATIENCE)
+    view = graph.refresh(TIMEOUT)
     assert [token.node_name for token in view.publishers("/scan")] == ["/robot"]
     assert [process.node for process in view.processes()] == ["/robot"]
     scan.close()
     eventually(lambda: not graph.view().publishers("/scan"), "the publisher is gone")
-    assert not graph.refresh(PATIENCE).publishers("/scan")
+    assert not graph.refresh(TIMEOUT).publishers("/scan")
     graph.close()
 
 
@@ -244,8 +244,8 @@ def test_domains_are_separate(network: Network, graph: Graph) -> None:
     context = network.context(domain=7)
     network.node("elsewhere", context=context)
     network.node("here")
-    graph.wait_for_node("/here", PATIENCE)
-    context.graph.wait_for_node("/elsewhere", PATIENCE)
+    graph.wait_for_node("/here", TIMEOUT)
+    context.graph.wait_for_node("/elsewhere", TIMEOUT)
     assert graph.view().nodes() == ["/here"]
     assert context.graph.view().nodes() == ["/elsewhere"]
 
@@ -269,7 +269,7 @@ def test_damaged_tokens(
         for key in keys:
             session.token(key)
         network.node("robot")
-        view = graph.wait_for_node("/robot", PATIENCE)
+        view = graph.wait_for_node("/robot", TIMEOUT)
     assert view.nodes() == ["/robot"]
     told = [record.getMessage() for record in caplog.records if record.name == "rosz.graph"]
     assert len(set(told)) == 1

@@ -14,7 +14,7 @@ from pathlib import Path
 from textwrap import dedent
 from typing import TYPE_CHECKING
 
-from network import PATIENCE, WHOLE_LINES, Program, eventually
+from network import TIMEOUT, WHOLE_LINES, Program, eventually
 
 from hosts.namespace import Namespace, children
 
@@ -53,7 +53,7 @@ class HostProgram(Program):
     def kill(self) -> None:
         """End it without its doing."""
         self.send(signal.SIGKILL)
-        self.process.wait(PATIENCE)
+        self.process.wait(TIMEOUT)
 
     def close(self) -> None:
         """Leave nothing of it behind."""
@@ -62,7 +62,7 @@ class HostProgram(Program):
                 os.killpg(self.inner, signal.SIGKILL)
             self.process.send_signal(signal.SIGCONT)
             with suppress(subprocess.TimeoutExpired):
-                self.process.wait(PATIENCE)
+                self.process.wait(TIMEOUT)
         super().close()
 
 
@@ -164,7 +164,7 @@ class Host:
 
     def kill(self) -> None:
         """End all that runs here at once, as a crash does; the system tells the other sides."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while pids := self.namespace.pids():
             assert time.monotonic() < deadline, f"{self.name} does not end: {self.processes()}"
             for pid in pids:

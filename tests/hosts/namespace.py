@@ -13,7 +13,7 @@ import pytest
 
 __all__ = ("Namespace", "children", "why_not")
 
-_PATIENCE = 30.0
+_TIMEOUT = 30.0
 _ENTER = {"-n": "--net", "-u": "--uts", "-m": "--mount", "-p": "--pid", "-i": "--ipc"}
 
 
@@ -65,7 +65,7 @@ class Namespace:
     def run(self, *command: str) -> str:
         """Run a command inside, and return what it prints; it must succeed."""
         done = subprocess.run(
-            self.inside(command), capture_output=True, text=True, timeout=_PATIENCE, check=False
+            self.inside(command), capture_output=True, text=True, timeout=_TIMEOUT, check=False
         )
         if done.returncode:
             pytest.fail(f"{' '.join(command)}: exit code {done.returncode}\n{done.stderr}")
@@ -96,7 +96,7 @@ class Namespace:
         assert self._holder.stdin is not None
         assert self._holder.stdout is not None
         self._holder.stdin.close()
-        self._holder.wait(_PATIENCE)
+        self._holder.wait(_TIMEOUT)
         self._holder.stdout.close()
 
     def __enter__(self) -> Self:

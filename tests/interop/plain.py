@@ -9,7 +9,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import zenoh
-from network import PATIENCE
+from network import TIMEOUT
 
 __all__ = ("Plain", "plain_session")
 
@@ -71,7 +71,7 @@ class Plain:
         given: dict[str, Any] = {
             "target": zenoh.QueryTarget.ALL_COMPLETE,
             "consolidation": zenoh.ConsolidationMode.NONE,
-            "timeout": PATIENCE,
+            "timeout": TIMEOUT,
         }
         return list(self.session.get(key, **(given | options)))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import zenoh
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.sensor_msgs.msg import PointCloud2
@@ -92,7 +92,7 @@ def listen(node: Node, form: str) -> Any:
     if form == "callback":
         got: SimpleQueue[String] = SimpleQueue()
         node.subscription("chatter", String, got.put, queue_size=100)
-        return lambda: got.get(timeout=PATIENCE)
+        return lambda: got.get(timeout=TIMEOUT)
     if form == "generic":
         return node.subscription("chatter", queue_size=100).get
     qos = QoS(depth=100, durability="transient_local" if form == "latched" else "volatile")
@@ -110,7 +110,7 @@ def test_kinds_of_damage_are_bounded(
     for end in range(len(cloud)):
         plain.put(key, cloud[:end], attachment=FINE)
     plain.put(key, cloud, attachment=struct.pack("<qqB16s", 9999, 2, 16, GID))
-    assert got.get(timeout=PATIENCE) == PointCloud2(data=bytes(1000))
+    assert got.get(timeout=TIMEOUT) == PointCloud2(data=bytes(1000))
     node.close()
     assert capfd.readouterr().err.count("dropping damaged samples on '/cloud'") <= 10
 
@@ -120,7 +120,7 @@ def test_no_attachment_is_no_damage(node: Node, plain: Plain) -> None:
     got: SimpleQueue[tuple[String, MessageInfo]] = SimpleQueue()
     node.subscription("chatter", String, lambda *both: got.put(both), with_info=True)
     plain.put(f"42/chatter/{STRING}", HELLO)
-    message, info = got.get(timeout=PATIENCE)
+    message, info = got.get(timeout=TIMEOUT)
     assert message == String("hello")
     assert (info.sequence, info.gid, info.source_time, info.lost) == (0, b"", 0, 0)
 
@@ -135,7 +135,7 @@ def test_strange_sequence_numbers(node: Node, plain: Plain) -> None:
     for number in numbers:
         attachment = struct.pack("<qqB16s", number, 2, 16, GID)
         plain.put(f"42/chatter/{STRING}", HELLO, attachment=attachment)
-    assert [got.get(timeout=PATIENCE) for _ in numbers] == numbers
+    assert [got.get(timeout=TIMEOUT) for _ in numbers] == numbers
 
 
 @pytest.mark.parametrize(
@@ -178,13 +178,13 @@ def test_answers(network: Network, node: Node, plain: Plain) -> None:
 
     def answer(payload: bytes, *, error: bool = False, times: int = 1) -> object:
         network.thread(call)
-        with queries.get(timeout=PATIENCE) as query:
+        with queries.get(timeout=TIMEOUT) as query:
             for _ in range(times):
                 if error:
                     query.reply_err(payload)
                 else:
                     query.reply(f"42/add/{ADD}", payload)
-        return ends.get(timeout=PATIENCE)
+        return ends.get(timeout=TIMEOUT)
 
     assert "service [/add] answered with damage: " in str(answer(b"\0\1\0\0\1"))
     assert "service [/add] answered with damage: " in str(answer(b""))
@@ -227,7 +227,7 @@ def test_answers_about_links(network: Network, plain: Plain) -> None:
 
     network.thread(lie)
     newcomer = network.node("newcomer")
-    assert newcomer.context.mesh.ready.wait(PATIENCE)
+    assert newcomer.context.mesh.ready.wait(TIMEOUT)
     lies.put(None)  # type: ignore[arg-type]  # the end
 
 
@@ -245,5 +245,5 @@ def test_flood_of_tokens(network: Network, node: Node) -> None:
             visitor.token(f"@ros2_lv/42/feed/{number}/{number}/NN/%/%/n{number}")
             visitor.token(f"@ros2_lv/42/feed/{number}/x/NN/%/%/n{number}")
         graph = node.context.graph
-        graph.wait_for(lambda view: len(view.nodes()) == 301, PATIENCE, "all tokens")
+        graph.wait_for(lambda view: len(view.nodes()) == 301, TIMEOUT, "all tokens")
     eventually(lambda: node.context.graph.view().nodes() == ["/victim"], "all tokens are gone")

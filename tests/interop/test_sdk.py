@@ -17,7 +17,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, Program, eventually
+from network import TIMEOUT, Network, Program, eventually
 
 from rosz.errors import ServiceError
 from rosz.message import Message
@@ -101,9 +101,9 @@ def node(city: Network) -> Node:
 
 def wait_for_echo(there: Publisher[Any]) -> None:
     """Wait until the SDK hears us, and we it: it announces both before they work."""
-    there.wait_for_subscribers(timeout=PATIENCE)
+    there.wait_for_subscribers(timeout=TIMEOUT)
     eventually(lambda: there._raw.matched, "a route to the SDK's subscriber")
-    there.node.context.graph.wait_for_topic("/back", PATIENCE)
+    there.node.context.graph.wait_for_topic("/back", TIMEOUT)
 
 
 @pytest.mark.parametrize("kind", dict.fromkeys(type(message) for message in MESSAGES))
@@ -116,7 +116,7 @@ def test_topics_both_ways(sdk: Partner, node: Node, kind: type[Message]) -> None
     for message in MESSAGES:
         if type(message) is kind:
             there.publish(message)
-            assert back.get(PATIENCE) == message
+            assert back.get(TIMEOUT) == message
 
 
 def test_generic_and_info(sdk: Partner, node: Node) -> None:
@@ -129,8 +129,8 @@ def test_generic_and_info(sdk: Partner, node: Node) -> None:
     wait_for_echo(there)
     for number in range(3):
         there.publish(str(number))
-        assert generic.get(PATIENCE).data == str(number)
-    infos = [got.get(timeout=PATIENCE) for _ in range(3)]
+        assert generic.get(TIMEOUT).data == str(number)
+    infos = [got.get(timeout=TIMEOUT) for _ in range(3)]
     assert [info.sequence for info in infos] == [0, 1, 2]
     assert [info.lost for info in infos] == [0, 0, 0]
     assert len({info.gid for info in infos}) == 1
@@ -138,8 +138,8 @@ def test_generic_and_info(sdk: Partner, node: Node) -> None:
 
 def test_calling_its_service(sdk: Partner, node: Node) -> None:
     sdk("serve", "/add")
-    client = node.client("add", AddTwoInts, timeout=PATIENCE)
-    client.wait_for_service(PATIENCE)
+    client = node.client("add", AddTwoInts, timeout=TIMEOUT)
+    client.wait_for_service(TIMEOUT)
     assert client(20, 22).sum == 42
     assert client(-0, 1).sum == 1
     with pytest.raises(ServiceError, match="Service callback error: nothing below zero"):
@@ -184,8 +184,8 @@ def test_our_view_of_it(sdk: Partner, node: Node) -> None:
     sdk("echo", "there", "back", "std_msgs/msg/String")  # it does not resolve names
     sdk("serve", "/add")
     graph = node.context.graph
-    graph.wait_for_service("/add", PATIENCE)
-    view = graph.wait_for_topic("/back", PATIENCE)
+    graph.wait_for_service("/add", TIMEOUT)
+    view = graph.wait_for_topic("/back", TIMEOUT)
     assert {"/sdk_echo", "/sdk_server", "/rosz_side"} <= set(view.nodes())
     (publisher,) = view.publishers("/back")
     assert publisher.type_name == "std_msgs/msg/String"

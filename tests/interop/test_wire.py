@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import xxhash
 import zenoh
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.geometry_msgs.msg import Twist
@@ -47,7 +47,7 @@ def plain(network: Network) -> Iterator[Plain]:
 
 
 def next_of(queue: SimpleQueue[Any]) -> Any:
-    return queue.get(timeout=PATIENCE)
+    return queue.get(timeout=TIMEOUT)
 
 
 def next_token(queue: SimpleQueue[tuple[str, bool]], part: str) -> tuple[str, bool]:
@@ -181,7 +181,7 @@ def test_latched_cache(network: Network, plain: Plain) -> None:
     publisher = node.publisher("map", String, qos=QoS(depth=2, durability="transient_local"))
     for text in ("one", "two", "three"):
         publisher.publish(text)
-    node.context.mesh.ready.wait(PATIENCE)
+    node.context.mesh.ready.wait(TIMEOUT)
     zid = node.context.session.zid
 
     def ask() -> list[zenoh.Reply]:

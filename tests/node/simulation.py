@@ -11,7 +11,7 @@ from rosz.node.clock import Clock
 
 SECOND = 1_000_000_000
 START = 100 * SECOND
-PATIENCE = 20.0
+TIMEOUT = 20.0
 
 
 class Beds(set[Any]):
@@ -39,7 +39,7 @@ class SimulatedClock(Clock):
 
     def wait_for_sleeper(self) -> None:
         """Wait until one more sleep has begun."""
-        assert self.beds.taken.acquire(timeout=PATIENCE), "nobody fell asleep"
+        assert self.beds.taken.acquire(timeout=TIMEOUT), "nobody fell asleep"
 
     def tick(self, time_ns: int) -> None:
         """Advance to a time once one more sleep has begun."""
@@ -75,7 +75,7 @@ class Task:
 
     def result(self) -> object:
         """Wait for the call, and return its result or raise its error."""
-        self._thread.join(PATIENCE)
+        self._thread.join(TIMEOUT)
         assert self.done, "the call has not returned"
         if self._error is not None:
             raise self._error

@@ -7,7 +7,7 @@ import time
 from queue import SimpleQueue
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.errors import (
     ClosedError,
@@ -115,7 +115,7 @@ def test_wait_for_service(network: Network, server: Node, caller: Node) -> None:
         client.wait_for_service(0.05)
     waited = network.thread(client.wait_for_service)
     server.service("add", AddTwoInts, lambda _: 0)
-    waited.join(PATIENCE)
+    waited.join(TIMEOUT)
     assert not waited.is_alive()
 
 
@@ -128,7 +128,7 @@ def test_call_at_once(network: Network, server: Node) -> None:
 
 def test_timeout(server: Node, caller: Node) -> None:
     gate = threading.Event()
-    server.service("slow", AddTwoInts, lambda _: int(gate.wait(PATIENCE)))
+    server.service("slow", AddTwoInts, lambda _: int(gate.wait(TIMEOUT)))
     client = caller.client("slow", AddTwoInts, timeout=0.1)
     client.wait_for_service()
     began = time.monotonic()
@@ -149,7 +149,7 @@ def test_closing_cancels_calls(network: Network, server: Node, caller: Node) -> 
 
     def slow(_request: object) -> int:
         inside.release()
-        return int(gate.wait(PATIENCE))
+        return int(gate.wait(TIMEOUT))
 
     server.service("slow", AddTwoInts, slow)
     client = caller.client("slow", AddTwoInts)
@@ -157,10 +157,10 @@ def test_closing_cancels_calls(network: Network, server: Node, caller: Node) -> 
     ends: SimpleQueue[RoszError | None] = SimpleQueue()
     for _ in range(3):
         network.thread(lambda: ends.put(outcome(lambda: client(1, 2))))
-        assert inside.acquire(timeout=PATIENCE)
+        assert inside.acquire(timeout=TIMEOUT)
     caller.context.close()
     for _ in range(3):
-        error = ends.get(timeout=PATIENCE)
+        error = ends.get(timeout=TIMEOUT)
         assert isinstance(error, ClosedError)
         assert str(error) == "the call of '/slow' was cancelled: shutting down"
     with pytest.raises(ClosedError, match=r"the client of .* is closed"):
@@ -172,18 +172,18 @@ def test_server_is_killed_during_a_call(network: Network, caller: Node) -> None:
     """The call ends at once, and is made once: the work may have been done."""
     program = network.program(SERVER, "victim")
     client = caller.client("slow", AddTwoInts)
-    client.wait_for_service(PATIENCE)
+    client.wait_for_service(TIMEOUT)
     ends: SimpleQueue[RoszError | None] = SimpleQueue()
     network.thread(lambda: ends.put(outcome(lambda: client(7, 60))))
     program.wait_for("asked 7")
     began = time.monotonic()
     program.kill()
-    error = ends.get(timeout=PATIENCE)
+    error = ends.get(timeout=TIMEOUT)
     assert isinstance(error, ServiceError)
     assert str(error) == "service [/slow]: the server ended before it answered"
     assert time.monotonic() - began < 2
     assert program.output.count("asked") == 1
-    caller.context.graph.wait_for(lambda view: not view.servers("/slow"), PATIENCE, "its end")
+    caller.context.graph.wait_for(lambda view: not view.servers("/slow"), TIMEOUT, "its end")
     with pytest.raises(ServiceNotFound):
         client(1, 2)
 
@@ -191,7 +191,7 @@ def test_server_is_killed_during_a_call(network: Network, caller: Node) -> None:
 def test_server_is_stopped(network: Network, caller: Node) -> None:
     program = network.program(SERVER, "sleeper")
     client = caller.client("slow", AddTwoInts)
-    client.wait_for_service(PATIENCE)
+    client.wait_for_service(TIMEOUT)
     program.send(signal.SIGSTOP)
     with pytest.raises(WaitTimeout, match="the server is busy, stopped or out of reach"):
         client(7, 0, timeout=0.3)
@@ -202,11 +202,11 @@ def test_server_is_stopped(network: Network, caller: Node) -> None:
 def test_several_servers(network: Network, caller: Node) -> None:
     """The first answer counts, and one that dies leaves the others."""
     program = network.program(SERVER, "mortal")
-    caller.context.graph.wait_for_service("/slow", PATIENCE)
+    caller.context.graph.wait_for_service("/slow", TIMEOUT)
     network.node("immortal").service("slow", AddTwoInts, lambda _: 42)
     client = caller.client("slow", AddTwoInts)
     caller.context.graph.wait_for(
-        lambda view: len(view.servers("/slow")) == 2, PATIENCE, "two servers"
+        lambda view: len(view.servers("/slow")) == 2, TIMEOUT, "two servers"
     )
     assert client(7, 60).sum == 42
     program.kill()
@@ -237,13 +237,13 @@ def test_calls_from_callbacks_of_every_kind(network: Network, server: Node) -> N
     publisher.wait_for_subscribers()
     publisher.publish(2)
     assert itself(5, 0).sum == 5
-    assert {got.get(timeout=PATIENCE) for _ in range(3)} == {
+    assert {got.get(timeout=TIMEOUT) for _ in range(3)} == {
         ("connection", 2),
         ("subscription", 4),
         ("timer", 6),
     }
     node.close()
-    assert got.get(timeout=PATIENCE) == ("hook", 8)
+    assert got.get(timeout=TIMEOUT) == ("hook", 8)
 
 
 def test_who_waits_forever_waits(server: Node, caller: Node) -> None:

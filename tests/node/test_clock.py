@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from simulation import PATIENCE, SECOND, START, Beds, SimulatedClock, Task
+from simulation import SECOND, START, TIMEOUT, Beds, SimulatedClock, Task
 
 from rosz.errors import TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock, TimeJump
@@ -77,7 +77,7 @@ def test_closing_ends_a_wall_sleep_at_once() -> None:
     clock = Clock()
     beds = clock._source.sleepers = Beds()
     task = Task(lambda: clock.sleep(10**30))
-    assert beds.taken.acquire(timeout=PATIENCE)
+    assert beds.taken.acquire(timeout=TIMEOUT)
     clock.close()
     assert task.result() is False
 
@@ -212,7 +212,7 @@ def test_wall_sleeps_under_way_keep_to_wall_time() -> None:
     clock = Clock()
     beds = clock._source.sleepers = Beds()
     task = Task(lambda: clock.sleep(20_000_000))
-    assert beds.taken.acquire(timeout=PATIENCE)
+    assert beds.taken.acquire(timeout=TIMEOUT)
     clock.enable_simulation()
     clock.advance(1)
     assert task.result() is True

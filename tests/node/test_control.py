@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.node import Node, control
 from rosz.node.control import NodeInfo, Request, control_key
@@ -25,7 +25,7 @@ def asker(network: Network, node: Node) -> Callable[..., list[Reply]]:
 
     def ask(action: str, **more: str) -> list[Reply]:
         payload = msgspec.msgpack.encode(Request(action, **more))
-        return session.get(key, payload=payload, timeout=PATIENCE)
+        return session.get(key, payload=payload, timeout=TIMEOUT)
 
     return ask
 
@@ -44,13 +44,13 @@ def test_many_questions_take_few_threads(network: Network, monkeypatch: pytest.M
 
     def slowly(*args: Any) -> NodeInfo:
         at_work.put(None)
-        assert go_on.wait(PATIENCE)
+        assert go_on.wait(TIMEOUT)
         return info(*args)
 
     monkeypatch.setattr(control, "_info", slowly)
-    asked = [session.query(key, timeout=PATIENCE, payload=_INFO) for _ in range(200)]
+    asked = [session.query(key, timeout=TIMEOUT, payload=_INFO) for _ in range(200)]
     for _ in range(control._THREADS):
-        at_work.get(timeout=PATIENCE)
+        at_work.get(timeout=TIMEOUT)
     assert len(threads("rosz-control/busy")) == control._THREADS
     go_on.set()
     found = [reply.ok for answers in asked for reply in answers]
@@ -66,11 +66,11 @@ def test_a_node_answers_while_it_ends(network: Network) -> None:
 
     def hook(_reason: str) -> None:
         begun.set()
-        assert go_on.wait(PATIENCE)
+        assert go_on.wait(TIMEOUT)
 
     node.on_shutdown(hook)
     assert ask("shutdown")[0].ok
-    assert begun.wait(PATIENCE)
+    assert begun.wait(TIMEOUT)
     for _ in range(3 * control._THREADS):
         assert ask("shutdown")[0].ok
     (reply,) = ask("info")

@@ -10,7 +10,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, repeats
+from network import TIMEOUT, Network, repeats
 
 from rosz.errors import ClosedError, RoszError
 from rosz.msgs.example_interfaces.srv import AddTwoInts, AddTwoIntsRequest
@@ -276,7 +276,7 @@ def watched(scene: Callable[[Subject], None], node: Node) -> None:
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: str(scene.__name__))
 def test_no_call_hangs(network: Network, scene: Callable[[Subject], None], partner: str) -> None:
     if partner == "other process":
-        network.program(PARTNER).wait_for("ready", PATIENCE)
+        network.program(PARTNER).wait_for("ready", TIMEOUT)
     elif partner == "other session":
         play_partner(network.node("partner"))
     for _ in range(ROUNDS):

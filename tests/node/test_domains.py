@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.errors import ServiceNotFound
 from rosz.msgs.example_interfaces.srv import AddTwoInts
@@ -22,11 +22,11 @@ def test_two_domains_at_one_meeting_point(network: Network) -> None:
     one.service("add", AddTwoInts, lambda request: request.a + request.b)
     for node, text in ((one, "one"), (two, "two")):
         publisher = node.publisher("chatter", String)
-        publisher.wait_for_subscribers(timeout=PATIENCE)
+        publisher.wait_for_subscribers(timeout=TIMEOUT)
         assert len(publisher.subscribers()) == 1
         publisher.publish(text)
-    assert got_one.get(PATIENCE).data == "one"
-    assert got_two.get(PATIENCE).data == "two"
+    assert got_one.get(TIMEOUT).data == "one"
+    assert got_two.get(TIMEOUT).data == "two"
     one.params["/shared"] = 1
     assert "/shared" not in two.params
     with pytest.raises(ServiceNotFound):
@@ -44,5 +44,5 @@ def test_contexts_end_apart(network: Network) -> None:
     assert not two.is_shutdown
     publisher = two.publisher("chatter", String)
     publisher.publish("still here")
-    assert subscription.get(PATIENCE).data == "still here"
-    two.context.graph.wait_for(lambda view: view.nodes() == ["/two"], PATIENCE, "the other's end")
+    assert subscription.get(TIMEOUT).data == "still here"
+    two.context.graph.wait_for(lambda view: view.nodes() == ["/two"], TIMEOUT, "the other's end")

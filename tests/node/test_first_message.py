@@ -7,7 +7,7 @@ import time
 from queue import Empty, SimpleQueue
 
 import pytest
-from network import PATIENCE, Network, repeats
+from network import TIMEOUT, Network, repeats
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Context, standard
@@ -40,14 +40,14 @@ def test_published_once_by_a_program_that_ends(network: Network, kind: str) -> N
     got: SimpleQueue[str] = SimpleQueue()
     listener = network.node("listener")
     listener.subscription("chatter", String, lambda m: got.put(m.data))
-    listener.context.mesh.ready.wait(PATIENCE)
+    listener.context.mesh.ready.wait(TIMEOUT)
     lost = []
     for number in range(repeats(10, 1000)):
         program = network.program(ONE_SHOT, str(number), kind)
         assert program.exit_code() == 0, program.output
         program.close()
         try:
-            assert got.get(timeout=PATIENCE) == str(number)
+            assert got.get(timeout=TIMEOUT) == str(number)
         except Empty:
             lost.append(number)
     assert not lost
@@ -77,9 +77,9 @@ def test_order_of_what_is_held(network: Network, monkeypatch: pytest.MonkeyPatch
     publisher = talker.publisher("chatter", String)
     for number in range(500):
         publisher.publish(str(number))
-    assert talker.context.mesh.ready.wait(PATIENCE)
+    assert talker.context.mesh.ready.wait(TIMEOUT)
     publisher.publish("500")
-    assert [got.get(timeout=PATIENCE) for _ in range(501)] == [(str(n), n + 1) for n in range(501)]
+    assert [got.get(timeout=TIMEOUT) for _ in range(501)] == [(str(n), n + 1) for n in range(501)]
 
 
 def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,7 +92,7 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(
         MeshReadiness, "_neighbours", lambda *_: set() if linked.is_set() else strangers
     )
-    monkeypatch.setattr(Context, "MESH_TIMEOUT", PATIENCE)
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", TIMEOUT)
     publisher = network.node("talker").publisher("chatter", String)
     for number in range(1500):
         publisher.publish(str(number))
@@ -110,7 +110,7 @@ def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.Monkey
     began = time.monotonic()
     network.node("talker").publisher("chatter", String).publish("hello")
     assert subscription.get().data == "hello"
-    assert 1.0 <= time.monotonic() - began < 1.0 + PATIENCE
+    assert 1.0 <= time.monotonic() - began < 1.0 + TIMEOUT
 
 
 def test_nobody_else_no_wait(network: Network) -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.std_msgs.msg import Int32, String
@@ -40,7 +40,7 @@ class Log:
 
 def see_each_other(one: Node, other: Node) -> None:
     for node, name in ((one, other.name), (other, one.name)):
-        node.context.graph.wait_for_node(name, PATIENCE)
+        node.context.graph.wait_for_node(name, TIMEOUT)
 
 
 def test_type_is_told_once_on_both_sides(network: Network, log: Log) -> None:
@@ -58,7 +58,7 @@ def test_type_is_told_once_on_both_sides(network: Network, log: Log) -> None:
     log.wait_for(on_talker)
     log.wait_for(on_listener)
     again = listener.subscription("chatter", Int32)
-    talker.context.graph.wait_for_subscribers("/chatter", 2, PATIENCE)
+    talker.context.graph.wait_for_subscribers("/chatter", 2, TIMEOUT)
     again.close()
     see_each_other(talker, listener)
     assert log.text.count(on_talker) == 1
@@ -123,7 +123,7 @@ def test_same_types_are_no_news(network: Network, log: Log) -> None:
     talker.publisher("other", String)
     listener.subscription("third", Int32)
     see_each_other(talker, listener)
-    talker.context.graph.wait_for_subscribers("/third", 1, PATIENCE)
+    talker.context.graph.wait_for_subscribers("/third", 1, TIMEOUT)
     assert "reach each other" not in log.text
 
 

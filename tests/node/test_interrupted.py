@@ -6,7 +6,7 @@ import threading
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.session import MeshReadiness
@@ -16,7 +16,7 @@ def in_time(call: Any) -> None:
     """Call on a thread of its own, so that one which waits for itself does not end the test run."""
     thread = threading.Thread(target=call, daemon=True)
     thread.start()
-    thread.join(PATIENCE)
+    thread.join(TIMEOUT)
     assert not thread.is_alive(), "it waits for the one that it interrupted"
 
 

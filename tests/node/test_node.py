@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import UsageError
 from rosz.lifecycle import Registration
@@ -134,7 +134,7 @@ def test_all_threads_share_one(
     _count(monkeypatch, made)
     threads = [network.thread(lambda: getattr(context, name)) for _ in range(2)]
     for thread in threads:
-        thread.join(PATIENCE)
+        thread.join(TIMEOUT)
     assert made.qsize() == 1
 
 
@@ -147,7 +147,7 @@ def test_contexts_join_the_store_side_by_side(
 
     class Joining(Replica):
         def __init__(self, *args: Any, **options: Any) -> None:
-            together.wait(PATIENCE)
+            together.wait(TIMEOUT)
             super().__init__(*args, **options)
 
     monkeypatch.setattr("rosz.params.replica.Replica", Joining)
@@ -155,7 +155,7 @@ def test_contexts_join_the_store_side_by_side(
         # Reading /use_sim_time joins.
         network.thread(lambda n=name, c=context: joined.put(Node(n, context=c)))  # type: ignore[misc]
     for _ in contexts:
-        joined.get(timeout=PATIENCE)
+        joined.get(timeout=TIMEOUT)
 
 
 def test_a_hook_that_comes_late_is_called_at_once(node: Node) -> None:
@@ -191,7 +191,7 @@ def test_a_queue_longer_than_the_memory(node: Node) -> None:
     node.subscription("chatter", String, lambda m: heard.put(m.data), queue_size=10**20)
     publisher = node.publisher("chatter", String, queue_size=10**20)
     publisher.publish("hello")
-    assert heard.get(timeout=PATIENCE) == "hello"
+    assert heard.get(timeout=TIMEOUT) == "hello"
 
 
 def test_a_command_line_that_is_no_utf_8(node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,7 +199,7 @@ def test_a_command_line_that_is_no_utf_8(node: Node, monkeypatch: pytest.MonkeyP
     context = node.context
     key = control_key(context.domain, context.session.zid, node.node_id)
     ask = msgspec.msgpack.encode({"action": "info"})
-    (reply,) = context.session.get(key, payload=ask, timeout=PATIENCE)
+    (reply,) = context.session.get(key, payload=ask, timeout=TIMEOUT)
     assert reply.ok, reply.payload
     info = msgspec.msgpack.decode(reply.payload, type=NodeInfo)
     assert info.argv[1:] == ["program", "file-\ufffd"]
@@ -208,7 +208,7 @@ def test_a_command_line_that_is_no_utf_8(node: Node, monkeypatch: pytest.MonkeyP
 def test_any_text_comes_to_rosout(network: Network, node: Node) -> None:
     log = network.node("console").subscription("/rosout", Log, qos=ROSOUT)
     node.log.info("cannot read 'file-\udcff': %s", "a\0b")
-    assert log.get(PATIENCE).msg == "cannot read 'file-\\udcff': a\\x00b"
+    assert log.get(TIMEOUT).msg == "cannot read 'file-\\udcff': a\\x00b"
 
 
 def test_timers_that_ended_are_not_kept(node: Node) -> None:
@@ -217,6 +217,6 @@ def test_timers_that_ended_are_not_kept(node: Node) -> None:
     for _ in range(50):
         node.timer(0.001, called.put, oneshot=True)
     for _ in range(50):
-        called.get(timeout=PATIENCE)
+        called.get(timeout=TIMEOUT)
     # What else comes is the publisher of /rosout, which a thread opens.
     eventually(lambda: len(node._lifecycle._parts) <= before + 1, "only what still runs is kept")

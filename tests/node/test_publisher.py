@@ -7,7 +7,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ClosedError, EncodeError, InvalidName, UsageError, WaitTimeout
 from rosz.lifecycle import Registration
@@ -122,7 +122,7 @@ def test_closed_follows_nobody(talker: Node) -> None:
 def test_interrupted_while_it_closes(talker: Node, monkeypatch: pytest.MonkeyPatch) -> None:
     publisher = talker.publisher("chatter", String)
     graph = talker.context.graph
-    graph.wait_for_topic("/chatter", PATIENCE)
+    graph.wait_for_topic("/chatter", TIMEOUT)
 
     def interrupt() -> None:
         raise KeyboardInterrupt
@@ -130,7 +130,7 @@ def test_interrupted_while_it_closes(talker: Node, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(publisher, "_finish", interrupt)
     with pytest.raises(KeyboardInterrupt):
         publisher.close()
-    graph.wait_for(lambda view: not view.publishers("/chatter"), PATIENCE, "end of '/chatter'")
+    graph.wait_for(lambda view: not view.publishers("/chatter"), TIMEOUT, "end of '/chatter'")
 
 
 def test_what_comes_to_a_closed_one_is_closed(talker: Node) -> None:
@@ -159,7 +159,7 @@ def test_depth_beyond_counting_is_latched_too(talker: Node, listener: Node, dept
     """0 leaves it to the system."""
     qos = QoS(depth=depth, durability="transient_local")
     talker.publisher("chatter", String, qos=qos).publish("kept")
-    assert listener.subscription("chatter", String, qos=qos).get(PATIENCE).data == "kept"
+    assert listener.subscription("chatter", String, qos=qos).get(TIMEOUT).data == "kept"
 
 
 def test_as_context_manager(talker: Node) -> None:
@@ -177,7 +177,7 @@ def test_closing_while_others_publish(network: Network, talker: Node, listener: 
         unexpected: list[BaseException] = []
 
         def work(publisher: Any = publisher, going: Any = going, bad: Any = unexpected) -> None:
-            going.wait(PATIENCE)
+            going.wait(TIMEOUT)
             try:
                 while True:
                     publisher.publish("hello")
@@ -187,10 +187,10 @@ def test_closing_while_others_publish(network: Network, talker: Node, listener: 
                 bad.append(error)
 
         threads = [network.thread(work) for _ in range(4)]
-        going.wait(PATIENCE)
+        going.wait(TIMEOUT)
         publisher.close()
         for thread in threads:
-            thread.join(PATIENCE)
+            thread.join(TIMEOUT)
         assert not unexpected
 
 
@@ -203,7 +203,7 @@ def test_wait_for_subscribers(network: Network, talker: Node, listener: Node) ->
     waited = network.thread(lambda: publisher.wait_for_subscribers(2))
     listener.subscription("chatter", String)
     talker.subscription("chatter", String)
-    waited.join(PATIENCE)
+    waited.join(TIMEOUT)
     assert [token.node_name for token in publisher.subscribers()] == ["/listener", "/talker"]
 
 
@@ -213,13 +213,13 @@ def test_wait_ends_with_the_node(network: Network, talker: Node) -> None:
 
     def wait() -> None:
         try:
-            publisher.wait_for_subscribers(timeout=PATIENCE)
+            publisher.wait_for_subscribers(timeout=TIMEOUT)
         except ClosedError as error:
             ended.put(str(error))
 
     network.thread(wait)
     talker.context.close()
-    assert "shutting down" in ended.get(timeout=PATIENCE)
+    assert "shutting down" in ended.get(timeout=TIMEOUT)
 
 
 def test_a_signal_handler_may_publish(network: Network) -> None:
@@ -263,11 +263,11 @@ class TestConnections:
         early = listener.subscription("chatter", String)
         publisher.wait_for_subscribers()
         publisher.on_connection(lambda link: came.put(link.node), went.put)
-        assert came.get(timeout=PATIENCE) == "/listener"
+        assert came.get(timeout=TIMEOUT) == "/listener"
         network.node("late").subscription("chatter", String)
-        assert came.get(timeout=PATIENCE) == "/late"
+        assert came.get(timeout=TIMEOUT) == "/late"
         early.close()
-        assert went.get(timeout=PATIENCE) == "/listener"
+        assert went.get(timeout=TIMEOUT) == "/listener"
 
     def test_first_message_for_one_alone(
         self, network: Network, talker: Node, listener: Node
@@ -289,7 +289,7 @@ class TestConnections:
         publisher.on_connection(links.put)
         subscriptions = [listener.subscription("chatter", String) for _ in range(2)]
         for number in range(2):
-            links.get(timeout=PATIENCE).publish(String(str(number)))
+            links.get(timeout=TIMEOUT).publish(String(str(number)))
         assert sorted(each.get().data for each in subscriptions) == ["0", "1"]
 
     def test_private_messages_make_no_gaps(self, talker: Node, listener: Node) -> None:
@@ -300,12 +300,12 @@ class TestConnections:
         )
         links: SimpleQueue[SubscriberLink[String]] = SimpleQueue()
         publisher.on_connection(links.put)
-        link = links.get(timeout=PATIENCE)
+        link = links.get(timeout=TIMEOUT)
         for text in ("1", "2"):
             publisher.publish(text)
-            assert lost.get(timeout=PATIENCE) == (text, 0)
+            assert lost.get(timeout=TIMEOUT) == (text, 0)
             link.publish(String("psst"))
-            assert lost.get(timeout=PATIENCE) == ("psst", 0)
+            assert lost.get(timeout=TIMEOUT) == ("psst", 0)
 
     @pytest.mark.parametrize("error", [ValueError, SystemExit])
     def test_callback_may_do_anything(
@@ -315,7 +315,7 @@ class TestConnections:
         seen: SimpleQueue[str] = SimpleQueue()
 
         def connected(link: SubscriberLink[String]) -> None:
-            talker.context.graph.wait_for_node("/listener", PATIENCE)
+            talker.context.graph.wait_for_node("/listener", TIMEOUT)
             seen.put(link.node)
             raise error("no more")
 
@@ -323,7 +323,7 @@ class TestConnections:
         publisher.on_connection(connected)
         for _ in range(2):
             listener.subscription("chatter", String)
-            assert seen.get(timeout=PATIENCE) == "/listener"
+            assert seen.get(timeout=TIMEOUT) == "/listener"
 
 
 STUCK = """
@@ -352,7 +352,7 @@ def test_stopped_subscriber_holds_nobody_up(network: Network, size: int) -> None
         began = time.monotonic()
         publisher.publish(data=bytes([number]) * size)
         longest = max(longest, time.monotonic() - began)
-        assert got.get(timeout=PATIENCE) == number
+        assert got.get(timeout=TIMEOUT) == number
     stuck.send(signal.SIGCONT)
     assert longest < 1.0
 

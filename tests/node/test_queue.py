@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.errors import ClosedError
 from rosz.node import Subscription
@@ -47,7 +47,7 @@ def test_samples_are_decoded_in_their_order_whoever_receives_them(
         return sample
 
     subscription = filled(network, monkeypatch, decode, 1, 2)
-    threads = [network.thread(lambda: subscription.get(PATIENCE)) for _ in range(2)]
+    threads = [network.thread(lambda: subscription.get(TIMEOUT)) for _ in range(2)]
     for thread in threads:
         thread.join()
     assert decoded == [1, 2]

@@ -8,7 +8,7 @@ from array import array
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ParamError
 from rosz.msgs.geometry_msgs.msg import Twist
@@ -51,8 +51,8 @@ def asker(network: Network, talker: Node) -> Node:  # noqa: ARG001  # there befo
 
 
 def client(asker: Node, name: str, kind: type[Any]) -> Client:
-    made = asker.client(f"/robot/talker/{name}", kind, timeout=PATIENCE)
-    made.wait_for_service(PATIENCE)
+    made = asker.client(f"/robot/talker/{name}", kind, timeout=TIMEOUT)
+    made.wait_for_service(TIMEOUT)
     return made
 
 
@@ -215,7 +215,7 @@ def test_arrays_arrive_as_lists(asker: Node, talker: Node) -> None:
 def test_a_node_without_parameters(network: Network) -> None:
     bare, asker = network.node("bare"), network.node("asker")
     ask = asker.client("/bare/list_parameters", ListParameters)
-    ask.wait_for_service(PATIENCE)
+    ask.wait_for_service(TIMEOUT)
     assert ask().result.names == ["use_sim_time"]
     bare.params["/bare"] = 3  # a leaf where a namespace is usual
     assert ask().result.names == ["use_sim_time"]
@@ -266,10 +266,10 @@ def test_type_that_is_not_known(asker: Node, name: str, type_hash: str, reason: 
 def test_nobody_asks_no_services(network: Network, talker: Node) -> None:
     """Among nodes of rosz alone nothing is declared, as long as no client wants it."""
     other = network.node("other")
-    other.context.graph.wait_for_node("/robot/talker", PATIENCE)
+    other.context.graph.wait_for_node("/robot/talker", TIMEOUT)
     other.client("/other/something/else", SetBool)
     graph = talker.context.graph
-    graph.wait_for(lambda view: bool(view.clients("/other/something/else")), PATIENCE, "a client")
+    graph.wait_for(lambda view: bool(view.clients("/other/something/else")), TIMEOUT, "a client")
     eventually(
         lambda: "rosz-ros2/robot/talker" not in {t.name for t in threading.enumerate()},
         "the talker has had a look",
@@ -281,8 +281,8 @@ def test_a_foreign_node_brings_them(network: Network, talker: Node) -> None:
     """Who looks at the list of services before calling, as ``ros2 param`` does, finds them."""
     token = Token(network.domain, "abc", 0, 0, Kind.NODE, "/", "_ros2cli_1")
     kept = network.session().token(format_token(token))
-    view = talker.context.graph.wait_for_service("/robot/talker/set_parameters", PATIENCE)
-    talker.context.graph.wait_for_service("/robot/talker/get_type_description", PATIENCE)
+    view = talker.context.graph.wait_for_service("/robot/talker/set_parameters", TIMEOUT)
+    talker.context.graph.wait_for_service("/robot/talker/get_type_description", TIMEOUT)
     (server,) = view.servers("/robot/talker/set_parameters")
     assert server.qos is not None
     assert server.qos.depth == 1000
@@ -299,18 +299,18 @@ def test_wanted_while_it_has_a_look(
         if lookout._node is not talker:
             return False
         looking.set()
-        return not go_on.wait(PATIENCE)
+        return not go_on.wait(TIMEOUT)
 
     monkeypatch.setattr(Ros2PeerDetector, "_is_foreign", look_long)
     asker = network.node("asker")
-    assert looking.wait(PATIENCE)
+    assert looking.wait(TIMEOUT)
     monkeypatch.setattr(Ros2PeerDetector, "_declare", lambda _: None)
     lists = asker.client("/robot/talker/list_parameters", ListParameters)
     graph = talker.context.graph
-    graph.wait_for(lambda view: bool(view.clients(lists.name)), PATIENCE, "a client")
+    graph.wait_for(lambda view: bool(view.clients(lists.name)), TIMEOUT, "a client")
     monkeypatch.undo()
     go_on.set()
-    lists.wait_for_service(PATIENCE)
+    lists.wait_for_service(TIMEOUT)
 
 
 def test_who_came_and_went_is_forgotten(network: Network, talker: Node) -> None:
@@ -318,7 +318,7 @@ def test_who_came_and_went_is_forgotten(network: Network, talker: Node) -> None:
     graph = talker.context.graph
     for _ in range(3):
         guest = network.node("guest")
-        graph.wait_for(lambda view: "/guest" in view.nodes(), PATIENCE, "a guest")
+        graph.wait_for(lambda view: "/guest" in view.nodes(), TIMEOUT, "a guest")
         zid = guest.context.session.zid
         eventually(lambda zid=zid: zid in lookout._tokens, "it is seen")  # type: ignore[misc]
         guest.context.close()
@@ -329,11 +329,11 @@ def test_who_came_and_went_is_forgotten(network: Network, talker: Node) -> None:
 def test_humble_has_no_type_descriptions(network: Network) -> None:
     context = network.context(distro="humble")
     node = network.node("old", context=context)
-    node.client("old/list_parameters", ListParameters).wait_for_service(PATIENCE)
+    node.client("old/list_parameters", ListParameters).wait_for_service(TIMEOUT)
     assert "/old/get_type_description" not in node.context.graph.view().services()
 
 
 def test_they_end_with_the_node(talker: Node, asker: Node) -> None:
     client(asker, "get_parameters", GetParameters)
     talker.close()
-    asker.context.graph.wait_for(lambda view: not view.services(), PATIENCE, "no more services")
+    asker.context.graph.wait_for(lambda view: not view.services(), TIMEOUT, "no more services")

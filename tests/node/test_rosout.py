@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from simulation import PATIENCE, START, SimulatedClock
+from simulation import START, TIMEOUT, SimulatedClock
 
 from rosz.errors import ClosedError
 from rosz.node import log_handlers
@@ -59,7 +59,7 @@ def test_line_has_all_that_ros_wants(bench: Bench) -> None:
             bench.log.warning("low: %d %%", 7)
 
     Talker().run()
-    line = bench.lines.get(timeout=PATIENCE)
+    line = bench.lines.get(timeout=TIMEOUT)
     assert line[:5] == (30, "ns.talker", "low: 7 %", __file__, "Talker.run")
     assert line[5] == Talker.run.__code__.co_firstlineno + 1
     assert line[6] == START
@@ -68,14 +68,14 @@ def test_line_has_all_that_ros_wants(bench: Bench) -> None:
 def test_child_has_its_name_below_the_nodes(bench: Bench) -> None:
     bench.log.publish_to(bench.publish)
     bench.log.child("arm").child("joint").error("stuck")
-    assert bench.lines.get(timeout=PATIENCE)[:3] == (40, "ns.talker.arm.joint", "stuck")
+    assert bench.lines.get(timeout=TIMEOUT)[:3] == (40, "ns.talker.arm.joint", "stuck")
 
 
 def test_time_is_that_of_logging_not_of_publishing(bench: Bench) -> None:
     bench.log.info("early")
     bench.clock.advance(START + 5)
     bench.log.publish_to(bench.publish)
-    assert bench.lines.get(timeout=PATIENCE)[6] == START
+    assert bench.lines.get(timeout=TIMEOUT)[6] == START
 
 
 def test_message_is_filled_in_when_logged(bench: Bench) -> None:
@@ -112,7 +112,7 @@ def test_severity_is_one_that_ros_knows(bench: Bench, level: int, severity: int)
     bench.log.setLevel(1)
     bench.log.publish_to(bench.publish)
     bench.log.log(level, "x")
-    assert bench.lines.get(timeout=PATIENCE)[0] == severity
+    assert bench.lines.get(timeout=TIMEOUT)[0] == severity
 
 
 def test_publishing_may_log_without_publishing_that(bench: Bench) -> None:
@@ -133,12 +133,12 @@ def test_slow_publisher_does_not_hold_up_logging_and_misses_are_counted(bench: B
 
     def publish(*line: object) -> None:
         entered.set()
-        assert proceed.wait(PATIENCE)
+        assert proceed.wait(TIMEOUT)
         bench.publish(*line)
 
     bench.log.publish_to(publish)
     bench.log.info("first")
-    assert entered.wait(PATIENCE)
+    assert entered.wait(TIMEOUT)
     for number in range(log_handlers._CAPACITY + 7):
         bench.log.info("%d", number)
     proceed.set()
@@ -181,7 +181,7 @@ def test_failing_publisher_is_told_once_and_not_to_itself(bench: Bench) -> None:
     bench.log.info("one")
     bench.log.info("two")
     bench.messages()
-    assert [tried.get(timeout=PATIENCE) for _ in range(2)] == ["one", "two"]
+    assert [tried.get(timeout=TIMEOUT) for _ in range(2)] == ["one", "two"]
     assert tried.empty()
     assert sorted(told) == ["cannot publish the log on /rosout: no route", "one", "two"]
 
@@ -197,7 +197,7 @@ def test_a_publisher_that_ended_first_is_no_trouble(bench: Bench) -> None:
     bench.log.publish_to(publish)
     bench.log.info("one")
     bench.messages()
-    assert tried.get(timeout=PATIENCE) == "one"
+    assert tried.get(timeout=TIMEOUT) == "one"
     assert told == ["one"]
 
 
@@ -221,11 +221,11 @@ def test_closing_waits_for_a_stuck_publisher_only_so_long(
 
     def publish(*_: object) -> None:
         entered.set()
-        assert proceed.wait(PATIENCE)
+        assert proceed.wait(TIMEOUT)
 
     bench.log.publish_to(publish)
     bench.log.info("one")
-    assert entered.wait(PATIENCE)
+    assert entered.wait(TIMEOUT)
     bench.log.close()
     assert not proceed.is_set()
     proceed.set()
@@ -240,7 +240,7 @@ def test_publisher_may_close_the_log(bench: Bench) -> None:
 
     bench.log.publish_to(publish)
     bench.log.info("one")
-    assert closed.wait(PATIENCE)
+    assert closed.wait(TIMEOUT)
 
 
 def test_second_publisher_is_refused(bench: Bench) -> None:

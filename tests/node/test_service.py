@@ -5,7 +5,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import EncodeError, ServiceError, UsageError
 from rosz.msgs.example_interfaces.srv import AddTwoInts, AddTwoIntsRequest, AddTwoIntsResponse
@@ -61,7 +61,7 @@ def test_request_and_response(server: Node, caller: Node) -> None:
     client = caller.client("add", AddTwoInts)
     client.wait_for_service()
     assert client(3, 4) == AddTwoIntsResponse(7)
-    assert requests.get(timeout=PATIENCE) == AddTwoIntsRequest(3, 4)
+    assert requests.get(timeout=TIMEOUT) == AddTwoIntsRequest(3, 4)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_several_calls_at_once(network: Network, server: Node, caller: Node) -> 
     together = threading.Barrier(4)
 
     def meet(request: AddTwoIntsRequest) -> int:
-        together.wait(PATIENCE)
+        together.wait(TIMEOUT)
         return request.a
 
     server.service("meet", AddTwoInts, meet, threads=4)
@@ -133,7 +133,7 @@ def test_several_calls_at_once(network: Network, server: Node, caller: Node) -> 
     answers: SimpleQueue[int] = SimpleQueue()
     for number in range(8):
         network.thread(lambda n=number: answers.put(client(n, 0).sum))  # type: ignore[misc]
-    assert sorted(answers.get(timeout=PATIENCE) for _ in range(8)) == list(range(8))
+    assert sorted(answers.get(timeout=TIMEOUT) for _ in range(8)) == list(range(8))
 
 
 def test_many_calls_of_many_clients(network: Network, server: Node) -> None:
@@ -153,7 +153,7 @@ def test_many_calls_of_many_clients(network: Network, server: Node) -> None:
     for number, client in enumerate(callers * 2):
         network.thread(lambda c=client, n=number: work(c, n * 1000))  # type: ignore[misc]
     for _ in range(6):
-        done.get(timeout=PATIENCE)
+        done.get(timeout=TIMEOUT)
     assert wrong.empty()
 
 
@@ -163,7 +163,7 @@ def test_closing_refuses_further_calls(network: Network, server: Node, caller: N
 
     def slow(_request: object) -> int:
         inside.set()
-        assert go_on.wait(PATIENCE)
+        assert go_on.wait(TIMEOUT)
         return 42
 
     service = server.service("slow", AddTwoInts, slow)
@@ -171,11 +171,11 @@ def test_closing_refuses_further_calls(network: Network, server: Node, caller: N
     client.wait_for_service()
     answers: SimpleQueue[int] = SimpleQueue()
     network.thread(lambda: answers.put(client(0, 0).sum))
-    assert inside.wait(PATIENCE)
+    assert inside.wait(TIMEOUT)
     service.close()
     service.close()
     go_on.set()
-    assert answers.get(timeout=PATIENCE) == 42
+    assert answers.get(timeout=TIMEOUT) == 42
     view = caller.context.graph
     eventually(lambda: not view.view().servers("/slow"), "the service is gone from the graph")
     with pytest.raises(ServiceError, match=r"service \[/slow\] is not available"):

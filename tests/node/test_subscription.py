@@ -6,7 +6,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.msgs.sensor_msgs.msg import Image
@@ -38,7 +38,7 @@ def test_callback(talker: Node, listener: Node) -> None:
     publisher = connected(talker)
     for text in ("one", "two"):
         publisher.publish(text)
-    assert [got.get(timeout=PATIENCE).data for _ in range(2)] == ["one", "two"]
+    assert [got.get(timeout=TIMEOUT).data for _ in range(2)] == ["one", "two"]
 
 
 def test_callbacks_come_one_at_a_time_in_order(talker: Node, listener: Node) -> None:
@@ -58,7 +58,7 @@ def test_callbacks_come_one_at_a_time_in_order(talker: Node, listener: Node) -> 
     publisher.wait_for_subscribers()
     for number in range(200):
         publisher.publish(number)
-    assert done.wait(PATIENCE)
+    assert done.wait(TIMEOUT)
     assert got == list(range(200))
 
 
@@ -70,7 +70,7 @@ def test_newest_samples_are_kept(talker: Node, listener: Node, with_callback: bo
 
     def slow(message: Int32) -> None:
         got.put(message.data)
-        assert gate.wait(PATIENCE)
+        assert gate.wait(TIMEOUT)
 
     publisher = talker.publisher("count", Int32)
     after = listener.subscription("after", String)
@@ -80,14 +80,14 @@ def test_newest_samples_are_kept(talker: Node, listener: Node, with_callback: bo
     publisher.wait_for_subscribers()
     publisher.publish(0)
     if with_callback:
-        assert got.get(timeout=PATIENCE) == 0
+        assert got.get(timeout=TIMEOUT) == 0
     for number in range(1, 20):
         publisher.publish(number)
     talker.publisher("after", String).publish("all that")
     after.get()
     gate.set()
     if with_callback:
-        assert [got.get(timeout=PATIENCE) for _ in range(3)] == [17, 18, 19]
+        assert [got.get(timeout=TIMEOUT) for _ in range(3)] == [17, 18, 19]
     else:
         waiting = subscription._queue.items  # each subscription has a thread that fills its own
         eventually(
@@ -123,7 +123,7 @@ def test_info(talker: Node, listener: Node) -> None:
     publisher = connected(talker)
     for count in (1, 2):
         publisher.publish("hello")
-        message, info = got.get(timeout=PATIENCE)
+        message, info = got.get(timeout=TIMEOUT)
         assert message == String("hello")
         assert info.sequence == count
         assert info.gid == publisher.gid
@@ -140,20 +140,20 @@ def test_gaps_are_counted_per_publisher(talker: Node, listener: Node) -> None:
 
     def callback(message: String, info: MessageInfo) -> None:
         got.put((message.data, info.lost))
-        assert gate.wait(PATIENCE)
+        assert gate.wait(TIMEOUT)
 
     listener.subscription("chatter", String, callback, queue_size=2, with_info=True)
     one, other = chatter(talker), chatter(talker)
     one.wait_for_subscribers()
     one.publish("1")
-    assert got.get(timeout=PATIENCE) == ("1", 0)
+    assert got.get(timeout=TIMEOUT) == ("1", 0)
     for number in range(2, 8):
         one.publish(str(number))
     other.publish("other")
     talker.publisher("after", String).publish("all that")
     after.get()
     gate.set()
-    assert [got.get(timeout=PATIENCE) for _ in range(2)] == [("7", 5), ("other", 0)]
+    assert [got.get(timeout=TIMEOUT) for _ in range(2)] == [("7", 5), ("other", 0)]
 
 
 def test_header_gets_the_sequence_number(talker: Node, listener: Node) -> None:
@@ -194,10 +194,10 @@ def test_several_may_wait(network: Network, talker: Node, listener: Node) -> Non
     publisher = connected(talker)
     for number in range(10):
         publisher.publish(str(number))
-    assert sorted(got.get(timeout=PATIENCE) for _ in range(10)) == [str(n) for n in range(10)]
+    assert sorted(got.get(timeout=TIMEOUT) for _ in range(10)) == [str(n) for n in range(10)]
     subscription.close()
     for thread in waiting:
-        thread.join(PATIENCE)
+        thread.join(TIMEOUT)
         assert not thread.is_alive()
 
 
@@ -207,14 +207,14 @@ def test_closing_ends_a_wait(network: Network, listener: Node) -> None:
 
     def take() -> None:
         try:
-            subscription.get(PATIENCE)
+            subscription.get(TIMEOUT)
         except ClosedError as error:
             ends.put(str(error))
 
     network.thread(take)
     listener.close()
     assert (
-        ends.get(timeout=PATIENCE)
+        ends.get(timeout=TIMEOUT)
         == "cannot get a message: the subscription of '/chatter' is closed"
     )
 
@@ -245,7 +245,7 @@ def test_async_iteration_ends_with_the_node(listener: Node) -> None:
         await closing
         return found
 
-    assert asyncio.run(asyncio.wait_for(collect(), PATIENCE)) == []
+    assert asyncio.run(asyncio.wait_for(collect(), TIMEOUT)) == []
 
 
 def test_two_loops_and_a_sample_after_them(talker: Node, listener: Node) -> None:
@@ -283,7 +283,7 @@ def test_exception_in_callback(
     publisher = connected(talker)
     for text in ("one", "exit", "stop", "two", "end"):
         publisher.publish(text)
-        assert got.get(timeout=PATIENCE) == text
+        assert got.get(timeout=TIMEOUT) == text
     listener.close()
     errors = capfd.readouterr().err
     assert errors.count("callback of '/chatter' failed") == 4
@@ -300,7 +300,7 @@ def test_closed_in_its_own_callback(talker: Node, listener: Node) -> None:
     subscription = listener.subscription("chatter", String, callback)
     publisher = connected(talker)
     publisher.publish("hello")
-    assert closed.wait(PATIENCE)
+    assert closed.wait(TIMEOUT)
     eventually(lambda: not publisher.subscribers(), "the subscription is gone from the graph")
 
 
@@ -309,7 +309,7 @@ def test_publishers(network: Network, talker: Node, listener: Node) -> None:
     chatter(talker)
     network.node("other").publisher("chatter", Int32)
     graph = listener.context.graph
-    graph.wait_for(lambda view: len(view.publishers("/chatter")) == 2, PATIENCE, "publishers")
+    graph.wait_for(lambda view: len(view.publishers("/chatter")) == 2, TIMEOUT, "publishers")
     assert [token.node_name for token in subscription.publishers()] == ["/talker"]
 
 
@@ -354,9 +354,9 @@ class TestLatched:
         publisher.publish("old")
         got: SimpleQueue[str] = SimpleQueue()
         network.node("listener").subscription("chatter", String, lambda m: got.put(m.data))
-        assert got.get(timeout=PATIENCE) == "old"
+        assert got.get(timeout=TIMEOUT) == "old"
         publisher.publish("new")
-        assert got.get(timeout=PATIENCE) == "new"
+        assert got.get(timeout=TIMEOUT) == "new"
 
     def test_transient_local_reader(self, network: Network, talker: Node) -> None:
         """The reader of ROS 2, which recovers history by itself."""
@@ -399,7 +399,7 @@ class TestGeneric:
         chatter(talker, latch=True).publish("hello")
         got: SimpleQueue[Any] = SimpleQueue()
         network.node("listener").subscription("chatter", callback=got.put)
-        assert got.get(timeout=PATIENCE).data == "hello"
+        assert got.get(timeout=TIMEOUT).data == "hello"
 
     def test_raw(self, talker: Node, listener: Node) -> None:
         """The form of rospy's AnyMsg: bytes, and the name of their type beside them."""
@@ -407,7 +407,7 @@ class TestGeneric:
         listener.subscription("count", None, lambda *both: got.put(both), raw=True, with_info=True)
         meet(talker, listener)
         talker.publisher("count", Int32).publish(7)
-        payload, info = got.get(timeout=PATIENCE)
+        payload, info = got.get(timeout=TIMEOUT)
         assert payload == Int32(7).to_cdr()
         assert info.type_name == "std_msgs/msg/Int32"
 
@@ -457,7 +457,7 @@ class TestGeneric:
         publisher.wait_for_subscribers()
         ended = network.thread(lambda: list(subscription))
         listener.close()
-        ended.join(PATIENCE)
+        ended.join(TIMEOUT)
         assert not ended.is_alive()
         assert subscription.closed
         eventually(lambda: not publisher.subscribers(), "the subscription is gone from the graph")

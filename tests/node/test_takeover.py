@@ -8,7 +8,7 @@ from queue import SimpleQueue
 from types import SimpleNamespace
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Node, control, core
@@ -41,7 +41,7 @@ def test_older_process_ends(network: Network) -> None:
     assert f"(process {king.process.pid} on {king.process.host})" in warning
     assert not king.is_shutdown
     graph = king.context.graph
-    graph.wait_for(lambda view: view.nodes() == ["/king"], PATIENCE, "one king")
+    graph.wait_for(lambda view: view.nodes() == ["/king"], TIMEOUT, "one king")
 
 
 def test_only_that_node_ends(network: Network) -> None:
@@ -76,7 +76,7 @@ def test_same_base_name_elsewhere_is_another_node(network: Network) -> None:
         lambda other, _: seen.set() if other.node == "/last" else None
     )
     network.node("last")
-    assert seen.wait(PATIENCE)  # listeners are called in order: the king has seen all the others
+    assert seen.wait(TIMEOUT)  # listeners are called in order: the king has seen all the others
     assert not takeovers() - before
     assert not any(node.is_shutdown for node in nodes)
 
@@ -110,7 +110,7 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
 
     def slowly(_node: Node, other: ProcessToken) -> bool:
         asked.put(other.node_id)
-        assert go_on.wait(PATIENCE)
+        assert go_on.wait(TIMEOUT)
         return False
 
     monkeypatch.setattr(control, "_is_newer", slowly)
@@ -122,13 +122,13 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
         for number in range(50)
     ]
     tokens = [elsewhere.session.token(format_process(duplicate)) for duplicate in duplicates]
-    seen = [asked.get(timeout=PATIENCE) for _ in range(control._THREADS)]
+    seen = [asked.get(timeout=TIMEOUT) for _ in range(control._THREADS)]
     network.node("last")
-    king.context.graph.wait_for_node("/last", PATIENCE)
+    king.context.graph.wait_for_node("/last", TIMEOUT)
     assert threading.active_count() - before < len(duplicates)
     assert len(takeovers() - ended) == control._THREADS
     go_on.set()
-    seen += [asked.get(timeout=PATIENCE) for _ in range(len(duplicates) - len(seen))]
+    seen += [asked.get(timeout=TIMEOUT) for _ in range(len(duplicates) - len(seen))]
     assert sorted(seen) == list(range(len(duplicates)))
     assert not king.is_shutdown
     for token in tokens:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from simulation import PATIENCE, SECOND, START, SimulatedClock
+from simulation import SECOND, START, TIMEOUT, SimulatedClock
 
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock
@@ -40,7 +40,7 @@ class Bench:
     def tick(self, time_ns: int) -> TimerEvent:
         """Advance the clock for a sleeping timer, and return the event of its call."""
         self.clock.tick(time_ns)
-        return self.events.get(timeout=PATIENCE)
+        return self.events.get(timeout=TIMEOUT)
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_timer_calls_at_each_period(bench: Bench) -> None:
     assert second.current_expected == START + 2 * SECOND
     assert second.current_real == START + 2 * SECOND + 7
     assert second.last_duration is not None
-    assert 0 <= second.last_duration < PATIENCE * SECOND
+    assert 0 <= second.last_duration < TIMEOUT * SECOND
     third = bench.tick(START + 3 * SECOND)
     assert third.last_real == START + 2 * SECOND + 7
     assert third.current_expected == START + 3 * SECOND
@@ -68,10 +68,10 @@ def test_timer_calls_at_each_period(bench: Bench) -> None:
 def test_late_timer_makes_up_then_gives_up_what_it_missed(bench: Bench) -> None:
     bench.timer()
     bench.tick(START + 2 * SECOND)
-    assert bench.events.get(timeout=PATIENCE).current_expected == START + 2 * SECOND
+    assert bench.events.get(timeout=TIMEOUT).current_expected == START + 2 * SECOND
     # Far too late: one call at once, one more from the period that the leap fell into, then none.
     assert bench.tick(START + 60 * SECOND).current_real == START + 60 * SECOND
-    assert bench.events.get(timeout=PATIENCE).current_real == START + 60 * SECOND
+    assert bench.events.get(timeout=TIMEOUT).current_real == START + 60 * SECOND
     bench.clock.wait_for_sleeper()
     assert bench.events.empty()
 
@@ -89,8 +89,8 @@ def test_oneshot_calls_once(bench: Bench) -> None:
     timer = bench.timer(oneshot=True)
     assert timer.alive
     bench.tick(START + SECOND)
-    assert bench.ended.get(timeout=PATIENCE) is timer
-    assert timer.join(PATIENCE)
+    assert bench.ended.get(timeout=TIMEOUT) is timer
+    assert timer.join(TIMEOUT)
     assert not timer.alive
     assert bench.events.empty()
 
@@ -98,10 +98,10 @@ def test_oneshot_calls_once(bench: Bench) -> None:
 def test_closing_ends_a_sleeping_timer_at_once(bench: Bench) -> None:
     with bench.timer() as timer:
         bench.clock.wait_for_sleeper()
-    assert timer.join(PATIENCE)
+    assert timer.join(TIMEOUT)
     timer.close()
     timer.shutdown()
-    assert bench.ended.get(timeout=PATIENCE) is timer
+    assert bench.ended.get(timeout=TIMEOUT) is timer
     assert not bench.clock.closed
     assert bench.events.empty()
 
@@ -110,7 +110,7 @@ def test_timer_ends_with_its_clock(bench: Bench) -> None:
     timer = bench.timer()
     bench.clock.wait_for_sleeper()
     bench.clock.close()
-    assert timer.join(PATIENCE)
+    assert timer.join(TIMEOUT)
 
 
 def test_timer_may_be_closed_and_joined_in_its_own_callback(bench: Bench) -> None:
@@ -118,15 +118,15 @@ def test_timer_may_be_closed_and_joined_in_its_own_callback(bench: Bench) -> Non
     timers: queue.Queue[Timer] = queue.Queue()
 
     def stop(_: TimerEvent) -> None:
-        timer = timers.get(timeout=PATIENCE)
+        timer = timers.get(timeout=TIMEOUT)
         timer.close()
         answers.put(timer.join())
 
     timer = Timer(SECOND, stop, bench.clock, on_error=bench.report)
     timers.put(timer)
     bench.clock.tick(START + SECOND)
-    assert answers.get(timeout=PATIENCE) is False
-    assert timer.join(PATIENCE)
+    assert answers.get(timeout=TIMEOUT) is False
+    assert timer.join(TIMEOUT)
     assert bench.errors.empty()
 
 
@@ -140,7 +140,7 @@ def test_error_in_the_callback_is_reported_and_the_timer_goes_on(
     Timer(SECOND, fail, bench.clock, on_error=bench.report, name="beat")
     for count in (1, 2):
         bench.clock.tick(START + count * SECOND)
-        text, error = bench.errors.get(timeout=PATIENCE)
+        text, error = bench.errors.get(timeout=TIMEOUT)
         assert text == "callback of timer 'beat' failed"
         assert isinstance(error, kind)
         assert error.__traceback__ is not None
@@ -153,7 +153,7 @@ def test_use_of_closed_things_in_a_callback_during_shutdown_is_no_error(bench: B
 
     timer = Timer(SECOND, fail, bench.clock, on_error=bench.report)
     bench.clock.tick(START + SECOND)
-    assert timer.join(PATIENCE)
+    assert timer.join(TIMEOUT)
     assert bench.errors.empty()
 
 
@@ -163,16 +163,16 @@ def test_use_of_closed_things_in_a_callback_is_an_error_otherwise(bench: Bench) 
 
     Timer(SECOND, fail, bench.clock, on_error=bench.report)
     bench.clock.tick(START + SECOND)
-    assert isinstance(bench.errors.get(timeout=PATIENCE)[1], ClosedError)
+    assert isinstance(bench.errors.get(timeout=TIMEOUT)[1], ClosedError)
 
 
 def test_timer_stops_with_an_error_when_time_moves_back(bench: Bench) -> None:
     timer = bench.timer()
     bench.clock.tick(1)
-    text, error = bench.errors.get(timeout=PATIENCE)
+    text, error = bench.errors.get(timeout=TIMEOUT)
     assert text == "timer 'beat' stopped"
     assert isinstance(error, TimeMovedBackwards)
-    assert timer.join(PATIENCE)
+    assert timer.join(TIMEOUT)
 
 
 def test_timer_with_reset_goes_on_when_time_moves_back(bench: Bench) -> None:
@@ -198,7 +198,7 @@ def test_timer_is_named_after_its_callback(bench: Bench) -> None:
         assert timer.name.endswith("beat")
         assert repr(timer) == f"<Timer {timer.name} every 1 s>"
         assert any(timer.name in thread.name for thread in threading.enumerate())
-    assert timer.join(PATIENCE)
+    assert timer.join(TIMEOUT)
     assert repr(timer).endswith("ended>")
 
 
@@ -207,9 +207,9 @@ def test_timer_in_wall_time() -> None:
     events: queue.Queue[TimerEvent] = queue.Queue()
     start = clock.now()
     timer = Timer(5_000_000, events.put, clock, on_error=lambda *_: None)
-    got = [events.get(timeout=PATIENCE) for _ in range(4)]
+    got = [events.get(timeout=TIMEOUT) for _ in range(4)]
     clock.close()
-    assert timer.join(PATIENCE)
+    assert timer.join(TIMEOUT)
     steps = [
         after.current_expected - before.current_expected
         for before, after in itertools.pairwise(got)

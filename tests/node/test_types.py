@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import TypeNotFound, WaitTimeout
 from rosz.msgs.example_interfaces.srv import AddTwoInts
@@ -40,7 +40,7 @@ def knowing(network: Network, packages: Path) -> Node:
 
 
 def publisher_token(node: Node, topic: str) -> Token:
-    view = node.context.graph.wait_for_topic(topic, PATIENCE)
+    view = node.context.graph.wait_for_topic(topic, TIMEOUT)
     return view.publishers(topic)[0]
 
 
@@ -52,14 +52,14 @@ def test_publisher_and_subscription_by_name(network: Network, name: str) -> None
     assert publisher.message_type is String
     assert subscription.message_type is String
     publisher.publish("hello")
-    assert subscription.get(PATIENCE).data == "hello"
+    assert subscription.get(TIMEOUT).data == "hello"
 
 
 def test_compiled_type_by_name(knowing: Node) -> None:
     received: SimpleQueue[Any] = SimpleQueue()
     knowing.subscription("grips", "gripper_msgs/Grip", received.put)
     knowing.publisher("grips", "gripper_msgs/Grip").publish(label="soft")
-    assert received.get(timeout=PATIENCE).label == "soft"
+    assert received.get(timeout=TIMEOUT).label == "soft"
 
 
 def test_unknown_name(network: Network) -> None:
@@ -77,7 +77,7 @@ def test_info_tells_the_type_and_its_hash(
     infos: SimpleQueue[MessageInfo] = SimpleQueue()
     node.subscription("chatter", message_type, lambda _, info: infos.put(info), with_info=True)
     node.publisher("chatter", String).publish("x")
-    info = infos.get(timeout=PATIENCE)
+    info = infos.get(timeout=TIMEOUT)
     assert (info.type_name, info.type_hash) == ("std_msgs/msg/String", String._type_hash)
 
 
@@ -99,7 +99,7 @@ def test_type_from_another_node(network: Network, knowing: Node) -> None:
     token = publisher_token(node, "/grips")
     made = request_type(node, token)
     assert made._type_hash == token.type_hash
-    received = node.subscription("grips", made).get(PATIENCE)
+    received = node.subscription("grips", made).get(TIMEOUT)
     assert (received.label, received.part.corners) == ("firm", [])
     parts = len(node._lifecycle._parts)
     request_type(node, token)
@@ -109,7 +109,7 @@ def test_type_from_another_node(network: Network, knowing: Node) -> None:
 def test_service_type_from_another_node(network: Network, knowing: Node) -> None:
     knowing.service("close", knowing.context.types.service("gripper_msgs/Close"), lambda _: [True])
     node = network.node("bridge")
-    view = node.context.graph.wait_for_service("/close", PATIENCE)
+    view = node.context.graph.wait_for_service("/close", TIMEOUT)
     made = request_type(node, view.servers("/close")[0])
     assert node.client("close", made)().success is True
 
@@ -120,7 +120,7 @@ def test_known_type_is_not_requested(network: Network) -> None:
     node.service("add", AddTwoInts, lambda _: [0])
     token = publisher_token(node, "/chatter")
     assert request_type(node, msgspec.structs.replace(token, node="gone"), 0) is String
-    server = node.context.graph.wait_for_service("/add", PATIENCE).servers("/add")[0]
+    server = node.context.graph.wait_for_service("/add", TIMEOUT).servers("/add")[0]
     assert request_type(node, msgspec.structs.replace(server, node="gone"), 0) is AddTwoInts
 
 

@@ -6,7 +6,7 @@ import time
 from queue import SimpleQueue
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import TimeMovedBackwards
 from rosz.msgs.builtin_interfaces.msg import Time
@@ -83,12 +83,12 @@ def test_sleep_timer_and_rate(network: Network, simulator: Simulator, node: Node
     simulator.set(node, 4.5)
     assert woke.empty()
     simulator.set(node, 5)
-    assert woke.get(timeout=PATIENCE) == ("rate", 5 * SECOND)
+    assert woke.get(timeout=TIMEOUT) == ("rate", 5 * SECOND)
     simulator.set(node, 6)
-    assert woke.get(timeout=PATIENCE) == ("sleep", 6 * SECOND)
+    assert woke.get(timeout=TIMEOUT) == ("sleep", 6 * SECOND)
     assert ticks.empty()
     simulator.set(node, 11)
-    assert ticks.get(timeout=PATIENCE) == 11 * SECOND
+    assert ticks.get(timeout=TIMEOUT) == 11 * SECOND
 
 
 def test_jump_back(network: Network, simulator: Simulator, node: Node) -> None:
@@ -104,7 +104,7 @@ def test_jump_back(network: Network, simulator: Simulator, node: Node) -> None:
     network.thread(sleep)
     eventually(lambda: len(node.clock._source.sleepers) == 1, "it sleeps")
     simulator.set(node, 3)
-    assert raised.get(timeout=PATIENCE)
+    assert raised.get(timeout=TIMEOUT)
     assert node.now() == 3 * SECOND
 
 
@@ -127,4 +127,4 @@ def test_end_without_a_tick(network: Network, node: Node) -> None:
     network.thread(lambda: ended.put(node.sleep(1)))
     eventually(lambda: len(node.clock._source.sleepers) == 1, "it sleeps")
     node.close()
-    assert ended.get(timeout=PATIENCE) is False
+    assert ended.get(timeout=TIMEOUT) is False

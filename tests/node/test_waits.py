@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.errors import UsageError, WaitTimeout
 from rosz.msgs.example_interfaces.srv import AddTwoInts
@@ -74,7 +74,7 @@ def test_less_than_nothing_is_nothing(network: Network) -> None:
     with pytest.raises(WaitTimeout, match="within -1 s"):
         node.subscription("x", Int32).get(-1.0)
     network.node("server").service("s", AddTwoInts, lambda _: 1)
-    client.wait_for_service(PATIENCE)
+    client.wait_for_service(TIMEOUT)
     with pytest.raises(WaitTimeout, match="answer of service '/s' within 0 s"):
         client(1, 2)
 

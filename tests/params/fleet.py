@@ -18,7 +18,7 @@ from typing import IO, Any
 from network import free_port
 
 ROOT = Path(__file__).parents[2]
-PATIENCE = 50.0
+TIMEOUT = 50.0
 
 
 class Process:
@@ -64,7 +64,7 @@ class Process:
         stdin.write(json.dumps([verb, arguments]).encode() + b"\n")
         stdin.flush()
 
-    def answer(self, timeout: float = PATIENCE) -> Any:
+    def answer(self, timeout: float = TIMEOUT) -> Any:
         stdout = _pipe(self._process.stdout).fileno()
         deadline = time.monotonic() + timeout
         while b"\n" not in self._rest:
@@ -138,7 +138,7 @@ def states(processes: Iterable[Process]) -> list[dict[str, Any]]:
 def until_known(processes: list[Process], others: int = 0) -> None:
     """Wait until all know all, or so many others."""
     others = others or len(processes) - 1
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     pause = threading.Event()
     while any(state["members"] < others for state in states(processes)):
         assert time.monotonic() < deadline, "they do not find each other"
@@ -150,7 +150,7 @@ def until_same(processes: list[Process], what: str) -> float:
     begun = time.monotonic()
     pause = threading.Event()
     while len({state["digest"] for state in states(processes)}) > 1:
-        assert time.monotonic() - begun < PATIENCE, "they do not become the same"
+        assert time.monotonic() - begun < TIMEOUT, "they do not become the same"
         pause.wait(0.005)
     took = time.monotonic() - begun
     print(f"{what}: the same on {len(processes)} replicas after {took:.3f} s")

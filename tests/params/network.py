@@ -14,7 +14,7 @@ from rosz.params.remote import ParamClient
 from rosz.params.replica import Outcome, Replica
 from rosz.session import MeshReadiness, Session, SessionConfig, serve_links
 
-PATIENCE = 10.0
+TIMEOUT = 10.0
 
 
 def merge(store: Replica | ParamClient, name: str, value: Any, **how: Any) -> Outcome:
@@ -34,7 +34,7 @@ class Network(network.Network):
         session = super().session(config or SessionConfig(rendezvous=self.rendezvous))
         self._keep(serve_links(session))
         if self._linked:
-            assert MeshReadiness(session, PATIENCE, threading.Event()).ready.wait(PATIENCE)
+            assert MeshReadiness(session, TIMEOUT, threading.Event()).ready.wait(TIMEOUT)
         self._linked += 1
         return session
 

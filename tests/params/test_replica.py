@@ -23,7 +23,7 @@ from rosz.params.wire import (
 )
 from rosz.session import HybridClock, Stamp
 
-from .network import PATIENCE, Network, merge, until
+from .network import TIMEOUT, Network, merge, until
 
 
 class SkewedClock(HybridClock):
@@ -114,10 +114,10 @@ def test_a_stamp_years_ahead_stops_no_later_write(
             keys.of(one.zid, "set"): encode(ClientRequest("write", batch=batch)),
         }
         for key, payload in asked.items():
-            (reply,) = stranger.get(key, payload=payload, timeout=PATIENCE)
+            (reply,) = stranger.get(key, payload=payload, timeout=TIMEOUT)
         assert b"years ahead" in reply.payload
         assert one.set("/a", 1).slow == other.set("/c", 2).slow == ()
-        assert one.compare(PATIENCE)
+        assert one.compare(TIMEOUT)
     assert one.root == other.root == {"a": 1, "b": "fair", "c": 2}
     assert caplog.text.count("years ahead") <= 2  # one line each
 
@@ -130,22 +130,22 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
         session.secured = True
     one = network.join(sessions[0])
     # One that knows the other when it joins does not compare with it again when it appears.
-    until(lambda: sessions[1].live_tokens(Keys(0).tokens, PATIENCE) != [])
+    until(lambda: sessions[1].live_tokens(Keys(0).tokens, TIMEOUT) != [])
     other = network.join(sessions[1])
     until(lambda: len(one.members()) == 1)
     monkeypatch.setattr(one._broadcaster, "send", lambda *_: ())
     other._declared[1].close()  # where it is told: rules leave such questions without an answer
     merge(one, "/", {"a": {"b": 1, "c": 2}, "d": 3})
     with caplog.at_level(logging.WARNING, "rosz.params"):
-        assert one.compare(PATIENCE)
-        assert one.compare(PATIENCE)
+        assert one.compare(TIMEOUT)
+        assert one.compare(TIMEOUT)
         key = f"{Keys(0).of(other.zid, 'tell')}/**"
         network.keep(sessions[1].queryable(key, other._sync.on_tell, complete=True))
-        assert one.compare(PATIENCE)
+        assert one.compare(TIMEOUT)
     assert other.root == {}
     assert caplog.text.count("and 2 more, which differs there from now on") == 1
     one._on_member(other._own, False)
-    until(lambda: one.compare(PATIENCE) and other.root == one.root)
+    until(lambda: one.compare(TIMEOUT) and other.root == one.root)
     assert one.digest() == other.digest()
 
 

@@ -14,11 +14,11 @@ from rosz.params.writes import Write, put
 
 from .network import Network, merge
 
-PATIENCE = 10
+TIMEOUT = 10
 
 
 def told(queue: SimpleQueue[Changed], count: int) -> list[tuple[str, Any, Any]]:
-    changes = [queue.get(timeout=PATIENCE) for _ in range(count)]
+    changes = [queue.get(timeout=TIMEOUT) for _ in range(count)]
     return [(change.name, change.old, change.new) for change in changes]
 
 
@@ -34,7 +34,7 @@ def test_changes_come_with_name_old_new_and_origin(network: Network) -> None:
     one.delete("/a/c")
     one.set("/", {"a": {"b": 4}})
     one.delete("/a")
-    first = heard.get(timeout=PATIENCE)
+    first = heard.get(timeout=TIMEOUT)
     assert (first.name, first.old, first.new, first.origin) == ("/a", None, 1, "r0")
     assert first.time > 0
     assert told(heard, 6) == [
@@ -87,7 +87,7 @@ def test_what_is_told_is_the_callbacks_own(network: Network) -> None:
 
     one.watch("/a", spoil)
     one.set("/a", [1])
-    assert done.wait(PATIENCE)
+    assert done.wait(TIMEOUT)
     assert one.get("/a") == [1]
 
 
@@ -103,7 +103,7 @@ def test_callbacks_may_write_and_watch_and_end_their_watch(network: Network) -> 
 
     watch = one.watch("/a", react)
     other.set("/a", 1)
-    assert done.wait(PATIENCE)
+    assert done.wait(TIMEOUT)
     assert other.get("/b") == [1]
 
 
@@ -131,7 +131,7 @@ def test_a_callback_that_hangs_piles_nothing_up(network: Network) -> None:
 
     def hang(change: Changed) -> None:
         heard.put(change)
-        go_on.wait(PATIENCE)
+        go_on.wait(TIMEOUT)
 
     one.watch("/a", hang)
     for number in range(100):
@@ -141,7 +141,7 @@ def test_a_callback_that_hangs_piles_nothing_up(network: Network) -> None:
     waiting = worker._queue.qsize()
     go_on.set()
     assert waiting <= 1
-    assert [heard.get(timeout=PATIENCE).new for _ in range(100)] == list(range(100))
+    assert [heard.get(timeout=TIMEOUT).new for _ in range(100)] == list(range(100))
 
 
 def test_a_closed_watch_hears_no_more(network: Network) -> None:
@@ -167,7 +167,7 @@ def test_a_slow_callback_gets_the_newest_of_each_name() -> None:
     def slow(change: Changed) -> None:
         heard.put(change)
         entered.set()
-        release.wait(PATIENCE)
+        release.wait(TIMEOUT)
 
     watchers.add(("a",), slow)
     root: dict[str, Any] = {}
@@ -177,11 +177,11 @@ def test_a_slow_callback_gets_the_newest_of_each_name() -> None:
         watchers.notify(TreeChange(root, changed, [write]))
         root = changed
         if number == 0:
-            assert entered.wait(PATIENCE)
+            assert entered.wait(TIMEOUT)
     release.set()
-    changes = [heard.get(timeout=PATIENCE)]
+    changes = [heard.get(timeout=TIMEOUT)]
     while changes[-1].new != 4999:
-        changes.append(heard.get(timeout=PATIENCE))
+        changes.append(heard.get(timeout=TIMEOUT))
     assert len(changes) < 1100
     assert all(before.new == after.old for before, after in pairwise(changes))
     watchers.close()

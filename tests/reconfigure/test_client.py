@@ -5,7 +5,7 @@ import threading
 from queue import SimpleQueue
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ClosedError, ParamError, ServiceError, ServiceNotFound, WaitTimeout
 from rosz.reconfigure import Client, Config, Description, find_servers
@@ -70,7 +70,7 @@ def test_what_it_gives_is_the_callers_own(network: Network) -> None:
 
 def test_a_callback_may_change_settings(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     # Were it to wait for the announcement, which is its own to take in, it would take that long.
-    monkeypatch.setattr(client_module, "_UPDATE_TIMEOUT", 2 * PATIENCE)
+    monkeypatch.setattr(client_module, "_UPDATE_TIMEOUT", 2 * TIMEOUT)
     robot = Robot(network.node("robot"))
     done = threading.Event()
 
@@ -81,7 +81,7 @@ def test_a_callback_may_change_settings(network: Network, monkeypatch: pytest.Mo
 
     client = Client(network.node("other"), "robot", config_callback=told)
     robot.server.update({"steps": 7})
-    assert done.wait(PATIENCE)
+    assert done.wait(TIMEOUT)
     eventually(lambda: client.config().steps == 8, "the change of the callback")
     assert robot.server.config.steps == 8
 

@@ -8,7 +8,7 @@ import weakref
 from queue import SimpleQueue
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.session import MeshReadiness, Sample
 
@@ -28,7 +28,7 @@ def test_a_callback_that_raises_gets_the_next_sample(
     with caplog.at_level(logging.ERROR, "rosz.session"):
         for payload in (b"bad", b"good"):
             session.put("topic", payload)
-            assert heard.get(timeout=PATIENCE) == payload
+            assert heard.get(timeout=TIMEOUT) == payload
     kept.close()
     assert "the callback of the subscriber 'topic' failed" in caplog.text
     assert "ValueError: no good" in caplog.text
@@ -48,6 +48,6 @@ def test_a_callback_of_mesh_readiness_is_freed(network: Network) -> None:
     mesh = MeshReadiness(session, 0.1, threading.Event())
     mesh.when_ready(waiting.call)
     del waiting
-    assert mesh.ready.wait(PATIENCE)
+    assert mesh.ready.wait(TIMEOUT)
     eventually(lambda: kept() is None, "the callback is freed")
     assert Waiting.called

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from network import PATIENCE, Network, Program, eventually, free_port
+from network import TIMEOUT, Network, Program, eventually, free_port
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
@@ -93,7 +93,7 @@ def test_a_router_takes_the_place(place: Network) -> None:
         ]
         for node in nodes:
             graph = node.context.graph
-            graph.wait_for(lambda view: len(view.nodes()) == 2, PATIENCE, "the other node")
+            graph.wait_for(lambda view: len(view.nodes()) == 2, TIMEOUT, "the other node")
 
 
 def test_client_waits_for_its_router(place: Network) -> None:
@@ -102,7 +102,7 @@ def test_client_waits_for_its_router(place: Network) -> None:
     with Session.open(SessionConfig(mode="router", rendezvous=place.rendezvous)):
         program.wait_for("ready")
         late = place.node("late", context=place.context(mode="client"))
-        late.context.graph.wait_for_node("/early", PATIENCE)
+        late.context.graph.wait_for_node("/early", TIMEOUT)
 
 
 def test_client_without_a_router(place: Network, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,7 +127,7 @@ def test_command_sees_all_at_once(place: Network) -> None:
         place.node(name)
     for _ in range(5):
         with Session.open(SessionConfig.command(place.environment())) as session:
-            tokens = session.live_tokens("@ros2_lv/42/*/*/*/NN/**", PATIENCE)
+            tokens = session.live_tokens("@ros2_lv/42/*/*/*/NN/**", TIMEOUT)
         assert sorted(token.rpartition("/")[2] for token in tokens) == ["one", "three", "two"]
 
 
@@ -152,12 +152,12 @@ def test_several_contexts_of_one_process(network: Network) -> None:
     nodes = [
         Node(name, context=context) for name, context in zip("abc", (one, two, other), strict=True)
     ]
-    one.graph.wait_for_node("/b", PATIENCE)
-    two.graph.wait_for_node("/a", PATIENCE)
+    one.graph.wait_for_node("/b", TIMEOUT)
+    two.graph.wait_for_node("/a", TIMEOUT)
     assert other.graph.view().nodes() == ["/c"]
     one.close()
     assert [node.is_shutdown for node in nodes] == [True, False, False]
-    two.graph.wait_for(lambda view: view.nodes() == ["/b"], PATIENCE, "the end of a")
+    two.graph.wait_for(lambda view: view.nodes() == ["/b"], TIMEOUT, "the end of a")
 
 
 def test_stop_and_go(network: Network) -> None:
@@ -177,6 +177,6 @@ def test_stop_and_go(network: Network) -> None:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(PATIENCE * 2)
+        thread.join(TIMEOUT * 2)
     assert not errors
     assert not any(thread.is_alive() for thread in threads)

@@ -6,7 +6,7 @@ import threading
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import RoszError
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
@@ -43,7 +43,7 @@ def start(network: Network, **params: object) -> Node:
         user.params[f"/turtlebot3_sim/{name}"] = value
     Simulator(network.node("turtlebot3_sim"))
     user.context.graph.wait_for(
-        lambda view: bool(view.servers("/gazebo/reset_world")), PATIENCE, "the simulation"
+        lambda view: bool(view.servers("/gazebo/reset_world")), TIMEOUT, "the simulation"
     )
     return user
 
@@ -90,7 +90,7 @@ def test_stamps_are_wall_time_unless_asked(network: Network) -> None:
     user = start(network)
     odometry, clock = Heard(user, "odom", Odometry), Heard(user, "/clock", Clock)
     eventually(lambda: odometry.last and clock.last, "odometry")
-    assert seconds(odometry.last) == pytest.approx(user.now() / 1e9, abs=PATIENCE)
+    assert seconds(odometry.last) == pytest.approx(user.now() / 1e9, abs=TIMEOUT)
     assert clock.last.clock.sec < 60
 
 

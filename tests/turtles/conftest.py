@@ -7,7 +7,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node
@@ -23,8 +23,8 @@ class Watcher:
 
     def wait_for(self, condition: Callable[[Pose], Any] = lambda _: True) -> Pose:
         """Return the next pose that meets a condition."""
-        for _ in range(int(PATIENCE * 62.5)):
-            pose = self._poses.get(timeout=PATIENCE)
+        for _ in range(int(TIMEOUT * 62.5)):
+            pose = self._poses.get(timeout=TIMEOUT)
             if condition(pose):
                 return pose
         pytest.fail(f"no such pose; the last was {pose}")
@@ -33,7 +33,7 @@ class Watcher:
 def wait_for_turtle(user: Node, name: str) -> None:
     """Wait until a node knows the services of a turtle."""
     user.context.graph.wait_for(
-        lambda view: bool(view.servers(f"{name}/teleport_relative")), PATIENCE, name
+        lambda view: bool(view.servers(f"{name}/teleport_relative")), TIMEOUT, name
     )
 
 
@@ -53,7 +53,7 @@ class Scene:
 
     def call(self, name: str, service_type: Any, *values: Any) -> Any:
         """Call a service from the other node."""
-        with self.user.client(name, service_type, timeout=PATIENCE) as client:
+        with self.user.client(name, service_type, timeout=TIMEOUT) as client:
             return client(*values)
 
     def watch(self, name: str = "turtle1") -> Watcher:

@@ -13,7 +13,7 @@ from queue import SimpleQueue
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.turtlesim.msg import Pose
@@ -97,7 +97,7 @@ class Terminal:
         """Close everything, including the processes of a launch."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
-        self.process.wait(PATIENCE)
+        self.process.wait(TIMEOUT)
         os.close(self.keyboard)
         os.close(self._side)
 
@@ -121,7 +121,7 @@ def commands(network: Network) -> SimpleQueue[Twist]:
 
 def speeds(commands: SimpleQueue[Twist]) -> tuple[float, float]:
     """Return the forward and the angular speed of the next command."""
-    twist = commands.get(timeout=PATIENCE)
+    twist = commands.get(timeout=TIMEOUT)
     return twist.linear.x, twist.angular.z
 
 
@@ -136,7 +136,7 @@ def test_arrows_drive_and_q_quits(
         terminal.press(f"\x1b[{key}")
         assert speeds(commands) == told
     terminal.press("xyz q")
-    assert terminal.process.wait(PATIENCE) == 0
+    assert terminal.process.wait(TIMEOUT) == 0
     assert commands.empty()
     assert terminal.cooked
 
@@ -150,7 +150,7 @@ def test_signals_end_it_and_the_terminal_is_as_before(
     terminal.expect(READY)
     assert not terminal.cooked
     terminal.process.send_signal(number)
-    assert terminal.process.wait(PATIENCE) == 0
+    assert terminal.process.wait(TIMEOUT) == 0
     assert terminal.cooked
 
 
@@ -204,7 +204,7 @@ def test_it_reads_the_terminal_of_a_launch(
     terminal.press("\x1b[A")
     assert speeds(commands) == (2.0, 0.0)
     terminal.process.send_signal(signal.SIGINT)
-    assert terminal.process.wait(PATIENCE) == 0
+    assert terminal.process.wait(TIMEOUT) == 0
     assert terminal.cooked
 
 

@@ -29,7 +29,7 @@ from rosz.launch.run.command import TAG  # noqa: E402  # of this tree
 from rosz.launch.run.host import ProcessTree  # noqa: E402
 
 ROSZ = [sys.executable, "-P", "-m", "rosz", "launch"]
-PATIENCE = 60.0
+TIMEOUT = 60.0
 TALKERS = 20
 MANY = 100
 
@@ -188,7 +188,7 @@ class Bench:
             stderr=subprocess.STDOUT,
             text=True,
         ) as process:
-            watchdog = threading.Timer(PATIENCE, ProcessTree(tag).kill)
+            watchdog = threading.Timer(TIMEOUT, ProcessTree(tag).kill)
             watchdog.start()
             try:
                 yield process
@@ -196,7 +196,7 @@ class Bench:
                 watchdog.cancel()
                 if process.poll() is None:
                     process.send_signal(signal.SIGTERM)
-                    process.communicate(timeout=PATIENCE)
+                    process.communicate(timeout=TIMEOUT)
                 ProcessTree(tag).kill()
 
 
@@ -221,7 +221,7 @@ def await_lines(process: subprocess.Popen[str], pattern: str, count: int = 1) ->
 def dump(bench: Bench, which: str) -> float:
     begin = time.perf_counter()
     with bench.launch(which, "--dump-params", str(bench.path("parameters"))) as process:
-        text, _ = process.communicate(timeout=PATIENCE)
+        text, _ = process.communicate(timeout=TIMEOUT)
     assert len(text.splitlines()) >= 300, text
     return time.perf_counter() - begin
 
@@ -242,7 +242,7 @@ def ending(name: str, count: int, *options: str) -> Callable[[Bench, str], float
             pids = [int(pid) for pid in re.findall(r"started with pid \[(\d+)\]", text)]
             begin = time.perf_counter()
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE)
+            process.communicate(timeout=TIMEOUT)
             seconds = time.perf_counter() - begin
         left = [pid for pid in pids if Path(f"/proc/{pid}").exists()]
         if left and which == "rosz":  # roslaunch does not wait for what it kills

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 INTERPRETER = "/usr/bin/python3"
-PATIENCE = 30.0
+TIMEOUT = 30.0
 
 
 def available() -> bool:
@@ -66,16 +66,16 @@ class Roscore:
     def close(self) -> None:
         """End both."""
         self._node.kill()
-        self._node.wait(PATIENCE)
+        self._node.wait(TIMEOUT)
         self._core.send_signal(signal.SIGINT)
-        self._core.wait(PATIENCE)
+        self._core.wait(TIMEOUT)
 
     def _read(self) -> Any:
         assert self._node.stdout is not None
         return json.loads(self._node.stdout.readline())
 
     def _wait_for(self, port: int) -> None:
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:
             with socket.socket() as probe:
                 if probe.connect_ex(("127.0.0.1", port)) == 0:

@@ -17,7 +17,7 @@ __all__ = ("Lab", "Peer")
 
 ROOT = Path(__file__).parents[3]
 DEBIAN_PYTHON = "/usr/bin/python3"
-PATIENCE = 30.0
+TIMEOUT = 30.0
 SHARED_FROM = 100_000
 """Bytes from which on samples go by shared memory, where that is on."""
 
@@ -60,7 +60,7 @@ class Peer:
 
     def wait(self) -> None:
         """Wait until it has ended by itself."""
-        self._process.wait(PATIENCE)
+        self._process.wait(TIMEOUT)
 
     def __enter__(self) -> Self:
         return self
@@ -69,7 +69,7 @@ class Peer:
         assert self._process.stdin is not None
         self._process.stdin.close()
         try:
-            self._process.wait(PATIENCE)
+            self._process.wait(TIMEOUT)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

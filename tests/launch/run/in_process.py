@@ -17,7 +17,7 @@ from rosz.launch.plan.model import NodePlan, Plan
 from rosz.launch.run.command import TAG
 from rosz.launch.run.host import ProcessTree
 
-from .in_thread import PATIENCE
+from .in_thread import TIMEOUT
 
 PROGRAM = Path(__file__).with_name("program.py")
 ROOT = Path(__file__).parents[3]
@@ -38,7 +38,7 @@ class LaunchProcess:
 
     def expect(self, pattern: str) -> re.Match[str]:
         """Read until a pattern has been seen."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while (found := re.search(pattern, self.text)) is None:
             left = deadline - time.monotonic()
             ready, _, _ = select.select([self._reading], [], [], max(0.0, left))
@@ -56,7 +56,7 @@ class LaunchProcess:
 
     def finish(self) -> int:
         """Read to the end, and return the exit code."""
-        code = self.process.wait(PATIENCE)
+        code = self.process.wait(TIMEOUT)
         while select.select([self._reading], [], [], 1.0)[0] and self._read():
             pass
         return code

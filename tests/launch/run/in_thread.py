@@ -20,7 +20,7 @@ from rosz.launch.run import Network, Options, Runner, Workplace
 from rosz.packages import PackageIndex
 from rosz.session import Session
 
-PATIENCE = 20.0
+TIMEOUT = 20.0
 """Time limit in seconds for something that normally takes milliseconds."""
 
 HERE = Place("test.launch", 3, 5)
@@ -87,16 +87,16 @@ class Transcript(io.StringIO):
 
     def wait_for(self, text: str, times: int = 1) -> str:
         with self._changed:
-            found = self._changed.wait_for(lambda: self.getvalue().count(text) >= times, PATIENCE)
+            found = self._changed.wait_for(lambda: self.getvalue().count(text) >= times, TIMEOUT)
             assert found, f"no {text!r} ({times} times) in:\n{self.getvalue()}"
             return self.getvalue()
 
 
 def wait_until(condition: Any, what: str) -> None:
     """Wait for a condition without an event, such as the end of another process's child."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while not condition():
-        assert time.monotonic() < deadline, f"no {what} within {PATIENCE} s"
+        assert time.monotonic() < deadline, f"no {what} within {TIMEOUT} s"
         threading.Event().wait(0.01)
 
 
@@ -179,7 +179,7 @@ class Launch:
 
     def join(self) -> int:
         """Wait for the launch to end by itself, and return its exit code."""
-        self._thread.join(PATIENCE)
+        self._thread.join(TIMEOUT)
         assert not self._thread.is_alive(), self.out.getvalue() + self.err.getvalue()
         if self.raised is not None:
             raise self.raised
@@ -204,5 +204,5 @@ def launch(
         yield running
     finally:
         running.runner.stop()
-        running._thread.join(PATIENCE)
+        running._thread.join(TIMEOUT)
         assert not running._thread.is_alive()

@@ -14,7 +14,7 @@ import pytest
 
 from rosz.launch.run.console import ConsoleWriter
 
-from .in_thread import PATIENCE
+from .in_thread import TIMEOUT
 
 LONG = "x" * 100_000 + "\n"
 """More than a pipe holds."""
@@ -53,9 +53,9 @@ def test_a_text_is_written_when_write_returns() -> None:
     for number in range(100):
         writer.write(stream, f"{number}\n")
         assert stream.getvalue().endswith(f"{number}\n")
-    writer.close(PATIENCE)
+    writer.close(TIMEOUT)
     writer.write(stream, "late")
-    writer.close(PATIENCE)
+    writer.close(TIMEOUT)
     assert stream.getvalue() == "".join(f"{number}\n" for number in range(100))
 
 
@@ -71,8 +71,8 @@ def test_a_blocked_stream_blocks_nobody_and_loses_nothing(pipe: Pipe) -> None:
     assert not freed.is_set()
     whole = "".join(texts)
     assert pipe.read(len(whole.encode())) == whole
-    assert freed.wait(PATIENCE)
-    writer.close(PATIENCE)
+    assert freed.wait(TIMEOUT)
+    writer.close(TIMEOUT)
     assert not writer.full
     again = threading.Event()
     writer.when_free(again.set)
@@ -86,7 +86,7 @@ def test_close_waits_no_longer_than_its_timeout(pipe: Pipe) -> None:
     writer.close(0.1)
     assert time.monotonic() - began < 5.0
     pipe.hang_up()
-    writer.close(PATIENCE)  # or it would write to whoever gets the descriptor next
+    writer.close(TIMEOUT)  # or it would write to whoever gets the descriptor next
 
 
 def test_a_closed_stream_is_ignored(pipe: Pipe) -> None:
@@ -94,7 +94,7 @@ def test_a_closed_stream_is_ignored(pipe: Pipe) -> None:
     pipe.hang_up()
     writer.write(pipe.stream, "nobody reads this\n")
     writer.write(other, "but this\n")
-    writer.close(PATIENCE)
+    writer.close(TIMEOUT)
     assert other.getvalue() == "but this\n"
 
 
@@ -103,4 +103,4 @@ def test_characters_outside_the_encoding_are_escaped(pipe: Pipe) -> None:
     with os.fdopen(os.dup(pipe.stream.fileno()), "w", encoding="ascii") as stream:
         writer.write(stream, "ä\n")
         assert pipe.read(5) == "\\xe4\n"
-    writer.close(PATIENCE)
+    writer.close(TIMEOUT)

@@ -11,7 +11,7 @@ import pytest
 
 from rosz.launch.run.loop import Loop
 
-from .in_thread import PATIENCE
+from .in_thread import TIMEOUT
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def test_timers_of_one_moment_keep_their_order(loop: Loop) -> None:
 
 def test_other_threads_wake_it(loop: Loop) -> None:
     thread = threading.Thread(target=lambda: loop.post(loop.stop))
-    loop.later(PATIENCE, lambda: pytest.fail("not woken"))
+    loop.later(TIMEOUT, lambda: pytest.fail("not woken"))
     thread.start()
     loop.run()
     thread.join()
@@ -119,5 +119,5 @@ def test_the_end_of_a_child_is_reported(
     assert child.stdin is not None
     child.stdin.close()
     loop.run()
-    assert child.wait(PATIENCE) == 1
+    assert child.wait(TIMEOUT) == 1
     loop.close()

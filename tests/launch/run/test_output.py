@@ -16,7 +16,7 @@ import pytest
 from rosz.launch.run.output import Output
 
 from .in_process import launch_process
-from .in_thread import PATIENCE, alive, launch, program, shell, wait_until
+from .in_thread import TIMEOUT, alive, launch, program, shell, wait_until
 
 CHATTER = (
     "import sys, time\n"
@@ -267,7 +267,7 @@ def test_a_blocked_screen_does_not_block_a_launch(tmp_path: Path, *, terminal: b
         wait_until(lambda: count.stat().st_size > before + 3, "starts anew")
         (log,) = (tmp_path / "log/latest").glob("roslaunch-*.log")
         run.process.send_signal(signal.SIGINT)
-        assert run.process.wait(PATIENCE) == 0
+        assert run.process.wait(TIMEOUT) == 0
     said = log.read_text()
     assert said.endswith("[INFO] done\n")
     pids = [int(pid) for pid in re.findall(r"started with pid \[(\d+)\]", said)]

@@ -20,7 +20,7 @@ from rosz.launch.plan import SystemContext, plan
 from rosz.packages import PackageIndex
 
 from .in_process import PROGRAM, ROOT
-from .in_thread import PATIENCE
+from .in_thread import TIMEOUT
 
 pytestmark = pytest.mark.skipif(
     shutil.which("roslaunch") is None, reason="roslaunch is not installed (python3-roslaunch)"
@@ -118,12 +118,12 @@ class Streams:
             return any(re.search(pattern, line) for _, line in self.lines)
 
         with self._changed:
-            assert self._changed.wait_for(seen, PATIENCE), (pattern, self.lines)
+            assert self._changed.wait_for(seen, TIMEOUT), (pattern, self.lines)
 
     def finish(self) -> None:
-        self.process.wait(PATIENCE)
+        self.process.wait(TIMEOUT)
         for thread in self._threads:
-            thread.join(PATIENCE)
+            thread.join(TIMEOUT)
 
     def text(self, name: str) -> str:
         return "".join(line for stream, line in self.lines if stream == name)

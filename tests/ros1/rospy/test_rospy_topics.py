@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from network import PATIENCE, Network
+from network import TIMEOUT, Network
 
 from rosz.msgs.std_msgs.msg import String
 
@@ -353,7 +353,7 @@ def test_remapped_topics_reach_other_nodes(network: Network) -> None:
         """,
         "chatter:=/far/out",
     )
-    assert came.wait(PATIENCE)
+    assert came.wait(TIMEOUT)
     assert texts[0] == "hello"
 
 

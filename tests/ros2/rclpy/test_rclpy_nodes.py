@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
-from network import PATIENCE, Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ClosedError, ServiceError
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -163,12 +163,12 @@ def test_services(world: World) -> None:
 
     service = world.node.create_service(SetBool, "switch", serve)
     client = world.node.create_client(SetBool, "switch")
-    assert client.wait_for_service(timeout_sec=PATIENCE)
+    assert client.wait_for_service(timeout_sec=TIMEOUT)
     assert client.service_is_ready()
     future = client.call_async(SetBool.Request(data=True))
     done: list[Future] = []
     future.add_done_callback(done.append)
-    world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+    world.executor.spin_until_future_complete(future, timeout_sec=TIMEOUT)
     assert future.done()
     assert done == [future]
     assert future.result() == SetBool.Response(success=True, message="done")
@@ -190,7 +190,7 @@ def test_an_async_callback_can_await_a_service(world: World) -> None:
     world.node.create_service(SetBool, "inner", inner)
     world.node.create_service(SetBool, "outer", serve)
     future = world.node.create_client(SetBool, "outer").call_async(SetBool.Request())
-    world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+    world.executor.spin_until_future_complete(future, timeout_sec=TIMEOUT)
     assert future.result().message == "outer inner"
 
 
@@ -201,8 +201,8 @@ def test_a_failing_service_reports_to_its_caller_and_to_spin(world: World) -> No
     world.node.create_service(SetBool, "switch", serve)
     future = world.node.create_client(SetBool, "switch").call_async(SetBool.Request())
     with pytest.raises(ValueError, match="no hand"):
-        world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
-    world.executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+        world.executor.spin_until_future_complete(future, timeout_sec=TIMEOUT)
+    world.executor.spin_until_future_complete(future, timeout_sec=TIMEOUT)
     with pytest.raises(ServiceError, match="no hand"):
         future.result()
 
@@ -339,7 +339,7 @@ def test_several_threads(start: Start) -> None:
 
     def meet() -> None:
         with suppress(threading.BrokenBarrierError):  # the end of the test
-            meeting.wait(PATIENCE)
+            meeting.wait(TIMEOUT)
             met.release()
 
     group = ReentrantCallbackGroup()
@@ -348,7 +348,7 @@ def test_several_threads(start: Start) -> None:
     with executors.MultiThreadedExecutor(2, context=context) as executor:
         executor.add_node(node)
         threading.Thread(target=executor.spin, daemon=True).start()
-        assert met.acquire(timeout=PATIENCE)
+        assert met.acquire(timeout=TIMEOUT)
         meeting.abort()
         context.shutdown()
 
@@ -375,7 +375,7 @@ def test_exclusive_callback_groups(start: Start) -> None:
         executor.add_node(node)
         threading.Thread(target=executor.spin, daemon=True).start()
         for _ in range(10):
-            assert both.acquire(timeout=PATIENCE)
+            assert both.acquire(timeout=TIMEOUT)
         context.shutdown()
     assert clashes == []
 
@@ -387,5 +387,5 @@ def test_tasks(world: World) -> None:
         return int(await first) * 10
 
     task = world.executor.create_task(second)
-    world.executor.spin_until_future_complete(task, timeout_sec=PATIENCE)
+    world.executor.spin_until_future_complete(task, timeout_sec=TIMEOUT)
     assert (first.result(), task.result()) == (3, 30)
