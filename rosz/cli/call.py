@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rosz import names, remap
-from rosz.cli.console import warn
+from rosz.cli.console import until_stopped, warn
 from rosz.cli.declare import App
 from rosz.environment import Environment
 from rosz.introspect.connect import open_context, open_session
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
-    from rosz.node import Context
+    from rosz.node import Context, Node
     from rosz.session import Session
     from rosz.typestore import TypeStore
 
@@ -67,11 +68,7 @@ class Call:
         return TypeStore(package_index(self.environment), self.environment.home / "rosz")
 
     def session(self) -> Session:
-        """Open a session for a short query.
-
-        Raises:
-            TransportError: Nobody answers.
-        """
+        """Open a session for a short query."""
         return open_session(self.environment)
 
     def context(self, *, lasting: bool = False) -> Context:
@@ -79,37 +76,48 @@ class Call:
 
         Args:
             lasting: Whether the command runs until it is stopped.
-
-        Raises:
-            TransportError: Nobody answers.
         """
         return open_context(self.environment, self.argv, lasting=lasting)
+
+    @contextmanager
+    def lasting_node(self, tool: str) -> Iterator[Node]:
+        """Open the node of a tool that runs until it is stopped."""
+        import rosz.introspect.subscribe  # noqa: F401  # used later; Ctrl-C must not interrupt an import
+        from rosz.node import Node
+
+        with (
+            until_stopped() as ready,
+            self.context(lasting=True) as context,
+            Node(tool, anonymous=True, context=context) as node,
+        ):
+            ready()
+            yield node
+
+    @contextmanager
+    def session_and_survey(self, *, processes: bool = False) -> Iterator[tuple[Session, Survey]]:
+        """Open a session, and take a survey of the domain, with processes if wanted."""
+        from rosz.introspect.survey import take_survey
+
+        with self.session() as session:
+            yield session, take_survey(session, self.domain, processes=processes)
 
     def survey(self, *, processes: bool = False) -> Survey:
         """Return the nodes, topics and services of the domain.
 
         Args:
             processes: Whether to ask for the processes of the nodes as well.
-
-        Raises:
-            TransportError: Nobody answers.
         """
-        from rosz.introspect.survey import take_survey
-
-        with self.session() as session:
-            survey = take_survey(session, self.domain, processes=processes)
+        with self.session_and_survey(processes=processes) as (_, survey):
+            pass
         for damage in survey.damaged:
             warn(f"ignoring an invalid name of a node or topic: {damage}")
         return survey
 
 
 def new_group(text: str) -> App:
-    """Return a group of commands that take remappings anywhere, as ROS 1's tools do.
+    """Return a described group of commands that take remappings anywhere, as ROS 1's tools do.
 
     So a command can be a node of a launch file.
-
-    Args:
-        text: The description of the group.
     """
     return App(text, is_remapping=_is_remapping)
 

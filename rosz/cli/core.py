@@ -38,12 +38,8 @@ def core_command(
             "--connect ENDPOINT", "Connect to this endpoint, such as tcp/robot1:7447; repeatable."
         ),
     ] = None,
-    keys: Annotated[
-        str, Option("--keys DIR", "Folder of the keys for links beyond this machine.")
-    ] = "",
-    store: Annotated[
-        str, Option("--store FILE", "Keep the parameters in a file.", suggest.files)
-    ] = "",
+    keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
+    store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = "",
     port: Annotated[str, Option("-p --port")] = "",
 ) -> None:
     """Run a meeting point with a copy of the parameters, until it is stopped.

@@ -39,14 +39,10 @@ def env_command(
         print_json(Environment.read())
         return
     name = shell or PurePath(os.environ.get("SHELL", "")).name
-    home = str(Path(__file__).parent.parent)
-    for known in SHELLS:
-        if name == known:
-            sys.stdout.write(script(known, home, sys.executable))
-            return
-    if shell:
+    if shell and shell not in SHELLS:
         raise UsageError(
             f"'{shell}' is not a known shell; expected {', '.join(SHELLS)}"
             f"{near_miss(shell, SHELLS)}"
         )
-    sys.stdout.write(script("bash", home, sys.executable))
+    home = str(Path(__file__).parent.parent)
+    sys.stdout.write(script(name if name in SHELLS else "bash", home, sys.executable))

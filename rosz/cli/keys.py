@@ -107,15 +107,7 @@ def check_keys(
 
 
 def _folder(given: str, command: str) -> Path:
-    """Return the folder of keys to use.
-
-    Args:
-        given: The folder on the command line; may be empty.
-        command: A command that takes a folder as its last word, for the error text.
-
-    Raises:
-        UsageError: No folder is given, and the keys are in the folder ``keys`` instead of here.
-    """
+    """Return the folder of keys to use."""
     named = given or os.environ.get("ROSZ_KEYS")
     here = Path.cwd()
     if not named and not _has_keys(here) and _has_keys(here / "keys"):

@@ -58,13 +58,9 @@ def launch_command(
     required: Annotated[bool, Option("--required", "End the launch when any node ends.")] = False,
     wait: Annotated[bool, Option("--wait", "Wait until a core or another launch runs.")] = False,
     local: Annotated[bool, Option("--local", "Leave out nodes of other machines.")] = False,
-    prefix: Annotated[
-        bool, Option("--prefix", "Begin each line with the name of its node.")
-    ] = False,
+    prefix: Annotated[bool, Option("--prefix", "Begin each line with its node's name.")] = False,
     verbose: Annotated[bool, Option("-v", "Print more.")] = False,
-    no_summary: Annotated[
-        bool, Option("--no-summary", "Do not print what will be started.")
-    ] = False,
+    no_summary: Annotated[bool, Option("--no-summary", "Do not print what will start.")] = False,
     disable_title: Annotated[
         bool, Option("--disable-title", "Do not change the title of the terminal.")
     ] = False,
@@ -75,9 +71,7 @@ def launch_command(
     sigterm_timeout: Annotated[
         float, Option("--sigterm-timeout SECONDS", "Time from SIGTERM to SIGKILL.")
     ] = 2.0,
-    keys: Annotated[
-        str, Option("--keys DIR", "Folder of the keys for links beyond this machine.")
-    ] = "",
+    keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
     pid: Annotated[
         str, Option("--pid FILE", "Write the process id of the launch to a file.", suggest.files)
     ] = "",
@@ -89,9 +83,7 @@ def launch_command(
     files: Annotated[bool, Option("--files", "List the files.")] = False,
     ros_args: Annotated[bool, Option("--ros-args", "List the args that the file takes.")] = False,
     dump_params: Annotated[bool, Option("--dump-params", "Print all parameters as YAML.")] = False,
-    dump_plan: Annotated[
-        bool, Option("--dump-plan", "Print the whole plan of the launch as JSON.")
-    ] = False,
+    dump_plan: Annotated[bool, Option("--dump-plan", "Print the whole plan as JSON.")] = False,
     status: Annotated[bool, Option("--status", "List the nodes of running launches.")] = False,
     restart: Annotated[
         str | None, Option("--restart NODE", "Restart a node of a running launch.", suggest.nodes)
@@ -189,12 +181,7 @@ def _question(**options: str | bool | None) -> tuple[str, str] | None:
 
 
 class _Launch:
-    """What a command line of ``rosz launch`` names.
-
-    Args:
-        words: The positional words.
-        keys: Folder of the keys that the launch uses instead of ``ROSZ_KEYS``.
-    """
+    """What a command line of ``rosz launch`` names."""
 
     def __init__(self, words: Sequence[str], keys: Path | None) -> None:
         from rosz.launch.plan import SystemContext, parse_arguments
@@ -230,11 +217,7 @@ class _Launch:
         return self.arguments.ns or self.environment.namespace
 
     def plan(self) -> Plan:
-        """Return the plan of the launch.
-
-        Raises:
-            RoszError: A file is wrong or missing.
-        """
+        """Return the plan of the launch."""
         from rosz.launch.plan import plan
 
         return plan(self.files, self.arguments.args, self.context, ns=self.namespace)
@@ -383,13 +366,7 @@ def _hint(name: str, packages: PackageIndex) -> str:
 
 
 def _control(words: Sequence[str], *, status: bool, restart: str, stop: str, as_json: bool) -> None:
-    """Print the status of running launches, or restart or stop one of their nodes.
-
-    Raises:
-        UsageError: More than one action is given, or a file as well.
-        LaunchError: No launch is running, or it refuses.
-        NotFoundError: No launch has such a node.
-    """
+    """Print the status of running launches, or restart or stop one of their nodes."""
     from rosz.introspect.connect import command_config
     from rosz.launch.run import StatusClient
     from rosz.session import Session
@@ -428,12 +405,7 @@ def _print_status(client: StatusClient, domain: int, *, as_json: bool) -> None:
 
 
 def _table(launch: LaunchStatus, before: LaunchStatus) -> str:
-    """Return the status of a launch as text.
-
-    Args:
-        launch: The status.
-        before: An earlier status; shares of processor time are counted from it.
-    """
+    """Return the status of a launch as text."""
     head = ("NODE", "STATE", "PID", "RESTARTS", "CPU", "MEMORY", "UPTIME", "MACHINE")
     earlier = {node.name: node.cpu for node in before.nodes}
     seconds = launch.sampled - before.sampled

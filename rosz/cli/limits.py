@@ -1,4 +1,7 @@
-"""Limits of the numbers on a command line."""
+"""Limits of the numbers on a command line.
+
+Each function takes the option that gives a number, for the text of the `UsageError`.
+"""
 
 from __future__ import annotations
 
@@ -12,50 +15,21 @@ _LONGEST = 1e9
 
 
 def seconds(option: str, value: float) -> float:
-    """Return a time limit if it makes sense.
-
-    Args:
-        option: The option that gives it.
-        value: The time limit in seconds.
-
-    Raises:
-        UsageError: The value is not a sensible time.
-    """
+    """Return a time limit in seconds if it makes sense."""
     if not 0 < value <= _LONGEST:
         raise UsageError(f"{option} is {value:g}; expected seconds above 0, at most {_LONGEST:g}")
     return value
 
 
-def per_second(option: str, value: float) -> float:
-    """Return a rate if it makes sense.
-
-    Args:
-        option: The option that gives it.
-        value: The rate in hertz.
-
-    Raises:
-        UsageError: The value is not a sensible rate.
-    """
-    if not 1 / _LONGEST <= value <= _MOST:
+def per_second(option: str, value: float | None) -> None:
+    """Check that a rate in hertz, if one is given, makes sense."""
+    if value is not None and not 1 / _LONGEST <= value <= _MOST:
         raise UsageError(f"{option} is {value:g}; expected a rate above 0, at most {_MOST:g} Hz")
-    return value
 
 
-def at_least(option: str, value: int, fewest: int, what: str, most: int = _MOST) -> int:
-    """Return a number if it is in its bounds.
-
-    Args:
-        option: The option that gives it.
-        value: The number.
-        fewest: The least number.
-        what: The things that are counted, in the plural.
-        most: The largest number.
-
-    Raises:
-        UsageError: The number is too small or too large.
-    """
-    if value < fewest:
+def at_least(option: str, value: int | None, fewest: int, what: str, most: int = _MOST) -> None:
+    """Check that a number of things, if one is given, is in its bounds."""
+    if value is not None and value < fewest:
         raise UsageError(f"{option} is {value}; expected {fewest} or more {what}")
-    if value > most:
+    if value is not None and value > most:
         raise UsageError(f"{option} is {value}; expected at most {most} {what}")
-    return value

@@ -15,7 +15,6 @@ from rosz.cli.console import (
     print_lines,
     print_result,
     takes_escapes,
-    until_stopped,
     warn,
 )
 from rosz.cli.declare import App, Argument, Option
@@ -51,21 +50,16 @@ def log_command(
     level: Annotated[
         str, Option("--level -l LEVEL", "The lowest level to print.", suggest.levels)
     ] = "DEBUG",
-    grep: Annotated[
-        str, Option("--grep PATTERN", "Print only messages that contain this pattern.")
-    ] = "",
+    grep: Annotated[str, Option("--grep PATTERN", "Print only messages with this pattern.")] = "",
     count: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
-    verbose: Annotated[
-        bool, Option("-v --verbose", "Print places in the source code as well.")
-    ] = False,
+    verbose: Annotated[bool, Option("-v --verbose", "Print places in the source as well.")] = False,
     json: Annotated[bool, Option("--json", "Print one line of JSON per message.")] = False,
 ) -> None:
     """Follow the log of nodes, or set and list the levels of their loggers.
 
     The levels are DEBUG, INFO, WARN, ERROR and FATAL. The logger of the node itself is 'rosout'.
     """
-    if count is not None:
-        at_least("-n", count, 1, "lines")
+    at_least("-n", count, 1, "lines")
     words = words or []
     if words[:1] == ["level"]:
         _set_level(call, words)
@@ -83,25 +77,22 @@ def _set_level(call: Call, words: Sequence[str]) -> None:
     if len(words) != _LEVEL_WORDS:
         raise UsageError("expected: rosz log level NODE LOGGER LEVEL")
     from rosz.introspect.nodes import find_nodes, set_level
-    from rosz.introspect.survey import take_survey
     from rosz.node import parse_severity
 
     _, node, logger, level = words
     parse_severity(level)
-    with call.session() as session:
-        for token in find_nodes(take_survey(session, call.domain), call.resolve(node, _TOOL)):
+    with call.session_and_survey() as (session, survey):
+        for token in find_nodes(survey, call.resolve(node, _TOOL)):
             set_level(session, token, logger, level)
 
 
 def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
     from rosz.introspect.nodes import find_nodes, get_levels
-    from rosz.introspect.survey import take_survey
 
     if not nodes:
         raise UsageError("expected: rosz log levels NODE")
     found: dict[str, dict[str, str]] = {}
-    with call.session() as session:
-        survey = take_survey(session, call.domain)
+    with call.session_and_survey() as (session, survey):
         for node in nodes:
             for token in find_nodes(survey, call.resolve(node, _TOOL)):
                 found[token.node_name] = get_levels(session, token)
@@ -116,22 +107,16 @@ def _follow(
     from rosz.introspect.rosout import format_line, read_line
     from rosz.introspect.subscribe import subscribe_samples
     from rosz.msgs.rcl_interfaces.msg import Log
-    from rosz.node import Node
 
     color = takes_escapes(sys.stdout) and not os.environ.get("NO_COLOR")
     left = count
-    with (
-        until_stopped() as ready,
-        call.context(lasting=True) as context,
-        Node(_TOOL, anonymous=True, context=context) as node,
-    ):
-        ready()
+    with call.lasting_node(_TOOL) as node:
         queue: SimpleQueue[Sample | None] = SimpleQueue()
         subscribe_samples(node, _ROSOUT, Log._type_name, Log._type_hash, queue.put)
         node.on_shutdown(lambda _: queue.put(None))
         while (sample := queue.get()) is not None:
             try:
-                line = read_line(Log.from_cdr(sample.payload), context.graph.view().nodes())
+                line = read_line(Log.from_cdr(sample.payload), node.context.graph.view().nodes())
             except DecodeError as error:
                 warn(f"a message on {_ROSOUT} is not a log message: {error}")
                 continue

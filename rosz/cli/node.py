@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
@@ -55,18 +55,14 @@ def info_command(
     call: Call,
     nodes: Annotated[list[str], Argument("NODE", source=suggest.nodes)],
     *,
-    quiet: Annotated[
-        bool, Option("-q --quiet", "Do not send requests to the nodes themselves.")
-    ] = False,
+    quiet: Annotated[bool, Option("-q --quiet", "Do not send requests to the nodes.")] = False,
     json: Json = False,
 ) -> None:
     """Print the topics, services and connections of nodes."""
     from rosz.introspect.nodes import find_nodes, format_connections, format_node
-    from rosz.introspect.survey import take_survey
 
     rows: list[dict[str, Any]] = []
-    with call.session() as session:
-        survey = take_survey(session, call.domain, processes=True)
+    with call.session_and_survey(processes=True) as (session, survey):
         chosen = [node for name in nodes for node in find_nodes(survey, call.resolve(name, _TOOL))]
         for node in chosen:
             if json:
@@ -119,9 +115,7 @@ def _info_row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> 
 @app.command("machine")
 def machine_command(
     call: Call,
-    machine: Annotated[
-        str, Argument("MACHINE", "Lists all machines if omitted.", suggest.machines)
-    ] = "",
+    machine: Annotated[str, Argument("MACHINE", "Lists all if omitted.", suggest.machines)] = "",
     *,
     json: Json = False,
 ) -> None:
@@ -146,8 +140,7 @@ def ping_command(
     """Print how long a node takes to reply; exit code 1 if it does not reply."""
     if everybody and (node or count is not None):
         raise UsageError("--all pings every node once: it takes no node and no -c")
-    if count is not None:
-        at_least("-c", count, 1, "pings")
+    at_least("-c", count, 1, "pings")
     if everybody:
         return _ping_all(call)
     if not node:
@@ -161,14 +154,12 @@ def ping_command(
 def _ping_often(call: Call, name: str, count: int | None) -> None:
     """Ping a node a number of times, or until stopped."""
     from rosz.introspect.nodes import PING_TIMEOUT, find_nodes
-    from rosz.introspect.survey import take_survey
 
     full = call.resolve(name, _TOOL)
     print_lines([f"rosnode: node is [{full}]"])
     times: list[float] = []
-    with until_stopped() as ready, call.session() as session:
+    with until_stopped() as ready, call.session_and_survey(processes=True) as (session, survey):
         ready()
-        survey = take_survey(session, call.domain, processes=True)
         node = find_nodes(survey, full)[-1]
         print_lines([f"pinging {full} with a timeout of {PING_TIMEOUT}s"])
         try:
@@ -194,10 +185,8 @@ def _ping(session: Session, survey: Survey, node: Token) -> float:
 def _ping_all(call: Call) -> int:
     """Ping every node once, and return the exit code."""
     from rosz.introspect.nodes import PING_TIMEOUT
-    from rosz.introspect.survey import take_survey
 
-    with call.session() as session:
-        survey = take_survey(session, call.domain, processes=True)
+    with call.session_and_survey(processes=True) as (session, survey):
         names = sorted(set(survey.view.nodes()))
         print_lines(["Will ping the following nodes: ", *(f" * {name}" for name in names), ""])
         code = 0
@@ -215,9 +204,7 @@ def _ping_all(call: Call) -> int:
 @app.command("kill")
 def kill_command(
     call: Call,
-    nodes: Annotated[
-        list[str] | None, Argument("NODE", "Asks which one if omitted.", suggest.nodes)
-    ] = None,
+    nodes: Annotated[list[str] | None, Argument("NODE", "Asks if omitted.", suggest.nodes)] = None,
     *,
     everybody: Annotated[bool, Option("-a --all", "Kill all nodes.")] = False,
 ) -> int:
@@ -225,14 +212,12 @@ def kill_command(
     if everybody and nodes:
         raise UsageError("--all ends every node: it takes no names")
     if not everybody and not nodes:
-        nodes = _choose(call, sys.stdin)
+        nodes = _choose(call)
         if not nodes:
             return 0
     from rosz.introspect.nodes import kill_nodes
-    from rosz.introspect.survey import take_survey
 
-    with call.session() as session:
-        survey = take_survey(session, call.domain, processes=True)
+    with call.session_and_survey(processes=True) as (session, survey):
         known = sorted(set(survey.view.nodes()))
         chosen = known if everybody else [call.resolve(name, _TOOL) for name in nodes or ()]
         unknown = [name for name in chosen if name not in known]
@@ -253,7 +238,7 @@ def kill_command(
     return 0
 
 
-def _choose(call: Call, source: TextIO) -> list[str]:
+def _choose(call: Call) -> list[str]:
     """Ask which node to kill; return no name if no node runs or nothing is chosen."""
     names = sorted(set(call.survey().view.nodes()))
     if not names:
@@ -262,7 +247,7 @@ def _choose(call: Call, source: TextIO) -> list[str]:
     print_lines(f"{number}. {name}" for number, name in enumerate(names, 1))
     sys.stdout.write("\nPlease enter the number of the node you wish to kill.\n> ")
     sys.stdout.flush()
-    for line in source:
+    for line in sys.stdin:
         answer = line.strip()
         if answer.isdecimal() and 1 <= int(answer) <= len(names):
             return [names[int(answer) - 1]]

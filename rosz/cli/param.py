@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 from rosz import names
@@ -25,7 +25,7 @@ from rosz.cli.limits import at_least
 from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, YamlError
 
 if TYPE_CHECKING:
-    from rosz.params import Difference, Value
+    from rosz.params import Change, Difference, Value
     from rosz.params.remote import ParamClient
     from rosz.params.replica import Changed, Outcome
 
@@ -78,9 +78,7 @@ def get_command(
     call: Call,
     name: _Name,
     *,
-    readable: Annotated[
-        bool, Option("-p", "Print it for reading; the output may not be valid YAML.")
-    ] = False,
+    readable: Annotated[bool, Option("-p", "Print for reading; it may not be valid YAML.")] = False,
     verbose: _Verbose = False,
     json: Json = False,
 ) -> int:
@@ -126,10 +124,7 @@ def set_command(
     with _client(call) as client:
         full = _resolve(call, name)
         found = _read_value(value, text_file, binary_file)
-        changes = condense(spread(full, normalise(found, full)))
-        _warn_slow(client, client.write(changes))
-    for path, item in changes:
-        _log(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
+        _write(client, condense(spread(full, normalise(found, full))), verbose)
 
 
 @app.command("delete")
@@ -148,9 +143,7 @@ def delete_command(call: Call, name: _Name, *, verbose: _Verbose = False) -> int
 @app.command("dump")
 def dump_command(
     call: Call,
-    file: Annotated[
-        str, Argument("FILE", "Standard output if omitted, or '-'.", suggest.files)
-    ] = "",
+    file: Annotated[str, Argument("FILE", "'-' or none is standard output.", suggest.files)] = "",
     namespace: _Space = "",
     *,
     verbose: _Verbose = False,
@@ -182,9 +175,7 @@ def load_command(
     file: Annotated[str, Argument("FILE", "'-' is standard input.", suggest.files)],
     namespace: _Space = "",
     *,
-    dry_run: Annotated[
-        bool, Option("--dry-run", "Print what would change, and change nothing.")
-    ] = False,
+    dry_run: Annotated[bool, Option("--dry-run", "Only print what would change.")] = False,
     verbose: _Verbose = False,
     json: Annotated[bool, Option("--json", "Print the result of --dry-run as JSON.")] = False,
 ) -> None:
@@ -205,9 +196,7 @@ def load_command(
         if dry_run:
             _print_preview(preview(client.get("/"), changes), as_json=json)
             return
-        _warn_slow(client, client.write(changes))
-    for path, item in changes:
-        _log(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
+        _write(client, changes, verbose)
 
 
 @app.command("search")
@@ -240,12 +229,14 @@ def watch_command(
     json: Json = False,
 ) -> None:
     """Print changes of a parameter, or of all parameters in a namespace, as they happen."""
-    if count is not None:
-        at_least("-n", count, 1, "changes")
+    at_least("-n", count, 1, "changes")
     from queue import SimpleQueue
 
+    from rosz.params.remote import ParamClient
+
     changes: SimpleQueue[Changed] = SimpleQueue()
-    with until_stopped() as ready, _client(call, lasting=True) as client:
+    with until_stopped() as ready, call.context(lasting=True) as context:
+        client = ParamClient(context.session, call.domain)
         full = _resolve(call, name)
         with client.follow() as follower, follower.watch(full, changes.put):
             ready()
@@ -257,15 +248,10 @@ def watch_command(
 
 
 @contextmanager
-def _client(call: Call, *, lasting: bool = False) -> Iterator[ParamClient]:
-    """Open a client of the parameter store."""
+def _client(call: Call) -> Iterator[ParamClient]:
     from rosz.params.remote import ParamClient
 
-    with ExitStack() as stack:
-        if lasting:
-            session = stack.enter_context(call.context(lasting=True)).session
-        else:
-            session = stack.enter_context(call.session())
+    with call.session() as session:
         yield ParamClient(session, call.domain)
 
 
@@ -376,6 +362,12 @@ def _fail_not_set(word: str, error: ParamNotFound) -> int:
     hint = str(error).partition(" is not set")[2]
     print_error(f"ERROR: {word} [{error.name}] is not set{hint}")
     return 1
+
+
+def _write(client: ParamClient, changes: list[Change], verbose: bool) -> None:
+    _warn_slow(client, client.write(changes))
+    for path, item in changes:
+        _log(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
 
 
 def _warn_slow(client: ParamClient, outcome: Outcome) -> None:

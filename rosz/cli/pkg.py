@@ -62,14 +62,10 @@ def create_package(
         list[str] | None, Argument("DEPENDENCY", source=suggest.packages)
     ] = None,
     *,
-    description: Annotated[
-        str, Option("--description -d TEXT", "Description of the package.")
-    ] = "",
+    description: Annotated[str, Option("--description -d TEXT", "The package's description.")] = "",
     maintainer: Annotated[str, Option("--maintainer -m NAME", "Name of the maintainer.")] = "",
     license_name: Annotated[str, Option("--license -l NAME", "Name of the license.")] = "",
-    bare: Annotated[
-        bool, Option("--bare", "Create only the files that catkin_create_pkg creates.")
-    ] = False,
+    bare: Annotated[bool, Option("--bare", "Create only what catkin_create_pkg creates.")] = False,
 ) -> None:
     """Create a package in the working folder, with a message, a talker and a launch file."""
     from rosz.workspace import create
@@ -108,11 +104,7 @@ def _print_created(made: Sequence[Path], parent: Path) -> None:
 
 
 def _workspace() -> Package:
-    """Return the first folder of the package path, where ``roscd`` alone goes.
-
-    Raises:
-        NotFoundError: The package path is empty.
-    """
+    """Return the first folder of the package path, where ``roscd`` alone goes."""
     from rosz.environment import Environment
     from rosz.packages import Package
 
@@ -221,12 +213,7 @@ def _shorten(place: str, cwd: Path) -> str:
 
 
 def _write_setup(cwd: Path) -> None:
-    """Write the files that course documents source after catkin_make.
-
-    Raises:
-        NotFoundError: There is no workspace around the working folder.
-        UsageError: catkin has its own files there.
-    """
+    """Write the files that course documents source after catkin_make."""
     import shlex
 
     from rosz.cli.shells import SHELLS

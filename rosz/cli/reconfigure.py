@@ -195,8 +195,7 @@ def watch_command(
     json: Json = False,
 ) -> None:
     """Print changes of the settings of a node as they happen."""
-    if count is not None:
-        at_least("-n", count, 1, "changes")
+    at_least("-n", count, 1, "changes")
     from queue import SimpleQueue
 
     configs: SimpleQueue[Config] = SimpleQueue()
@@ -227,12 +226,7 @@ def _client(
     wait: bool,
     lasting: bool = False,
 ) -> Iterator[Client]:
-    """Open a client of a node's settings.
-
-    Raises:
-        NotFoundError: The node does not run, or has no settings.
-        WaitTimeout: The node did not start in time.
-    """
+    """Open a client of a node's settings."""
     if timeout is not None:
         seconds("--timeout", timeout)
     from rosz.node import Node
@@ -278,11 +272,7 @@ def _change(client: Client, changes: Mapping[str, Any], *, as_json: bool) -> Non
 def _print_description(
     description: Description, config: Config, only: str, *, as_json: bool
 ) -> None:
-    """Print all settings, or one of them, with their values.
-
-    Raises:
-        ParamError: The setting does not exist.
-    """
+    """Print all settings, or one of them, with their values."""
     if only:
         setting = description.setting(only)
         lines = _describe(setting, config, "")

@@ -9,12 +9,10 @@ interactive shell, the TAB key runs ``rosz complete``.
 from __future__ import annotations
 
 import shlex
-from typing import Literal
 
-__all__ = ("ALIASES", "SHELLS", "Shell", "program", "script")
+__all__ = ("ALIASES", "SHELLS", "program", "script")
 
-Shell = Literal["bash", "zsh", "fish"]
-SHELLS: tuple[Shell, ...] = ("bash", "zsh", "fish")
+SHELLS = ("bash", "zsh", "fish")
 
 ALIASES = {
     "catkin_create_pkg": "pkg create --bare",
@@ -93,11 +91,11 @@ end
 """
 
 
-def script(shell: Shell, home: str, python: str) -> str:
+def script(shell: str, home: str, python: str) -> str:
     """Return the code for a shell to evaluate.
 
     Args:
-        shell: The shell.
+        shell: One of `SHELLS`.
         home: The folder of the package ``rosz``.
         python: The Python interpreter that has rosz.
     """

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -82,14 +82,9 @@ class Line:
         known = self.environment
         session = None
         if known.connect or known.multicast or is_listening(known.rendezvous):
-            try:
+            with suppress(RoszError):
                 session = Session.open(SessionConfig.command(known, self.timeout))
-            except RoszError:
-                session = None
-        if session is None:
-            yield None
-            return
-        with session:
+        with session or nullcontext():
             yield session
 
     @property

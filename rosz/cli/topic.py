@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
     from rosz.wire import Token
 
 __all__ = ("app",)
+
+_Stats = TypeVar("_Stats", bound="Struct | None")
 
 app = new_group("List, show, measure and publish topics.")
 
@@ -176,10 +177,8 @@ def echo_command(
     from rosz.introspect.echo import EchoOptions
     from rosz.introspect.fields import Filter
 
-    if width is not None:
-        at_least("-w", width, 2, "characters", _WIDEST)
-    if count is not None:
-        at_least("-n", count, 1, "messages")
+    at_least("-w", width, 2, "characters", _WIDEST)
+    at_least("-n", count, 1, "messages")
     options = EchoOptions(
         plot=plot,
         as_json=json,
@@ -197,7 +196,7 @@ def echo_command(
     from rosz.introspect.subscribe import find_class
     from rosz.qos import QoS
 
-    with _open_node(call) as node:
+    with call.lasting_node(_TOOL) as node:
         target, token = _wait_for(node, topic)
         to_text = _raw_text(options) if raw else _text(node, target, token, options)
         printer = _Printer(to_text, 1 if once else count)
@@ -205,21 +204,6 @@ def echo_command(
         qos = QoS(depth=_DEPTH)
         node.subscription(target.topic, cls, printer.receive, qos=qos, raw=raw, with_info=True)
         printer.wait(node.context, target.topic)
-
-
-@contextmanager
-def _open_node(call: Call) -> Iterator[Node]:
-    """Open a node that lasts until the command is stopped."""
-    import rosz.introspect.subscribe  # noqa: F401  # used later; Ctrl-C must not interrupt an import
-    from rosz.node import Node
-
-    with (
-        until_stopped() as ready,
-        call.context(lasting=True) as context,
-        Node(_TOOL, anonymous=True, context=context) as node,
-    ):
-        ready()
-        yield node
 
 
 def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
@@ -249,12 +233,7 @@ def _raw_text(options: EchoOptions) -> Callable[[Any], str]:
 
 
 class _Printer:
-    """Prints messages on the subscription's thread; the main thread waits for the end.
-
-    Args:
-        to_text: A function that returns the text of a message, or ``None`` to leave it out.
-        count: The number of messages to print; ``None`` for no limit.
-    """
+    """Prints messages on the subscription's thread; the main thread waits for the end."""
 
     def __init__(self, to_text: Callable[[Any], str | None], count: int | None) -> None:
         self._to_text = to_text
@@ -287,11 +266,7 @@ class _Printer:
                 self._ended.set()
 
     def wait(self, context: Context, topic: str) -> None:
-        """Wait for the last message.
-
-        Raises:
-            ClosedError: Something else has shut the context down.
-        """
+        """Wait for the last message."""
         withdraw = context.on_shutdown(lambda _: self._ended.set())
         self._ended.wait()
         withdraw()
@@ -308,9 +283,7 @@ def hz_command(
     *,
     window: _Window = None,
     condition: _Condition = "",
-    wall_time: Annotated[
-        bool, Option("--wall-time", "Measure wall time instead of simulated time.")
-    ] = False,
+    wall_time: Annotated[bool, Option("--wall-time", "Use wall time, not simulated time.")] = False,
     json: Json = False,
 ) -> None:
     """Print once per second how many messages arrive per second."""
@@ -319,7 +292,7 @@ def hz_command(
 
     accepted = Filter(condition) if condition else None
     size = _window(window)
-    with _open_node(call) as node:
+    with call.lasting_node(_TOOL) as node:
         clock = time.monotonic_ns if wall_time else node.context.clock.steady
         meters: dict[str, RateMeter] = {}
         for name in topics:
@@ -328,13 +301,12 @@ def hz_command(
             _measure(node, token, lambda meter=meter: meter.tick(clock()), accepted)  # type: ignore[misc]
             if not json:
                 print_lines([f"subscribed to [{token.name}]"])
-        while _wait_period(node):
-            found = {name: meter.stats() for name, meter in meters.items()}
-            if json:
-                _print_stats(found)
-            else:
-                text = format_rates(found) if len(found) > 1 else format_rate(*found.values())
-                print_lines([text])
+        _report(
+            node,
+            lambda: {name: meter.stats() for name, meter in meters.items()},
+            lambda found: format_rates(found) if len(found) > 1 else format_rate(*found.values()),
+            as_json=json,
+        )
 
 
 def _measure(node: Node, token: Token, tick: Callable[[], None], condition: Filter | None) -> None:
@@ -362,17 +334,17 @@ def bw_command(
     from rosz.introspect.measure import BandwidthMeter, format_bandwidth
 
     meter = BandwidthMeter(_window(window))
-    with _open_node(call) as node:
+    with call.lasting_node(_TOOL) as node:
         _, token = _wait_for(node, topic)
         _open_tap(node, token, lambda sample: meter.add(sample.size, time.monotonic_ns()))
         if not json:
             print_lines([f"subscribed to [{token.name}]"])
-        while _wait_period(node):
-            stats = meter.stats(time.monotonic_ns())
-            if json:
-                _print_stats({token.name: stats})
-            elif stats is not None:
-                print_lines([format_bandwidth(stats)])
+        _report(
+            node,
+            lambda: {token.name: meter.stats(time.monotonic_ns())},
+            lambda found: "".join(format_bandwidth(one) for one in found.values() if one),
+            as_json=json,
+        )
 
 
 @app.command("delay")
@@ -384,7 +356,7 @@ def delay_command(
     from rosz.introspect.subscribe import find_class
 
     meter = DelayMeter(_window(window))
-    with _open_node(call) as node:
+    with call.lasting_node(_TOOL) as node:
         target, token = _wait_for(node, topic)
         cls = find_class(node.context, token)
         if not cls._has_header:
@@ -398,17 +370,19 @@ def delay_command(
         _open_tap(node, token, receive)
         if not json:
             print_lines([f"subscribed to [{token.name}]"])
-        while _wait_period(node):
-            if json:
-                _print_stats({token.name: meter.stats()})
-            elif meter.begun:
-                print_lines([format_delay(meter.stats())])
+        _report(
+            node,
+            lambda: {token.name: meter.stats()},
+            lambda found: format_delay(found[token.name]) if meter.begun else "",
+            as_json=json,
+        )
 
 
 def _window(given: int | None) -> int | None:
     if given is None or given < 0:
         return None  # as in ROS 1's tools
-    return at_least("-w", given, 2, "messages")  # there is no time between fewer messages
+    at_least("-w", given, 2, "messages")  # there is no time between fewer messages
+    return given
 
 
 def _open_tap(node: Node, token: Token, callback: Callable[[Sample], None]) -> None:
@@ -417,21 +391,25 @@ def _open_tap(node: Node, token: Token, callback: Callable[[Sample], None]) -> N
     subscribe_samples(node, token.name, token.type_name, token.type_hash, callback)
 
 
-def _wait_period(node: Node) -> bool:
-    """Wait until the next report; return whether one is due."""
-    if node.is_shutdown:
-        return False
-    node.context.wait_for_shutdown(_PERIOD)
-    return True
-
-
-def _print_stats(found: Mapping[str, Struct | None]) -> None:
-    """Print statistics as JSON, one line for each topic that has sent something."""
+def _report(
+    node: Node,
+    stats: Callable[[], dict[str, _Stats]],
+    to_text: Callable[[dict[str, _Stats]], str],
+    *,
+    as_json: bool,
+) -> None:
+    """Print statistics by topic once per period, until the node is shut down."""
     import msgspec
 
-    for name, stats in found.items():
-        if stats is not None:
-            print_json_line({"topic": name, **msgspec.structs.asdict(stats)})
+    while not node.is_shutdown:
+        node.context.wait_for_shutdown(_PERIOD)
+        found = stats()
+        if as_json:
+            rows = {name: one for name, one in found.items() if one is not None}
+            for name, row in rows.items():
+                print_json_line({"topic": name, **msgspec.structs.asdict(row)})
+        elif text := to_text(found):
+            print_lines([text])
 
 
 @app.command("pub")
@@ -451,25 +429,20 @@ def pub_command(
     *,
     rate: Annotated[float | None, Option("-r --rate HZ", "Publish at this rate.")] = None,
     once: Annotated[bool, Option("-1 --once", "Publish one message and stop.")] = False,
-    latch: Annotated[
-        bool, Option("-l --latch", "Latch also with -f, -r and standard input.")
-    ] = False,
-    file: Annotated[
-        str, Option("-f --file FILE", "Read messages from a YAML file.", suggest.files)
-    ] = "",
+    latch: Annotated[bool, Option("-l --latch", "Latch also with -f, -r and stdin.")] = False,
+    file: Annotated[str, Option("-f --file FILE", "Read messages in YAML.", suggest.files)] = "",
     verbose: Annotated[bool, Option("-v", "Print what is published.")] = False,
     substitute: Annotated[
         bool, Option("-s --substitute-keywords", "Replace 'now' and 'auto' in each message.")
     ] = False,
     use_rostime: Annotated[
-        bool, Option("--use-rostime", "Take 'now' and 'auto' from ROS time.")
+        bool, Option("--use-rostime", "'now' and 'auto' mean ROS time.")
     ] = False,
 ) -> None:
     """Publish messages."""
     if rate is not None and once:
         raise UsageError("-r and -1 exclude each other")
-    if rate is not None:
-        per_second("-r", rate)
+    per_second("-r", rate)
     if values and file:
         raise UsageError("-f gives the messages: no values are taken beside it")
     from pathlib import Path

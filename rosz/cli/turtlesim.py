@@ -20,13 +20,9 @@ app = new_group("Save pictures of turtlesims; 'rosz run turtlesim turtlesim_node
 @app.command("snapshot")
 def snapshot(
     call: Call,
-    file: Annotated[
-        str, Argument("FILE.png", "The file to write; '-' is standard output.", suggest.files)
-    ],
+    file: Annotated[str, Argument("FILE.png", "The file; '-' is standard output.", suggest.files)],
     *,
-    node: Annotated[
-        str, Option("--node NODE", "The turtlesim, if several run.", suggest.nodes)
-    ] = "",
+    node: Annotated[str, Option("--node NODE", "Turtlesim, if several run.", suggest.nodes)] = "",
 ) -> None:
     """Save a picture of the field with its turtles."""
     from rosz.turtlesim.snapshot import fetch

@@ -9,13 +9,12 @@ from typing import Annotated, Any
 import typer
 from typer.exceptions import TyperException
 
-from rosz.cli.declare import App, Argument, Command, Option, Parameter
+from rosz.cli.declare import App, Argument, Command, Option
 from rosz.errors import UsageError
 
 __all__ = ("run", "translate")
 
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-_NUMBERS: dict[Any, str] = {int: "integer", float: "number"}
 
 
 def run(app: App, argv: Sequence[str], program: str) -> Any:
@@ -73,8 +72,8 @@ def translate(app: App, remappings: Sequence[str]) -> typer.Typer:
             name or None,
             help=command.help,
             short_help=" ".join(command.help.partition("\n\n")[0].split()),
-            context_settings=_SETTINGS
-            | {
+            context_settings={
+                **_SETTINGS,
                 "allow_interspersed_args": command.interspersed,
                 "ignore_unknown_options": command.tolerant,
             },
@@ -96,7 +95,7 @@ def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
         else:
             given = signature[one.name]
             hint: Any = given.annotation.__origin__
-            kept.append(given.replace(annotation=Annotated[hint, _declare(one, one.mark)]))
+            kept.append(given.replace(annotation=Annotated[hint, _declare(one.mark)]))
 
     def call(**values: Any) -> Any:
         return command.function(**values, **fixed)
@@ -106,21 +105,9 @@ def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
     return call
 
 
-def _declare(one: Parameter, mark: Argument | Option) -> Any:
+def _declare(mark: Argument | Option) -> Any:
     """Return the declaration of a parameter for typer."""
-    parser = _parser(one.kind) if one.kind in _NUMBERS else None
     if isinstance(mark, Argument):
-        return typer.Argument(metavar=mark.metavar, help=mark.help, parser=parser)
-    return typer.Option(
-        *mark.names, metavar=mark.metavar, help=mark.help, hidden=mark.help is None, parser=parser
-    )
-
-
-def _parser(kind: Callable[[str], Any]) -> Callable[[Any], Any]:
-    def parse(word: Any) -> Any:
-        try:
-            return kind(word)
-        except ValueError as error:
-            raise typer.BadParameter(f"'{word}' is not a valid {_NUMBERS[kind]}") from error
-
-    return parse
+        return typer.Argument(metavar=mark.metavar, help=mark.help)
+    hidden = mark.help is None
+    return typer.Option(*mark.names, metavar=mark.metavar, help=mark.help, hidden=hidden)

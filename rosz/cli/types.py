@@ -33,11 +33,7 @@ _Package = Annotated[
 
 
 class _Types:
-    """The commands for one kind of types.
-
-    Args:
-        kind: The kind.
-    """
+    """The commands for one kind of types."""
 
     def __init__(self, kind: Kind) -> None:
         self._kind: Kind = kind
@@ -47,9 +43,7 @@ class _Types:
         call: Call,
         name: _TypeName = "",
         *,
-        raw: Annotated[
-            bool, Option("-r --raw", "Print the definition as written, with comments.")
-        ] = False,
+        raw: Annotated[bool, Option("-r --raw", "Print it as written, with comments.")] = False,
         json: Json = False,
     ) -> None:
         definitions = self._definitions(call)
@@ -116,12 +110,7 @@ def _given(word: str, what: str = "type") -> str:
 
 
 def _new_app(kind: Kind, word: str) -> App:
-    """Return the commands that show definitions.
-
-    Args:
-        kind: The kind of types.
-        word: The name of that kind in help.
-    """
+    """Return the commands that show definitions."""
     app = new_group(f"Show {word} types.")
     types = _Types(kind)
     show = f"Print a {word} type, with the fields of the types in it."
