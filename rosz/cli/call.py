@@ -39,19 +39,11 @@ class Call:
         return self.environment.domain
 
     def node_name(self, tool: str) -> str:
-        """Return the full name of a tool's node, which private names belong to.
-
-        Args:
-            tool: The base name of the node when no remapping gives another one.
-        """
+        """Return the full name of a tool's node, which private names belong to."""
         return self._remappings.node_name(tool, self.environment.namespace)
 
     def resolve(self, name: str, tool: str = "rosz") -> str:
         """Return the global name that a name means to a tool.
-
-        Args:
-            name: The name as it is typed.
-            tool: The base name of the tool's node.
 
         Raises:
             InvalidName: The name is not valid.

@@ -38,11 +38,7 @@ _APPS = {"msg": "types:msg", "srv": "types:srv", "help": "manual:app"}
 
 
 def load(name: str) -> App:
-    """Import a command.
-
-    Args:
-        name: One of `COMMANDS`.
-    """
+    """Import a command."""
     module, _, attribute = _APPS.get(name, f"{name}:app").partition(":")
     app: App = getattr(import_module(f"rosz.cli.{module}"), attribute)
     return app

@@ -16,8 +16,8 @@ from contextlib import contextmanager
 from rosz.cli import suggest
 from rosz.cli.commands import COMMANDS, load
 from rosz.cli.declare import Argument, Option, Parameter
+from rosz.cli.env import ALIASES
 from rosz.cli.manual import pages
-from rosz.cli.shells import ALIASES
 from rosz.cli.suggest import Line, Source
 from rosz.environment import Environment
 from rosz.errors import RoszError
@@ -38,11 +38,7 @@ _BASH_BREAKS = ":="
 
 
 def complete(argv: Sequence[str]) -> int:
-    """Print the candidates for the last word of a command line.
-
-    Args:
-        argv: The shell, and the command line up to the cursor.
-    """
+    """Print the candidates for the last word of a command line."""
     shell, line = (*argv, "", "")[:2]
     words = split_line(line)
     if words is None:
@@ -99,11 +95,7 @@ def split_line(line: str) -> list[str] | None:
 
 
 def expand(words: Sequence[str]) -> list[str]:
-    """Return the ``rosz`` command line that a command line means; empty if it is another program.
-
-    Args:
-        words: The words before the cursor.
-    """
+    """Return the ``rosz`` command line that a line means; empty if it is another program."""
     rest = list(words)
     while rest and "=" in rest[0] and not rest[0].startswith("="):
         rest.pop(0)  # an environment variable of this command
@@ -157,10 +149,11 @@ def _in_command(line: Line, group: str, *words: str) -> list[str]:
             return list(app.commands)
         name, *rest = rest
     command = app.commands.get(name)
-    return _source(command.parameters() if command else [], rest, line)(line)
+    source = _source(command.parameters(), rest, line) if command else None
+    return source(line) if source else []
 
 
-def _source(parameters: Sequence[Parameter], words: Sequence[str], line: Line) -> Source:
+def _source(parameters: Sequence[Parameter], words: Sequence[str], line: Line) -> Source | None:
     """Return the source of what may follow the words of a command, and set the words before."""
     options = {spelling: one for one in parameters for spelling in one.spellings}
     before: list[str] = []
@@ -178,7 +171,7 @@ def _source(parameters: Sequence[Parameter], words: Sequence[str], line: Line) -
             before.append(word)
     line.before = before
     if pending is not None:
-        return _source_of(pending)
+        return pending.mark and pending.mark.source
     if line.word.startswith("-") and not ended:
         shown = [one for one in parameters if isinstance(one.mark, Option) and one.mark.help]
         names = [max(one.spellings, key=len) for one in shown]
@@ -186,16 +179,8 @@ def _source(parameters: Sequence[Parameter], words: Sequence[str], line: Line) -
     arguments = [one for one in parameters if isinstance(one.mark, Argument)]
     for place, one in enumerate(arguments):
         if place == len(before) or one.many:
-            return _source_of(one)
-    return _nothing
-
-
-def _source_of(one: Parameter) -> Source:
-    return (one.mark and one.mark.source) or _nothing
-
-
-def _nothing(_: Line) -> list[str]:
-    return []
+            return one.mark and one.mark.source
+    return None
 
 
 def _quote(word: str) -> str:

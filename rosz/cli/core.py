@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import re
+import sys
 import threading
+import time
 import uuid
-from contextlib import ExitStack, closing, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager, nullcontext, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
-from rosz.cli.console import print_lines, until_stopped
+from rosz.cli.console import print_error, print_lines, until_stopped
 from rosz.cli.declare import App, Option
 from rosz.errors import UsageError
 
@@ -17,7 +22,17 @@ if TYPE_CHECKING:
     from rosz.params.replica import Replica
     from rosz.params.replica.storage import Storage
 
-__all__ = ("app",)
+__all__ = ("LogSummary", "app")
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_LINE = re.compile(r"\S+ +(?:WARN|ERROR) .*?zenoh_link_tls\S*: (?P<reason>.*)")
+_MISLEADING = re.compile(r"\.? Hint: .*")
+_PROBE = "tls handshake eof"
+"""A peer has only probed the port, as a peer with keys does first."""
+_NUMBER = re.compile(r"\d+")
+_EVERY_SECONDS = 60.0
+_KINDS = 100
+_STANDARD_OUTPUT = 1
 
 app = App()
 
@@ -27,16 +42,11 @@ def core_command(
     *,
     listen: Annotated[
         list[str] | None,
-        Option(
-            "--listen ENDPOINT",
-            "Listen at this endpoint as well, such as tcp/0.0.0.0:7447; repeatable.",
-        ),
+        Option("--listen ENDPOINT", "Also listen here, such as at tcp/0.0.0.0:7447; repeatable."),
     ] = None,
     connect: Annotated[
         list[str] | None,
-        Option(
-            "--connect ENDPOINT", "Connect to this endpoint, such as tcp/robot1:7447; repeatable."
-        ),
+        Option("--connect ENDPOINT", "Connect here, such as to tcp/robot1:7447; repeatable."),
     ] = None,
     keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
     store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = "",
@@ -53,7 +63,6 @@ def core_command(
         )
     import msgspec
 
-    from rosz.cli.zenohlog import summarize_zenoh_log
     from rosz.environment import Environment
     from rosz.params.replica import Replica
     from rosz.session.router import Router
@@ -62,7 +71,7 @@ def core_command(
     if keys:
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     file = Path(store).absolute() if store else None
-    logging = nullcontext() if environment.keys is None else summarize_zenoh_log()
+    logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
     with logging, until_stopped() as ready, ExitStack() as stack:
         storage = None if file is None else _open_storage(file, stack)
         router = stack.enter_context(Router(environment, listen or (), connect or ()))
@@ -92,3 +101,72 @@ def _set_core_params(replica: Replica) -> None:
     missing = {name: value for name, value in known.items() if not replica.has(name)}
     if missing:
         write_params(replica, missing)
+
+
+class LogSummary:
+    """A summary of what Zenoh logs by itself: each kind of message once per minute.
+
+    Zenoh writes to standard output, one line for each attempt to connect that it refuses; and a
+    peer that is refused tries again five times a second, for days.
+
+    Args:
+        write: Function called with each line of the summary.
+        clock: Clock in seconds.
+    """
+
+    def __init__(
+        self, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._write = write
+        self._clock = clock
+        self._seen: dict[str, tuple[float, int]] = {}
+
+    def add(self, line: str) -> None:
+        """Write a line, unless one of its kind has been written within a minute."""
+        line = _COLOUR.sub("", line).strip()
+        match = _LINE.fullmatch(line)
+        reason = _MISLEADING.sub("", match["reason"]) if match else line
+        if reason == _PROBE:
+            return
+        kind = _NUMBER.sub("0", reason)
+        since, more = self._seen.pop(kind, (-_EVERY_SECONDS, 0))
+        now = self._clock()
+        if now - since < _EVERY_SECONDS:
+            self._seen[kind] = (since, more + 1)
+            return
+        while len(self._seen) >= _KINDS:
+            del self._seen[next(iter(self._seen))]
+        self._seen[kind] = (now, 0)
+        again = f" ({more} times more since)" if more else ""
+        self._write(f"WARNING: a link is refused: {reason}{again}" if match else reason)
+
+
+@contextmanager
+def _summarize_zenoh_log() -> Iterator[None]:
+    """Write a `LogSummary` of Zenoh's log to standard error, unless ``RUST_LOG`` is set."""
+    if "RUST_LOG" in os.environ:
+        yield
+        return
+    before = sys.stdout
+    before.flush()
+    own = os.dup(_STANDARD_OUTPUT)
+    reader, writer = os.pipe()
+    os.dup2(writer, _STANDARD_OUTPUT)
+    os.close(writer)
+    summary = LogSummary(print_error)
+    thread = threading.Thread(target=_read, args=(reader, summary), name="rosz-log", daemon=True)
+    thread.start()
+    try:
+        out = os.fdopen(os.dup(own), "w", buffering=1, encoding=before.encoding)
+        with out, redirect_stdout(out):
+            yield
+    finally:
+        os.dup2(own, _STANDARD_OUTPUT)
+        os.close(own)
+        thread.join(1)
+
+
+def _read(reader: int, summary: LogSummary) -> None:
+    with os.fdopen(reader, encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            summary.add(line)

@@ -23,12 +23,28 @@ from typing import (
     get_type_hints,
 )
 
+from rosz.errors import UsageError
+
 if TYPE_CHECKING:
     from rosz.cli.suggest import Source
 
-__all__ = ("App", "Argument", "Command", "Json", "Option", "Parameter", "values_last")
+__all__ = (
+    "App",
+    "Argument",
+    "Command",
+    "Json",
+    "Option",
+    "Parameter",
+    "at_least",
+    "per_second",
+    "seconds",
+    "values_last",
+)
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_MOST = 1_000_000_000
+_LONGEST = 1e9
+"""Thirty years. A longer time is a mistake, and more than some system clocks can hold."""
 
 
 class Argument(NamedTuple):
@@ -215,3 +231,24 @@ def values_last(*with_value: str) -> Callable[[list[str]], list[str]]:
         return [*options, "--", *values]
 
     return arrange
+
+
+def seconds(option: str, value: float) -> float:
+    """Return a time limit in seconds if it makes sense."""
+    if not 0 < value <= _LONGEST:
+        raise UsageError(f"{option} is {value:g}; expected seconds above 0, at most {_LONGEST:g}")
+    return value
+
+
+def per_second(option: str, value: float | None) -> None:
+    """Check that a rate in hertz, if one is given, makes sense."""
+    if value is not None and not 1 / _LONGEST <= value <= _MOST:
+        raise UsageError(f"{option} is {value:g}; expected a rate above 0, at most {_MOST:g} Hz")
+
+
+def at_least(option: str, value: int | None, fewest: int, what: str, most: int = _MOST) -> None:
+    """Check that a number of things, if one is given, is in its bounds."""
+    if value is not None and value < fewest:
+        raise UsageError(f"{option} is {value}; expected {fewest} or more {what}")
+    if value is not None and value > most:
+        raise UsageError(f"{option} is {value}; expected at most {most} {what}")

@@ -6,9 +6,8 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
-from rosz.cli.console import count, paint, print_json, takes_escapes
-from rosz.cli.declare import App, Json, Option
-from rosz.cli.limits import seconds
+from rosz.cli.console import count, paint, print_json, print_lines, takes_escapes
+from rosz.cli.declare import App, Json, Option, seconds
 
 if TYPE_CHECKING:
     from rosz.doctor import Examination, Finding
@@ -55,16 +54,9 @@ def _show(findings: Iterable[Finding], examination: Examination) -> list[Finding
         if colored:
             title = paint(title, finding.level)
         evidence = "".join(f"  - {line}\n" for line in listed(finding.evidence))
-        sys.stdout.write(f"{title}: {finding.text}\n{evidence}  what to do: {finding.remedy}\n\n")
-        sys.stdout.flush()
-    sys.stdout.write(_summary(found, examination.nodes))
-    return found
-
-
-def _summary(found: list[Finding], nodes: int) -> str:
+        print_lines([f"{title}: {finding.text}\n{evidence}  what to do: {finding.remedy}\n"])
     errors = sum(finding.level == "error" for finding in found)
-    warnings = len(found) - errors
-    domain = count(nodes, "node")
-    if not found:
-        return f"looked at {domain}: all is well\n"
-    return f"looked at {domain}: {count(errors, 'error')}, {count(warnings, 'warning')}\n"
+    counts = f"{count(errors, 'error')}, {count(len(found) - errors, 'warning')}"
+    verdict = counts if found else "all is well"
+    print_lines([f"looked at {count(examination.nodes, 'node')}: {verdict}"])
+    return found

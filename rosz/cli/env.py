@@ -1,19 +1,102 @@
-"""``rosz env``: print shell code that makes ROS 1's command names run rosz."""
+"""``rosz env``: print shell code that makes ROS 1's command names run rosz.
+
+A folder of small programs goes on the PATH, so that ``timeout 5 rostopic …``, ``nohup roscore`` and
+scripts find them as well. Only roscd, which changes the working folder of the shell, is a function.
+Another folder goes on the PYTHONPATH, so that scripts that are run directly can import rospy. In an
+interactive shell, the TAB key runs ``rosz complete``.
+"""
 
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from pathlib import Path, PurePath
 from typing import Annotated
 
-from rosz.cli import suggest
 from rosz.cli.console import print_json
 from rosz.cli.declare import App, Argument, Option
-from rosz.cli.shells import SHELLS, script
 from rosz.errors import UsageError, near_miss
 
-__all__ = ("app",)
+__all__ = ("ALIASES", "SHELLS", "app")
+
+SHELLS = ("bash", "zsh", "fish")
+
+ALIASES = {
+    "catkin_create_pkg": "pkg create --bare",
+    "catkin_make": "pkg check --setup",
+    "roscore": "core",
+    "roslaunch": "launch",
+    "rosmsg": "msg",
+    "rosnode": "node",
+    "rosparam": "param",
+    "rosrun": "run",
+    "rosservice": "service",
+    "rossrv": "srv",
+    "rostopic": "topic",
+    "roswtf": "doctor",
+}
+"""ROS 1's commands, with the commands of rosz that replace them."""
+
+_HELPERS = ("roscd", "rosed", "rosls", "rospack")
+
+_POSIX = """\
+export ROSZ_PYTHON={python}
+case ":$PATH:" in *:{folder}:*) ;; *) export PATH={folder}:"$PATH" ;; esac
+case ":${{PYTHONPATH-}}:" in
+  *:{modules}:*) ;;
+  *) export PYTHONPATH="${{PYTHONPATH:+$PYTHONPATH:}}"{modules} ;;
+esac
+unalias roscd 2>/dev/null
+roscd() {{
+  local package="${{1%%/*}}" folder
+  folder="$("$ROSZ_PYTHON" -P -m rosz pkg find "$package")" && cd "$folder${{1#"$package"}}"
+}}
+"""
+
+_BASH = """\
+if [[ $- = *i* ]]; then
+_rosz_complete() {{
+  local line="${{COMP_LINE:0:COMP_POINT}}"
+  mapfile -t COMPREPLY < <("$ROSZ_PYTHON" -P -m rosz complete bash "$line" 2>/dev/null)
+  [[ ${{#COMPREPLY[@]}} = 1 && $COMPREPLY = *[/=] ]] && compopt -o nospace
+  return 0
+}}
+complete -F _rosz_complete {names}
+fi
+"""
+
+_ZSH = """\
+if [[ -o interactive ]]; then
+(( $+functions[compdef] )) || {{ autoload -Uz compinit && compinit -u -D; }}
+_rosz_complete() {{
+  local line="${{(j: :)words[1,CURRENT-1]}} $PREFIX"
+  local -a found ended
+  found=(${{(f)"$("$ROSZ_PYTHON" -P -m rosz complete zsh "$line" 2>/dev/null)"}})
+  ended=(${{found:#*[/=]}})
+  found=(${{(M)found:#*[/=]}})
+  (( $#ended )) && compadd -Q -a ended
+  (( $#found )) && compadd -Q -S '' -a found
+}}
+compdef _rosz_complete {names}
+fi
+"""
+
+_FISH = """\
+set -gx ROSZ_PYTHON {python}
+contains {folder} $PATH; or set -gx PATH {folder} $PATH
+contains {modules} $PYTHONPATH; or set -gx --path PYTHONPATH $PYTHONPATH {modules}
+function roscd
+    set -l parts (string split -m 1 / "$argv[1]")
+    set -l folder ($ROSZ_PYTHON -P -m rosz pkg find "$parts[1]"); and cd "$folder/$parts[2]"
+end
+function __rosz_complete
+    $ROSZ_PYTHON -P -m rosz complete fish (commandline -cp | string collect) 2>/dev/null
+end
+for command in {names}
+    complete -c $command -f -a "(__rosz_complete)"
+end
+"""
 
 app = App()
 
@@ -22,9 +105,7 @@ app = App()
 def env_command(
     shell: Annotated[
         str,
-        Argument(
-            "SHELL", "bash, zsh or fish; the one in the variable SHELL if omitted.", suggest.shells
-        ),
+        Argument("SHELL", "bash, zsh or fish; $SHELL if omitted.", lambda _: list(SHELLS)),
     ] = "",
     *,
     json: Annotated[bool, Option("--json", "Print the settings of rosz as JSON.")] = False,
@@ -45,4 +126,16 @@ def env_command(
             f"{near_miss(shell, SHELLS)}"
         )
     home = str(Path(__file__).parent.parent)
-    sys.stdout.write(script(name if name in SHELLS else "bash", home, sys.executable))
+    sys.stdout.write(_script(name if name in SHELLS else "bash", home, sys.executable))
+
+
+def _script(shell: str, home: str, python: str) -> str:
+    """Return the code for a shell to evaluate, from the folder of the package and Python."""
+    text = {"bash": _POSIX + _BASH, "zsh": _POSIX + _ZSH, "fish": _FISH}[shell]
+    names = " ".join(("rosz", *ALIASES, *_HELPERS))
+    return text.format(
+        folder=shlex.quote(f"{home}/cli/bin"),
+        modules=shlex.quote(f"{home}/ros1/shell"),
+        python=shlex.quote(python),
+        names=names,
+    )

@@ -19,18 +19,14 @@ def gen_command(
     packages: Annotated[
         list[str] | None,
         Argument(
-            "PACKAGE",
-            "Names or folders; the package around the working folder if omitted.",
-            suggest.packages,
+            "PACKAGE", "Names or folders; the package of this folder if omitted.", suggest.packages
         ),
     ] = None,
     *,
     output: Annotated[
         str,
         Option(
-            "-o --output FOLDER",
-            "Folder to write to; src in the package if omitted.",
-            suggest.files,
+            "-o --output FOLDER", "Where to write; src in the package if omitted.", suggest.files
         ),
     ] = "",
     check: Annotated[

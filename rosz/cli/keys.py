@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from rosz.cli.console import count, print_json
-from rosz.cli.declare import App, Argument, Json, Option
-from rosz.cli.limits import at_least
+from rosz.cli.declare import App, Argument, Json, Option, at_least
 from rosz.errors import UsageError
 
 __all__ = ("app",)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 
 from rosz.cli import suggest
-from rosz.cli.console import print_error
-from rosz.cli.declare import App, Argument, Option
-from rosz.cli.limits import seconds
+from rosz.cli.console import print_error, print_json, print_lines
+from rosz.cli.declare import App, Argument, Option, seconds
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, NotFoundError, TransportError, UsageError
 
@@ -128,18 +128,22 @@ def launch_command(
     if status or restart or stop:
         _control(words or (), status=status, restart=restart or "", stop=stop or "", as_json=json)
         return 0
-    question = _question(
-        nodes=nodes,
-        args=args,
-        find_node=find_node,
-        files=files,
-        ros_args=ros_args,
-        dump_params=dump_params,
-        dump_plan=dump_plan,
-    )
+    questions = {
+        "nodes": nodes,
+        "args": args,
+        "find-node": find_node,
+        "files": files,
+        "ros-args": ros_args,
+        "dump-params": dump_params,
+        "dump-plan": dump_plan,
+    }
+    asked = [(name, str(value)) for name, value in questions.items() if value]
+    if len(asked) > 1:
+        listing = ", ".join(f"--{name}" for name, _ in asked)
+        raise UsageError(f"{listing}: only one of them can be answered at a time")
     launch = _Launch(words or (), Path(keys).expanduser().absolute() if keys else None)
-    if question is not None:
-        sys.stdout.write(launch.answer(*question))
+    if asked:
+        print_lines([launch.answer(*asked[0])])
         return 0
     from rosz.launch.run import MachineOption, Options, Timeouts
 
@@ -171,15 +175,6 @@ def _check_named(**nodes: str | None) -> None:
             raise UsageError(f"--{option.replace('_', '-')} is ''; expected the name of a node")
 
 
-def _question(**options: str | bool | None) -> tuple[str, str] | None:
-    """Return the one of roslaunch's questions that is asked, and its node."""
-    chosen = [(name, str(value)) for name, value in options.items() if value]
-    if len(chosen) > 1:
-        listing = ", ".join(f"--{name.replace('_', '-')}" for name, _ in chosen)
-        raise UsageError(f"{listing}: only one of them can be answered at a time")
-    return chosen[0] if chosen else None
-
-
 class _Launch:
     """What a command line of ``rosz launch`` names."""
 
@@ -197,7 +192,7 @@ class _Launch:
             print_error(f"WARNING: {warning}")
         self.files = _find_files(self.arguments.rest, self.packages)
         self._add_own_packages()
-        self.context = SystemContext(self.packages, self.environ, self.cwd, _AnonymousNames())
+        self.context = SystemContext(self.packages, self.environ, self.cwd, _anonymous_names())
 
     def _add_own_packages(self) -> None:
         """Add the packages that the files are in to the package path, if they are not on it."""
@@ -232,20 +227,20 @@ class _Launch:
         """Return the answer to one of roslaunch's questions."""
         from rosz.launch.plan import describe_args, report
 
-        if question == "ros_args":
+        if question == "ros-args":
             docs = describe_args(self.files, self.arguments.args, self.context, ns=self.namespace)
-            return f"{report.describe(docs)}\n"
+            return report.describe(docs)
         plan = self.plan()
         ns = self.namespace or "/"
         if question == "args":
             find = self.workplace().find
-            return f"{report.node_args(plan, node, find, self.environ, ns=ns)}\n"
-        if question == "find_node":
-            return f"{report.node_file(plan, node, ns=ns)}\n"
-        if question == "dump_plan":
-            return msgspec.json.format(plan.to_json()).decode() + "\n"
+            return report.node_args(plan, node, find, self.environ, ns=ns)
+        if question == "find-node":
+            return report.node_file(plan, node, ns=ns)
+        if question == "dump-plan":
+            return msgspec.json.format(plan.to_json()).decode()
         listings = {"nodes": report.list_nodes, "files": report.list_files}
-        return f"{listings.get(question, report.dump_params)(plan)}\n"
+        return listings.get(question, report.dump_params)(plan)
 
     def run(self, options: Options, *, wait: bool) -> int:
         """Run the plan, and return the exit code."""
@@ -267,37 +262,29 @@ class _Launch:
         with Context(self.environment) as context:
             if wait:
                 _wait_for_peer(context)
-            runner = Runner(
-                plan,
-                self.workplace(),
-                Network(context, router),
-                options,
-                out=sys.stdout,
-                err=sys.stderr,
-            )
-            return runner.run()
+            network = Network(context, router)
+            place = self.workplace()
+            return Runner(plan, place, network, options, out=sys.stdout, err=sys.stderr).run()
 
 
-class _AnonymousNames:
-    """Makes names unique, also when two are made within a millisecond."""
+def _anonymous_names() -> Callable[[str], str]:
+    """Return a function that makes unique names, also two within a millisecond."""
+    numbers = itertools.count(1)
 
-    def __init__(self) -> None:
-        self._count = 0
-
-    def __call__(self, base: str) -> str:
+    def make(base: str) -> str:
         import socket
 
         from rosz import names
 
-        self._count += 1
-        moment = time.time_ns() // 1_000_000 + self._count
+        moment = time.time_ns() // 1_000_000 + next(numbers)
         return names.anonymous(base, socket.gethostname(), os.getpid(), moment)
+
+    return make
 
 
 def _wait_for_peer(context: Context) -> None:
     if not context.session.peers():
-        sys.stdout.write("nobody else is there yet; waiting for a core or another launch\n")
-        sys.stdout.flush()
+        print_lines(["nobody else is there yet; waiting for a core or another launch"])
     while not context.session.peers():
         time.sleep(_WAIT_PERIOD)
 
@@ -395,8 +382,7 @@ def _print_status(client: StatusClient, domain: int, *, as_json: bool) -> None:
     if not before:
         raise LaunchError(f"no launch is running in domain {domain}")
     if as_json:
-        text = msgspec.json.format(msgspec.json.encode(list(before.values())))
-        sys.stdout.write(f"{text.decode()}\n")
+        print_json(list(before.values()))
         return
     time.sleep(_SAMPLE_SECONDS)
     for launch in client.statuses():

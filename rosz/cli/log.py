@@ -17,8 +17,7 @@ from rosz.cli.console import (
     takes_escapes,
     warn,
 )
-from rosz.cli.declare import App, Argument, Option
-from rosz.cli.limits import at_least
+from rosz.cli.declare import App, Argument, Option, at_least
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
@@ -31,6 +30,7 @@ app = App()
 
 _TOOL = "rosconsole"
 _LEVEL_WORDS = 4
+_LEVELS = ["debug", "info", "warn", "error", "fatal"]
 _ROSOUT = "/rosout"
 
 
@@ -48,7 +48,7 @@ def log_command(
     ] = None,
     *,
     level: Annotated[
-        str, Option("--level -l LEVEL", "The lowest level to print.", suggest.levels)
+        str, Option("--level -l LEVEL", "The lowest level to print.", lambda _: _LEVELS)
     ] = "DEBUG",
     grep: Annotated[str, Option("--grep PATTERN", "Print only messages with this pattern.")] = "",
     count: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,

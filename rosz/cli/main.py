@@ -98,18 +98,13 @@ def _exit(code: int) -> NoReturn:
 def run(argv: Sequence[str]) -> int:
     """Run one command line.
 
-    Args:
-        argv: The arguments without the program name.
-
     Returns:
         The exit code; every error of rosz and of the system has been printed as one line.
     """
     try:
         return _dispatch(list(argv))
-    except UsageError as error:
-        return _fail(error, 2)
     except RoszError as error:
-        return _fail(error, 1)
+        return _fail(error, 2 if isinstance(error, UsageError) else 1)
     except BrokenPipeError:
         _discard_stdout()
         return 0
@@ -169,15 +164,12 @@ def _invoke(app: App, argv: list[str], program: str) -> int:
 
     alone = bool(app.help) and not argv
     command = None if alone else read(app, argv)
-    if command is None:
-        from rosz.cli.typer_app import run as run_typer
+    if command is not None:
+        return command() or 0
+    from rosz.cli.typer_app import run as run_typer
 
-        code = run_typer(app, ["--help"] if alone else argv, program)
-    else:
-        code = command()
-    if alone:
-        return 2
-    return code if isinstance(code, int) else 0
+    code = run_typer(app, ["--help"] if alone else argv, program)
+    return 2 if alone else code or 0
 
 
 def _version() -> str:

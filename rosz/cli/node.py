@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_error, print_json, print_lines, print_result, until_stopped
-from rosz.cli.declare import Argument, Json, Option
-from rosz.cli.limits import at_least
+from rosz.cli.declare import Argument, Json, Option, at_least
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
 
 if TYPE_CHECKING:

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from typing import TYPE_CHECKING, Annotated
 
 from rosz import names
@@ -16,12 +17,12 @@ from rosz.cli.console import (
     print_json,
     print_json_line,
     print_lines,
+    print_result,
     until_stopped,
     warn,
     write_file,
 )
-from rosz.cli.declare import App, Argument, Json, Option, values_last
-from rosz.cli.limits import at_least
+from rosz.cli.declare import App, Argument, Json, Option, at_least, values_last
 from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, YamlError
 
 if TYPE_CHECKING:
@@ -185,10 +186,8 @@ def load_command(
     from rosz.params import condense, preview, spread
     from rosz.params.yaml import load_documents
 
-    if file == "-":
-        text, source = _read_stdin(), _STDIN
-    else:
-        text, source = _decode(_read_bytes(file, NotFoundError), file), file
+    source = _STDIN if file == "-" else file
+    text = _read_stdin() if file == "-" else _decode(_read_bytes(file, NotFoundError), file)
     with _client(call) as client:
         _log(verbose, f"reading parameters from [{source}]")
         documents = load_documents(text, _resolve(call, namespace), source)
@@ -210,10 +209,7 @@ def search_command(
     """Print the full name of a parameter, searched in a namespace and then in those above it."""
     with _client(call) as client:
         found = client.search(name, _resolve(call, namespace))
-    if json:
-        print_json(found)
-    elif found is not None:
-        print_lines([found])
+    print_result([] if found is None else [found], found, as_json=json)
     if found is None:
         print_error(f"ERROR: Cannot find parameter [{name}] in an upwards search")
         return 1
@@ -241,10 +237,8 @@ def watch_command(
         with client.follow() as follower, follower.watch(full, changes.put):
             ready()
             print_error(f"watching [{full}]; press Ctrl-C to end")
-            left = count
-            while left is None or left > 0:
-                _print_change(changes.get(), as_json=json)
-                left = None if left is None else left - 1
+            for change in islice(iter(changes.get, None), count):
+                _print_change(change, as_json=json)
 
 
 @contextmanager
@@ -333,11 +327,10 @@ def _check_target(file: str) -> None:
 
 
 def _print_preview(differences: list[Difference], *, as_json: bool) -> None:
-    if as_json:
-        print_json(differences)
-        return
-    print_lines(_change_line(found.name, found.old, found.new) for found in differences)
-    print_error(f"{len(differences)} parameters would change; nothing is written")
+    lines = (_change_line(found.name, found.old, found.new) for found in differences)
+    print_result(lines, differences, as_json=as_json)
+    if not as_json:
+        print_error(f"{len(differences)} parameters would change; nothing is written")
 
 
 def _print_change(change: Changed, *, as_json: bool) -> None:

@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
-from rosz.cli.console import count, paint, print_json, print_result, takes_escapes, warn
+from rosz.cli.console import (
+    count,
+    paint,
+    print_json,
+    print_lines,
+    print_result,
+    takes_escapes,
+    warn,
+)
 from rosz.cli.declare import App, Argument, Json, Option
 from rosz.errors import NotFoundError
 
@@ -45,7 +53,9 @@ def list_packages(
 
 @app.command("find")
 def find_package(
-    name: Annotated[str, Argument("PACKAGE", "The workspace if omitted.", suggest.packages)] = "",
+    name: Annotated[
+        str, Argument("PACKAGE", "The workspace of this folder if omitted.", suggest.packages)
+    ] = "",
     *,
     json: Json = False,
 ) -> None:
@@ -86,20 +96,17 @@ def create_package(
         if dependency not in index.names() and dependency not in _BUILT_IN:
             warn(f"dependency '{dependency}' is not on the package path")
     if not bare:
-        folder = made[0].parent
-        sys.stdout.write(
-            f"created {folder}\nrun it with: rosz launch {folder / 'launch' / 'talker.launch'}\n"
-        )
+        file = made[0].parent / "launch" / "talker.launch"
+        print_lines([f"created {made[0].parent}", f"run it with: rosz launch {file}"])
 
 
 def _print_created(made: Sequence[Path], parent: Path) -> None:
     """Print what has been created, in the words of catkin_create_pkg."""
     for path in made:
-        kind = "folder" if path.is_dir() else "file"
-        sys.stdout.write(f"Created {kind} {path.relative_to(parent)}\n")
-    sys.stdout.write(
-        f"Successfully created files in {made[0].parent}."
-        " Please adjust the values in package.xml.\n"
+        print_lines([f"Created {'folder' if path.is_dir() else 'file'} {path.relative_to(parent)}"])
+    where = made[0].parent
+    print_lines(
+        [f"Successfully created files in {where}. Please adjust the values in package.xml."]
     )
 
 
@@ -129,7 +136,7 @@ def check_command(
         list[str] | None,
         Argument(
             "FOLDER|PACKAGE",
-            "The workspace around the working folder if omitted.",
+            "The workspace of this folder if omitted.",
             suggest.packages_and_folders,
         ),
     ] = None,
@@ -216,7 +223,7 @@ def _write_setup(cwd: Path) -> None:
     """Write the files that course documents source after catkin_make."""
     import shlex
 
-    from rosz.cli.shells import SHELLS
+    from rosz.cli.env import SHELLS
     from rosz.workspace import write_setup
 
     workspace = next((f for f in (cwd, *cwd.parents) if (f / "src").is_dir()), None)

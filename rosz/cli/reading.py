@@ -21,12 +21,7 @@ class _NotSound(Exception):  # it does not leave this module
 
 
 def read(app: App, argv: Sequence[str]) -> Callable[[], Any] | None:
-    """Return a function that runs a command line; ``None`` if typer has to read it.
-
-    Args:
-        app: The commands.
-        argv: The words that follow the name of the app.
-    """
+    """Return a function that runs a command line; ``None`` if typer has to read it."""
     remappings, words = app.split(argv)
     command = app.commands.get(words.pop(0) if app.help and words else "")
     if command is None:

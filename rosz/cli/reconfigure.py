@@ -19,8 +19,7 @@ from rosz.cli.console import (
     warn,
     write_file,
 )
-from rosz.cli.declare import Argument, Json, Option, values_last
-from rosz.cli.limits import at_least, seconds
+from rosz.cli.declare import Argument, Json, Option, at_least, seconds, values_last
 from rosz.errors import NotFoundError, WaitTimeout, near_miss
 
 if TYPE_CHECKING:
@@ -117,8 +116,7 @@ def set_from_parameters_command(
 ) -> None:
     """Change settings of a node to the private parameters of this command, such as _gain:=2."""
     with _client(call, node, timeout, wait=wait) as client:
-        params = client.node.params
-        changes: dict[str, Any] = params.get("~", {})
+        changes: dict[str, Any] = client.node.params.get("~", {})
         if not changes:
             raise NotFoundError(
                 f"no parameters are set under '{client.node.name}'; give some as _name:=value, or"

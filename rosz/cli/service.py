@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result, until_stopped, warn
-from rosz.cli.declare import Argument, Json, Option, values_last
-from rosz.cli.limits import seconds
+from rosz.cli.declare import Argument, Json, Option, seconds, values_last
 from rosz.errors import EncodeError, UsageError
 
 if TYPE_CHECKING:

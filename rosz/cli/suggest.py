@@ -29,7 +29,6 @@ __all__ = (
     "executables",
     "files",
     "launch_words",
-    "levels",
     "machines",
     "nodes",
     "package_file_names",
@@ -42,7 +41,6 @@ __all__ = (
     "rospack_commands",
     "service_types",
     "services",
-    "shells",
     "topic_type",
     "topic_types",
     "topics",
@@ -98,11 +96,7 @@ class Line:
         return self.take_survey()
 
     def take_survey(self, *, processes: bool = False) -> Survey | None:
-        """Return the nodes and topics of the domain; ``None`` when nobody answers.
-
-        Args:
-            processes: Whether to ask for the processes of the nodes as well.
-        """
+        """Return the survey, with the processes of the nodes if wanted."""
         from rosz.introspect.survey import take_survey
 
         with self.session() as session:
@@ -286,16 +280,6 @@ def package_file_names(line: Line) -> list[str]:
 def rospack_commands(line: Line) -> list[str]:
     """Return the commands of rospack, then the packages."""
     return packages(line) if line.before else ["find", "list", "list-names"]
-
-
-def levels(_: Line) -> list[str]:
-    """Return the levels of a log."""
-    return ["debug", "info", "warn", "error", "fatal"]
-
-
-def shells(_: Line) -> list[str]:
-    """Return the shells that ``rosz env`` knows."""
-    return ["bash", "zsh", "fish"]
 
 
 def _ros1_types(types: Iterable[Iterable[str]]) -> list[str]:

@@ -18,8 +18,7 @@ from rosz.cli.console import (
     until_stopped,
     warn,
 )
-from rosz.cli.declare import Argument, Json, Option
-from rosz.cli.limits import at_least, per_second
+from rosz.cli.declare import Argument, Json, Option, at_least, per_second
 from rosz.errors import ClosedError, EncodeError, NotFoundError, UsageError
 
 if TYPE_CHECKING:

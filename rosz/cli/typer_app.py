@@ -52,12 +52,7 @@ def _reword(text: str, program: str) -> str:
 
 
 def translate(app: App, remappings: Sequence[str]) -> typer.Typer:
-    """Return the app as typer declares it.
-
-    Args:
-        app: The commands.
-        remappings: The remappings of the command line.
-    """
+    """Return the app as typer declares it."""
     made = typer.Typer(
         help=app.help or None,
         add_completion=False,

@@ -11,6 +11,7 @@ from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result
 from rosz.cli.declare import App, Argument, Json, Option
 from rosz.errors import UsageError
+from rosz.names import short_type
 
 if TYPE_CHECKING:
     from rosz.introspect.definitions import Definitions
@@ -54,7 +55,7 @@ class _Types:
             return
         for one in found:
             if "/" not in wanted:
-                print_lines([f"[{_short(one)}]:"])
+                print_lines([f"[{short_type(one)}]:"])
             print_lines([definitions.text(one) if raw else definitions.show(one)])
 
     def list(self, call: Call, *, json: Json = False) -> None:
@@ -90,13 +91,8 @@ def _print_hashes(
 ) -> None:
     wanted = _given(name)
     hashes = {one: compute(one) for one in definitions.find(wanted)}
-    lines = (v if "/" in wanted else f"[{_short(one)}]: {v}" for one, v in hashes.items())
-    print_result(lines, {_short(one): v for one, v in hashes.items()}, as_json=as_json)
-
-
-def _short(name: str) -> str:
-    package, _, base = name.split("/")
-    return f"{package}/{base}"
+    lines = (v if "/" in wanted else f"[{short_type(one)}]: {v}" for one, v in hashes.items())
+    print_result(lines, {short_type(one): v for one, v in hashes.items()}, as_json=as_json)
 
 
 def _given(word: str, what: str = "type") -> str:

@@ -17,7 +17,7 @@ import pytest
 from network import TIMEOUT, Network
 
 from rosz.cli.complete import complete, expand, split_line
-from rosz.cli.shells import ALIASES
+from rosz.cli.env import ALIASES
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.workspace import create

@@ -70,7 +70,7 @@ Arguments:
   NAME <str>  [required]
 
 Options:
-  -p          Print it for reading; the output may not be valid YAML.
+  -p          Print for reading; it may not be valid YAML.
   -v          Print each step to standard error.
   --json      Print JSON.
   -h, --help  Show this message and exit.

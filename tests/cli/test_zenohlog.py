@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from rosz.cli.zenohlog import LogSummary
+from rosz.cli.core import LogSummary
 
 LINE = (
     "\x1b[2m2026-11-21T07:34:36.684141Z\x1b[0m \x1b[33m WARN\x1b[0m acc-0 ThreadId(05) "
