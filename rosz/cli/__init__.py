@@ -7,3 +7,5 @@ being typed. Programs that run ``rosz`` in their own process import `rosz.cli.ma
 """
 
 __all__: tuple[str, ...] = ()
+
+PUBLIC_MODULES = ("main",)

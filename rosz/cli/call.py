@@ -64,11 +64,7 @@ class Call:
         return open_session(self.environment)
 
     def context(self, *, lasting: bool = False) -> Context:
-        """Open the context of a node that publishes, subscribes or calls.
-
-        Args:
-            lasting: Whether the command runs until it is stopped.
-        """
+        """Open the context of a node, which may belong to a command that runs until stopped."""
         return open_context(self.environment, self.argv, lasting=lasting)
 
     @contextmanager
@@ -94,11 +90,7 @@ class Call:
             yield session, take_survey(session, self.domain, processes=processes)
 
     def survey(self, *, processes: bool = False) -> Survey:
-        """Return the nodes, topics and services of the domain.
-
-        Args:
-            processes: Whether to ask for the processes of the nodes as well.
-        """
+        """Return the nodes, topics and services of the domain, with processes if wanted."""
         with self.session_and_survey(processes=processes) as (_, survey):
             pass
         for damage in survey.damaged:

@@ -112,10 +112,7 @@ def expand(words: Sequence[str]) -> list[str]:
 def candidates(environment: Environment, words: Sequence[str], word: str) -> list[str]:
     """Return the words that may stand at the cursor; not only those that begin as its word does.
 
-    Args:
-        environment: The settings.
-        words: The words before the cursor, as `expand` returns them.
-        word: The word at the cursor; may be empty.
+    The words before the cursor are those that `expand` returns.
 
     Raises:
         RoszError: Something that is named before the cursor does not exist.

@@ -109,9 +109,7 @@ class LogSummary:
     Zenoh writes to standard output, one line for each attempt to connect that it refuses; and a
     peer that is refused tries again five times a second, for days.
 
-    Args:
-        write: Function called with each line of the summary.
-        clock: Clock in seconds.
+    It calls a function with each line; the clock is in seconds.
     """
 
     def __init__(

@@ -209,11 +209,7 @@ class App:
 
 
 def values_last(*with_value: str) -> Callable[[list[str]], list[str]]:
-    """Return a function that moves options to the front, so that ``-1`` can be a value.
-
-    Args:
-        with_value: The options that a value follows.
-    """
+    """Return a function that moves options, some with a value, before values such as ``-1``."""
 
     def arrange(args: list[str]) -> list[str]:
         options: list[str] = []

@@ -128,25 +128,23 @@ def launch_command(
     if status or restart or stop:
         _control(words or (), status=status, restart=restart or "", stop=stop or "", as_json=json)
         return 0
-    questions = {
-        "nodes": nodes,
-        "args": args,
-        "find-node": find_node,
-        "files": files,
-        "ros-args": ros_args,
-        "dump-params": dump_params,
-        "dump-plan": dump_plan,
-    }
-    asked = [(name, str(value)) for name, value in questions.items() if value]
-    if len(asked) > 1:
-        listing = ", ".join(f"--{name}" for name, _ in asked)
-        raise UsageError(f"{listing}: only one of them can be answered at a time")
+    asked = _asked(
+        nodes=nodes,
+        args=args,
+        find_node=find_node,
+        files=files,
+        ros_args=ros_args,
+        dump_params=dump_params,
+        dump_plan=dump_plan,
+    )
     launch = _Launch(words or (), Path(keys).expanduser().absolute() if keys else None)
     if asked:
-        print_lines([launch.answer(*asked[0])])
+        print_lines([launch.answer(*asked)])
         return 0
     from rosz.launch.run import MachineOption, Options, Timeouts
 
+    interrupt = seconds("--sigint-timeout", sigint_timeout)
+    terminate = seconds("--sigterm-timeout", sigterm_timeout)
     options = Options(
         screen=screen,
         log=log,
@@ -158,10 +156,7 @@ def launch_command(
         title=not disable_title,
         machines=tuple(map(MachineOption.parse, machine or ())),
         silence=seconds("--lost-after", lost_after),
-        timeouts=Timeouts(
-            seconds("--sigint-timeout", sigint_timeout),
-            seconds("--sigterm-timeout", sigterm_timeout),
-        ),
+        timeouts=Timeouts(interrupt, terminate),
     )
     if pid:
         Path(pid).expanduser().write_text(str(os.getpid()))
@@ -173,6 +168,15 @@ def _check_named(**nodes: str | None) -> None:
     for option, node in nodes.items():
         if node == "":
             raise UsageError(f"--{option.replace('_', '-')} is ''; expected the name of a node")
+
+
+def _asked(**questions: str | bool | None) -> tuple[str, str] | None:
+    """Return the one of roslaunch's questions that is asked, and its node."""
+    asked = [(name.replace("_", "-"), str(value)) for name, value in questions.items() if value]
+    if len(asked) > 1:
+        listing = ", ".join(f"--{name}" for name, _ in asked)
+        raise UsageError(f"{listing}: only one of them can be answered at a time")
+    return asked[0] if asked else None
 
 
 class _Launch:

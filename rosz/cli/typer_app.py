@@ -20,11 +20,6 @@ _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 def run(app: App, argv: Sequence[str], program: str) -> Any:
     """Run a command line, and return what its command returns.
 
-    Args:
-        app: The commands.
-        argv: The words that follow the name of the app.
-        program: The name of the app as it is typed, such as ``rosz topic``.
-
     Raises:
         UsageError: The command line is wrong.
         KeyboardInterrupt: Ctrl-C was pressed.
