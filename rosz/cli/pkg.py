@@ -53,9 +53,7 @@ def list_packages(
 
 @app.command("find")
 def find_package(
-    name: Annotated[
-        str, Argument("PACKAGE", "The workspace of this folder if omitted.", suggest.packages)
-    ] = "",
+    name: Annotated[str, Argument("PACKAGE", "The workspace if omitted.", suggest.packages)] = "",
     *,
     json: Json = False,
 ) -> None:
