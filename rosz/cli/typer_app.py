@@ -14,6 +14,7 @@ from rosz.errors import UsageError
 
 __all__ = ("run", "translate")
 
+_NUMBERS: dict[Any, str] = {int: "integer", float: "number"}
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
@@ -85,7 +86,7 @@ def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
         else:
             given = signature[one.name]
             hint: Any = given.annotation.__origin__
-            kept.append(given.replace(annotation=Annotated[hint, _declare(one.mark)]))
+            kept.append(given.replace(annotation=Annotated[hint, _declare(one.kind, one.mark)]))
 
     def call(**values: Any) -> Any:
         return command.function(**values, **fixed)
@@ -95,9 +96,18 @@ def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
     return call
 
 
-def _declare(mark: Argument | Option) -> Any:
+def _declare(kind: Callable[[Any], Any], mark: Argument | Option) -> Any:
     """Return the declaration of a parameter for typer."""
+
+    def parse(word: Any) -> Any:
+        try:
+            return kind(word)
+        except ValueError as error:
+            raise typer.BadParameter(f"'{word}' is not a valid {_NUMBERS[kind]}") from error
+
+    parser = parse if kind in _NUMBERS else None
     if isinstance(mark, Argument):
-        return typer.Argument(metavar=mark.metavar, help=mark.help)
-    hidden = mark.help is None
-    return typer.Option(*mark.names, metavar=mark.metavar, help=mark.help, hidden=hidden)
+        return typer.Argument(metavar=mark.metavar, help=mark.help, parser=parser)
+    return typer.Option(
+        *mark.names, metavar=mark.metavar, help=mark.help, hidden=mark.help is None, parser=parser
+    )
