@@ -13,16 +13,17 @@ import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from queue import Empty, SimpleQueue
-from typing import Final
+from typing import Any, Final
 
 from rosz.errors import DecodeError, RoszError
 from rosz.params.history import EMPTY_DIGEST
 from rosz.params.paths import Path, common_path, joined
-from rosz.params.replica.members import Core
+from rosz.params.replica.members import Core, Members
 from rosz.params.replica.serve import ParameterKeys
 from rosz.params.replica.state import State
 from rosz.params.wire import (
     Index,
+    Keys,
     Member,
     Record,
     SyncReply,
@@ -34,8 +35,8 @@ from rosz.params.wire import (
     split_path,
 )
 from rosz.params.writes import DELETED, Write
-from rosz.session import Query, Reply
-from rosz.worker import start_thread
+from rosz.session import Query, Reply, Session
+from rosz.worker import Worker, start_thread
 
 __all__ = ("AntiEntropy", "Synchroniser")
 
@@ -85,11 +86,11 @@ class Synchroniser:
 
     def __init__(self, core: Core) -> None:
         self.ready: bool = False
-        self.session = core.session
-        self.keys = core.keys
-        self.state = core.state
-        self.members = core.members
-        self.worker = core.worker
+        self.session: Session = core.session
+        self.keys: Keys = core.keys
+        self.state: State = core.state
+        self.members: Members = core.members
+        self.worker: Worker[Any] = core.worker
         self.busy: set[str] = set()
         self.refused: _RefusedWrites = _RefusedWrites()
         self._appeared: set[str] = set()
