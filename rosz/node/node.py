@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from rosz.errors import ClosedError
-from rosz.node import control, signals, standard
+from rosz.node import control, signals, standard, takeover
 from rosz.node.client import Client
 from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
@@ -71,7 +71,7 @@ class Node(NodeCore):
     def _begin(self) -> None:
         standard.set_initial_params(self)
         control.serve_control(self)
-        control.yield_to_newer(self)
+        takeover.yield_to_newer(self)
         self._announce()
         if not self.context.passing:
             standard.follow_clock(self)

@@ -11,7 +11,7 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.std_msgs.msg import String
-from rosz.node import Node, control, core
+from rosz.node import Node, core, takeover
 from rosz.wire import ProcessToken, format_process
 
 LOSER = """
@@ -113,7 +113,7 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
         assert go_on.wait(TIMEOUT)
         return False
 
-    monkeypatch.setattr(control, "_is_newer", slowly)
+    monkeypatch.setattr(takeover, "_is_newer", slowly)
     king = network.node("king")
     elsewhere = network.context()
     before, ended = threading.active_count(), takeovers()
@@ -122,11 +122,11 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
         for number in range(50)
     ]
     tokens = [elsewhere.session.token(format_process(duplicate)) for duplicate in duplicates]
-    seen = [asked.get(timeout=TIMEOUT) for _ in range(control._THREADS)]
+    seen = [asked.get(timeout=TIMEOUT) for _ in range(takeover._THREADS)]
     network.node("last")
     king.context.graph.wait_for_node("/last", TIMEOUT)
     assert threading.active_count() - before < len(duplicates)
-    assert len(takeovers() - ended) == control._THREADS
+    assert len(takeovers() - ended) == takeover._THREADS
     go_on.set()
     seen += [asked.get(timeout=TIMEOUT) for _ in range(len(duplicates) - len(seen))]
     assert sorted(seen) == list(range(len(duplicates)))
