@@ -25,7 +25,7 @@ def snapshot(
     node: Annotated[str, Option("--node NODE", "Turtlesim, if several run.", suggest.nodes)] = "",
 ) -> None:
     """Save a picture of the field with its turtles."""
-    from rosz.turtlesim.snapshot import fetch
+    from rosz.turtlesim import fetch
 
     if file != "-" and Path(file).suffix.lower() != ".png":
         raise UsageError(f"'{file}' does not end in .png; the picture is written as PNG")

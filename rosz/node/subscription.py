@@ -89,7 +89,7 @@ class _Publisher:
         self.replays = False
 
 
-class Decoder:
+class _Decoder:
     """Decode samples, count lost ones, and drop damaged and repeated ones.
 
     Args:
@@ -178,7 +178,7 @@ class Decoder:
             )
 
 
-_Item = tuple["Sample | Reply", Decoder | None]
+_Item = tuple["Sample | Reply", _Decoder | None]
 """A sample, with its decoder if its key does not tell its type."""
 
 
@@ -228,7 +228,7 @@ class Subscription(Entity, Generic[M]):
         self._turn = threading.RLock()
         self._learning = threading.RLock()  # a signal handler may come in between
         self._decoder = None
-        self._decoders: dict[tuple[str, str], Decoder | None] = {}
+        self._decoders: dict[tuple[str, str], _Decoder | None] = {}
         self._announced: set[tuple[str, str]] = set()
         if message_type is not None:
             self._decoder = self._make_decoder(name, type_hash, None if raw else message_type)
@@ -277,7 +277,7 @@ class Subscription(Entity, Generic[M]):
 
     # Receiving.
 
-    def _receive(self, sample: Sample | Reply, decoder: Decoder | None = None) -> None:
+    def _receive(self, sample: Sample | Reply, decoder: _Decoder | None = None) -> None:
         """Put a sample into the queue; called on threads of the session.
 
         Args:
@@ -294,11 +294,11 @@ class Subscription(Entity, Generic[M]):
                         receive=self._queue.receive,
                     )
 
-    def _decode(self, sample: Sample | Reply, decoder: Decoder | None) -> Received | None:
+    def _decode(self, sample: Sample | Reply, decoder: _Decoder | None) -> Received | None:
         decoder = decoder or self._decoder or self._decoder_of(sample)
         return None if decoder is None else decoder.decode(sample)
 
-    def _dispatch(self, sample: Sample | Reply, decoder: Decoder | None = None) -> None:
+    def _dispatch(self, sample: Sample | Reply, decoder: _Decoder | None = None) -> None:
         """Call the callback with a sample whose turn it is."""
         callback = self._callback
         if callback is None or self._queue.closed:
@@ -445,7 +445,7 @@ class Subscription(Entity, Generic[M]):
                     "no history of '%s' from node '%s': %s", self.name, publisher.node_name, error
                 )
 
-    def _decoder_of(self, sample: Sample | Reply) -> Decoder | None:
+    def _decoder_of(self, sample: Sample | Reply) -> _Decoder | None:
         """Return the decoder for a sample whose key tells its type."""
         *_, dds_name, type_hash = sample.key.split("/")
         try:
@@ -453,7 +453,7 @@ class Subscription(Entity, Generic[M]):
         except DecodeError:
             return None  # something else of Zenoh's below the name of the topic
 
-    def _decoder_for(self, type_name: str, type_hash: str) -> Decoder | None:
+    def _decoder_for(self, type_name: str, type_hash: str) -> _Decoder | None:
         """Return the decoder for a type; ``None``, after one warning, if it cannot be decoded."""
         kind = (type_name, type_hash)
         with self._learning:
@@ -461,7 +461,7 @@ class Subscription(Entity, Generic[M]):
                 self._decoders[kind] = self._learn(*kind)
             return self._decoders[kind]
 
-    def _learn(self, type_name: str, type_hash: str) -> Decoder | None:
+    def _learn(self, type_name: str, type_hash: str) -> _Decoder | None:
         log = self.node.log
         if self._raw:
             return self._make_decoder(type_name, type_hash, None)
@@ -484,9 +484,9 @@ class Subscription(Entity, Generic[M]):
 
     def _make_decoder(
         self, type_name: str, type_hash: str, message_type: type[Message] | None
-    ) -> Decoder:
+    ) -> _Decoder:
         log, with_info = self.node.log, self._with_info
-        return Decoder(self.name, type_name, type_hash, message_type, log, with_info=with_info)
+        return _Decoder(self.name, type_name, type_hash, message_type, log, with_info=with_info)
 
     # The end.
 

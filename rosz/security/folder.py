@@ -24,7 +24,17 @@ from rosz.errors import UsageError
 from rosz.security.rules import Permit, Rules, read_rules
 from rosz.wire import Kind
 
-__all__ = ("AUTHORITY", "CERTIFICATE", "KEY", "RULES", "KeyFolder", "LocalPermissions")
+__all__ = (
+    "AUTHORITY",
+    "CERTIFICATE",
+    "KEY",
+    "RULES",
+    "KeyFolder",
+    "LocalPermissions",
+    "check_private",
+    "check_trusted",
+    "load_rules",
+)
 
 AUTHORITY = "authority.pem"
 CERTIFICATE = "certificate.pem"

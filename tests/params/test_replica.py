@@ -140,7 +140,7 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
         assert one.compare(TIMEOUT)
         assert one.compare(TIMEOUT)
         key = f"{Keys(0).of(other.zid, 'tell')}/**"
-        network.keep(sessions[1].queryable(key, other._sync.on_tell, complete=True))
+        network.keep(sessions[1].queryable(key, other._sync.on_writes, complete=True))
         assert one.compare(TIMEOUT)
     assert other.root == {}
     assert caplog.text.count("and 2 more, which differs there from now on") == 1

@@ -17,8 +17,7 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import ExecutableNotFound
-from rosz.launch.plan import report
-from rosz.launch.plan.model import NodePlan
+from rosz.launch.plan import NodePlan, report
 from rosz.packages import Package, PackageIndex
 
 __all__ = (

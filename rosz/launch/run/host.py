@@ -23,7 +23,7 @@ from typing import Protocol
 import msgspec
 
 from rosz.errors import LaunchError, RoszError
-from rosz.launch.plan.model import MachinePlan, NodePlan
+from rosz.launch.plan import MachinePlan, NodePlan
 from rosz.launch.run.command import TAG, Command, Workplace
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.output import Output, RunFolder, Streams

@@ -17,7 +17,7 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import UsageError, near_miss
-from rosz.launch.plan.model import MachinePlan, Place, Plan
+from rosz.launch.plan import MachinePlan, Place, Plan
 from rosz.wire import Endpoint
 
 __all__ = (

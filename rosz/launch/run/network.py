@@ -22,7 +22,7 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import LaunchError, ParamNotFound
-from rosz.launch.plan.model import Condition, Plan, SetupPlan
+from rosz.launch.plan import Condition, Plan, SetupPlan
 from rosz.launch.run.command import TAG
 from rosz.launch.run.console import Console
 from rosz.launch.run.loop import Loop

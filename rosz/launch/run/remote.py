@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 import msgspec
 
 from rosz.errors import LaunchError
-from rosz.launch.plan.model import MachinePlan
+from rosz.launch.plan import MachinePlan
 from rosz.launch.run.console import Console
 from rosz.launch.run.host import OnExit, OnStart, ProcessSpec, Usage
 from rosz.launch.run.loop import Loop

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 import msgspec
 
 from rosz.errors import LaunchError, ParamNotFound, UsageError
-from rosz.launch.plan.model import NodePlan, Plan
+from rosz.launch.plan import NodePlan, Plan
 from rosz.launch.run.command import TAG, Workplace
 from rosz.launch.run.console import Console, LaunchLog
 from rosz.launch.run.control import StatusServer

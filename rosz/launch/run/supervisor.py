@@ -15,7 +15,7 @@ from functools import partial
 import msgspec
 
 from rosz.errors import LaunchError, NotFoundError, RoszError, near_miss
-from rosz.launch.plan.model import Condition, NodePlan, Wait
+from rosz.launch.plan import Condition, NodePlan, Wait
 from rosz.launch.run.console import Console
 from rosz.launch.run.host import Child, Host, ProcessSpec
 from rosz.launch.run.loop import Loop, Timer

@@ -162,7 +162,7 @@ class Replica(_Copy):
         tell_key = keys.of(session.zid, "tell")
         self._declared: list[Closable] = [
             session.queryable(keys.of(session.zid, "sync"), sync.on_sync, complete=True),
-            session.queryable(f"{tell_key}/**", sync.on_tell, complete=True),
+            session.queryable(f"{tell_key}/**", sync.on_writes, complete=True),
             ClientServer(self._core, self.write, lambda: sync.ready),
         ]
         if settled is not None:

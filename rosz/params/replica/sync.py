@@ -133,7 +133,7 @@ class Synchroniser:
         if not self.worker.offer(partial(self._handle, query, _DAMAGED_COMPARISON, respond)):
             query.close()
 
-    def on_tell(self, query: Query) -> None:
+    def on_writes(self, query: Query) -> None:
         """Handle writes of another replica on the ``tell`` key."""
         payload = query.payload or b""
         respond = partial(self._receive, query.key, payload)

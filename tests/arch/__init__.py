@@ -1,0 +1,1 @@
+"""Tests of the form of the source: floors, doors, words, sizes, types."""

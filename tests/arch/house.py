@@ -1,0 +1,155 @@
+"""The house as its source shows it: modules, what they import, and on which floor they stand."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+__all__ = (
+    "FLOORS",
+    "HAND_WRITTEN",
+    "MODULES",
+    "SOURCE",
+    "Import",
+    "assigned_names",
+    "floor",
+    "imports",
+    "is_package",
+    "path_of",
+)
+
+SOURCE = Path(__file__).parents[2] / "rosz"
+_SKIPPED = {"share"}
+
+# The longest prefix counts.
+FLOORS = {
+    "rosz": 9,
+    "rosz.__main__": 9,
+    "rosz.script": 9,
+    "rosz.errors": 0,
+    "rosz.names": 0,
+    "rosz.remap": 0,
+    "rosz.time": 0,
+    "rosz.qos": 0,
+    "rosz.packages": 0,
+    "rosz.message": 0,
+    "rosz.idl": 1,
+    "rosz.params": 1,
+    "rosz.launch": 1,
+    "rosz.launch.plan": 1,
+    "rosz.wire": 1,
+    "rosz.msgs": 2,
+    "rosz.typestore": 2,
+    "rosz.worker": 3,
+    "rosz.environment": 3,
+    "rosz.lifecycle": 3,
+    "rosz.security": 3,
+    "rosz.security.rules": 1,
+    "rosz.security.access": 1,
+    "rosz.session": 3,
+    "rosz.graph": 4,
+    "rosz.params.replica": 4,
+    "rosz.params.remote": 4,
+    "rosz.params.api": 5,
+    "rosz.node": 5,
+    "rosz.actions": 6,
+    "rosz.bags": 6,
+    "rosz.introspect": 6,
+    "rosz.launch.run": 6,
+    "rosz.reconfigure": 6,
+    "rosz.transforms": 6,
+    "rosz.bridges": 7,
+    "rosz.doctor": 7,
+    "rosz.ros1": 7,
+    "rosz.ros2": 7,
+    "rosz.turtlebot3_sim": 7,
+    "rosz.turtlesim": 7,
+    "rosz.workspace": 7,
+    "rosz.cli": 8,
+    "rosz.web": 8,
+}
+
+
+class Import(NamedTuple):
+    """One name that a module imports.
+
+    Attributes:
+        module: The module that it comes from.
+        name: The name; empty for ``import module``.
+        line: Where.
+    """
+
+    module: str
+    name: str
+    line: int
+
+
+def _module_name(path: Path) -> str:
+    parts = path.relative_to(SOURCE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+_PATHS = {
+    _module_name(path): path
+    for path in sorted(SOURCE.rglob("*.py"))
+    if not _SKIPPED & set(path.relative_to(SOURCE).parts)
+}
+MODULES = {name: ast.parse(path.read_text(), str(path)) for name, path in _PATHS.items()}
+HAND_WRITTEN = tuple(name for name in MODULES if not name.startswith("rosz.msgs."))
+
+
+def path_of(module: str) -> Path:
+    """Return the file of a module."""
+    return _PATHS[module]
+
+
+def is_package(module: str) -> bool:
+    """Tell whether a module is the ``__init__`` of a package."""
+    return _PATHS[module].name == "__init__.py"
+
+
+def floor(module: str) -> int:
+    """Return the floor of a module.
+
+    Raises:
+        AssertionError: It stands on none.
+    """
+    parts = module.split(".")
+    for end in range(len(parts), 0, -1):
+        known = FLOORS.get(".".join(parts[:end]))
+        if known is not None:
+            return known
+    raise AssertionError(f"{module} has no floor: add it to the table")
+
+
+def imports(module: str) -> Iterator[Import]:
+    """Yield everything that a module imports: at load time, in functions, and for typing."""
+    for node in ast.walk(MODULES[module]):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(alias.name, "", node.lineno)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module} line {node.lineno}: relative import"
+            assert node.module is not None
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                exported = node.module in MODULES and assigned_names(node.module, "__all__")
+                # A package may export a function that has the name of its module.
+                if whole in MODULES and not (exported and alias.name in exported):
+                    yield Import(whole, "", node.lineno)
+                else:
+                    yield Import(node.module, alias.name, node.lineno)
+
+
+def assigned_names(module: str, variable: str) -> tuple[str, ...] | None:
+    """Return the strings of a tuple or list that a module assigns at its top level."""
+    for node in MODULES[module].body:
+        if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
+            continue
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        if any(isinstance(target, ast.Name) and target.id == variable for target in targets):
+            found: tuple[str, ...] = tuple(ast.literal_eval(node.value))
+            return found
+    return None

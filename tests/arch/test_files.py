@@ -1,0 +1,90 @@
+"""The form of files: size, exports, documentation."""
+
+from __future__ import annotations
+
+import ast
+
+from arch.house import HAND_WRITTEN, MODULES, assigned_names, is_package, path_of
+
+LONGEST_FILE = 600
+LONGEST_FUNCTION = 50
+# Their exports are those of ROS.
+FOREIGN = ("rosz.ros1.", "rosz.ros2.")
+# Its functions are the commands that an app registers.
+COMMANDS = "rosz.cli."
+
+
+def functions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
+    return [
+        node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    ]
+
+
+def body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Return the lines of a function below its signature and docstring."""
+    body = function.body[1:] if ast.get_docstring(function) is not None else function.body
+    if not body:
+        return 0
+    return (function.end_lineno or 0) - body[0].lineno + 1
+
+
+def test_files_hold_one_idea() -> None:
+    long = {
+        module: lines
+        for module in HAND_WRITTEN
+        if (lines := path_of(module).read_text().count("\n")) > LONGEST_FILE
+    }
+    assert not long, f"longer than {LONGEST_FILE} lines: {long}"
+
+
+def test_functions_fit_a_page() -> None:
+    long = [
+        f"{module}:{function.lineno} {function.name}: {body_lines(function)} lines"
+        for module in HAND_WRITTEN
+        for function in functions(MODULES[module])
+        if body_lines(function) > LONGEST_FUNCTION
+    ]
+    assert not long, "\n".join(long)
+
+
+def test_exports_are_exact_and_sorted() -> None:
+    """Each name in ``__all__`` exists; each public definition of a module is in its ``__all__``."""
+    wrong = []
+    for module in HAND_WRITTEN:
+        exported = assigned_names(module, "__all__")
+        if exported is None or module.startswith(FOREIGN):
+            continue
+        if list(exported) != sorted(exported, key=_isort_key):
+            wrong.append(f"{module}: __all__ is not sorted")
+        defined = _bound_names(MODULES[module])
+        wrong += [
+            f"{module}: exports '{name}', which it lacks"
+            for name in exported
+            if name not in defined and "__getattr__" not in defined
+        ]
+        if not is_package(module) and not module.startswith(COMMANDS):
+            wrong += [
+                f"{module}: defines '{node.name}', which it does not export"
+                for node in MODULES[module].body
+                if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+                and not node.name.startswith("_")
+                and node.name not in exported
+            ]
+    assert not wrong, "\n".join(wrong)
+
+
+def _isort_key(name: str) -> tuple[int, str]:
+    kind = 0 if name.isupper() and len(name) > 1 else 1 if name[:1].isupper() else 2
+    return kind, name
+
+
+def _bound_names(tree: ast.Module) -> set[str]:
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names.update((alias.asname or alias.name).split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+    return names
