@@ -8,13 +8,24 @@ starts ROS 1; otherwise it is written in the file.
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
 
 import oracle
 import pytest
+from hypothesis import HealthCheck, settings
 from network import Network
+
+# Tests give the same result on a busy machine. ROSZ_EXAMPLES=20000 takes a night.
+settings.register_profile(
+    "rosz",
+    deadline=None,
+    max_examples=int(os.environ.get("ROSZ_EXAMPLES", "100")),
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+settings.load_profile("rosz")
 
 
 def pytest_configure() -> None:

@@ -49,8 +49,16 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def eventually(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> None:
-    """Wait for something that tells nobody when it comes about."""
+def eventually(
+    condition: Callable[[], Any], what: str = "the condition", timeout: float = TIMEOUT
+) -> None:
+    """Wait until a condition holds that has no event to wait for.
+
+    Args:
+        condition: Function that returns whether it holds.
+        what: What the condition says, for the failure.
+        timeout: Time limit in seconds.
+    """
     deadline = time.monotonic() + timeout
     pause = threading.Event()
     while not condition():

@@ -157,7 +157,7 @@ OTHERS = VALUES | st.integers(-5, 5).map(str) | st.floats(-5, 5, allow_nan=False
 EXPRESSION = st.builds("{} {} {}".format, VALUES, OPERATORS, OTHERS)
 
 
-@settings(deadline=None, max_examples=400)
+@settings(max_examples=400)
 @given(expression=EXPRESSION)
 def test_any_operation_as_genpy(genpy: Worker, expression: str) -> None:
     agree(genpy, expression)

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from network import eventually
 from oracle import Worker, require
-from params.network import Network, until
+from params.network import Network
 
 from rosz.cli.main import run
 from rosz.cli.param import _format_scalar, _parse_scalar
@@ -436,7 +437,7 @@ def test_a_writer_is_warned_of_silent_replicas(
     monkeypatch.setattr(package, "ACK_TIMEOUT", 0.3)
     replica = network.replica()
     Mute(network)
-    until(lambda: len(replica.members()) == 1)
+    eventually(lambda: len(replica.members()) == 1)
     assert param("set", "/a", "1") == (
         0,
         "",
@@ -472,7 +473,6 @@ def test_other_words_are_left_to_yaml(word: str) -> None:
     assert _parse_scalar(word) is None
 
 
-@settings(deadline=None)
 @given(st.from_regex(r"[-0-9a-zA-Z_.]{1,8}", fullmatch=True))
 def test_no_word_means_something_else_in_yaml(word: str) -> None:
     found = _parse_scalar(word)

@@ -153,7 +153,7 @@ WORDS = [
 ]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.sampled_from(["take", "set", "run"]), st.lists(st.sampled_from(WORDS), max_size=7))
 def test_no_line_means_something_else_to_typer(command: str, words: list[str]) -> None:
     found = by_reading(app, [command, *words])

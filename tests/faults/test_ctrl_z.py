@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import signal
-import socket
 from collections.abc import Iterator
 
 import pytest
-from network import Network, Program
+from network import Network, Program, free_port
 
 OLD = """
     import sys
@@ -126,9 +125,7 @@ def network(request: pytest.FixtureRequest) -> Iterator[Network]:
     """A network that meets at a unix socket, or at a port."""
     made = Network()
     if request.param == "tcp":
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            made.rendezvous = f"tcp/localhost:{free.getsockname()[1]}"
+        made.rendezvous = f"tcp/localhost:{free_port()}"
     yield made
     made.close()
 

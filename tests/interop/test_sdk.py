@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
-import socket
 from array import array
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +16,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import TIMEOUT, Network, Program, eventually
+from network import TIMEOUT, Network, Program, eventually, free_port
 
 from rosz.errors import ServiceError
 from rosz.message import Message
@@ -73,10 +72,7 @@ class Partner:
 @pytest.fixture
 def city(network: Network) -> Iterator[Network]:
     """A network around a router, as ROS 2 has one."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    network.rendezvous = f"tcp/127.0.0.1:{port}"
+    network.rendezvous = f"tcp/127.0.0.1:{free_port()}"
     with Session.open(SessionConfig(mode="router", rendezvous=network.rendezvous)):
         yield network
         network.close()

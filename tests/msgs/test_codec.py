@@ -72,7 +72,7 @@ def test_defaults_can_be_sent() -> None:
         assert cls.from_cdr(cls().to_cdr()) == cls(), name
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 1 << 62))
 def test_invented_types(seed: int) -> None:
     rng = random.Random(seed)

@@ -79,7 +79,7 @@ def test_strify_as_genpy(genpy: Worker, name: str, width: int | None) -> None:
         assert ours == theirs["value"]
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.text(st.characters(exclude_categories=["Cs"]), max_size=120))
 def test_strings_as_genpy(genpy: Worker, text: str) -> None:
     if text:

@@ -1,22 +1,11 @@
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import HealthCheck, settings
 from oracle import Worker, require
 
 from .network import Network
-
-# ROSZ_EXAMPLES=20000 makes a night of it.
-settings.register_profile(
-    "params",
-    deadline=None,
-    max_examples=int(os.environ.get("ROSZ_EXAMPLES", "100")),
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
-settings.load_profile("params")
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Any
 
-from network import free_port
+from network import eventually, free_port
 
 ROOT = Path(__file__).parents[2]
 TIMEOUT = 50.0
@@ -138,20 +138,21 @@ def states(processes: Iterable[Process]) -> list[dict[str, Any]]:
 def until_known(processes: list[Process], others: int = 0) -> None:
     """Wait until all know all, or so many others."""
     others = others or len(processes) - 1
-    deadline = time.monotonic() + TIMEOUT
-    pause = threading.Event()
-    while any(state["members"] < others for state in states(processes)):
-        assert time.monotonic() < deadline, "they do not find each other"
-        pause.wait(0.01)
+
+    def known() -> bool:
+        return all(state["members"] >= others for state in states(processes))
+
+    eventually(known, "all know each other", TIMEOUT)
 
 
 def until_same(processes: list[Process], what: str) -> float:
     """Wait until all hold the same; print and return how long that took."""
     begun = time.monotonic()
-    pause = threading.Event()
-    while len({state["digest"] for state in states(processes)}) > 1:
-        assert time.monotonic() - begun < TIMEOUT, "they do not become the same"
-        pause.wait(0.005)
+
+    def same() -> bool:
+        return len({state["digest"] for state in states(processes)}) == 1
+
+    eventually(same, "all hold the same", TIMEOUT)
     took = time.monotonic() - begun
     print(f"{what}: the same on {len(processes)} replicas after {took:.3f} s")
     roots = [process.do("root") for process in processes]

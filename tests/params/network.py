@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import network
@@ -55,14 +54,9 @@ class Network(network.Network):
     def replicas(self, count: int) -> list[Replica]:
         """Return replicas that all know each other."""
         found = [self.replica(label=f"r{index}") for index in range(count)]
-        until(lambda: all(len(replica.members()) == count - 1 for replica in found))
+        network.eventually(lambda: all(len(replica.members()) == count - 1 for replica in found))
         return found
 
     def keep(self, thing: Closable) -> None:
         """Close something at the end of the test."""
         self._keep(thing)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    """Wait until a condition holds that has no event of its own."""
-    network.eventually(condition, "the condition of a test of parameters")

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from network import eventually
 
 from rosz.params.replica import Replica
 from rosz.params.tree import MISSING, leaves
@@ -14,7 +15,7 @@ from rosz.params.wire import Keys, decode_value
 from rosz.params.writes import Write
 from rosz.session import Reply, Session
 
-from .network import Network, merge, until
+from .network import Network, merge
 from .storage import Storage
 from .strategies import BELOW_ROOT, VALUES
 
@@ -81,7 +82,7 @@ def test_a_storage_holds_what_the_store_holds(network: Network) -> None:
     one.set("/gone", 1)
     other.set("/", {**one.root, "z": dt.datetime(2024, 1, 2, tzinfo=dt.UTC), "gone": 2})
     other.delete("/gone")
-    until(lambda: held(storage) == shown(one.root))
+    eventually(lambda: held(storage) == shown(one.root))
 
 
 def source(replica: Replica) -> Write | None:
@@ -97,7 +98,7 @@ def test_a_storage_brings_the_store_back(network: Network) -> None:
     first.set("/a", {"b": 1, "c": [2, b"x"]})
     first.set("/old", 1)
     first.delete("/old")
-    until(lambda: held(storage) == shown(first.root))
+    eventually(lambda: held(storage) == shown(first.root))
     stamp = source(first)
     first.close()
     again = network.replica()
@@ -114,14 +115,14 @@ def test_a_storage_that_comes_late_or_is_wrong_is_put_right(network: Network) ->
     replica.set("/a", {"b": 1, "c": 2})
     storage = Storage(network.session())
     network.keep(storage)
-    until(lambda: held(storage) == {"@rosz/0/param/a/b": 1, "@rosz/0/param/a/c": 2})
+    eventually(lambda: held(storage) == {"@rosz/0/param/a/b": 1, "@rosz/0/param/a/c": 2})
     stranger = network.session()
     stranger.put("@rosz/0/param/left over", b"\x01", stamp=stranger.stamp())
     stranger.put("@rosz/0/param/a//b".replace("//", "/%41"), b"\x01", stamp=stranger.stamp())
     stranger.put("@rosz/0/param/a/b", b"\x09", stamp=stranger.stamp())
-    until(lambda: len(storage.held) == 4)
+    eventually(lambda: len(storage.held) == 4)
     replica._parameter_keys.reconcile()
-    until(lambda: held(storage) == {"@rosz/0/param/a/b": 1, "@rosz/0/param/a/c": 2})
+    eventually(lambda: held(storage) == {"@rosz/0/param/a/b": 1, "@rosz/0/param/a/c": 2})
 
 
 @settings(max_examples=15)
@@ -144,7 +145,7 @@ def test_a_storage_follows_any_history(steps: list[tuple[int, Any, Any]]) -> Non
             elif replica.has(name):
                 replica.delete(name)
         expected = shown(replicas[0].root)
-        until(lambda: {k: v for k, v in held(storage).items() if v != {}} == expected)
+        eventually(lambda: {k: v for k, v in held(storage).items() if v != {}} == expected)
     finally:
         network.close()
 
@@ -156,7 +157,7 @@ def test_damaged_storages_are_survived(network: Network, caplog: pytest.LogCaptu
     stranger.put("@rosz/0/param/a", b"\xc1", stamp=stranger.stamp())
     stranger.put("@rosz/0/param/%61", b"\x01", stamp=stranger.stamp())
     stranger.put("@rosz/0/param/b", b"\x01", stamp=stranger.stamp())
-    until(lambda: len(storage.held) == 3)
+    eventually(lambda: len(storage.held) == 3)
     replica = network.replica()
     assert replica.root == {"b": 1}
     assert caplog.text.count("a storage holds something that is not a parameter") == 2
@@ -166,10 +167,10 @@ def test_a_storage_gives_back_names_that_are_no_parts_of_keys(network: Network) 
     storage = Storage(network.session())
     network.keep(storage)
     one = network.replica()
-    until(lambda: one._parameter_keys.subscribed)
+    eventually(lambda: one._parameter_keys.subscribed)
     value = {"a": {"": 1, "b": 2}, "c": {"d/e": 3, "f": 4}, "g": 5}
     one.set("/v", value)
-    until(lambda: len(storage.held) == 3)
+    eventually(lambda: len(storage.held) == 3)
     one._parameter_keys.reconcile()
     assert len(storage.held) == 3
     one.close()

@@ -6,6 +6,7 @@ import time
 from queue import SimpleQueue
 
 import pytest
+from network import eventually
 
 from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
 from rosz.params.remote import ParamClient
@@ -13,7 +14,7 @@ from rosz.params.replica import Changed
 from rosz.params.writes import DELETED, condense
 from rosz.session import HybridClock
 
-from .network import Network, merge, until
+from .network import Network, merge
 from .test_replica import Mute
 
 
@@ -150,7 +151,7 @@ def test_a_follower_finds_what_it_missed(network: Network) -> None:
         follower._subscriber.close()
         replica.set("/a", 2)
         follower._sync.compare_with_one()
-        until(lambda: follower.get("/a") == 2)
+        eventually(lambda: follower.get("/a") == 2)
 
 
 def test_many_may_write_at_once(network: Network, client: ParamClient) -> None:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Collection
 
 import pytest
+from network import eventually
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
 from rosz.params.replica import Replica
@@ -23,7 +24,7 @@ from rosz.params.wire import (
 )
 from rosz.session import HybridClock, Stamp
 
-from .network import TIMEOUT, Network, merge, until
+from .network import TIMEOUT, Network, merge
 
 
 class SkewedClock(HybridClock):
@@ -62,7 +63,7 @@ def test_nobody_waits_for_one_that_ends_as_it_is_counted(
 
     def too_late(zids: Collection[str]) -> PendingWrite:
         second.close()
-        until(lambda: first.members() == [] and not first._members.zids)
+        eventually(lambda: first.members() == [] and not first._members.zids)
         first._broadcaster.drop_peer(second.zid)
         return count(zids)
 
@@ -130,9 +131,9 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
         session.secured = True
     one = network.join(sessions[0])
     # One that knows the other when it joins does not compare with it again when it appears.
-    until(lambda: sessions[1].live_tokens(Keys(0).tokens, TIMEOUT) != [])
+    eventually(lambda: sessions[1].live_tokens(Keys(0).tokens, TIMEOUT) != [])
     other = network.join(sessions[1])
-    until(lambda: len(one.members()) == 1)
+    eventually(lambda: len(one.members()) == 1)
     monkeypatch.setattr(one._broadcaster, "send", lambda *_: ())
     other._declared[1].close()  # where it is told: rules leave such questions without an answer
     merge(one, "/", {"a": {"b": 1, "c": 2}, "d": 3})
@@ -145,7 +146,7 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
     assert other.root == {}
     assert caplog.text.count("and 2 more, which differs there from now on") == 1
     one._on_member(other._own, False)
-    until(lambda: one.compare(TIMEOUT) and other.root == one.root)
+    eventually(lambda: one.compare(TIMEOUT) and other.root == one.root)
     assert one.digest() == other.digest()
 
 
@@ -153,7 +154,7 @@ def test_the_store_lives_while_any_replica_does(network: Network) -> None:
     first, second = network.replicas(2)
     first.set("/a", 1)
     first.close()
-    until(lambda: second.members() == [])
+    eventually(lambda: second.members() == [])
     third = network.replica()
     assert third.get("/a") == 1
 
@@ -294,7 +295,7 @@ def test_a_wrong_clock_loses_nothing(network: Network, seconds: float) -> None:
     session = network.session()
     session.clock = SkewedClock(session.zid, seconds)
     wrong = network.join(session)
-    until(lambda: len(right.members()) == 1)
+    eventually(lambda: len(right.members()) == 1)
     for number in range(20):
         right.set("/a", ("right", number))
         assert wrong.get("/a") == ["right", number]
@@ -319,7 +320,7 @@ def test_a_replica_that_does_not_answer_is_named_once_and_then_not_waited_for(
 ) -> None:
     one, other = network.replicas(2)
     Mute(network)
-    until(lambda: len(one.members()) == 2)
+    eventually(lambda: len(one.members()) == 2)
     begun = time.monotonic()
     with caplog.at_level(logging.WARNING, "rosz.params"):
         outcome = one.set("/a/b", 1, timeout=0.4)
@@ -340,7 +341,7 @@ def test_a_replica_that_does_not_answer_is_named_once_and_then_not_waited_for(
 def test_a_replica_that_goes_is_not_waited_for(network: Network) -> None:
     one = network.replica()
     mute = Mute(network)
-    until(lambda: len(one.members()) == 1)
+    eventually(lambda: len(one.members()) == 1)
     timer = threading.Timer(0.2, mute.token.close)
     timer.start()
     begun = time.monotonic()
@@ -390,7 +391,7 @@ def test_those_that_meet_again_compare_unasked(network: Network) -> None:
     deaf._members._on_token(Keys(0).token(one._own), False)
     assert deaf.members() == []
     deaf._members._on_token(Keys(0).token(one._own), True)
-    until(lambda: deaf.has("/a"))
+    eventually(lambda: deaf.has("/a"))
 
 
 def test_one_that_went_before_it_could_be_watched_is_forgotten(network: Network) -> None:
@@ -398,7 +399,7 @@ def test_one_that_went_before_it_could_be_watched_is_forgotten(network: Network)
     ghost = Member(1, "f0f0", "ghost")
     replica._members._update(ghost, True)
     assert replica.members() == [ghost]
-    until(lambda: replica.members() == [])
+    eventually(lambda: replica.members() == [])
     assert replica.set("/a", 1).slow == ()
 
 
@@ -408,7 +409,7 @@ def test_leaving_is_seen_and_ends_writing(network: Network) -> None:
         one.set("/a", 1)
     one.close()
     assert one.closed
-    until(lambda: other.members() == [])
+    eventually(lambda: other.members() == [])
     with pytest.raises(ClosedError, match="parameter store of this process is closed"):
         one.set("/a", 2)
     assert one.get("/a") == 1
@@ -420,7 +421,7 @@ def test_what_nobody_wrote_is_survived(network: Network, caplog: pytest.LogCaptu
     replica = network.replica()
     stranger = network.session()
     keys = Keys(0)
-    until(lambda: stranger.peers() == [replica.zid])
+    eventually(lambda: stranger.peers() == [replica.zid])
     junk = [b"", b"\xff", b"\x93", b"[1,2,3]", b"\xc1" * 50, b"\x96\x01\xff\xa1x\xa1y\x90\x90"]
     for data in junk:
         stranger.put(keys.change, data)
@@ -441,7 +442,7 @@ def test_a_program_with_a_name_that_is_no_utf_8(
 ) -> None:
     monkeypatch.setattr("sys.argv", ["/home/file-\udcff.py"])
     one, other = network.replica(), network.replica()
-    until(lambda: len(one.members()) == 1)
+    eventually(lambda: len(one.members()) == 1)
     one.set("/a", 1)
     assert other.get("/a") == 1
     assert other.origin("/a").startswith("file-\ufffd.py (pid ")

@@ -13,13 +13,14 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given
+from network import eventually
 
 from rosz.errors import StoreError
 from rosz.params.history import History
 from rosz.params.replica.storage import Storage, StoreFile
 from rosz.params.writes import DELETED, Write, put
 
-from .network import Network, until
+from .network import Network
 from .strategies import writes
 
 WRITER = """
@@ -206,7 +207,7 @@ def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) ->
     path = tmp_path / "params"
     keeper = network.replica(storage=Storage(StoreFile(path)))
     other = network.replica()
-    until(lambda: len(keeper.members()) == 1)
+    eventually(lambda: len(keeper.members()) == 1)
     other.set("/a", {"b": 1, "c": 2})
     keeper.delete("/a/b")
     other.set("/late", 5)
@@ -281,7 +282,7 @@ def test_what_comes_right_before_the_end_is_saved() -> None:
     storage.save([put(("n",), (1, "c"), 1)])
     end = threading.Thread(target=storage.close)
     end.start()
-    until(lambda: storage._worker.closed)
+    eventually(lambda: storage._worker.closed)
     go_on.set()
     end.join()
     assert [write.path for write in disk.kept] == [("n",)]
@@ -303,8 +304,8 @@ def test_a_disk_that_is_full_for_long_costs_no_memory() -> None:
     storage = Storage(disk)
     for number in range(1, 101):
         storage.save([put(("n",), (number, "c"), number), put(("m",), (number, "c"), 0)])
-    until(lambda: not storage._worker.waiting and bool(storage._unsaved))
-    until(lambda: len(storage._unsaved) == 2)
+    eventually(lambda: not storage._worker.waiting and bool(storage._unsaved))
+    eventually(lambda: len(storage._unsaved) == 2)
     disk.full = False
     storage.save([put(("late",), (101, "c"), 1)])
     storage.close()

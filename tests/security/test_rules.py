@@ -4,7 +4,7 @@ import json
 
 import pytest
 import zenoh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosz.errors import YamlError
@@ -100,7 +100,6 @@ def test_process_tokens_need_control() -> None:
     assert process in allowed("a: {control: true}", "ingress", "liveliness_token")
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow])  # generating waits where cores are busy
 @given(
     st.lists(
         st.lists(st.sampled_from(["*", "**", "a", "b*", "*c", "d*e*"]), min_size=1, max_size=5).map(

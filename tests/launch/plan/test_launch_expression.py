@@ -202,7 +202,7 @@ _expressions = st.recursive(
 
 
 @given(text=_expressions)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_random_expressions_agree_with_python(text: str) -> None:
     names: dict[str, Any] = {**vars(math), **ARGS}
     names.pop("max")
@@ -221,7 +221,7 @@ def test_random_expressions_agree_with_python(text: str) -> None:
 @given(
     text=st.text(max_size=60) | st.lists(st.sampled_from([*_ATOMS, *"()[]{}.,:+*'"])).map("".join)
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_any_text_is_a_value_or_an_error(text: str) -> None:
     try:
         index = len(run(text)) * 0

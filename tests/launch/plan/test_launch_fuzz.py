@@ -33,14 +33,14 @@ def read(data: bytes) -> Plan | LaunchFileError:
 
 
 @given(data=st.binary(max_size=80) | st.lists(st.sampled_from(PIECES), max_size=30).map(b"".join))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_any_bytes(data: bytes) -> None:
     found = read(data)
     assert isinstance(found, Plan) or found.path
 
 
 @given(seed=st.sampled_from(SEEDS), chance=st.integers(0, 2**32))
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 def test_damaged_launch_files(seed: bytes, chance: int) -> None:
     dice = random.Random(chance)
     data = bytearray(seed)
@@ -55,7 +55,7 @@ def test_damaged_launch_files(seed: bytes, chance: int) -> None:
 
 
 @given(text=st.text(alphabet="$()argevl findo'\\\" /~1.", max_size=40))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_any_value(text: str) -> None:
     from xml.sax.saxutils import quoteattr
 

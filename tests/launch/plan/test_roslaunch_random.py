@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, event, given, settings
+from hypothesis import event, given, settings
 
 from .launch_trees import Tree, launch_trees
 from .roslaunch_oracle import Roslaunch, Rosz, differences
@@ -15,11 +15,7 @@ EXAMPLES = int(os.environ.get("ROSZ_LAUNCH_EXAMPLES", "25"))
 
 
 @pytest.mark.parametrize("batch", range(6))
-@settings(
-    max_examples=EXAMPLES,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
+@settings(max_examples=EXAMPLES)
 @given(tree=launch_trees())
 def test_random_files_are_read_as_by_roslaunch(
     tree: Tree, tmp_path: Path, roslaunch: Roslaunch, rosz: Rosz, batch: int

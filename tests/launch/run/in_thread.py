@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 import threading
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -90,14 +89,6 @@ class Transcript(io.StringIO):
             found = self._changed.wait_for(lambda: self.getvalue().count(text) >= times, TIMEOUT)
             assert found, f"no {text!r} ({times} times) in:\n{self.getvalue()}"
             return self.getvalue()
-
-
-def wait_until(condition: Any, what: str) -> None:
-    """Wait for a condition without an event, such as the end of another process's child."""
-    deadline = time.monotonic() + TIMEOUT
-    while not condition():
-        assert time.monotonic() < deadline, f"no {what} within {TIMEOUT} s"
-        threading.Event().wait(0.01)
 
 
 def alive(pid: int) -> bool:

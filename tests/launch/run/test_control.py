@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import os
-import socket
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
 import pytest
+from network import eventually, free_port
 
 from rosz.errors import LaunchError, NotFoundError
 from rosz.launch.run import Network, StatusClient
 from rosz.session import Query, Session, SessionConfig
 from rosz.wire import own_key
 
-from .in_thread import MemoryNetwork, alive, launch, program, shell, wait_until
+from .in_thread import MemoryNetwork, alive, launch, program, shell
 
 DOMAIN = 3
 
 
 @pytest.fixture
 def rendezvous() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @pytest.fixture
@@ -105,7 +103,7 @@ def test_a_launch_that_ends_refuses_requests(
     slow = shell("s", f"trap 'sleep 0.7; exit 0' INT; touch {ready}; sleep 600 & wait")
     with launch(tmp_path, slow, network=network) as run:
         run.pid("s-1")
-        wait_until(ready.exists, "trap")
+        eventually(ready.exists, "trap")
         run.runner.stop()
         run.out.wait_for("killing on exit")
         with pytest.raises(LaunchError, match="this launch is ending"):

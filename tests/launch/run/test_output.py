@@ -12,11 +12,12 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from network import eventually
 
 from rosz.launch.run.output import Output
 
 from .in_process import launch_process
-from .in_thread import TIMEOUT, alive, launch, program, shell, wait_until
+from .in_thread import TIMEOUT, alive, launch, program, shell
 
 CHATTER = (
     "import sys, time\n"
@@ -147,7 +148,7 @@ def test_nodes_outlive_a_killed_launch(tmp_path: Path) -> None:
         assert alive(pid)
         os.killpg(pid, signal.SIGKILL)
         assert run.finish() == -signal.SIGKILL
-        wait_until(lambda: not _relays_of(run._reading), "end of the relay")
+        eventually(lambda: not _relays_of(run._reading), "end of the relay")
 
 
 def _relays_of(pipe: int) -> list[str]:
@@ -174,7 +175,7 @@ def test_a_relay_that_dies_is_restarted(tmp_path: Path, *, terminal: bool) -> No
     with launch_process(tmp_path, node, shell("m", "exec sleep 600"), terminal=terminal) as run:
         run.expect(r"tick\r?\n")
         relay = _relay_below(run.process.pid)
-        wait_until(lambda: _age(relay) > 1.5, "some life")
+        eventually(lambda: _age(relay) > 1.5, "some life")
         os.kill(relay, signal.SIGKILL)
         run.expect(
             rf"the relay of the nodes' output \(pid {relay}\) has died \(-9\): nodes that run"
@@ -219,9 +220,9 @@ def test_nodes_run_on_when_the_screen_is_closed(tmp_path: Path) -> None:
         run.expect("\ntick\r\n")
         os.close(run._reading)
         run._reading = os.open(os.devnull, os.O_RDONLY)
-        wait_until(count.exists, "count")
+        eventually(count.exists, "count")
         before = count.stat().st_size
-        wait_until(lambda: count.stat().st_size > before + 20000, "ticks")
+        eventually(lambda: count.stat().st_size > before + 20000, "ticks")
         run.process.send_signal(signal.SIGTERM)
         assert run.process.wait(10) == 0
 
@@ -262,9 +263,9 @@ def test_a_blocked_screen_does_not_block_a_launch(tmp_path: Path, *, terminal: b
     with launch_process(tmp_path, *nodes, terminal=terminal) as run:
         run.expect(r"m-2\]: started with pid")
         run.expect("ticking")
-        wait_until(count.exists, "first start")
+        eventually(count.exists, "first start")
         before = count.stat().st_size
-        wait_until(lambda: count.stat().st_size > before + 3, "starts anew")
+        eventually(lambda: count.stat().st_size > before + 3, "starts anew")
         (log,) = (tmp_path / "log/latest").glob("roslaunch-*.log")
         run.process.send_signal(signal.SIGINT)
         assert run.process.wait(TIMEOUT) == 0

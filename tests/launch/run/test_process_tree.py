@@ -12,10 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from network import eventually
 
 from rosz.launch.run.host import ProcessTree, Usage, group_alive
 
-from .in_thread import alive, wait_until
+from .in_thread import alive
 
 
 @pytest.fixture
@@ -40,21 +41,21 @@ def parent(tag: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def test_all_descendants_are_found(tag: str, parent: subprocess.Popen[bytes]) -> None:
-    wait_until(lambda: len(ProcessTree(tag).tags()) == 2, "both processes")
+    eventually(lambda: len(ProcessTree(tag).tags()) == 2, "both processes")
     assert parent.pid in ProcessTree(tag).tags()
     # The child shows no environment in the instant in which it becomes another program.
-    wait_until(lambda: ProcessTree(f"{tag}:1").tags() == ProcessTree(tag).tags(), "one answer")
+    eventually(lambda: ProcessTree(f"{tag}:1").tags() == ProcessTree(tag).tags(), "one answer")
     assert ProcessTree(f"{tag}:11").tags() == {}
     assert ProcessTree(tag[:-1]).tags() == {}
     assert set(ProcessTree(tag).tags().values()) == {f"{tag}:1"}
 
 
 def test_all_descendants_are_killed(tag: str, parent: subprocess.Popen[bytes]) -> None:
-    wait_until(lambda: len(ProcessTree(tag).tags()) == 2, "both processes")
+    eventually(lambda: len(ProcessTree(tag).tags()) == 2, "both processes")
     pids = list(ProcessTree(tag).tags())
     ProcessTree(tag).kill()
     parent.wait(10)
-    wait_until(lambda: not any(map(alive, pids)), "end of both")
+    eventually(lambda: not any(map(alive, pids)), "end of both")
 
 
 def test_a_process_that_executes_another_program_is_killed(
@@ -107,7 +108,7 @@ def test_usage_is_counted_by_tag(tag: str) -> None:
             used = seen.get(f"{tag}:7")
             return used is not None and used.cpu > 0.05 and used.memory > 50_000_000
 
-        wait_until(is_busy, "some work")
+        eventually(is_busy, "some work")
         busy.kill()
     used = seen[f"{tag}:7"]
     assert used.processes == 1

@@ -12,13 +12,14 @@ from pathlib import Path
 import msgspec
 import pytest
 from network import Network as Net
+from network import eventually
 
 from rosz.launch.run import Network, RouterProcess, needs_router
 from rosz.launch.run.network import MESH_LIMIT
 from rosz.node import Context
 from rosz.session import is_listening
 
-from .in_thread import alive, launch, shell, wait_until
+from .in_thread import alive, launch, shell
 
 MANY = MESH_LIMIT + 1
 
@@ -67,9 +68,9 @@ def test_a_launch_restarts_its_router(router: RouterProcess, tmp_path: Path) -> 
             os.kill(first, signal.SIGKILL)
             run.err.wait_for(f"[core] process has died [pid {first}, exit code -9].")
             run.out.wait_for("process[core]: started", times=2)
-            wait_until(lambda: is_listening(router.environment.rendezvous), "the new core")
+            eventually(lambda: is_listening(router.environment.rendezvous), "the new core")
             assert router.pid != first
-            wait_until(context.session.peers, "the link to it")
+            eventually(context.session.peers, "the link to it")
             assert run.stop() == 0
         assert alive(router.pid)
 

@@ -9,9 +9,10 @@ import time
 from pathlib import Path
 
 import pytest
+from network import eventually
 
 from .in_process import launch_process
-from .in_thread import alive, program, shell, wait_until
+from .in_thread import alive, program, shell
 
 SLEEPERS = [
     shell(name, "trap 'exit 0' INT; echo up; while :; do sleep 0.02; done") for name in "abc"
@@ -90,7 +91,7 @@ def test_a_closed_terminal_ends_all(tmp_path: Path) -> None:
         os.close(run._reading)
         run._reading = os.open(os.devnull, os.O_RDONLY)
         run.process.wait(10)
-    wait_until(lambda: not any(map(alive, run.pids())), "end of all nodes")
+    eventually(lambda: not any(map(alive, run.pids())), "end of all nodes")
 
 
 def test_nohup_is_honoured(tmp_path: Path) -> None:

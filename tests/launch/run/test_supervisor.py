@@ -9,12 +9,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from network import eventually
 
 from rosz.errors import LaunchError, UsageError
 from rosz.launch.plan.model import Condition, MachinePlan, NodePlan, Plan, Wait
 from rosz.launch.run import Timeouts
 
-from .in_thread import HERE, MemoryNetwork, alive, launch, program, shell, wait_until
+from .in_thread import HERE, MemoryNetwork, alive, launch, program, shell
 
 STUBBORN = (
     sys.executable,
@@ -132,7 +133,7 @@ def test_sigint_then_sigterm_then_sigkill(tmp_path: Path) -> None:
     node = program("mule", *STUBBORN, str(ready))
     with launch(tmp_path, node, timeouts=Timeouts(0.2, 0.1)) as run:
         pid = run.pid("mule-1")
-        wait_until(ready.exists, "handlers")
+        eventually(ready.exists, "handlers")
         assert run.stop() == 0
     assert not alive(pid)
     err = run.err.getvalue()
@@ -149,7 +150,7 @@ def test_sigint_is_enough_for_python(tmp_path: Path) -> None:
     )
     with launch(tmp_path, program("p", sys.executable, "-S", "-c", script, str(ready))) as run:
         run.pid("p-1")
-        wait_until(ready.exists, "start")
+        eventually(ready.exists, "start")
         run.stop()
     assert ready.read_text() == "bye"
     assert "escalating" not in run.err.getvalue()
@@ -163,7 +164,7 @@ def test_grandchildren_end_with_their_node(tmp_path: Path) -> None:
     )
     with launch(tmp_path, shell("parent", script), timeouts=Timeouts(0.5, 0.3)) as run:
         run.pid("parent-1")
-        wait_until(noted.exists, "grandchildren")
+        eventually(noted.exists, "grandchildren")
         pids = [int(word) for word in noted.read_text().split()]
         assert len(pids) == 2
         assert all(map(alive, pids))
@@ -179,7 +180,7 @@ def test_descendants_of_a_dead_node_are_ended(tmp_path: Path, start: str) -> Non
     with launch(tmp_path, shell("parent", script), shell("other", "exec sleep 600")) as run:
         run.err.wait_for("[parent-1] process has died")
         pid = int(noted.read_text())
-        wait_until(lambda: not alive(pid), "end of the grandchild")
+        eventually(lambda: not alive(pid), "end of the grandchild")
         assert alive(run.pid("other-2"))
 
 
@@ -266,7 +267,7 @@ def test_restart_and_stop_one(tmp_path: Path) -> None:
         )
         assert run.pid("a-1", 2) != first
         runner._loop.post(lambda: supervisor.stop(supervisor.find("b"), lambda: done.append("b")))
-        wait_until(lambda: done == ["a", "b"], "end of both orders")
+        eventually(lambda: done == ["a", "b"], "end of both orders")
         assert not alive(first)
         assert not alive(second)
         assert alive(run.pid("a-1", 2))
