@@ -6,6 +6,7 @@ import ast
 from graphlib import CycleError, TopologicalSorter
 
 import pytest
+
 from arch.house import (
     HAND_WRITTEN,
     MODULES,
