@@ -263,7 +263,11 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> Array:
     """
     whole = identity_matrix()
     for axis, angle in _rotations(ai, aj, ak, axes):
-        whole = whole @ rotation_matrix(angle, np.identity(3)[axis])
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        turn = identity_matrix()
+        turn[j, j] = turn[k, k] = cos(angle)
+        turn[k, j], turn[j, k] = sin(angle), -sin(angle)
+        whole = whole @ turn
     return whole
 
 
