@@ -7,12 +7,11 @@ from typing import Any, NoReturn, Self, TypeVar
 
 from rosz import names
 from rosz.errors import UsageError
-from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rosz.node import Node as RoszNode
 from rosz.node import simulate
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.ros2.rclpy.entities import Client, Publisher, Service, Subscription, Timer
-from rosz.ros2.rclpy.exceptions import NotInitializedException, ParameterNotDeclaredException
+from rosz.ros2.rclpy.exceptions import NotInitializedException
 from rosz.ros2.rclpy.executors import (
     CallbackGroup,
     Entity,
@@ -31,7 +30,7 @@ P = TypeVar("P")
 _SECOND = 1_000_000_000
 
 
-class Node:
+class Node(NodeParameters):
     """A node whose callbacks run only while an executor spins it.
 
     Names of rosz's own begin with ``rosz_``, so that subclasses are free to use any others.
@@ -68,19 +67,19 @@ class Node:
         if unknown:
             raise UsageError(f"Node takes no '{min(unknown)}' in rosz")
         self.executor: Executor | None = None
-        self.rosz_node: RoszNode = RoszNode(
-            node_name, namespace=namespace, context=self.context.opened
-        )
+        node = RoszNode(node_name, namespace=namespace, context=self.context.opened)
+        given = self.context.given
+        overrides: dict[str, Any] = {}
+        for name in ("", node.base_name, node.name):
+            overrides |= given.params.get(name, {})
+        overrides |= {one.name: one.value for one in parameter_overrides or ()}
+        super().__init__(node, overrides, self._rosz_call_soon)
         self._clock = ROSClock(self.rosz_node.clock)
         self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
         write_as_rclpy(self.rosz_node.log, self._rosz_logger_name)
         self.default_callback_group: CallbackGroup = MutuallyExclusiveCallbackGroup()
-        given = self.context.given
         if given.level:
             self.rosz_node.log.set_level("", given.level)
-        overrides = self._rosz_overrides(given.params)
-        overrides |= {one.name: one.value for one in parameter_overrides or ()}
-        self._rosz_parameters = NodeParameters(self.rosz_node, overrides, self._rosz_call_soon)
         self.declare_parameter("use_sim_time", self.rosz_node.clock.simulated)
         if self.get_parameter("use_sim_time").value and not self.rosz_node.clock.simulated:
             simulate(self.rosz_node)
@@ -88,12 +87,6 @@ class Node:
             for name, value in overrides.items():
                 if not self.has_parameter(name):
                     self.declare_parameter(name, value)
-
-    def _rosz_overrides(self, params: dict[str, dict[str, Any]]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for node in ("", self.rosz_node.base_name, self.rosz_node.name):
-            found |= params.get(node, {})
-        return found
 
     def __getattr__(self, name: str) -> NoReturn:
         raise AttributeError(
@@ -335,100 +328,6 @@ class Node:
 
     def __exit__(self, *_details: object) -> None:
         self.destroy_node()
-
-    # Parameters
-
-    def declare_parameter(
-        self,
-        name: str,
-        value: Any = None,
-        descriptor: ParameterDescriptor | None = None,
-        ignore_override: bool = False,
-    ) -> Parameter:
-        """Declare a parameter; the command line and launch files override its default value.
-
-        Args:
-            name: Name of the parameter.
-            value: Default value, or a ``Parameter.Type`` for a parameter without a value.
-            descriptor: Description of the parameter.
-            ignore_override: Whether to use the default value in any case.
-
-        Raises:
-            ParameterAlreadyDeclaredException: The parameter is declared already.
-            InvalidParameterTypeException: The overriding value is of another type.
-        """
-        return self._rosz_parameters.declare(name, value, descriptor, ignore_override)
-
-    def declare_parameters(
-        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
-    ) -> list[Parameter]:
-        """Declare several parameters: tuples of the arguments of `declare_parameter`.
-
-        Args:
-            namespace: Prefix of the names, without the dot; may be empty.
-            parameters: Name, and optionally default value and descriptor, of each parameter.
-            ignore_override: Whether to use the default values in any case.
-        """
-        start = f"{namespace}." if namespace else ""
-        declared: list[Parameter] = []
-        for name, *rest in parameters:
-            value, descriptor = (*rest, None, None)[:2]
-            declared.append(
-                self._rosz_parameters.declare(start + name, value, descriptor, ignore_override)
-            )
-        return declared
-
-    def undeclare_parameter(self, name: str) -> None:
-        """Remove the declaration of a parameter."""
-        self._rosz_parameters.undeclare(name)
-
-    def has_parameter(self, name: str) -> bool:
-        """Return whether a parameter is declared."""
-        return self._rosz_parameters.has(name)
-
-    def get_parameter(self, name: str) -> Parameter:
-        """Return a parameter.
-
-        Raises:
-            ParameterNotDeclaredException: The parameter is not declared.
-            ParameterUninitializedException: It was declared by type only, and has no value.
-        """
-        return self._rosz_parameters.get(name)
-
-    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
-        """Return several parameters."""
-        return [self._rosz_parameters.get(name) for name in names]
-
-    def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
-        """Return a parameter, or an alternative value if it is not declared."""
-        try:
-            return self._rosz_parameters.get(name)
-        except ParameterNotDeclaredException:
-            return alternative_value
-
-    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """Return the parameters below a prefix, by the rest of their names."""
-        return self._rosz_parameters.below(prefix)
-
-    def describe_parameter(self, name: str) -> ParameterDescriptor:
-        """Return the descriptor of a parameter."""
-        return self._rosz_parameters.descriptor(name)
-
-    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
-        """Set parameters one by one, and return one result for each."""
-        return self._rosz_parameters.set(parameter_list)
-
-    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
-        """Set all parameters or none."""
-        return self._rosz_parameters.set_atomically(parameter_list)
-
-    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
-        """Call a function that may refuse parameters before they are set."""
-        self._rosz_parameters.add_check(callback)
-
-    def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
-        """Remove a function of `add_on_set_parameters_callback`."""
-        self._rosz_parameters.remove_check(callback)
 
     # Names and other nodes
 

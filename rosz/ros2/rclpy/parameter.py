@@ -8,7 +8,7 @@ other programs set is checked and applied by the executor, as with ROS 2's param
 from __future__ import annotations
 
 import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,6 @@ from rosz.ros2.rclpy.exceptions import (
 
 if TYPE_CHECKING:
     from rosz.node import Node as RoszNode
-    from rosz.params.replica import Changed
 
 __all__ = ("PARAMETER_SEPARATOR_STRING", "NodeParameters", "Parameter", "get_parameter_value")
 
@@ -194,14 +193,13 @@ def get_parameter_value(string_value: str) -> ParameterValue:
     return Parameter("", value=value).get_parameter_value()
 
 
-Check = Callable[[list[Parameter]], Any]
-"""A function called with parameters before they are set; returns a SetParametersResult."""
-
 _MISSING = object()
 
 
 class NodeParameters:
-    """The declared parameters of a node.
+    """The methods of `rclpy.node.Node` for its parameters.
+
+    Names of rosz's own begin with ``rosz_``, so that subclasses are free to use any others.
 
     Args:
         node: The node.
@@ -215,184 +213,203 @@ class NodeParameters:
         overrides: dict[str, Any],
         call_soon: Callable[[Callable[[], object]], None],
     ) -> None:
-        self._node = node
-        self._overrides = overrides
-        self._call_soon = call_soon
-        self._known: dict[str, Parameter] = {}
-        self._descriptors: dict[str, ParameterDescriptor] = {}
-        self._checks: list[Check] = []
+        self.rosz_node: RoszNode = node
+        self._rosz_overrides = overrides
+        self._rosz_update_soon = call_soon
+        self._rosz_known: dict[str, Parameter] = {}
+        self._rosz_descriptors: dict[str, ParameterDescriptor] = {}
+        self._rosz_checks: list[Callable[[list[Parameter]], Any]] = []
 
-    def declare(
+    def declare_parameter(
         self,
         name: str,
         value: Any = None,
         descriptor: ParameterDescriptor | None = None,
         ignore_override: bool = False,
     ) -> Parameter:
-        """Declare a parameter; see `rclpy.node.Node.declare_parameter`.
+        """Declare a parameter; the command line and launch files override its default value.
+
+        Args:
+            name: Name of the parameter.
+            value: Default value, or a ``Parameter.Type`` for a parameter without a value.
+            descriptor: Description of the parameter.
+            ignore_override: Whether to use the default value in any case.
 
         Raises:
-            ParameterException: The declaration is refused; the subclass tells the reason.
+            ParameterAlreadyDeclaredException: The parameter is declared already.
+            InvalidParameterTypeException: The overriding value is of another type.
+            InvalidParameterValueException: A callback refuses the value.
         """
-        if name in self._known:
+        if name in self._rosz_known:
             raise ParameterAlreadyDeclaredException([name])
         kind = value if isinstance(value, Parameter.Type) else None
-        default = Parameter(name, value=None if kind is not None else value)
-        given = _MISSING if ignore_override else self._override(name)
-        if given is _MISSING:
-            chosen = default
-        else:
-            expected = kind or default.type_
+        chosen = Parameter(name, value=None if kind is not None else value)
+        given = _MISSING
+        if not ignore_override:
+            given = self._rosz_overrides.get(name, _MISSING)
+            if given is _MISSING:
+                given = self.rosz_node.params.get(_path(name), _MISSING)
+        if given is not _MISSING:
             free = descriptor is not None and descriptor.dynamic_typing
-            chosen = self._convert(name, given, Parameter.Type.NOT_SET if free else expected)
-        refusal = self._refusal([chosen])
+            chosen = _convert(name, given, _Type.NOT_SET if free else kind or chosen.type_)
+        refusal = self._rosz_refusal([chosen])
         if refusal:
             raise InvalidParameterValueException(name, chosen.value, refusal)
-        self._descriptors[name] = descriptor or ParameterDescriptor(name=name)
-        self._known[name] = chosen
-        self._store(chosen)
-        self._node.params.watch(self._path(name), lambda change: self._on_change(name, change))
+        self._rosz_descriptors[name] = descriptor or ParameterDescriptor(name=name)
+        self._rosz_set(chosen)
+        self.rosz_node.params.watch(
+            _path(name), lambda _: self._rosz_update_soon(lambda: self._rosz_update(name))
+        )
         return chosen
 
-    def _override(self, name: str) -> Any:
-        if name in self._overrides:
-            return self._overrides[name]
-        return self._node.params.get(self._path(name), _MISSING)
+    def declare_parameters(
+        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
+    ) -> list[Parameter]:
+        """Declare several parameters: tuples of the arguments of `declare_parameter`.
 
-    def _convert(self, name: str, value: Any, kind: Parameter.Type) -> Parameter:
-        """Return a parameter of the declared type."""
-        if kind is Parameter.Type.DOUBLE and type(value) is int:
-            value = float(value)  # YAML and ROS 1 write whole numbers without a point
-        if kind is Parameter.Type.DOUBLE_ARRAY and isinstance(value, list):
-            value = [float(one) if type(one) is int else one for one in value]
-        if kind is not Parameter.Type.NOT_SET and not kind.check(value):
-            raise InvalidParameterTypeException(name, kind.name, type_name(value))
-        return Parameter(name, None if kind is Parameter.Type.NOT_SET else kind, value)
+        Args:
+            namespace: Prefix of the names, without the dot; may be empty.
+            parameters: Name, and optionally default value and descriptor, of each parameter.
+            ignore_override: Whether to use the default values in any case.
+        """
+        start = f"{namespace}." if namespace else ""
+        declared: list[Parameter] = []
+        for name, *rest in parameters:
+            value, descriptor = (*rest, None, None)[:2]
+            declared.append(
+                self.declare_parameter(start + name, value, descriptor, ignore_override)
+            )
+        return declared
 
-    def _path(self, name: str) -> str:
-        return f"~{name.replace('.', '/')}"
+    def _rosz_set(self, parameter: Parameter) -> None:
+        self._rosz_known[parameter.name] = parameter
+        if parameter.type_ is not _Type.NOT_SET:
+            self.rosz_node.params.set(_path(parameter.name), parameter.value)
 
-    def _store(self, parameter: Parameter) -> None:
-        if parameter.type_ is not Parameter.Type.NOT_SET:
-            self._node.params.set(self._path(parameter.name), parameter.value)
-
-    def _on_change(self, name: str, _change: Changed) -> None:
-        """Let the executor apply what another program set."""
-        self._call_soon(lambda: self._update(name))
-
-    def _update(self, name: str) -> None:
-        known = self._known.get(name)
-        value = self._node.params.get(self._path(name), _MISSING)
+    def _rosz_update(self, name: str) -> None:
+        """Apply the value that another program has set."""
+        known = self._rosz_known.get(name)
+        value = self.rosz_node.params.get(_path(name), _MISSING)
         if known is None or value is _MISSING or value == known.value:
             return
         try:
-            changed = self._convert(name, value, known.type_)
+            changed = _convert(name, value, known.type_)
         except InvalidParameterTypeException as error:
-            self._node.log.warning("%s; it stays %r", error, known.value)
+            self.rosz_node.log.warning("%s; it stays %r", error, known.value)
             return
-        reason = self._refusal([changed])
+        reason = self._rosz_refusal([changed])
         if reason:
-            self._node.log.warning("parameter '%s' stays %r: %s", name, known.value, reason)
+            self.rosz_node.log.warning("parameter '%s' stays %r: %s", name, known.value, reason)
         else:
-            self._known[name] = changed
+            self._rosz_known[name] = changed
 
-    def has(self, name: str) -> bool:
+    def undeclare_parameter(self, name: str) -> None:
+        """Remove the declaration of a parameter."""
+        if name not in self._rosz_known:
+            raise ParameterNotDeclaredException(name)
+        del self._rosz_known[name], self._rosz_descriptors[name]
+
+    def has_parameter(self, name: str) -> bool:
         """Return whether a parameter is declared."""
-        return name in self._known
+        return name in self._rosz_known
 
-    def get(self, name: str) -> Parameter:
+    def get_parameter(self, name: str) -> Parameter:
         """Return a parameter.
 
         Raises:
             ParameterNotDeclaredException: The parameter is not declared.
             ParameterUninitializedException: It was declared by type only, and has no value.
         """
-        found = self._known.get(name)
+        found = self._rosz_known.get(name)
         if found is None:
             raise ParameterNotDeclaredException(name)
-        if found.type_ is Parameter.Type.NOT_SET and not self._descriptors[name].dynamic_typing:
+        if found.type_ is _Type.NOT_SET and not self._rosz_descriptors[name].dynamic_typing:
             raise ParameterUninitializedException(name)
         return found
 
-    def below(self, prefix: str) -> dict[str, Parameter]:
+    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
+        """Return several parameters."""
+        return [self.get_parameter(name) for name in names]
+
+    def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
+        """Return a parameter, or an alternative value if it is not declared."""
+        return self.get_parameter(name) if name in self._rosz_known else alternative_value
+
+    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
         """Return the parameters below a prefix, by the rest of their names."""
         start = f"{prefix}." if prefix else ""
         return {
             name.removeprefix(start): one
-            for name, one in self._known.items()
+            for name, one in self._rosz_known.items()
             if name.startswith(start)
         }
 
-    def descriptor(self, name: str) -> ParameterDescriptor:
-        """Return the descriptor of a parameter.
-
-        Raises:
-            ParameterNotDeclaredException: The parameter is not declared.
-        """
-        if name not in self._descriptors:
+    def describe_parameter(self, name: str) -> ParameterDescriptor:
+        """Return the descriptor of a parameter."""
+        if name not in self._rosz_descriptors:
             raise ParameterNotDeclaredException(name)
-        return self._descriptors[name]
+        return self._rosz_descriptors[name]
 
-    def set(self, parameters: Iterable[Parameter]) -> list[SetParametersResult]:
-        """Set parameters one by one; see `set_atomically`."""
-        return [self.set_atomically([one]) for one in parameters]
+    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
+        """Set parameters one by one, and return one result for each."""
+        return [self.set_parameters_atomically([one]) for one in parameter_list]
 
-    def set_atomically(self, parameters: Sequence[Parameter]) -> SetParametersResult:
-        """Set all parameters, or none if one is refused.
+    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
+        """Set all parameters or none.
 
         Raises:
             ParameterNotDeclaredException: A parameter is not declared.
         """
-        missing = [one.name for one in parameters if one.name not in self._known]
+        missing = [one.name for one in parameter_list if one.name not in self._rosz_known]
         if missing:
             raise ParameterNotDeclaredException(missing)
-        reasons = [self._mismatch(one) for one in parameters]
-        reason = next(filter(None, reasons), "") or self._refusal(list(parameters))
+        reasons = [self._rosz_mismatch(one) for one in parameter_list]
+        reason = next(filter(None, reasons), "") or self._rosz_refusal(list(parameter_list))
         if reason:
             return SetParametersResult(successful=False, reason=reason)
-        for one in parameters:
-            self._known[one.name] = one
-            self._store(one)
+        for one in parameter_list:
+            self._rosz_set(one)
         return SetParametersResult(successful=True)
 
-    def _mismatch(self, parameter: Parameter) -> str:
+    def _rosz_mismatch(self, parameter: Parameter) -> str:
         """Return why a parameter cannot have a value; empty if it can."""
-        descriptor, known = self._descriptors[parameter.name], self._known[parameter.name].type_
+        descriptor = self._rosz_descriptors[parameter.name]
+        known, given = self._rosz_known[parameter.name].type_, parameter.type_
         if descriptor.read_only:
             return f"Trying to set a read-only parameter: {parameter.name}."
-        loose = descriptor.dynamic_typing or Parameter.Type.NOT_SET in {known, parameter.type_}
-        if loose or known is parameter.type_:
+        if descriptor.dynamic_typing or known is given or _Type.NOT_SET in {known, given}:
             return ""
-        return (
-            f"Wrong parameter type, expected 'Type.{known.name}' got 'Type.{parameter.type_.name}'"
-        )
+        return f"Wrong parameter type, expected 'Type.{known.name}' got 'Type.{given.name}'"
 
-    def undeclare(self, name: str) -> None:
-        """Remove a declaration.
+    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+        """Call a function that may refuse parameters before they are set."""
+        self._rosz_checks.insert(0, callback)
 
-        Raises:
-            ParameterNotDeclaredException: The parameter is not declared.
-        """
-        if name not in self._known:
-            raise ParameterNotDeclaredException(name)
-        del self._known[name], self._descriptors[name]
+    def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+        """Remove a function of `add_on_set_parameters_callback`."""
+        self._rosz_checks.remove(callback)
 
-    def add_check(self, check: Check) -> None:
-        """Call a function before parameters are set."""
-        self._checks.insert(0, check)
-
-    def remove_check(self, check: Check) -> None:
-        """Remove a function of `add_check`.
-
-        Raises:
-            ValueError: The function was not added.
-        """
-        self._checks.remove(check)
-
-    def _refusal(self, parameters: list[Parameter]) -> str:
-        """Return why a check refuses parameters; empty if all accept them."""
-        for check in self._checks:
+    def _rosz_refusal(self, parameters: list[Parameter]) -> str:
+        """Return why a callback refuses parameters; empty if all accept them."""
+        for check in self._rosz_checks:
             result = check(parameters)
             if not result.successful:
                 return result.reason or "a callback refuses it"
         return ""
+
+
+def _path(name: str) -> str:
+    return f"~{name.replace('.', '/')}"
+
+
+def _convert(name: str, value: Any, kind: Parameter.Type) -> Parameter:
+    """Return a parameter of the declared type."""
+    if kind is _Type.NOT_SET:
+        return Parameter(name, None, value)
+    if kind is _Type.DOUBLE and type(value) is int:
+        value = float(value)  # YAML and ROS 1 write whole numbers without a point
+    if kind is _Type.DOUBLE_ARRAY and isinstance(value, list):
+        value = [float(one) if type(one) is int else one for one in value]
+    if not kind.check(value):
+        raise InvalidParameterTypeException(name, kind.name, type_name(value))
+    return Parameter(name, kind, value)
