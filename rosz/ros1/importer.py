@@ -118,7 +118,7 @@ class _Types:
 
     def cfg_files(self, package: str) -> list[Path]:
         """Return the dynamic_reconfigure files of a package."""
-        from rosz.ros1.dynamic_reconfigure.search import find_files
+        from rosz.ros1.dynamic_reconfigure import find_files
 
         try:
             return find_files(self.packages.find(package).path)

@@ -63,6 +63,15 @@ _MESSAGE = {
 }
 
 SUBMODULES: Mapping[str, Mapping[str, str]] = {
+    "dynamic_reconfigure.encoding": {
+        "reconfigure": "Config",
+        "reconfigure.messages": "decode_config decode_description encode_config encode_description"
+        " encode_groups extract_params get_tree group_dict in_groups initial_config",
+    },
+    "dynamic_reconfigure.exceptions": {
+        "ros1.dynamic_reconfigure": "DynamicReconfigureCallbackException"
+        " DynamicReconfigureException DynamicReconfigureParameterException"
+    },
     "genmsg.names": {"ros1.genmsg": f"PRN_SEPARATOR normalize_package_context {_NAMES}"},
     "genpy.message": {
         **_MESSAGE,
@@ -151,22 +160,18 @@ _NO_MASTER = (
     "there is no master and no XML-RPC here; rospy.get_master() answers what a master would"
 )
 _NO_TCPROS = "messages travel over Zenoh, not TCPROS; use rospy.Publisher and rospy.Subscriber"
+_NEEDS_MASTER = (
+    "get_registration_listeners get_service_manager set_node_uri set_service_manager xmlrpcapi"
+    " xmlrpcclient"
+)
+_NEEDS_TCPROS = (
+    "get_tcpros_handler get_tcpros_server_address get_topic_manager init_tcpros QueuedConnection"
+    " set_topic_manager TCPROSHandler TCPROSTransport"
+)
 _REASONS = {
-    "get_registration_listeners": _NO_MASTER,
-    "get_service_manager": _NO_MASTER,
-    "get_tcpros_handler": _NO_TCPROS,
-    "get_tcpros_server_address": _NO_TCPROS,
-    "get_topic_manager": _NO_TCPROS,
-    "init_tcpros": _NO_TCPROS,
-    "QueuedConnection": _NO_TCPROS,
-    "set_node_uri": _NO_MASTER,
-    "set_service_manager": _NO_MASTER,
-    "set_topic_manager": _NO_TCPROS,
     "start_node": "use rospy.init_node()",
-    "TCPROSHandler": _NO_TCPROS,
-    "TCPROSTransport": _NO_TCPROS,
-    "xmlrpcapi": _NO_MASTER,
-    "xmlrpcclient": _NO_MASTER,
+    **dict.fromkeys(_NEEDS_MASTER.split(), _NO_MASTER),
+    **dict.fromkeys(_NEEDS_TCPROS.split(), _NO_TCPROS),
 }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +45,12 @@ def get_msg_text(type_: str, raw: bool = False, rospack: RosPack | None = None) 
     Raises:
         ROSMsgException: There is no such type, or its definition is invalid.
     """
-    return _text(type_, MODE_MSG, raw=raw)
+    return _read(MODE_MSG, type_, Definitions.text if raw else Definitions.show)
 
 
 def get_srv_text(type_: str, raw: bool = False, rospack: RosPack | None = None) -> str:  # noqa: ARG001
     """Return the definition of a service; see `get_msg_text`."""
-    return _text(type_, MODE_SRV, raw=raw)
+    return _read(MODE_SRV, type_, Definitions.text if raw else Definitions.show)
 
 
 def _definitions(mode: str) -> Definitions:
@@ -59,11 +59,10 @@ def _definitions(mode: str) -> Definitions:
     return Definitions(type_store(), "msg" if mode == MODE_MSG else "srv")
 
 
-def _text(name: str, mode: str, *, raw: bool) -> str:
+def _read(mode: str, name: str, read: Callable[[Definitions, str], str]) -> str:
     definitions = _definitions(mode)
     try:
-        full = definitions.find(name)[0]
-        return definitions.text(full) if raw else definitions.show(full)
+        return read(definitions, definitions.find(name)[0])
     except RoszError as error:
         raise ROSMsgException(f"Unable to load {mode[1:]} [{name}]: {error}") from error
 
@@ -74,11 +73,7 @@ def rosmsg_md5(mode: str, type_: str) -> str:
     Raises:
         ROSMsgException: There is no such type, or its definition is invalid.
     """
-    definitions = _definitions(mode)
-    try:
-        return definitions.md5(definitions.find(type_)[0])
-    except RoszError as error:
-        raise ROSMsgException(f"Unable to load {mode[1:]} [{type_}]: {error}") from error
+    return _read(mode, type_, Definitions.md5)
 
 
 def list_msgs(package: str, rospack: RosPack | None = None) -> list[str]:

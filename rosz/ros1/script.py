@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from traceback import walk_tb
 from types import CodeType, ModuleType, TracebackType
 
 from rosz.errors import NotFoundError, RoszError
@@ -112,21 +113,17 @@ def _excepthook(show: _Hook, main: ModuleType) -> _Hook:
 
 def _is_importing(trace: TracebackType | None, main: ModuleType) -> bool:
     """Return whether another module than the script was being imported."""
-    while trace is not None:
-        code = trace.tb_frame.f_code
-        if code.co_filename.startswith("<frozen importlib"):
-            return True
-        if code.co_name == "<module>" and trace.tb_frame.f_globals is not main.__dict__:
-            return True
-        trace = trace.tb_next
-    return False
+    return any(
+        frame.f_code.co_filename.startswith("<frozen importlib")
+        or (frame.f_code.co_name == "<module>" and frame.f_globals is not main.__dict__)
+        for frame, _ in walk_tb(trace)
+    )
 
 
 def _place(trace: TracebackType | None, main: ModuleType) -> str:
     """Return ``file:line: `` of the innermost frame of the script."""
     place = ""
-    while trace is not None:
-        if trace.tb_frame.f_globals is main.__dict__:
-            place = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}: "
-        trace = trace.tb_next
+    for frame, line in walk_tb(trace):
+        if frame.f_globals is main.__dict__:
+            place = f"{frame.f_code.co_filename}:{line}: "
     return place

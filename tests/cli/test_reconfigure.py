@@ -9,8 +9,7 @@ import pytest
 from network import Network, Program, eventually
 from reconfigure.robots import Robot
 
-from rosz.reconfigure import Description, Server, Setting
-from rosz.ros1.dynamic_reconfigure.encoding import Config
+from rosz.reconfigure import Config, Description, Server, Setting
 
 from .shell import Shell
 

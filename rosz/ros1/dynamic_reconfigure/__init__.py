@@ -7,14 +7,12 @@ import what rospy is built on, and rospy's own modules.
 `PUBLIC_MODULES` are those that the importer of ``.cfg`` files needs alone.
 """
 
-from rosz.ros1.dynamic_reconfigure.exceptions import (
-    DynamicReconfigureCallbackException,
-    DynamicReconfigureException,
-    DynamicReconfigureParameterException,
-)
-from rosz.ros1.dynamic_reconfigure.search import find_reconfigure_services, get_parameter_names
+from __future__ import annotations
 
-PUBLIC_MODULES = ("cfgfile", "search")
+from pathlib import Path
+from typing import Any
+
+PUBLIC_MODULES = ("cfgfile",)
 
 __all__ = (
     "DynamicReconfigureCallbackException",
@@ -23,3 +21,46 @@ __all__ = (
     "find_reconfigure_services",
     "get_parameter_names",
 )
+
+_MARK = b"dynamic_reconfigure"
+
+
+class DynamicReconfigureException(Exception):
+    """Base class of the exceptions of dynamic_reconfigure."""
+
+
+class DynamicReconfigureParameterException(DynamicReconfigureException):
+    """There is no such parameter, or it cannot have a value."""
+
+
+class DynamicReconfigureCallbackException(DynamicReconfigureException):
+    """A server's callback returned nothing, or a server refused or did not reply."""
+
+
+def find_reconfigure_services() -> list[str]:
+    """Return the sorted names of all servers; works before ``init_node`` as well."""
+    from rosz.reconfigure import find_servers
+    from rosz.ros1 import state
+
+    return find_servers(state.context().graph.refresh())
+
+
+def get_parameter_names(descr: Any) -> list[str]:
+    """Return the names of the parameters of a module such as ``my_pkg.cfg.TutorialsConfig``."""
+    return list(descr.defaults)
+
+
+def find_files(folder: Path) -> list[Path]:
+    """Return the sorted ``.cfg`` files of a package that describe parameters.
+
+    Args:
+        folder: Folder of the package; other files with such names (``setup.cfg``) are left out.
+    """
+    return [file for file in sorted(folder.rglob("*.cfg")) if _describes_parameters(file)]
+
+
+def _describes_parameters(file: Path) -> bool:
+    try:
+        return _MARK in file.read_bytes()
+    except OSError:  # a folder, or a broken link
+        return False

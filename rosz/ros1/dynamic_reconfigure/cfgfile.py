@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from traceback import walk_tb
 from types import CodeType, ModuleType, TracebackType
 from typing import NoReturn, TextIO
 
@@ -90,13 +91,7 @@ def load(module: str, files: Sequence[Path]) -> ModuleType:
 
 
 def build(module: str, path: Path, generated: Generated) -> ModuleType:
-    """Return the module for what a file describes.
-
-    Args:
-        module: Full name of the module.
-        path: Path of the file.
-        generated: What the file describes.
-    """
+    """Return the module of a full name for what a file describes."""
     made = ModuleType(module, f"Made of {path}.")
     parameters = extract_params(generated.description)
     made.__dict__.update(
@@ -106,15 +101,10 @@ def build(module: str, path: Path, generated: Generated) -> ModuleType:
         config_description=generated.description,
         all_level=0,
         **{
-            column: {one["name"]: one[key] for one in parameters}
-            for column, key in (
-                ("min", "min"),
-                ("max", "max"),
-                ("defaults", "default"),
-                ("level", "level"),
-                ("type", "type"),
-            )
+            key: {one["name"]: one[key] for one in parameters}
+            for key in ("min", "max", "level", "type")
         },
+        defaults={one["name"]: one["default"] for one in parameters},
         **{f"{generated.name}_{name}": value for name, value in generated.constants.items()},
     )
     for one in parameters:
@@ -149,12 +139,8 @@ def _folder_first(path: Path) -> Iterator[None]:
 
 def _line(trace: TracebackType | None, path: Path) -> int:
     """Return the innermost line of a file in a traceback; 0 if there is none."""
-    line = 0
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
+    lines = [at for frame, at in walk_tb(trace) if frame.f_code.co_filename == str(path)]
+    return lines[-1] if lines else 0
 
 
 def _exit(code: object = None) -> NoReturn:

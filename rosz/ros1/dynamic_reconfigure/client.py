@@ -17,7 +17,7 @@ from rosz.reconfigure.messages import (
     pack_description,
 )
 from rosz.ros1 import state
-from rosz.ros1.dynamic_reconfigure.exceptions import (
+from rosz.ros1.dynamic_reconfigure import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
 )
@@ -234,11 +234,7 @@ def _wait_for_server(service: str, timeout: float | None) -> None:
 
 
 def _check(description: Description, changes: Mapping[str, Any]) -> None:
-    """Refuse changes with the messages of ROS 1.
-
-    Raises:
-        DynamicReconfigureParameterException: A change is not possible.
-    """
+    """Refuse changes with the messages of ROS 1."""
     for name, value in changes.items():
         if name == "groups":
             continue

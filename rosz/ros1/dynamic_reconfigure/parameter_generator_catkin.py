@@ -42,13 +42,6 @@ int_t: Kind = "int"
 double_t: Kind = "double"
 
 _DEFAULTS: dict[Kind, Scalar] = {"str": "", "bool": False, "int": 0, "double": 0.0}
-_C_TYPES: dict[Kind, str] = {"str": "std::string", "bool": "bool", "int": "int", "double": "double"}
-_C_CONSTANTS: dict[Kind, str] = {
-    "str": "const char * const",
-    "bool": "const bool",
-    "int": "const int",
-    "double": "const double",
-}
 _TYPE_NAMES = "int_t, double_t, str_t or bool_t"
 
 
@@ -268,11 +261,6 @@ class ParameterGenerator:
 
 
 def _kind(name: str, given: str) -> Kind:
-    """Return the type that a file gives to a parameter.
-
-    Raises:
-        ParamError: There is no such type.
-    """
     for kind in _DEFAULTS:
         if given == kind:
             return kind
@@ -280,7 +268,9 @@ def _kind(name: str, given: str) -> Kind:
 
 
 def _c_types(kind: Kind) -> dict[str, str]:
-    return {"ctype": _C_TYPES[kind], "cconsttype": _C_CONSTANTS[kind]}
+    if kind == str_t:
+        return {"ctype": "std::string", "cconsttype": "const char * const"}
+    return {"ctype": kind, "cconsttype": f"const {kind}"}
 
 
 def _place() -> dict[str, Any]:

@@ -10,7 +10,7 @@ from rosz.errors import ParamError
 from rosz.reconfigure import Config
 from rosz.reconfigure.messages import describe, encode_description
 from rosz.ros1 import state
-from rosz.ros1.dynamic_reconfigure.exceptions import (
+from rosz.ros1.dynamic_reconfigure import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
 )

@@ -6,48 +6,20 @@ One process is one node. Programs also import its modules, as in ROS 1.
 from __future__ import annotations
 
 import sys
+from typing import Any
 
-from rosz.ros1.exceptions import (
-    ROSException,
-    ROSInitException,
-    ROSInternalException,
-    ROSInterruptException,
-    ROSSerializationException,
-    ROSTimeMovedBackwardsException,
-    TransportException,
-    TransportInitError,
-    TransportTerminated,
-)
+from rosz.ros1 import exceptions
+from rosz.ros1.exceptions import *  # noqa: F403
 from rosz.ros1.modules import attribute
-from rosz.ros1.rospy.client import (
-    delete_param,
-    get_master,
-    get_param,
-    get_param_cached,
-    get_param_names,
-    get_published_topics,
-    has_param,
-    init_node,
-    myargv,
-    search_param,
-    set_param,
-    spin,
-    wait_for_message,
-)
+from rosz.ros1.rospy import client, service, timer
+from rosz.ros1.rospy.client import *  # noqa: F403
 from rosz.ros1.rospy.core import (
-    DEBUG,
-    ERROR,
-    FATAL,
-    INFO,
-    WARN,
     get_node_uri,
     get_ros_root,
     is_shutdown,
-    logdebug,
     logdebug_once,
     logdebug_throttle,
     logdebug_throttle_identical,
-    logerr,
     logerr_once,
     logerr_throttle,
     logerr_throttle_identical,
@@ -55,25 +27,26 @@ from rosz.ros1.rospy.core import (
     logfatal_once,
     logfatal_throttle,
     logfatal_throttle_identical,
-    loginfo,
     loginfo_once,
     loginfo_throttle,
     loginfo_throttle_identical,
     logout,
-    logwarn,
     logwarn_once,
     logwarn_throttle,
     logwarn_throttle_identical,
-    on_shutdown,
     parse_rosrpc_uri,
     signal_shutdown,
 )
 from rosz.ros1.rospy.msg import AnyMsg
 from rosz.ros1.rospy.names import get_caller_id, get_name, get_namespace, remap_name, resolve_name
 from rosz.ros1.rospy.rostime import Duration, Time, get_rostime, get_time
-from rosz.ros1.rospy.service import Service, ServiceException, ServiceProxy, wait_for_service
-from rosz.ros1.rospy.timer import Rate, Timer, TimerEvent, sleep
+from rosz.ros1.rospy.service import *  # noqa: F403
+from rosz.ros1.rospy.timer import *  # noqa: F403
 from rosz.ros1.rospy.topics import Publisher, SubscribeListener, Subscriber
+
+Header: Any  # loaded when it is first used, as the next two
+MasterProxy: Any
+Message: Any
 
 PUBLIC_MODULES = (
     "client",
@@ -88,57 +61,27 @@ PUBLIC_MODULES = (
     "topics",
 )
 
-__all__ = (
-    "DEBUG",
-    "ERROR",
-    "FATAL",
-    "INFO",
-    "WARN",
+__all__: tuple[str, ...] = (
     "AnyMsg",
     "Duration",
     "Header",
     "MasterProxy",
     "Message",
     "Publisher",
-    "ROSException",
-    "ROSInitException",
-    "ROSInternalException",
-    "ROSInterruptException",
-    "ROSSerializationException",
-    "ROSTimeMovedBackwardsException",
-    "Rate",
-    "Service",
-    "ServiceException",
-    "ServiceProxy",
     "SubscribeListener",
     "Subscriber",
     "Time",
-    "Timer",
-    "TimerEvent",
-    "TransportException",
-    "TransportInitError",
-    "TransportTerminated",
-    "delete_param",
     "get_caller_id",
-    "get_master",
     "get_name",
     "get_namespace",
     "get_node_uri",
-    "get_param",
-    "get_param_cached",
-    "get_param_names",
-    "get_published_topics",
     "get_ros_root",
     "get_rostime",
     "get_time",
-    "has_param",
-    "init_node",
     "is_shutdown",
-    "logdebug",
     "logdebug_once",
     "logdebug_throttle",
     "logdebug_throttle_identical",
-    "logerr",
     "logerr_once",
     "logerr_throttle",
     "logerr_throttle_identical",
@@ -146,28 +89,19 @@ __all__ = (
     "logfatal_once",
     "logfatal_throttle",
     "logfatal_throttle_identical",
-    "loginfo",
     "loginfo_once",
     "loginfo_throttle",
     "loginfo_throttle_identical",
     "logout",
-    "logwarn",
     "logwarn_once",
     "logwarn_throttle",
     "logwarn_throttle_identical",
-    "myargv",
-    "on_shutdown",
     "parse_rosrpc_uri",
     "remap_name",
     "resolve_name",
-    "search_param",
-    "set_param",
     "signal_shutdown",
-    "sleep",
-    "spin",
-    "wait_for_message",
-    "wait_for_service",
 )
+__all__ += client.__all__ + exceptions.__all__ + service.__all__ + timer.__all__
 
 __getattr__ = attribute(
     "rospy",

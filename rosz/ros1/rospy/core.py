@@ -36,7 +36,7 @@ from rosz.ros1.rospy.names import (
     remap_name,
     resolve_name,
 )
-from rosz.ros1.state import cooperate, node_uri, run_hooks, state
+from rosz.ros1.state import cooperate, has_node, node_uri, run_hooks, state
 from rosz.ros1.state import is_shutdown as node_is_shutdown
 from rosz.session import clamp_timeout
 from rosz.time import DurationValue
@@ -110,9 +110,7 @@ atexit.register(run_hooks, "atexit")
 # The shutdown.
 
 
-def is_initialized() -> bool:
-    """Return whether ``init_node`` has been called."""
-    return state.node is not None
+is_initialized = has_node
 
 
 def is_shutdown() -> bool:
@@ -121,9 +119,7 @@ def is_shutdown() -> bool:
     return node_is_shutdown()
 
 
-def is_shutdown_requested() -> bool:
-    """Return whether the node is shut down; the same as `is_shutdown`."""
-    return is_shutdown()
+is_shutdown_requested = is_shutdown
 
 
 def signal_shutdown(reason: object) -> None:
@@ -267,11 +263,6 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
     if not parts.hostname or parts.port is None:
         raise ValueError(f"expected a URI such as rosrpc://host:1234, got '{uri}'")
     return parts.hostname, parts.port
-
-
-def deprecated(function: Callable[..., object]) -> Callable[..., object]:
-    """Return a function unchanged."""
-    return function
 
 
 # The log.

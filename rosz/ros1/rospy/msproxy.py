@@ -117,14 +117,7 @@ class MasterProxy:
 
 
 def _reply(text: str, call: Callable[..., Any], *args: Any, failed: Any = "") -> list[Any]:
-    """Call a method of the master.
-
-    Args:
-        text: Text of the reply.
-        call: The method.
-        args: Arguments of the method.
-        failed: Value of the reply if the call fails.
-    """
+    """Call a method of the master, and return a reply with a text, or one that it failed."""
     try:
         return [1, text, call(*args)]
     except MasterError as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.ros1.exceptions import ROSInitException
-from rosz.ros1.state import state
+from rosz.ros1.state import has_node, state
 from rosz.time import ClassicConstructor
 
 if TYPE_CHECKING:
@@ -86,9 +86,7 @@ def get_time() -> float:
     return get_rostime().to_sec()
 
 
-def is_rostime_initialized() -> bool:
-    """Return whether ``init_node`` has been called."""
-    return state.node is not None
+is_rostime_initialized = has_node
 
 
 def set_rostime_initialized(val: bool) -> None:

@@ -41,21 +41,7 @@ class ServiceException(Exception):
 
 
 class _ServiceBase:
-    """Base class of services and their callers.
-
-    Args:
-        name: Name of the service.
-        service_class: Class of the service.
-
-    Attributes:
-        resolved_name: Full name of the service.
-        request_class: Class of the requests.
-        response_class: Class of the responses.
-
-    Raises:
-        ValueError: The name is invalid.
-        AttributeError: The class is not that of a service.
-    """
+    """Base class of services and their callers."""
 
     def __init__(self, name: str, service_class: type[Any]) -> None:
         if not name or not isinstance(name, str):

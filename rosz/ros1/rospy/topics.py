@@ -226,13 +226,7 @@ class Subscriber(Topic):
 class _Shared:
     """Base class of what the publishers, or the subscribers, of a topic and type share.
 
-    Args:
-        name: Full name of the topic.
-        data_class: Message class.
-        queue_size: Queue size of the first publisher or subscriber.
-
-    Attributes:
-        closed: Whether all publishers or subscribers are unregistered.
+    It has the queue size of the first one, and is closed after the last one.
     """
 
     def __init__(self, name: str, data_class: type[Any], queue_size: int | None) -> None:
@@ -257,13 +251,7 @@ class _Shared:
 
 
 class _SharedPublisher(_Shared):
-    """The publisher of the node that all publishers of a topic share.
-
-    Attributes:
-        seq: Number of messages published.
-        latch: The latched message.
-        is_latch: Whether it latches.
-    """
+    """The publisher of the node that all publishers of a topic share."""
 
     def __init__(self, name: str, data_class: type[Any], queue_size: int | None) -> None:
         super().__init__(name, data_class, queue_size)
