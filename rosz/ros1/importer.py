@@ -95,9 +95,6 @@ class _Types:
     def store(self) -> TypeStore:
         return TypeStore(self.packages, self._environment.home / "rosz")
 
-    def has(self, package: str, kind: Kind) -> bool:
-        return self.store.has(package, kind)
-
     def shipped(self, package: str, kind: Kind) -> ModuleType:
         """Return a shipped module; types that it lacks come from a package of the same name."""
         if not shipped_types(package, kind):
@@ -128,11 +125,10 @@ class _Types:
     def folder(self, package: str) -> Path | None:
         """Return the folder of a package that has types or dynamic_reconfigure files."""
         try:
-            if self.has(package, "msg") or self.has(package, "srv") or self.cfg_files(package):
-                return self.packages.find(package).path
+            known = self.store.has(package, "msg") or self.store.has(package, "srv")
+            return self.packages.find(package).path if known or self.cfg_files(package) else None
         except RoszError:  # a broken package must not break other imports
             return None
-        return None
 
 
 class _AliasLoader(Loader):
@@ -210,7 +206,7 @@ class _FrontFinder(MetaPathFinder):
         if len(parts) == 3 and self.types.folder(package) is not None:  # noqa: PLR2004
             return ModuleSpec(name, None, is_package=True)
         kind = _KINDS.get(parts[3]) if len(parts) == 4 else None  # noqa: PLR2004
-        if kind is None or not self.types.has(package, kind):
+        if kind is None or not self.types.store.has(package, kind):
             return None
         return _alias(name, lambda: self.types.store.module(package, kind))
 
@@ -218,7 +214,7 @@ class _FrontFinder(MetaPathFinder):
         self, name: str, package: str, kind: Kind, inner: str, path: Sequence[str] | None
     ) -> ModuleSpec | None:
         """Find ``<package>.msg``, or ``<package>.msg._Type`` as genpy has it."""
-        if not self.types.has(package, kind):
+        if not self.types.store.has(package, kind):
             return None
         if not inner:
             if package in self._shipped:

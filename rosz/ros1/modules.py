@@ -103,6 +103,10 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros2.rclpy.program": "get_default_context get_rmw_implementation_identifier ok"
         " remove_ros_args shutdown try_shutdown"
     },
+    "rosgraph.rosenv": {
+        "ros1.rosgraph.names": "DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP ROS_IPV6"
+        " ROS_MASTER_URI ROS_NAMESPACE get_master_uri"
+    },
     "roslib.launcher": {"ros1.roslib": "load_manifest"},
     "roslib.message": {**_MESSAGE, "time": "TVal=StampValue"},
     "roslib.names": {
@@ -176,11 +180,7 @@ _REASONS = {
 
 
 def submodule(name: str) -> ModuleType:
-    """Build a module of `SUBMODULES`.
-
-    Args:
-        name: Full name, such as ``rospy.impl.tcpros``.
-    """
+    """Build a module of `SUBMODULES`, such as ``rospy.impl.tcpros``."""
     module = ModuleType(name, f"``{name}``: names that programs import from here.")
     for home, names in SUBMODULES[name].items():
         defined = import_module(f"rosz.{home}")
@@ -199,12 +199,7 @@ def add_submodules(name: str) -> None:
 
 
 def explain_missing(name: str, module: ModuleType) -> None:
-    """Make a module and its loaded submodules say what to use instead of a missing name.
-
-    Args:
-        name: Name that programs import the module by.
-        module: The module.
-    """
+    """Make a module and its loaded submodules say what to use instead of a missing name."""
     vars(module).setdefault("__getattr__", attribute(name, module, {}))
     own = f"{module.__name__}."
     for inner in list(vars(module).values()):

@@ -153,7 +153,7 @@ def find_node(pkg: str, node_type: str, rospack: RosPack | None = None) -> list[
     Raises:
         ResourceNotFound: There is no such package.
     """
-    return find_resource(pkg, node_type, _is_executable, rospack)
+    return find_resource(pkg, node_type, lambda path: os.access(path, os.R_OK | os.X_OK), rospack)
 
 
 def find_resource(
@@ -176,10 +176,6 @@ def find_resource(
     top = Path((rospack or RosPack()).get_path(pkg))
     found = [str(file) for file in Package(pkg, top).files(resource_name)]
     return [path for path in found if filter_fn is None or filter_fn(path)]
-
-
-def _is_executable(path: str) -> bool:
-    return os.access(path, os.R_OK | os.X_OK)
 
 
 def list_pkgs() -> list[str]:

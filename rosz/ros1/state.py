@@ -160,11 +160,7 @@ def arguments() -> remap.Arguments:
 
 
 def set_arguments(argv: Sequence[str]) -> None:
-    """Replace the command line of the process.
-
-    Args:
-        argv: Command line without the program name.
-    """
+    """Replace the command line of the process, which has no program name."""
     with state.lock:
         state.arguments = remap.parse(argv)
         if state.context is not None:
@@ -215,11 +211,6 @@ def node_uri(zid: str, node_id: int, host: str) -> str:
     """Return the URI of a node.
 
     In ROS 1 it is the address of the node's XML-RPC server. Here nothing listens there.
-
-    Args:
-        zid: Zenoh id of the session of the node.
-        node_id: Number of the node in its session.
-        host: Host name.
     """
     return f"rosz://{host}/{zid}/{node_id}"
 
@@ -268,11 +259,7 @@ def params() -> Params:
 
 
 def params_of(name: str) -> Params:
-    """Return the parameters as a node sees them, without remappings.
-
-    Args:
-        name: Full name of the node.
-    """
+    """Return the parameters as the node of a full name sees them, without remappings."""
     return Params(ready_context().params, name)
 
 

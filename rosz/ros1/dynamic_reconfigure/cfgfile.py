@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import builtins
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from traceback import walk_tb
 from types import CodeType, ModuleType, TracebackType
@@ -41,9 +40,11 @@ def run(path: Path) -> list[Generated]:
     names = {"__name__": "__main__", "__file__": str(path), "__builtins__": tools}
     found: list[Generated] = []
     token = results.set(found)
+    before = list(sys.path)
     try:
-        with _folder_first(path):
-            exec(code, names)  # noqa: S102  # the purpose of this function
+        # A file may import modules beside it.
+        sys.path.insert(0, str(path.resolve().parent))
+        exec(code, names)  # noqa: S102  # the purpose of this function
     except SystemExit as error:
         if error.code not in {None, 0} or not found:
             reason = f"it exits with {error.code!r} before it has generated anything"
@@ -54,6 +55,7 @@ def run(path: Path) -> list[Generated]:
         reason = "; ".join(filter(None, (f"{type(error).__name__}: {error}", hint(error))))
         raise SourceError(reason, str(path), _line(error.__traceback__, path)) from error
     finally:
+        sys.path[:] = before
         results.reset(token)
     if not found:
         reason = "it describes nothing; expected gen.generate(PACKAGE, NODE, NAME) at its end"
@@ -124,17 +126,6 @@ def _compile(path: Path) -> CodeType:
         ) from error
     except ValueError as error:  # null bytes
         raise SourceError(str(error), str(path)) from error
-
-
-@contextmanager
-def _folder_first(path: Path) -> Iterator[None]:
-    """Let a file import modules beside it, and restore ``sys.path`` afterwards."""
-    before = list(sys.path)
-    sys.path.insert(0, str(path.resolve().parent))
-    try:
-        yield
-    finally:
-        sys.path[:] = before
 
 
 def _line(trace: TracebackType | None, path: Path) -> int:

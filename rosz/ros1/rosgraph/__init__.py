@@ -6,7 +6,9 @@ the calls that register something, since nodes declare themselves.
 Programs also import its modules, as in ROS 1.
 """
 
-from rosz.ros1.rosgraph import masterapi, names, network, rosenv
+from types import ModuleType
+
+from rosz.ros1.rosgraph import masterapi, names, network
 from rosz.ros1.rosgraph.masterapi import (
     Master,
     MasterError,
@@ -14,17 +16,19 @@ from rosz.ros1.rosgraph.masterapi import (
     MasterFailure,
     is_online,
 )
-from rosz.ros1.rosgraph.names import myargv
-from rosz.ros1.rosgraph.rosenv import (
+from rosz.ros1.rosgraph.names import (
     ROS_HOSTNAME,
     ROS_IP,
     ROS_IPV6,
     ROS_MASTER_URI,
     ROS_NAMESPACE,
     get_master_uri,
+    myargv,
 )
 
-PUBLIC_MODULES = ("masterapi", "names", "network", "rosenv")
+rosenv: ModuleType  # built by the importer
+
+PUBLIC_MODULES = ("masterapi", "names", "network")
 
 __all__ = (
     "ROS_HOSTNAME",

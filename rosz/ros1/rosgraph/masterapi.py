@@ -13,8 +13,7 @@ from typing import Any, NoReturn
 from rosz.errors import ParamError, ParamNotFound, RoszError, TransportError
 from rosz.names import short_type
 from rosz.params.api import Params
-from rosz.ros1.rosgraph.names import make_caller_id
-from rosz.ros1.rosgraph.rosenv import get_master_uri
+from rosz.ros1.rosgraph.names import get_master_uri, make_caller_id
 from rosz.ros1.state import params_of, ready_context, survey, token_uri
 from rosz.wire import Kind, Token
 

@@ -1,4 +1,7 @@
-"""rosgraph.names: graph resource names (ROS wiki, Names)."""
+"""rosgraph.names: graph resource names (ROS wiki, Names).
+
+It also has the environment variables of ROS 1, which programs import from `rosgraph.rosenv`.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,6 @@ import time
 from collections.abc import Mapping, Sequence
 
 from rosz import names
-from rosz.ros1.rosgraph.rosenv import ROS_NAMESPACE
 
 __all__ = (
     "ANYTYPE",
@@ -39,6 +41,14 @@ __all__ = (
     "script_resolve_name",
 )
 
+ROS_MASTER_URI = "ROS_MASTER_URI"
+ROS_IP = "ROS_IP"
+ROS_IPV6 = "ROS_IPV6"
+ROS_HOSTNAME = "ROS_HOSTNAME"
+ROS_NAMESPACE = "ROS_NAMESPACE"
+DEFAULT_MASTER_PORT = 11311
+DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
+
 MSG_EXT = ".msg"
 SRV_EXT = ".srv"
 SEP = "/"
@@ -52,6 +62,31 @@ _BASE = re.compile(r"[A-Za-z]\w*")
 _NAME = re.compile(r"[~/A-Za-z][\w/]*")
 
 
+def find_option(options: str | tuple[str, ...], argv: Sequence[str] | None = None) -> str | None:
+    """Return the value of the first of some options, such as ``__ns:=``, or None."""
+    found = (word for word in (sys.argv if argv is None else argv) if word.startswith(options))
+    first = next(found, None)
+    return None if first is None else first.partition(REMAP)[2]
+
+
+def get_master_uri(
+    env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
+) -> str | None:
+    """Return the URI of the master: ``__master:=``, ``ROS_MASTER_URI`` or ROS 1's default.
+
+    Programs print it; nothing in rosz uses it.
+
+    Args:
+        env: Environment variables; those of the process when not given.
+        argv: Command line; that of the process when not given.
+    """
+    given = find_option("__master:=", argv)
+    if given is not None:
+        return given or None
+    variables = os.environ if env is None else env
+    return variables.get(ROS_MASTER_URI) or DEFAULT_MASTER_URI
+
+
 def get_ros_namespace(
     env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
 ) -> str:
@@ -61,11 +96,9 @@ def get_ros_namespace(
         env: Environment variables; those of the process when not given.
         argv: Command line; that of the process when not given.
     """
-    for word in sys.argv if argv is None else argv:
-        if word.startswith("__ns:="):
-            return make_global_ns(word.partition(REMAP)[2])
+    given = find_option("__ns:=", argv)
     variables = os.environ if env is None else env
-    return make_global_ns(variables.get(ROS_NAMESPACE, GLOBALNS))
+    return make_global_ns(variables.get(ROS_NAMESPACE, GLOBALNS) if given is None else given)
 
 
 def make_caller_id(name: str) -> str:

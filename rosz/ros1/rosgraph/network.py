@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import os
 import socket
-import sys
 from urllib.parse import urlsplit
+
+from rosz.ros1.rosgraph.names import find_option
 
 __all__ = (
     "get_address_override",
@@ -38,9 +39,9 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 
 def get_address_override() -> str | None:
     """Return the value of ``__hostname:=``, ``__ip:=``, ``ROS_HOSTNAME`` or ``ROS_IP``, or None."""
-    for word in sys.argv:
-        if word.startswith(("__hostname:=", "__ip:=")):
-            return word.partition(":=")[2]
+    given = find_option(("__hostname:=", "__ip:="))
+    if given is not None:
+        return given
     return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or None
 
 

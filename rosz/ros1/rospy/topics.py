@@ -391,10 +391,7 @@ class _SharedPublisher(_Shared):
 
     def _listen(self, publisher: NodePublisher[Any], listener: SubscribeListener) -> None:
         def connected(link: SubscriberLink[Any]) -> None:
-            def peer_publish(message: Any) -> None:
-                link.publish(message)
-
-            listener.peer_subscribe(self.name, self.publish, peer_publish)
+            listener.peer_subscribe(self.name, self.publish, link.publish)
 
         def disconnected(_node: str) -> None:
             listener.peer_unsubscribe(self.name, self.get_num_connections())
