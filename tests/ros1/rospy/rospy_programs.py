@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import count
 from textwrap import dedent
 
 from network import Network, Program
 
-__all__ = ("run", "start")
+__all__ = ("Printed", "run", "start")
+
+Printed = Callable[[str], list[str]]
+"""Runs a program, and returns its lines."""
 
 _NUMBERS = count()
 _SHOW = '''

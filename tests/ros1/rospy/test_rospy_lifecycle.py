@@ -7,7 +7,7 @@ import signal
 import pytest
 from network import Network, eventually
 
-from .rospy_programs import run, start
+from .rospy_programs import Printed, run, start
 
 HOOKS = """
     import sys, threading, time
@@ -29,10 +29,8 @@ def ended(reason: str) -> list[str]:
     return [*STOPPED, f"before {reason}", f"last {reason}"]
 
 
-def test_before_init_node(network: Network) -> None:
-    assert run(
-        network,
-        """
+def test_before_init_node(printed: Printed) -> None:
+    assert printed("""
         import rospy
         from std_msgs.msg import String
         from std_srvs.srv import Empty
@@ -53,8 +51,7 @@ def test_before_init_node(network: Network) -> None:
         show("publish", lambda: rospy.Publisher("x", String, queue_size=1).publish("a"))
         show("proxy", lambda: rospy.ServiceProxy("none", Empty)())
         show("hook", lambda: rospy.on_shutdown(3))
-        """,
-    ) == [
+        """) == [
         "shut down -> False",
         "initialized -> False",
         "name -> '/unnamed'",
@@ -81,10 +78,8 @@ def test_warnings_before_init_node_go_to_stderr_as_python_logs_them(network: Net
     assert run(network, "import rospy\nrospy.logwarn('early %d', 1)\n") == ["early 1"]
 
 
-def test_init_node_twice(network: Network) -> None:
-    lines = run(
-        network,
-        """
+def test_init_node_twice(printed: Printed) -> None:
+    lines = printed("""
         import sys
         import rospy
         sys.argv[0] = "node.py"
@@ -94,8 +89,7 @@ def test_init_node_twice(network: Network) -> None:
         show("same", lambda: rospy.init_node("one"))
         show("other", lambda: rospy.init_node("two"))
         show("name", rospy.get_name)
-        """,
-    )
+        """)
     assert lines == [
         "empty -> ValueError | name must not be empty",
         "namespace -> ValueError | namespaces are not allowed in node names",
@@ -311,10 +305,8 @@ def test_a_new_node_of_the_same_name_takes_over(network: Network) -> None:
     assert newer.exit_code() == 0
 
 
-def test_spin_on_another_thread(network: Network) -> None:
-    assert run(
-        network,
-        """
+def test_spin_on_another_thread(printed: Printed) -> None:
+    assert printed("""
         import threading, rospy
         rospy.init_node("spinner")
         thread = threading.Thread(target=rospy.spin)
@@ -322,8 +314,7 @@ def test_spin_on_another_thread(network: Network) -> None:
         rospy.signal_shutdown("enough")
         thread.join(10)
         print(thread.is_alive())
-        """,
-    ) == ["False"]
+        """) == ["False"]
 
 
 def test_other_nodes_see_the_node(network: Network) -> None:

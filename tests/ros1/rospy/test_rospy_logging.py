@@ -9,7 +9,7 @@ from network import Network, eventually
 
 from rosz.msgs.rcl_interfaces.msg import Log
 
-from .rospy_programs import run, start
+from .rospy_programs import Printed, run, start
 
 _STAMP = re.compile(r"\[\d{10}\.\d{6}\]")
 
@@ -18,11 +18,9 @@ def stamped(lines: list[str]) -> list[str]:
     return [_STAMP.sub("[T]", line) for line in lines]
 
 
-def test_levels_and_formats(network: Network) -> None:
+def test_levels_and_formats(printed: Printed) -> None:
     assert stamped(
-        run(
-            network,
-            """
+        printed("""
             import rospy
             rospy.init_node("logs")
             rospy.logdebug("hidden")
@@ -36,8 +34,7 @@ def test_levels_and_formats(network: Network) -> None:
             rospy.logfatal("fatal")
             rospy.core.logerr("core")
             print(rospy.DEBUG, rospy.INFO, rospy.WARN, rospy.ERROR, rospy.FATAL)
-            """,
-        )
+            """)
     ) == [
         "[INFO] [T]: text and 5",
         "[INFO] [T]: 100 %",
@@ -53,11 +50,9 @@ def test_levels_and_formats(network: Network) -> None:
     ]
 
 
-def test_once_and_throttled_messages(network: Network) -> None:
+def test_once_and_throttled_messages(printed: Printed) -> None:
     assert stamped(
-        run(
-            network,
-            """
+        printed("""
             import rospy
             rospy.init_node("logs")
             for i in range(3):
@@ -67,8 +62,7 @@ def test_once_and_throttled_messages(network: Network) -> None:
                 rospy.loginfo_throttle_identical(60, "same")
                 rospy.logerr_throttle_identical(60, "text %d", i // 2)
                 rospy.logdebug_once("hidden")
-            """,
-        )
+            """)
     ) == [
         "[INFO] [T]: once",
         "[INFO] [T]: throttled 0",
@@ -81,10 +75,8 @@ def test_once_and_throttled_messages(network: Network) -> None:
     ]
 
 
-def test_streams(network: Network) -> None:
-    assert run(
-        network,
-        """
+def test_streams(printed: Printed) -> None:
+    assert printed("""
         import io, sys, rospy
         rospy.init_node("logs", log_level=rospy.DEBUG)
         sys.stdout, sys.stderr = out, error = io.StringIO(), io.StringIO()
@@ -93,8 +85,7 @@ def test_streams(network: Network) -> None:
         sys.stdout = sys.__stdout__
         print(out.getvalue().count("DEBUG"), out.getvalue().count("\\n"))
         print(error.getvalue().count("\\n"))
-        """,
-    ) == ["1 2", "3"]
+        """) == ["1 2", "3"]
 
 
 @pytest.mark.parametrize(
@@ -118,11 +109,9 @@ def test_console_format(network: Network, form: str, line: str) -> None:
     ) == [line]
 
 
-def test_levels_set_by_service_and_by_python_logging(network: Network) -> None:
+def test_levels_set_by_service_and_by_python_logging(printed: Printed) -> None:
     assert stamped(
-        run(
-            network,
-            """
+        printed("""
             import logging
             import rospy
             from roscpp.srv import GetLoggers, SetLoggerLevel
@@ -142,8 +131,7 @@ def test_levels_set_by_service_and_by_python_logging(network: Network) -> None:
             from rospy.impl.rosout import _rospy_to_logging_levels
             logging.getLogger("rosout").setLevel(_rospy_to_logging_levels[rospy.DEBUG])
             rospy.logdebug("shown again")
-            """,
-        )
+            """)
     ) == [
         "[DEBUG] [T]: shown",
         "[Logger(name='rosout', level='DEBUG')]",

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from network import Network
 
 from rosz.msgs.nav_msgs.msg import OccupancyGrid
 from rosz.msgs.sensor_msgs.msg import Image, JointState, LaserScan, MultiDOFJointState
 from rosz.ros1.rospy.numpy_msg import numpy_msg
 
-from .rospy_programs import run
+from .rospy_programs import Printed
 
 np = pytest.importorskip("numpy")
 
@@ -54,10 +53,8 @@ def test_octets_and_texts_are_not_arrays() -> None:
     assert numpy_msg(MultiDOFJointState).from_cdr(state.to_cdr()).joint_names == ["a"]
 
 
-def test_on_a_topic(network: Network) -> None:
-    assert run(
-        network,
-        """
+def test_on_a_topic(printed: Printed) -> None:
+    assert printed("""
         import time
         import numpy as np
         import rospy
@@ -69,5 +66,4 @@ def test_on_a_topic(network: Network) -> None:
         got = rospy.wait_for_message("floats", numpy_msg(Floats), 10)
         print(type(got.data).__name__, got.data.dtype, got.data.tolist())
         print(rospy.wait_for_message("floats", Floats, 10).data.tolist())
-        """,
-    ) == ["ndarray float32 [1.0, 2.5]", "[1.0, 2.5]"]
+        """) == ["ndarray float32 [1.0, 2.5]", "[1.0, 2.5]"]

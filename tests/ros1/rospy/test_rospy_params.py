@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import pytest
 from network import Network
 
-from .rospy_programs import run
+from .rospy_programs import Printed, run
 
 BEGIN = """
     import rospy
     rospy.init_node("me")
 """
+
+
+@pytest.fixture
+def printed(network: Network) -> Printed:
+    return lambda script: run(network, BEGIN + script)
 
 
 def test_parameters(network: Network) -> None:
@@ -63,11 +69,8 @@ def test_parameters(network: Network) -> None:
     assert lines[16] == "4 5"
 
 
-def test_the_master(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_the_master(printed: Printed) -> None:
+    assert printed("""
     from std_msgs.msg import String
     from std_srvs.srv import Empty
     import time
@@ -91,8 +94,7 @@ def test_the_master(network: Network) -> None:
     show("gone", lambda: master["p"])
     show("other", lambda: master.registerPublisher("x"))
     print(master.getPid()[0], master.hasParam("/p"), master.getParam("/p"))
-""",
-    )[:-2] == [
+""")[:-2] == [
         "1 current system state [['/x', ['/me']]] [['/x', ['/me']]]",
         "[['/s', ['/me']]]",
         "True",

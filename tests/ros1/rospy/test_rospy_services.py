@@ -7,7 +7,7 @@ import signal
 import pytest
 from network import Network
 
-from .rospy_programs import run, start
+from .rospy_programs import Printed, run, start
 
 BEGIN = """
     import threading, time
@@ -18,6 +18,11 @@ BEGIN = """
     rospy.init_node("services")
 """
 ERROR = "ServiceException | service [/s] responded with an error: "
+
+
+@pytest.fixture
+def printed(network: Network) -> Printed:
+    return lambda script: run(network, BEGIN + script)
 
 
 @pytest.mark.parametrize(
@@ -86,11 +91,8 @@ def test_invalid_results_of_handlers(network: Network, kind: str, handler: str, 
     assert lines == [f"call -> {ERROR}{text.encode()!r}"]
 
 
-def test_handler_errors_are_logged_and_sent_to_the_caller(network: Network) -> None:
-    lines = run(
-        network,
-        BEGIN
-        + """
+def test_handler_errors_are_logged_and_sent_to_the_caller(printed: Printed) -> None:
+    lines = printed("""
     def bad(request):
         raise ValueError("boo")
     def wide(request):
@@ -104,8 +106,7 @@ def test_handler_errors_are_logged_and_sent_to_the_caller(network: Network) -> N
     show("gone", lambda: rospy.ServiceProxy("s", AddTwoInts)(1, 2))
     rospy.Service("w", AddTwoInts, wide, error_handler=lambda *e: print("told", e[:2]))
     show("wide", lambda: rospy.ServiceProxy("w", AddTwoInts)(1, 2))
-""",
-    )
+""")
     assert "[ERROR] [" in lines[0]
     assert lines[0].endswith("]: Error processing request: boo")
     assert "ValueError: boo" in lines[1]
@@ -117,11 +118,8 @@ def test_handler_errors_are_logged_and_sent_to_the_caller(network: Network) -> N
     )
 
 
-def test_arguments_of_calls(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_arguments_of_calls(printed: Printed) -> None:
+    assert printed("""
     rospy.Service("s", AddTwoInts, lambda r: r.a + r.b)
     add = rospy.ServiceProxy("s", AddTwoInts, persistent=True, headers={"x": "y"})
     add.wait_for_service(5)
@@ -137,8 +135,7 @@ def test_arguments_of_calls(network: Network) -> None:
     show("no class", lambda: rospy.ServiceProxy("s", str))
     show("no name", lambda: rospy.Service("", AddTwoInts, print))
     show("other type", lambda: rospy.ServiceProxy("s", Trigger)())
-""",
-    )[:10] == [
+""")[:10] == [
         "3 7 11 0",
         "2 2 9",
         "one -> TypeError | Invalid number of arguments, args should be ['a', 'b'] args are(1,)",
@@ -153,11 +150,8 @@ def test_arguments_of_calls(network: Network) -> None:
     ]
 
 
-def test_wait_for_service(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_wait_for_service(printed: Printed) -> None:
+    assert printed("""
     from std_msgs.msg import String
     show("none", lambda: rospy.wait_for_service("none", 0.1))
     show("duration", lambda: rospy.wait_for_service("none", timeout=rospy.Duration(0.1)))
@@ -168,8 +162,7 @@ def test_wait_for_service(network: Network) -> None:
     out = rospy.Publisher("x", String, queue_size=1, latch=True)
     out.publish("there")
     print(rospy.wait_for_message("x", String, timeout=5).data)
-""",
-    ) == [
+""") == [
         "none -> ROSException | timeout exceeded while waiting for service /none",
         "duration -> ROSException | timeout exceeded while waiting for service /none",
         "zero -> ValueError | timeout must be non-zero",
@@ -206,11 +199,8 @@ def test_calls_between_processes_and_from_handlers(network: Network) -> None:
     assert server.exit_code() == 0
 
 
-def test_shutdown_ends_a_call(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_shutdown_ends_a_call(printed: Printed) -> None:
+    assert printed("""
     busy, never = threading.Event(), threading.Event()
     def wait(request):
         busy.set()
@@ -224,8 +214,7 @@ def test_shutdown_ends_a_call(network: Network) -> None:
     show("call", lambda: rospy.ServiceProxy("slow", Empty)())
     show("after", lambda: rospy.ServiceProxy("slow", Empty)())
     never.set()
-""",
-    ) == [
+""") == [
         "call -> ServiceException | service [/slow] returned no response",
         "after -> ServiceException | service [/slow] unavailable",
     ]

@@ -14,7 +14,7 @@ from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.msgs.std_msgs.msg import Header
 from rosz.ros1.rospy import rostime
 
-from .rospy_programs import run
+from .rospy_programs import Printed
 
 Time: Any = rostime.Time
 Duration: Any = rostime.Duration
@@ -83,10 +83,8 @@ def test_times_in_messages() -> None:
     assert type(header.stamp - Time(1)) is DurationMessage
 
 
-def test_clock_functions(network: Network) -> None:
-    assert run(
-        network,
-        """
+def test_clock_functions(printed: Printed) -> None:
+    assert printed("""
         import time, rospy
         show("wall", rospy.rostime.is_wallclock)
         rospy.rostime.set_rostime_initialized(True)
@@ -102,8 +100,7 @@ def test_clock_functions(network: Network) -> None:
         show("negative", lambda: rospy.sleep(-1))
         show("text", lambda: rospy.sleep("a"))
         show("zero", lambda: rospy.Rate(0))
-        """,
-    ) == [
+        """) == [
         "wall -> True",
         "True True",
         "True",
@@ -116,10 +113,8 @@ def test_clock_functions(network: Network) -> None:
     ]
 
 
-def test_rate(network: Network) -> None:
-    assert run(
-        network,
-        """
+def test_rate(printed: Printed) -> None:
+    assert printed("""
         import time, rospy
         rospy.init_node("rates")
         rate = rospy.Rate(50)
@@ -132,14 +127,11 @@ def test_rate(network: Network) -> None:
         print(rate.remaining().to_sec() < -0.4)
         rate.sleep()
         print(rate.remaining().to_sec() <= 0.02)
-        """,
-    ) == ["20000000 True", "True", "True", "True"]
+        """) == ["20000000 True", "True", "True", "True"]
 
 
-def test_timers(network: Network) -> None:
-    lines = run(
-        network,
-        """
+def test_timers(printed: Printed) -> None:
+    lines = printed("""
         import threading, rospy
         rospy.init_node("timers")
         events, three = [], threading.Event()
@@ -165,8 +157,7 @@ def test_timers(network: Network) -> None:
         failing = rospy.Timer(rospy.Duration(0.01), fail)
         failing.join(10)
         print(failing.is_alive())
-        """,
-    )
+        """)
     assert lines[:7] == [
         "True True True True",
         "False",
@@ -179,12 +170,10 @@ def test_timers(network: Network) -> None:
     assert lines[-2:] == ["ValueError: boom", "False"]
 
 
-def test_simulated_time(network: Network) -> None:
+def test_simulated_time(network: Network, printed: Printed) -> None:
     node = network.node("simulator")
     node.params.set("/use_sim_time", True)
-    lines = run(
-        network,
-        """
+    lines = printed("""
         import threading, rospy
         from rosgraph_msgs.msg import Clock
         rospy.init_node("simulated")
@@ -214,8 +203,7 @@ def test_simulated_time(network: Network) -> None:
         threading.Timer(0.1, back).start()
         show("back", lambda: rospy.sleep(1e6))
         print(rospy.get_time())
-        """,
-    )
+        """)
     assert lines == [
         "False 0.0",
         "True",

@@ -9,7 +9,7 @@ from network import TIMEOUT, Network
 
 from rosz.msgs.std_msgs.msg import String
 
-from .rospy_programs import run, start
+from .rospy_programs import Printed, run, start
 
 BEGIN = """
     import threading, time, warnings
@@ -25,11 +25,13 @@ BEGIN = """
 """
 
 
-def test_arguments_of_publish(network: Network) -> None:
-    lines = run(
-        network,
-        BEGIN
-        + """
+@pytest.fixture
+def printed(network: Network) -> Printed:
+    return lambda script: run(network, BEGIN + script)
+
+
+def test_arguments_of_publish(printed: Printed) -> None:
+    lines = printed("""
     text = rospy.Publisher("text", String, queue_size=1)
     got = []
     rospy.Subscriber("text", String, lambda m: got.append(m.data))
@@ -51,8 +53,7 @@ def test_arguments_of_publish(network: Network) -> None:
     show("not empty", lambda: empty.publish(1))
     number = rospy.Publisher("number", Int32, queue_size=1)
     show("unheard", lambda: number.publish("x"))
-""",
-    )
+""")
     assert lines[:-2] == [
         "value -> None",
         "message -> None",
@@ -74,11 +75,8 @@ def test_arguments_of_publish(network: Network) -> None:
     assert lines[-1] == "unheard -> None"
 
 
-def test_invalid_topics(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_invalid_topics(printed: Printed) -> None:
+    assert printed("""
     show("name", lambda: rospy.Publisher("", String, queue_size=1))
     show("no class", lambda: rospy.Publisher("a", None, queue_size=1))
     show("no type", lambda: rospy.Publisher("a", "std_msgs/String", queue_size=1))
@@ -93,8 +91,7 @@ def test_invalid_topics(network: Network) -> None:
     print(full.name, full.resolved_name, full.type, full.data_class is String, full.reg_type)
     half = rospy.Subscriber("c", String, print, 3, buff_size=10, tcp_nodelay=True)
     print(half.name, half.callback is print, half.callback_args, half.impl is not None)
-""",
-    ) == [
+""") == [
         "name -> ValueError | topic name is not a non-empty string",
         "no class -> ValueError | topic parameter 'data_class' is not initialized",
         "no type -> ValueError | data_class [std_msgs/String] is not a class",
@@ -113,11 +110,8 @@ def test_a_missing_queue_size_warns(network: Network) -> None:
     assert lines[1].strip() == "rospy.Publisher('x', String)"
 
 
-def test_subscribers_of_a_topic_share_a_thread(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_subscribers_of_a_topic_share_a_thread(printed: Printed) -> None:
+    assert printed("""
     calls, threads = [], set()
     def first(m):
         threads.add(threading.get_ident())
@@ -140,15 +134,11 @@ def test_subscribers_of_a_topic_share_a_thread(network: Network) -> None:
     print(calls[-1])
     b.unregister()
     until(lambda: not out.get_num_connections())
-""",
-    ) == ["['a0', 'b0!', 'a1', 'b1!', 'a2', 'b2!'] 1 1 1", "True", "bz!"]
+""") == ["['a0', 'b0!', 'a1', 'b1!', 'a2', 'b2!'] 1 1 1", "True", "bz!"]
 
 
-def test_a_failing_callback_does_not_stop_the_others(network: Network) -> None:
-    lines = run(
-        network,
-        BEGIN
-        + """
+def test_a_failing_callback_does_not_stop_the_others(printed: Printed) -> None:
+    lines = printed("""
     got = []
     def bad(m):
         raise ValueError("boom")
@@ -159,19 +149,15 @@ def test_a_failing_callback_does_not_stop_the_others(network: Network) -> None:
     out.publish("1")
     out.publish("2")
     until(lambda: len(got) == 2)
-""",
-    )
+""")
     assert "bad callback: <function bad at 0x" in lines[0]
     assert lines[1] == "Traceback (most recent call last):"
     assert "in bad" in lines[2]
     assert lines[-2:] == ["ValueError: boom", ""]
 
 
-def test_latched_messages_reach_later_subscribers_of_the_process(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_latched_messages_reach_later_subscribers_of_the_process(printed: Printed) -> None:
+    assert printed("""
     got = []
     out = rospy.Publisher("x", String, latch=True, queue_size=1)
     out.publish("one")
@@ -185,21 +171,16 @@ def test_latched_messages_reach_later_subscribers_of_the_process(network: Networ
     c = rospy.Subscriber("x", String, lambda m: got.append("c " + m.data))
     until(lambda: len(got) == 5)
     print(got[2:], rospy.wait_for_message("x", String, 5).data, plain.impl is out.impl)
-""",
-    ) == ["['a two', 'b two', 'c two'] two True"]
+""") == ["['a two', 'b two', 'c two'] two True"]
 
 
-def test_a_second_publisher_can_make_a_topic_latch(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_a_second_publisher_can_make_a_topic_latch(printed: Printed) -> None:
+    assert printed("""
     plain = rospy.Publisher("x", String, queue_size=1)
     rospy.Publisher("x", String, latch=True, queue_size=1)
     plain.publish("kept")
     print(rospy.wait_for_message("x", String, 5).data, plain.impl.ref_count)
-""",
-    ) == ["kept 2"]
+""") == ["kept 2"]
 
 
 def test_topics_created_before_init_node(network: Network) -> None:
@@ -221,11 +202,8 @@ def test_topics_created_before_init_node(network: Network) -> None:
     ) == ["True /y served"]
 
 
-def test_headers_are_numbered(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_headers_are_numbered(printed: Printed) -> None:
+    assert printed("""
     got = []
     out = rospy.Publisher("x", PointStamped, queue_size=10)
     rospy.Subscriber("x", PointStamped, got.append)
@@ -237,15 +215,11 @@ def test_headers_are_numbered(network: Network) -> None:
         print(message.header.seq, message.header.stamp)
     until(lambda: len(got) == 2)
     print([(m.header.seq, m.header.stamp.to_sec(), m.header.frame_id) for m in got])
-""",
-    ) == ["1 3000000000", "2 3000000000", "[(1, 3.0, 'map'), (2, 3.0, 'map')]"]
+""") == ["1 3000000000", "2 3000000000", "[(1, 3.0, 'map'), (2, 3.0, 'map')]"]
 
 
-def test_slow_callbacks_receive_the_newest_messages(network: Network) -> None:
-    first, last = run(
-        network,
-        BEGIN
-        + """
+def test_slow_callbacks_receive_the_newest_messages(printed: Printed) -> None:
+    first, last = printed("""
     seen, go, busy = [], threading.Event(), threading.Event()
     def slow(m):
         seen.append(m.data)
@@ -268,16 +242,12 @@ def test_slow_callbacks_receive_the_newest_messages(network: Network) -> None:
     until(lambda: len(seen) == 2)
     print(seen)
     print(everything == list(range(1, 2000)))
-""",
-    )
+""")
     assert (first, last) == ("[0, 1999]", "True")
 
 
-def test_any_message(network: Network) -> None:
-    lines = run(
-        network,
-        BEGIN
-        + """
+def test_any_message(printed: Printed) -> None:
+    lines = printed("""
     got, known = [], []
     rospy.Subscriber("x", rospy.AnyMsg, got.append)
     rospy.Subscriber("x", String, lambda m: known.append((m.data, m._connection_header)))
@@ -294,8 +264,7 @@ def test_any_message(network: Network) -> None:
     show("unknown", lambda: copy.publish(rospy.AnyMsg()))
     copy.publish(message)
     print(rospy.wait_for_message("copy", String, 5).data)
-""",
-    )
+""")
     assert lines[:4] == [
         "['callerid', 'latching', 'md5sum', 'message_definition', 'topic', 'type']",
         "['std_msgs/String', '/x', '/topics', '0', '992ce8a1687cec8c8bd883ec73ca41d1']",
@@ -306,11 +275,8 @@ def test_any_message(network: Network) -> None:
     assert lines[5] == "abc"
 
 
-def test_a_listener_is_notified_of_each_subscriber(network: Network) -> None:
-    assert run(
-        network,
-        BEGIN
-        + """
+def test_a_listener_is_notified_of_each_subscriber(printed: Printed) -> None:
+    assert printed("""
     class Greeter(rospy.SubscribeListener):
         def peer_subscribe(self, topic, publish, publish_to_it):
             publish_to_it(String("hello, only you"))
@@ -325,8 +291,7 @@ def test_a_listener_is_notified_of_each_subscriber(network: Network) -> None:
     print(sorted(got))
     sub.unregister()
     over.wait(10)
-""",
-    ) == ["['hello, all', 'hello, only you']", "gone /x 0"]
+""") == ["['hello, all', 'hello, only you']", "gone /x 0"]
 
 
 def test_remapped_topics_reach_other_nodes(network: Network) -> None:
