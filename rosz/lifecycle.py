@@ -1,4 +1,4 @@
-"""The life of whatever can be closed: open, closing, closed.
+"""The lifecycle of objects that can be closed: open, closing, closed.
 
 An owner has a `Lifecycle` and closes itself with it::
 
@@ -11,7 +11,7 @@ An owner has a `Lifecycle` and closes itself with it::
 
 The first `Lifecycle.close` does the work. A later one on another thread waits for the first; one on
 the same thread, from a hook or a signal handler, returns at once. No method holds a lock, so a
-signal handler may come in between anywhere.
+signal handler may interrupt any of them.
 
 Threads and Zenoh's links do not survive a fork. In a forked child this module closes every
 lifecycle of the parent, without running hooks and without closing parts, and then calls ``on_fork``
@@ -226,14 +226,14 @@ class Lifecycle:
                 part = self._parts.pop()
                 try:
                     part.close()
-                except Exception:  # noqa: BLE001  # a part may be anybody's
+                except Exception:  # noqa: BLE001  # a part may belong to the program
                     self._log.exception("a part of %s could not be closed", self._what)
         finally:
             self.closed = True
             self._until_closed.release()
 
     def _wait_for_closer(self) -> bool:
-        """Wait for the first caller, which the main thread must not outrun on its way out."""
+        """Wait for the first caller, so that the main thread does not end before it."""
         if _wait(self._until_closed, _CLOSED_BY):
             return True
         self._log.warning(
@@ -256,7 +256,7 @@ def _wait(until: threading.Lock, timeout: float | None) -> bool:
 
 
 def _remove(items: list[T], item: T) -> bool:
-    """Remove an item that may be gone already; tell whether it was there."""
+    """Remove an item if the list contains it; return whether it did."""
     try:
         items.remove(item)
     except ValueError:

@@ -99,7 +99,7 @@ class ClientGoal:
         self._client.forget(self)
 
     def update(self, statuses: list[GoalStatus]) -> None:
-        """Take the state of the goal from a status message."""
+        """Update the state of the goal from a status message."""
         if self._finished:
             return
         for status in statuses:
@@ -135,7 +135,7 @@ class ClientGoal:
         self._active_over.set()
 
     def receive_feedback(self, feedback: Any) -> None:
-        """Pass feedback on."""
+        """Call the feedback callback."""
         if not self.done:
             self._call(self._on_feedback, feedback)
 
@@ -149,7 +149,7 @@ class ClientGoal:
             starts = self._starts(status.status in _EXECUTED)
         if starts:
             self._activate()
-        # `on_done` comes after `on_active`, but never hangs on what that waits for.
+        # `on_done` is called after `on_active`, but waits only a limited time for it.
         self._active_over.wait(_ACTIVE_TIMEOUT)
         self._call(self._on_done, self)
         self._done.set()
@@ -174,7 +174,7 @@ class ActionClient:
         action_type: Class of the action, such as ``FibonacciAction``.
 
     Attributes:
-        node: As given.
+        node: Node that the client belongs to.
         name: Full name of the action.
 
     Raises:
@@ -203,7 +203,7 @@ class ActionClient:
             timeout: Time limit in seconds; none when not given or 0.
 
         Returns:
-            Whether one is.
+            Whether a server is connected.
         """
         topics = [f"{self.name}/{topic}" for topic in ("status", "feedback", "result")]
 

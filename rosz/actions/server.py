@@ -151,15 +151,15 @@ class ActionServer:
         return goal.goal
 
     def set_succeeded(self, result: Any = None, text: str = "") -> None:
-        """End the current goal as reached."""
+        """End the current goal as succeeded."""
         self._end_current(GoalStatus.SUCCEEDED, result, text)
 
     def set_aborted(self, result: Any = None, text: str = "") -> None:
-        """End the current goal as failed."""
+        """End the current goal as aborted."""
         self._end_current(GoalStatus.ABORTED, result, text)
 
     def set_preempted(self, result: Any = None, text: str = "") -> None:
-        """End the current goal as cancelled or replaced by a newer one."""
+        """End the current goal as preempted: cancelled, or replaced by a newer one."""
         self._end_current(GoalStatus.PREEMPTED, result, text)
 
     def publish_feedback(self, feedback: Any) -> None:

@@ -34,7 +34,7 @@ COMMANDS = {
 """Every command with its summary, in the order of ``rosz --help``."""
 
 _APPS = {"msg": "types:msg", "srv": "types:srv", "help": "manual:app"}
-"""Where an app is that is not ``app`` in the module of its command's name."""
+"""Module and name of each app that is not ``app`` in the module named like its command."""
 
 
 def load(name: str) -> App:

@@ -110,7 +110,7 @@ def expand(words: Sequence[str]) -> list[str]:
 
 
 def candidates(environment: Environment, words: Sequence[str], word: str) -> list[str]:
-    """Return the words that may stand at the cursor; not only those that begin as its word does.
+    """Return the words that may stand at the cursor, whatever its word begins with.
 
     The words before the cursor are those that `expand` returns.
 

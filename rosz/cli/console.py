@@ -1,4 +1,4 @@
-"""How commands print, write files, and are stopped."""
+"""Output, file writing and stopping of commands."""
 
 from __future__ import annotations
 

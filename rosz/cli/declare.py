@@ -1,4 +1,4 @@
-"""Declarations of commands: what each command takes, and what its help says.
+"""Declarations of commands: their arguments, options and help texts.
 
 A command is a function. The annotations of its parameters say which are positional arguments and
 which are options, as in typer. Typer takes longer to import than most commands take to run, so the
@@ -230,14 +230,14 @@ def values_last(*with_value: str) -> Callable[[list[str]], list[str]]:
 
 
 def seconds(option: str, value: float) -> float:
-    """Return a time limit in seconds if it makes sense."""
+    """Return a time limit in seconds, if it is in its bounds."""
     if not 0 < value <= _LONGEST:
         raise UsageError(f"{option} is {value:g}; expected seconds above 0, at most {_LONGEST:g}")
     return value
 
 
 def per_second(option: str, value: float | None) -> None:
-    """Check that a rate in hertz, if one is given, makes sense."""
+    """Check that a rate in hertz, if one is given, is in its bounds."""
     if value is not None and not 1 / _LONGEST <= value <= _MOST:
         raise UsageError(f"{option} is {value:g}; expected a rate above 0, at most {_MOST:g} Hz")
 

@@ -180,7 +180,7 @@ def _asked(**questions: str | bool | None) -> tuple[str, str] | None:
 
 
 class _Launch:
-    """What a command line of ``rosz launch`` names."""
+    """The files, arguments and settings of one ``rosz launch`` command line."""
 
     def __init__(self, words: Sequence[str], keys: Path | None) -> None:
         from rosz.launch.plan import SystemContext, parse_arguments

@@ -159,7 +159,7 @@ def _overview() -> str:
 
 
 def _invoke(app: App, argv: list[str], program: str) -> int:
-    """Run a command line of an app, by typer unless it is sound; return the exit code."""
+    """Run a command line of an app, with typer unless it is simple; return the exit code."""
     from rosz.cli.reading import read
 
     alone = bool(app.help) and not argv

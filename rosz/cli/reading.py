@@ -1,4 +1,4 @@
-"""Read a sound command line from the declarations of its command, without typer.
+"""Read a simple command line from the declarations of its command, without typer.
 
 All other lines (an unknown option, a missing argument, ``--help``, letters of options run together)
 are left to typer, which knows what they mean or what is wrong with them.

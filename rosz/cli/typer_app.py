@@ -76,7 +76,7 @@ def _group() -> None: ...
 
 
 def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
-    """Return a function for typer: it has typer's annotations, and calls the command's."""
+    """Return a function with typer's annotations that calls the function of a command."""
     signature = inspect.signature(command.function, eval_str=True).parameters
     fixed: dict[str, Any] = {}
     kept: list[inspect.Parameter] = []

@@ -146,7 +146,7 @@ def check_sight(
             lines.append(f"{here} and {there} do not see each other")
     yield error(
         "unreachable-peer",
-        "nodes that are there do not see each other",
+        "running nodes do not see each other",
         lines,
         "their machines reach a third one but not each other: run 'rosz core' on each and connect"
         " them (--connect), or open the firewall and let ROSZ_LISTEN name an address that the"
@@ -321,7 +321,7 @@ def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
     if silent:
         yield error(
             "replica-silent",
-            "replicas of the parameters do not reply: a write waits for them in vain",
+            "replicas of the parameters do not reply: a write may wait for them to time out",
             sorted(f"{member.label} (session {member.zid})" for member in silent),
             "they hang or are stopped: let them go on, or end them",
         )

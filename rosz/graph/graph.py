@@ -179,8 +179,8 @@ class Graph:
         Args:
             condition: Function that tells whether a view meets it.
             timeout: Time limit in seconds.
-            what: The name of what is waited for, for the error.
-            hint: What to do when it does not come, for the error.
+            what: Name of the condition, for the error.
+            hint: Advice at the end of the error text.
 
         Returns:
             The view that met the condition.

@@ -26,7 +26,7 @@ _STAMPS = frozenset({"builtin_interfaces/Time", "builtin_interfaces/Duration"})
 
 
 class EchoOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """How messages are shown.
+    """The options of an `Echo`.
 
     Attributes:
         plot: Whether to show rows of numbers.

@@ -22,7 +22,7 @@ DEFAULT_RATE = 10.0
 
 
 class SendOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """How messages are sent.
+    """The options of a `Sender`.
 
     Attributes:
         rate: Messages per second; None to latch one message.

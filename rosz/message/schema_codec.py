@@ -172,7 +172,7 @@ class _Writer:
             self.data += block if isinstance(block, bytes) else block.tobytes()
 
     def _by_number(self, kind: str, value: Any, path: str, error: Exception) -> bytes:
-        """Convert a sequence number by number, and name the one that is wrong."""
+        """Convert the numbers of a sequence one by one; the error names the wrong one."""
         if isinstance(value, str | bytes | bytearray | dict | set) or not hasattr(value, "__len__"):
             self._refuse(path, f"a sequence of {kind}", value)
         try:

@@ -141,7 +141,7 @@ class Client(Entity):
         try:
             response: Message = self.service_type.Response._decode(reply.payload)
         except DecodeError as error:
-            raise ServiceError(f"service [{self.name}] answered with damage: {error}") from error
+            raise ServiceError(f"service [{self.name}] sent a damaged response: {error}") from error
         return response
 
     def _late(self, limit: float) -> WaitTimeout:

@@ -1,4 +1,4 @@
-"""What the nodes of one process share: the session, the graph, the clock, and their end."""
+"""The context that the nodes of one process share: session, graph, clock and shutdown."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ class Context:
     Args:
         environment: Settings; those of the process when not given.
         argv: Command-line arguments without the program name; ROS arguments are taken out.
-        config: How to open the session; as the environment says when not given.
+        config: Settings of the session; those of the environment when not given.
 
     Attributes:
         session: The session.
         graph: The graph of the domain.
         clock: ROS time.
-        mesh: Whether the process is linked to all its neighbours yet.
+        mesh: Readiness of the session: whether it is linked to all its neighbours.
         direct_delivery: Samples for single subscriptions of this process.
         incompatible: Warnings about entities that cannot reach each other.
         passing: Whether this is a command, which holds no parameters, rather than a node.
-        permissions: What the rules let this machine do elsewhere, if it has any.
-        cooperative: Whether the program has shown that it asks whether it is to end.
+        permissions: Permissions of this machine on others; None without rules.
+        cooperative: Whether the program is known to check for the shutdown.
 
     Raises:
         TransportError: The session cannot be opened.
@@ -183,7 +183,7 @@ class Context:
 
     @property
     def reason(self) -> str:
-        """Why the context is shut down, or about to be."""
+        """Reason of the shutdown; may be set before it."""
         return self._lifecycle.reason
 
     @reason.setter
@@ -209,7 +209,7 @@ class Context:
         It may be called from any callback, and a second call has no effect.
 
         Args:
-            reason: Why, for the hooks and for errors.
+            reason: Reason of the shutdown, for hooks and errors.
         """
         self._lifecycle.close(self._disconnect, first=self.clock.close, reason=reason)
 

@@ -46,7 +46,7 @@ class NodeCore:
         began: Time of the start by the monotonic clock, in seconds.
         clock: Clock of the node, closed with it.
         log: Log of the node.
-        process: What the graph tells about the process of the node.
+        process: Token of the process of the node.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What publishers, subscriptions, services and clients have in common: key, token, lifecycle."""
+"""The base class of publishers, subscriptions, services and clients: key, token, lifecycle."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Entity:
 
     Attributes:
         key: Key expression of its data.
-        token: What the graph tells others about it.
+        token: Liveliness token of the entity.
         gid: 16 bytes that identify it.
 
     Raises:

@@ -56,7 +56,7 @@ class LogOptions(TypedDict, total=False):
     Attributes:
         exc_info: An exception to show, or True for the one being handled.
         stack_info: Whether to show the stack.
-        stacklevel: How many frames up the message is said to come from; 1 is the caller.
+        stacklevel: Number of frames up to the one that is shown as the origin; 1 is the caller.
         extra: Attributes for the record.
         once: Whether to log this line of the program only the first time.
         throttle: Shortest time in seconds between two messages of this line of the program.

@@ -1,4 +1,4 @@
-"""Where a node's log goes: console, a file of bounded size, ``/rosout``; ROS's severities."""
+"""The handlers of a node's log: console, a file of bounded size, ``/rosout``; ROS's severities."""
 
 from __future__ import annotations
 

@@ -190,7 +190,7 @@ class Publisher(Entity, Generic[M]):
             timeout: Time limit in seconds.
 
         Raises:
-            WaitTimeout: There were fewer at the end of the time.
+            WaitTimeout: There were fewer when the time limit was reached.
             ClosedError: The context was shut down meanwhile.
             UsageError: The timeout is not a number.
         """
@@ -242,4 +242,4 @@ class Publisher(Entity, Generic[M]):
 
     def _forked(self) -> None:
         self._ordered = threading.RLock()
-        self._held = []  # so that publish looks whether it is open
+        self._held = []  # so that `publish` checks whether the publisher is open

@@ -86,7 +86,7 @@ class _Handler:
         threading.Thread(target=self._watch, name="rosz-signal-watch", daemon=True).start()
 
     def add(self, context: Context) -> None:
-        """Shut this context down, too."""
+        """Add a context that the signals shut down."""
         self._contexts = [*(c for c in self._contexts if not c.is_shutdown), context]
         self._asked = False
 

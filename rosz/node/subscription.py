@@ -1,12 +1,12 @@
 """Subscriptions: from Zenoh's samples to a callback, an iterator or `Subscription.get`.
 
-There is one way in, `Subscription._receive`, which puts a sample into the queue of the
-subscription; it is decoded when its turn comes, so a sample that newer ones push out costs nothing.
+`Subscription._receive` puts a sample into the queue of the subscription. A sample is decoded when
+it is taken from the queue, so a sample that newer ones displace is not decoded.
 
 With a callback, live samples skip that queue: Zenoh's own ring holds them, and a thread takes them
-from there. Python then has no part before a sample's turn comes, which halves the time from arrival
-to callback. Only replays of latching publishers and directly delivered samples come by the queue,
-and have a second thread, started with the first of them; callbacks run one at a time.
+from there. No Python code runs before a sample is taken, which halves the time from arrival
+to callback. Only replays of latching publishers and directly delivered samples use the queue,
+which a second thread reads; it starts with the first of them. Callbacks run one at a time.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ __all__ = ("GenericSubscription", "MessageInfo", "Subscription")
 M = TypeVar("M")
 
 _ALL = 1 << 17
-"""Samples to keep when all are to be kept: a callback that hangs must not eat the memory."""
+"""Largest depth for keep_all, so that a callback that hangs does not exhaust the memory."""
 
 _MOST = 1 << 20
 """Largest queue: Zenoh allocates 256 bytes for each sample at once, and aborts if it cannot."""
@@ -51,7 +51,7 @@ _PUBLISHERS = 1000
 
 
 class MessageInfo(msgspec.Struct, frozen=True):
-    """Where a message comes from.
+    """The origin of a message.
 
     Attributes:
         source_time: Time of publication by the sender's clock, in nanoseconds since the Unix epoch;
@@ -80,7 +80,7 @@ Received = tuple[Any, MessageInfo | None]
 
 
 class _Publisher:
-    """What is remembered of a publisher."""
+    """The last sequence number of a publisher, and whether its samples may be replayed."""
 
     __slots__ = ("last", "replays")
 
@@ -299,7 +299,7 @@ class Subscription(Entity, Generic[M]):
         return None if decoder is None else decoder.decode(sample)
 
     def _dispatch(self, sample: Sample | Reply, decoder: _Decoder | None = None) -> None:
-        """Call the callback with a sample whose turn it is."""
+        """Decode a sample, and call the callback with the message."""
         callback = self._callback
         if callback is None or self._queue.closed:
             return
@@ -314,7 +314,7 @@ class Subscription(Entity, Generic[M]):
                     callback(received[0])
         except BaseException as error:  # noqa: BLE001  # the thread outlives what a callback raises
             ending = self._queue.closed or self.node.context.is_shutdown
-            # What a callback tries while its node is being shut down is not its fault.
+            # A callback may use its node while that is being shut down.
             if not (ending and isinstance(error, ClosedError)):
                 self.node.log.report(f"callback of '{self.name}' failed", error)
 
@@ -372,7 +372,7 @@ class Subscription(Entity, Generic[M]):
         return self._async_messages()
 
     async def _async_messages(self) -> AsyncIterator[M]:
-        import asyncio  # a third of what a node would load, for the few that use it
+        import asyncio  # it takes long to import, and few programs need it
 
         queue, loop = self._queue, asyncio.get_running_loop()
         arrived = asyncio.Event()
@@ -451,7 +451,7 @@ class Subscription(Entity, Generic[M]):
         try:
             return self._decoder_for(ros_type(dds_name), type_hash)
         except DecodeError:
-            return None  # something else of Zenoh's below the name of the topic
+            return None  # a key of Zenoh itself below the name of the topic
 
     def _decoder_for(self, type_name: str, type_hash: str) -> _Decoder | None:
         """Return the decoder for a type; ``None``, after one warning, if it cannot be decoded."""
@@ -520,9 +520,9 @@ class GenericSubscription(Subscription[Any]):
 class _Queue:
     """The newest samples, and the threads and event loops that wait for them.
 
-    A lock serves as the bell: it is locked while nothing new has come, and releasing it wakes one
-    waiter. That takes a fraction of the time of a condition, on a path that every sample goes.
-    Whoever leaves items for others, or finds the queue closed, wakes the next one.
+    A lock notifies the waiters: it is locked while no new item has come, and releasing it wakes one
+    waiter. A condition takes several times as long, and every sample takes this path.
+    A thread that leaves items in the queue, or finds it closed, wakes the next waiter.
 
     Args:
         depth: Number of newest samples to keep.
@@ -575,7 +575,7 @@ class _Queue:
         return None
 
     def add_waker(self, waker: Callable[[], None]) -> None:
-        """Call a function with each item, and at the end."""
+        """Call a function whenever an item is added, and when the queue is closed."""
         self._wakers = (*self._wakers, waker)
 
     def remove_waker(self, waker: Callable[[], None]) -> None:

@@ -22,7 +22,7 @@ _THREADS = 4
 _REASON = "new node registered with same name"
 _REPLY_TIMEOUT = 1.0
 _TOGETHER = 0.2
-"""Seconds; of two nodes that start within this time, their own clocks tell which one is newer."""
+"""Seconds between two starts below which the times in the tokens tell which node is newer."""
 
 
 def yield_to_newer(node: NodeCore) -> None:
@@ -47,7 +47,7 @@ def _compare(node: NodeCore, other: ProcessToken) -> None:
 
 
 def _is_newer(node: NodeCore, other: ProcessToken) -> bool:
-    """Return whether another node is newer, whatever the clocks of the two machines show."""
+    """Return whether another node is newer, even if the clocks of the two machines differ."""
     key = control_key(other.domain, other.zid, other.node_id)
     request = msgspec.msgpack.encode(Request("info"))
     asked = time.monotonic()
@@ -61,5 +61,5 @@ def _is_newer(node: NodeCore, other: ProcessToken) -> bool:
         lead = asked + journey / 2 - node.began - infos[0].age
         if abs(lead) > max(_TOGETHER, journey):
             return lead > 0
-    # Two that start together, or one that does not respond: the times they gave themselves decide.
+    # They started together, or the other one did not respond: compare the times in their tokens.
     return other.newer_than(node.process)

@@ -131,7 +131,7 @@ class Rate:
 
 
 class TimerEvent(msgspec.Struct, frozen=True):
-    """When a call of a timer was due and when it was made; ROS 1's fields, in nanoseconds.
+    """The times at which calls of a timer were due and made; ROS 1's fields, in nanoseconds.
 
     Attributes:
         last_expected: Time at which the previous call was due; None at the first.

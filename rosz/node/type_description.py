@@ -1,4 +1,4 @@
-"""How a type is defined: ROS 2's service ``get_type_description``, both sides (REP 2016)."""
+"""ROS 2's service ``get_type_description``, server and client (REP 2016)."""
 
 from __future__ import annotations
 

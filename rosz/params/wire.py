@@ -285,7 +285,7 @@ class Index(msgspec.Struct, array_like=True):
 
 
 class SyncRequest(msgspec.Struct, omit_defaults=True):
-    """What one replica sends another to find their differences, or to settle them.
+    """A request of one replica to another, to find their differences or to remove them.
 
     Attributes:
         digest: Digest of the sender's writes.
@@ -315,7 +315,7 @@ class SyncReply(msgspec.Struct, omit_defaults=True):
 
 
 class ClientRequest(msgspec.Struct, omit_defaults=True):
-    """What a process without a replica asks of one.
+    """A request of a process without a replica to a replica.
 
     Attributes:
         verb: ``get``, ``names``, ``search``, ``stamp`` or ``write``.

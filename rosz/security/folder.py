@@ -112,7 +112,7 @@ class KeyFolder(msgspec.Struct, frozen=True):
 
 
 class LocalPermissions:
-    """What rules permit the machine that has them.
+    """The permissions of this machine according to its rules.
 
     Other machines refuse what their rules do not permit, and say nothing. If all machines have the
     same rules, and these name this machine, it can be warned at once.
@@ -201,7 +201,7 @@ def load_rules(file: Path) -> Rules:
     try:
         check_trusted(file)
         if not file.is_file():  # opening a pipe would block
-            raise UsageError(f"'{file}' is no regular file")
+            raise UsageError(f"'{file}' is not a regular file")
         return read_rules(file.read_text(encoding="utf-8"), str(file))
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"cannot read '{file}': {error}") from error

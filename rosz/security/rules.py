@@ -75,7 +75,7 @@ class Permit(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Rules(msgspec.Struct, frozen=True):
-    """Who may do what.
+    """The access rules: the permissions of all holders of keys.
 
     Attributes:
         permits: What each holder may do, by the name in its certificate; what all may do is under

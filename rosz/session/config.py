@@ -39,13 +39,13 @@ __all__ = (
 
 _RETRY_MS = 200
 _LEASE_MS = 60_000
-"""How long others keep a link that is silent: a process that was stopped for a while keeps its own.
+"""Milliseconds for which others keep a silent link, so that a stopped process keeps its links.
 """
 _LEASE_BEYOND_MS = 8_000
 """The same beyond the machine. A link that was cut is opened again after this time. TCP by itself
-tries ever more rarely, so that after a minute without connection it may pause for another one."""
+pauses longer after each attempt, so after a minute without connection it may wait another one."""
 _LOCAL_LINKS = {"open_timeout": 10_000, "accept_timeout": 60_000, "accept_pending": 1000}
-"""How long either end tries to open a link, and how many links may be opened at a time. Answers
+"""Time limits for opening a link in milliseconds, and how many may be opened at a time. Answers
 take long when many processes start at once, and Zenoh tries each peer that it heard of only once.
 """
 _OPEN_BEYOND_MS = 3_000
@@ -54,7 +54,7 @@ _ROUTER_TIMEOUT = 10.0
 """Seconds that a node waits for its router, which may have been started just before it."""
 
 EPHEMERAL = "tcp/127.0.0.1:0"
-"""Where a peer listens for sessions of its machine: at any port."""
+"""Endpoint at which a peer listens for sessions of its machine, on any free port."""
 _AUTOCONNECT = {"router": ["router"], "peer": ["router", "peer"], "client": ["router"]}
 """The sessions found by multicast that each mode connects to; Zenoh's routers connect to none."""
 _ONE_DIALS = {"autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}}}
@@ -66,7 +66,7 @@ _GREATEST = b"\xff\xff"
 that reaches beyond the machine may be unreachable for these, so it connects to them."""
 _COUNTDOWN_BYTES, _RANDOM_BYTES = 6, 8
 _EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
-"""Where a peer listens that others find by multicast."""
+"""Endpoint at which a peer listens that others find by multicast."""
 
 _INTERFACES = Path("/sys/class/net")
 _LOOPBACK = "772"
@@ -271,7 +271,7 @@ def connect_endpoint(text: str) -> str:
 def listen_endpoints(
     rendezvous: str, listen: Sequence[str], *, keys: bool = False
 ) -> tuple[str, ...]:
-    """Return where to listen so that the rendezvous is held at all addresses of its name.
+    """Return the endpoints that hold the rendezvous at all addresses of its host name.
 
     ``tcp/0.0.0.0:7447`` includes ``127.0.0.1:7447``, and a second listener there would fail. Where
     ``localhost`` is also ``::1``, that address has to be held too, or the next node would hold it.

@@ -1,4 +1,4 @@
-"""What is declared on a session: publishers, subscribers, and the threads that call back."""
+"""Declarations on a session: publishers, subscribers, and the threads that call back."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class CallbackThread(Declared):
 
     def __init__(self, what: str, entity: Any, callback: Callable[[Any], None]) -> None:
         super().__init__(what, entity)
-        # The thread must not refer to this object, else nobody would undeclare it. And the items
+        # The thread must not refer to this object, else it would not be undeclared. The items
         # must not leave this package, not even as arguments: see `rosz.session.at_exit`.
         recv = entity.handler.recv
         item: Any = None
@@ -188,6 +188,6 @@ class RawPublisher(Declared):
             ClosedError: The publisher or the session is closed.
         """
         if self._entity is None:
-            raise ClosedError(f"nobody hears '{self.key}': the publisher is closed")
+            raise ClosedError(f"'{self.key}' has no subscribers: the publisher is closed")
         with translate_errors(f"look for subscribers of '{self.key}'"):
             return bool(self._entity.matching_status.matching)

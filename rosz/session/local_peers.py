@@ -2,7 +2,7 @@
 
 A process that finds nobody at the rendezvous may be the first one. But the process that held the
 rendezvous may also have just died, before its peers could find the newcomer, or it may be stopped,
-so that it introduces nobody to anybody. So each session registers itself with a socket in Linux's
+so that it does not introduce peers. So each session registers itself with a socket in Linux's
 abstract namespace, which disappears with the process. Nothing is ever sent to it. Its name contains
 the process id and the loopback port where the session can be reached directly.
 
@@ -188,7 +188,7 @@ class LocalRegistration:
         reachable: Whether to reserve a port that the session will listen at.
 
     Attributes:
-        peer: What others see.
+        peer: Registration that others read.
 
     Raises:
         TransportError: This process has registered another session that is not reachable: a router.

@@ -95,7 +95,7 @@ class MeshReadiness:
                 try:
                     callback()
                 except RoszError as error:
-                    _log.warning("cannot send what was held: %s", error)
+                    _log.warning("cannot send the held samples: %s", error)
 
     def _wait(self) -> None:
         deadline = time.monotonic() + self._timeout
@@ -132,7 +132,7 @@ def serve_links(session: Session) -> Closable:
 
 @cache
 def machine_id() -> str:
-    """Return an id that all processes share that can reach each other by loopback."""
+    """Return the id of this machine; processes with the same id reach each other by loopback."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
         return f"{boot}-{Path('/proc/self/ns/net').stat().st_ino}"

@@ -61,7 +61,7 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         UsageError: The override text is malformed.
     """
     if config.mode == "client" and not config.must_connect and peers.is_any_running:
-        # When many nodes start at once, some come last.
+        # When many nodes start at once, some of them are answered late.
         longer = max(config.open_timeout, _BUSY_TIMEOUT)
         config = msgspec.structs.replace(config, open_timeout=longer)
     reachable = reachable_config(config, peers)
@@ -69,7 +69,7 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         raise _nobody(config)
     config = reachable
     if config.shared_memory and SEGMENTS.exists() and not os.access(SEGMENTS, os.W_OK):
-        _log.warning("no shared memory, for %s cannot be written to: samples go by links", SEGMENTS)
+        _log.warning("no shared memory: %s cannot be written to; samples go over links", SEGMENTS)
         config = msgspec.structs.replace(config, shared_memory=0)
     settings = _settings(config)
     if own is not None:
@@ -92,7 +92,7 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
 
 
 def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return where a session would listen and connect, by everything that configures it.
+    """Return the endpoints to listen at and to connect to, from the whole configuration.
 
     Raises:
         TransportError: A configuration value is refused.
@@ -158,7 +158,7 @@ def _quoted(config: SessionConfig) -> str:
 
 
 def _refused_links(config: SessionConfig) -> Iterator[str]:
-    """Yield the endpoints that refuse links for want of the right keys, each with the reason.
+    """Yield the endpoints that refuse links because of missing or wrong keys, with the reason.
 
     This connects to each endpoint, which takes seconds where nobody answers.
     """
@@ -171,7 +171,7 @@ def _refused_links(config: SessionConfig) -> Iterator[str]:
         if config.keys is not None:
             reason = refusal(endpoint, config.keys)
         elif wants_keys(endpoint):
-            reason = "it wants keys, and there are none here: set ROSZ_KEYS"
+            reason = "it requires keys, and this machine has none: set ROSZ_KEYS"
         else:
             reason = ""
         if reason:

@@ -1,4 +1,4 @@
-"""Queries, their replies, and what is declared for either side."""
+"""Queries, replies, queriers and queryables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = (
 )
 
 Target = Literal["all", "all_complete", "best"]
-"""Who gets a query: all queryables, those that have all there is, or the best of these."""
+"""Queryables that get a query: all, those declared complete, or the best one of these."""
 
 TARGETS: Final = {
     "all": zenoh.QueryTarget.ALL,

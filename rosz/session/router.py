@@ -1,7 +1,7 @@
 """A Zenoh router at the rendezvous: the session of ``rosz core``.
 
-Nothing needs it, because nodes find each other by themselves. It gives what only a process that
-stays can give: a rendezvous that does not move, and links to other machines.
+Nodes find each other without it. It provides what needs a permanent process: a rendezvous that does
+not move, and links to other machines.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _OCCUPIED: Final = re.compile(
     r"bound to (\S+?): \[.*address already in use|listener on (\S+) - unable to acquire lock",
     re.IGNORECASE,
 )
-"""What Zenoh says about a TCP endpoint, and about a unix socket, that another process holds."""
+"""Errors of Zenoh for a TCP endpoint, and for a unix socket, that another process holds."""
 _POLL_SECONDS: Final = 2.0
 _ON_INTERFACE: Final = "#iface="
 _log = logging.getLogger("rosz.core")
@@ -77,7 +77,7 @@ class Router:
             endpoint = next((one for one in self.endpoints if one.endswith(place)), place)
             raise TransportError(
                 f"'{endpoint}' is occupied: another core, or a node that the others meet at, holds"
-                " it; all goes on as it is, or end that one and start the core then"
+                " it; nodes keep working with it, or end it and start the core again"
             ) from error
         if any(_ON_INTERFACE in place for place in self.endpoints):
             self._lifecycle.keep(_NewInterfaces(config))

@@ -1,4 +1,4 @@
-"""What arrives on a session: samples, and the time stamps that order writes.
+"""Samples that arrive on a session, and the time stamps that order writes.
 
 `Sample` is a thin view of Zenoh's object, which decodes an attribute when it is read.
 
@@ -22,7 +22,7 @@ _SECOND = 1_000_000_000
 
 
 class Stamp(msgspec.Struct, frozen=True, order=True):
-    """A moment that no two writes share; ordered by time, then by clock.
+    """A unique time stamp of a write; ordered by time, then by clock.
 
     Attributes:
         time: Nanoseconds since the Unix epoch, moved forward where the order requires it.

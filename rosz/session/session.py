@@ -1,4 +1,4 @@
-"""The Zenoh session: the one way to the network.
+"""The Zenoh session, which all communication uses.
 
 No Python runs on the threads of Zenoh: what arrives waits in channels of Zenoh, and threads of
 Python receive it from there. Otherwise a link would wait for Python's lock, and a thread of Zenoh
@@ -52,7 +52,7 @@ from rosz.worker import start_thread
 __all__ = ("Session",)
 
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
-"""What to do when a link is full, by whether to wait for it."""
+"""Congestion control for a full link, by whether to wait for it."""
 _HEARTBEAT_SECONDS = 0.5
 
 _log = logging.getLogger("rosz.session")
@@ -332,7 +332,7 @@ class Session:
             payload: The payload of the query.
             attachment: The bytes to send beside the payload.
             parameters: The part of the selector after the ``?``.
-            target: Who gets the query.
+            target: Queryables that get the query.
             any_key: Whether replies may be for keys that ``key`` does not match.
             cancel: The cancellation that can end the query early; one that was cancelled before
                 makes the query raise `ClosedError`.

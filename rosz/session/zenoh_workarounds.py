@@ -158,7 +158,7 @@ def connect_to_running(settings: zenoh.Config, peers: LocalPeers) -> None:
     if pid is None:
         return
     what = f"{describe_process(pid)} holds the meeting point {peers.rendezvous} and is stopped"
-    _log.warning("%s: it is not reached until it goes on (%s)", what, how_to_resume(pid))
+    _log.warning("%s: it is not reached until it resumes (%s)", what, how_to_resume(pid))
     running = [f"{endpoint}#{_RARE_RETRIES}" for endpoint in peers.running]
     connect = [*running, *json.loads(settings.get_json("connect/endpoints"))]
     settings.insert_json5("connect/endpoints", json.dumps(connect))

@@ -38,7 +38,7 @@ def read_attachment(data: bytes | None) -> tuple[int, int, bytes]:
         DecodeError: The attachment is missing, damaged, or in the layout of an older release.
     """
     if data is None:
-        raise DecodeError("attachment", -1, "missing; the sender is no ROS 2 or rosz node")
+        raise DecodeError("attachment", -1, "missing; the sender is not a node of ROS 2 or rosz")
     if len(data) == _OLD_SIZE:
         raise DecodeError(
             "attachment", 0, "in the layout of rmw_zenoh before 0.2.5; update the sender"

@@ -186,8 +186,8 @@ def test_answers(network: Network, node: Node, plain: Plain) -> None:
                     query.reply(f"42/add/{ADD}", payload)
         return ends.get(timeout=TIMEOUT)
 
-    assert "service [/add] answered with damage: " in str(answer(b"\0\1\0\0\1"))
-    assert "service [/add] answered with damage: " in str(answer(b""))
+    assert "service [/add] sent a damaged response: " in str(answer(b"\0\1\0\0\1"))
+    assert "service [/add] sent a damaged response: " in str(answer(b""))
     assert "responded with an error: \ufffd\ufffd" in str(answer(b"\xff\xfe", error=True))
     assert answer(struct.pack("<4sq", b"\0\1\0\0", 3), times=2) == 3
 

@@ -236,7 +236,7 @@ def test_a_signal_handler_in_the_midst_of_work_reads_what_was_and_is_refused_the
         shared.defer(message("b", 1, 1))
         seen.append(shared.root)
         for refused in (lambda: stored(shared), lambda: shared.write([(("a",), 3)], "handler")):
-            with pytest.raises(ParamError, match="have it start a thread"):
+            with pytest.raises(ParamError, match="start a thread from it"):
                 refused()
         return apply(writes)
 

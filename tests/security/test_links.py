@@ -192,7 +192,7 @@ def test_without_a_key(pair: Pair) -> None:
     listing = pair.laptop.rosz("topic", "list")
     assert listing.exit_code() == 1
     assert "/odom" not in listing.output
-    assert "no link to 'tcp/robot:7447': it wants keys, and there are none here" in listing.output
+    assert "'tcp/robot:7447': it requires keys, and this machine has none" in listing.output
     core.wait_for("WARNING: a link is refused: received corrupt message of type InvalidContentType")
     assert robot.output == "up"
 
@@ -227,7 +227,7 @@ def test_cores_log_why_a_link_is_refused(pair: Pair) -> None:
     _, robot = pair.start()
     del pair.laptop.variables["ROSZ_KEYS"]
     without = pair.laptop.rosz("core", "--connect", "tcp/robot:7447")
-    without.wait_for("no link to 'tcp/robot:7447': it wants keys")
+    without.wait_for("no link to 'tcp/robot:7447': it requires keys")
     robot.kill()
 
 

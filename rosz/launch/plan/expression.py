@@ -5,7 +5,7 @@ tuples, sets, dicts, f-strings, and call the functions and methods listed here; 
 refused by name. Names are looked up in roslaunch's order: the functions of launch files and of
 `math`, the args of the file, then those functions of Python that only compute.
 
-An expression may come from a stranger. It has no loops, so the number of its operations is limited
+An expression may be untrusted. It has no loops, so the number of its operations is limited
 by its length. The total size of all values is limited too: each value is charged when it is
 computed, and the operations whose result may be huge are charged before they run.
 """
@@ -154,7 +154,7 @@ def evaluate(
 
 
 class _Refused(Exception):
-    """An expression that is not allowed or makes too large values."""
+    """An expression that is not allowed, or whose values are too large."""
 
 
 _PYTHON_ERRORS = (ArithmeticError, LookupError, RecursionError, TypeError, ValueError)
@@ -362,12 +362,12 @@ def _check_width(name: str, args: tuple[Any, ...]) -> None:
         case ".format", (str(template), *_):
             for _, field, form, _ in string.Formatter().parse(template):
                 if "." in (field or ""):
-                    raise _Refused(f"'{{{field}}}' reaches for an attribute")
+                    raise _Refused(f"'{{{field}}}' accesses an attribute")
                 wide = wide or "{" in (form or "") or bool(_WIDE.search(form or ""))
         case ".center" | ".ljust" | ".rjust" | ".zfill", (_, int(width), *_):
             wide = width > _MAX_WIDTH
     if wide:
-        raise _Refused(f"it makes a field wider than {_MAX_WIDTH}, or of a width from a value")
+        raise _Refused(f"it makes a field wider than {_MAX_WIDTH}, or one whose width is computed")
 
 
 def _growth(name: str, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> float:

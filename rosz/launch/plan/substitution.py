@@ -209,7 +209,7 @@ def _collect(text: str) -> list[tuple[str, int]]:
     for match in _SUBSTITUTION.finditer(text):
         content, end = match.groups()
         if end in {"$", "("}:
-            reason = "they do not nest, $(eval …) can combine values"
+            reason = "substitutions do not nest; $(eval …) can combine values"
             raise TextError(f"'{end}' inside a substitution; {reason}", match.start(2))
         if content and end:
             found.append((content, match.start()))

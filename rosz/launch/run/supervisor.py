@@ -477,7 +477,7 @@ class Supervisor:
             self.casualties.append(process)
 
     def finished(self, process: Process) -> None:
-        """Handle that a process and its descendants have ended for good."""
+        """Handle the final end of a process and its descendants."""
         self._call_back(process)
         self._end_when_over()
 

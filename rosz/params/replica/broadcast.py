@@ -2,7 +2,7 @@
 
 A write is acknowledged, and `WriteBroadcaster.send` returns, when every live replica has applied
 it. A replica that has not acknowledged it after a moment is sent it once more, as a query to it
-alone. One that still does not answer in time is lagging: no write waits for it until it is heard of
+alone. One that still does not answer in time is lagging: no write waits for it until it answers
 again.
 """
 
@@ -214,7 +214,7 @@ class WriteBroadcaster:
             self._publisher.put(message)
 
     def _all_stopped(self, pending: PendingWrite) -> bool:
-        """Tell whether all sessions waited for are stopped; they get the write when they go on."""
+        """Tell whether all sessions waited for are stopped; they get the write when they resume."""
         return self._session.out_of_reach().issuperset(pending.waiting.copy())
 
     def _labels(self, late: Collection[str]) -> list[str]:
@@ -274,8 +274,8 @@ class WriteBroadcaster:
         ack = _ACK.pack(number) + self._own
         publisher = self._ack_publishers.get(sender)
         try:
-            # On Zenoh's thread: an acknowledgement that waits for a full link would hold up all
-            # that arrives, and one that is lost is asked for again.
+            # On Zenoh's thread: an acknowledgement that waits for a full link would delay the
+            # samples that arrive. If it is lost, the writer sends the write again.
             if publisher is not None:
                 publisher.put(ack)
             else:

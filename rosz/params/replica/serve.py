@@ -1,4 +1,4 @@
-"""What a replica does for programs that have none.
+"""The services of a replica for programs that do not have one.
 
 `ClientServer` reads and writes for `rosz.params.remote.ParamClient`, mostly commands.
 

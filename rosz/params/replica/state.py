@@ -37,8 +37,8 @@ _MAX_SUGGESTIONS: Final = 200
 """Names beside a missing one that are compared with it."""
 
 _INTERRUPTED: Final = (
-    "a signal handler interrupted its thread at work on the parameters, and cannot work on them"
-    " itself: have it start a thread that does"
+    "a signal handler interrupted its thread during a change of the parameters, and cannot do one"
+    " itself; start a thread from it that does"
 )
 
 

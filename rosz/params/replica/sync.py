@@ -56,7 +56,7 @@ _SPREAD: Final = 0.05
 """Seconds for each ten replicas over which those that find each other spread their requests."""
 
 _MAX_COMPARED: Final = 8
-"""Replicas to compare with of those that appear together; with more, many that start never end."""
+"""Replicas to compare with, of those that appear together; with more, a large start never ends."""
 
 _RETRY_REFUSED_AFTER: Final = 3600.0
 """Seconds before a refused write is sent again: the rules on the way may have changed."""
@@ -144,7 +144,7 @@ class Synchroniser:
     def compare_soon(self, member: Member) -> None:
         """Compare with a replica that has appeared, after a random delay.
 
-        Of many that appear together, such as those behind a link that is back, a few are enough:
+        Of many that appear together, such as those behind a restored link, a few are enough:
         they have told each other what they know. Anti-entropy finds what is missing even so.
         """
         self.worker.submit(lambda: self._add_appeared(member.zid))

@@ -185,7 +185,7 @@ class Subscriber(Topic):
     Args:
         name: Name of the topic.
         data_class: Message class; ``rospy.AnyMsg`` for messages of any type, not decoded.
-        callback: Function of a message, called on the thread of the topic.
+        callback: Function called with each message, on the thread of the topic.
         callback_args: Second argument for the callback, if it is not None.
         queue_size: Number of the newest messages to keep; 10 000 when not given or 0.
         buff_size: Ignored; there is no such buffer.

@@ -60,7 +60,7 @@ class DurabilityPolicy(IntEnum):
 
 
 class LivelinessPolicy(IntEnum):
-    """How a publisher shows that it is alive; for information only."""
+    """The liveliness policy of a publisher; for information only."""
 
     SYSTEM_DEFAULT = 0
     AUTOMATIC = 1
