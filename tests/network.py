@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import socket
@@ -14,7 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from textwrap import dedent
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import pytest
 
@@ -68,65 +69,96 @@ def eventually(
 
 
 class Program:
-    """A Python program whose output can be waited for.
+    """A process whose output can be waited for.
 
     Args:
-        command: What to run.
-        variables: The environment.
+        command: Command line.
+        variables: Environment.
+        folder: Working directory; that of the tests when None.
+        separate: Whether to keep the lines of stderr apart, in `errors`.
+
+    Attributes:
+        lines: Lines that it has written, to either stream or to stdout.
+        errors: Lines that it has written to stderr, if these are kept apart.
     """
 
-    def __init__(self, command: Sequence[str], variables: dict[str, str]) -> None:
+    def __init__(
+        self,
+        command: Sequence[str],
+        variables: dict[str, str],
+        folder: Path | None = None,
+        *,
+        separate: bool = False,
+    ) -> None:
         self.lines: list[str] = []
+        self.errors: list[str] = []
         self._changed = threading.Condition()
-        self._ended = False
         self.process = subprocess.Popen(
             command,
             env=variables,
+            cwd=folder,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            stderr=subprocess.PIPE if separate else subprocess.STDOUT,
             text=True,
             bufsize=1,
             start_new_session=True,
         )
         self.pid = self.process.pid
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        streams = ((self.process.stdout, self.lines), (self.process.stderr, self.errors))
+        self._readers = [
+            threading.Thread(target=self._read, args=(stream, lines), daemon=True)
+            for stream, lines in streams
+            if stream is not None
+        ]
+        self._reading = len(self._readers)
+        for reader in self._readers:
+            reader.start()
 
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
+    def _read(self, stream: IO[str], lines: list[str]) -> None:
+        for line in stream:
             with self._changed:
-                self.lines.append(line.rstrip("\n"))
+                lines.append(line.rstrip("\n"))
                 self._changed.notify_all()
         with self._changed:
-            self._ended = True
+            self._reading -= 1
             self._changed.notify_all()
 
     @property
     def output(self) -> str:
         """All that it wrote so far, to either stream."""
         with self._changed:
-            return "\n".join(self.lines)
+            return "\n".join(self.lines + self.errors)
 
-    def wait_for(self, text: str, timeout: float = TIMEOUT, *, after: int = 0) -> str:
+    def wait_until(self, condition: Callable[[], object], timeout: float = TIMEOUT) -> bool:
+        """Wait until its output fulfils a condition, and return whether it does.
+
+        Args:
+            condition: Function that is called after each line.
+            timeout: Time limit in seconds; the end of the output ends the wait, too.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: condition() or not self._reading, timeout)
+            return bool(condition())
+
+    def wait_for(
+        self, text: str | re.Pattern[str], timeout: float = TIMEOUT, *, after: int = 0
+    ) -> str:
         """Wait for a line with a text in it, and return the first such line.
 
         Args:
-            text: What to look for.
-            timeout: Seconds.
-            after: Lines to leave out at the beginning.
+            text: Text or regular expression to look for.
+            timeout: Time limit in seconds.
+            after: Number of lines to leave out at the beginning.
         """
+        pattern = re.compile(re.escape(text)) if isinstance(text, str) else text
 
         def found() -> list[str]:
-            return [line for line in self.lines[after:] if text in line]
+            return [line for line in self.lines[after:] + self.errors if pattern.search(line)]
 
-        with self._changed:
-            self._changed.wait_for(lambda: found() or self._ended, timeout)
-            lines = found()
-        if not lines:
-            pytest.fail(f"no line with '{text}' from the program, only:\n{self.output}")
-        return lines[0]
+        if not self.wait_until(found, timeout):
+            pytest.fail(f"no line with '{pattern.pattern}' from the program, only:\n{self.output}")
+        return found()[0]
 
     def say(self, line: str) -> None:
         """Write a line to its standard input."""
@@ -148,18 +180,22 @@ class Program:
             code = self.process.wait(timeout)
         except subprocess.TimeoutExpired:
             self.send(signal.SIGABRT)  # faulthandler tells where it stands
-            self._reader.join(5)
+            self._join(5)
             pytest.fail(f"the program did not end within {timeout:g} s:\n{self.output}")
-        self._reader.join(timeout)
+        self._join(timeout)
         return code
+
+    def _join(self, timeout: float) -> None:
+        for reader in self._readers:
+            reader.join(timeout)
 
     def close(self) -> None:
         """Leave nothing of it behind."""
         if self.process.poll() is None:
             os.killpg(self.pid, signal.SIGKILL)
         self.process.wait()
-        self._reader.join(TIMEOUT)
-        for stream in (self.process.stdin, self.process.stdout):
+        self._join(TIMEOUT)
+        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
             if stream is not None:
                 stream.close()
 

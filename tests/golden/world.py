@@ -110,9 +110,7 @@ class GoldenWorld(Rosz):
         with ExitStack() as stack:
             stack.push(self)
             super().__enter__()
-            robot = self.start(sys.executable, str(_ROBOT))
-            assert robot.stdout is not None
-            assert robot.stdout.readline() == "ready\n"
+            self.start(sys.executable, str(_ROBOT)).wait_for("ready", _LIMIT)
             stack.pop_all()
         return self
 

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import signal
 import socket
-import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from network import eventually, free_port
+from network import Program, eventually, free_port
 
 ROOT = Path(__file__).parents[2]
 TIMEOUT = 50.0
 
 
-class Process:
-    """One member; `tell` and `answer` are apart so that many can work at a time."""
+class Process(Program):
+    """A member, which replies to requests in lines of JSON.
+
+    `tell` and `answer` are apart so that many work at a time.
+    """
 
     def __init__(
         self,
@@ -42,39 +43,22 @@ class Process:
             "file": file,
             "more": more,
         }
-        self._process = subprocess.Popen(
-            [
-                sys.executable,
-                "-P",
-                str(Path(__file__).with_name("member.py")),
-                json.dumps(settings),
-            ],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        script = str(Path(__file__).with_name("member.py"))
+        super().__init__(
+            [sys.executable, "-P", script, json.dumps(settings)],
+            {**os.environ, "PYTHONPATH": str(ROOT)},
+            separate=True,
         )
-        self._rest = b""
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
+        self._answered = 0
 
     def tell(self, verb: str, **arguments: Any) -> None:
-        stdin = _pipe(self._process.stdin)
-        stdin.write(json.dumps([verb, arguments]).encode() + b"\n")
-        stdin.flush()
+        self.say(json.dumps([verb, arguments]))
 
     def answer(self, timeout: float = TIMEOUT) -> Any:
-        stdout = _pipe(self._process.stdout).fileno()
-        deadline = time.monotonic() + timeout
-        while b"\n" not in self._rest:
-            ready = select.select([stdout], [], [], max(0.0, deadline - time.monotonic()))[0]
-            assert ready, f"no answer within {timeout} s"
-            chunk = os.read(stdout, 1 << 20)
-            assert chunk, "the member ended"
-            self._rest += chunk
-        line, _, self._rest = self._rest.partition(b"\n")
-        return json.loads(line)
+        answered = self.wait_until(lambda: len(self.lines) > self._answered, timeout)
+        assert answered, f"no answer within {timeout} s, or the member ended:\n{self.errors}"
+        self._answered += 1
+        return json.loads(self.lines[self._answered - 1])
 
     def do(self, verb: str, **arguments: Any) -> Any:
         self.tell(verb, **arguments)
@@ -82,22 +66,13 @@ class Process:
 
     def stop(self) -> None:
         """Keep it from running, and wait until it does not."""
-        os.kill(self.pid, signal.SIGSTOP)
+        self.send(signal.SIGSTOP)
         status = Path(f"/proc/{self.pid}/stat")
-        while status.read_text().rpartition(")")[2].split()[0] != "T":
-            time.sleep(0.001)
+        eventually(lambda: status.read_text().rpartition(")")[2].split()[0] == "T", "its stop")
 
     def resume(self) -> None:
         """Let it run again."""
-        os.kill(self.pid, signal.SIGCONT)
-
-    def kill(self) -> None:
-        """End it as a power cut would; again is no error."""
-        if self._process.returncode is None:
-            self._process.kill()
-            self._process.wait(10)
-            _pipe(self._process.stdin).close()
-            _pipe(self._process.stdout).close()
+        self.send(signal.SIGCONT)
 
 
 class Fleet:
@@ -125,7 +100,7 @@ class Fleet:
 
     def close(self) -> None:
         for process in self._all:
-            process.kill()
+            process.close()
 
 
 def states(processes: Iterable[Process]) -> list[dict[str, Any]]:
@@ -237,8 +212,3 @@ class Cable:
         finally:
             source.close()
             sink.close()
-
-
-def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
-    assert pipe is not None
-    return pipe

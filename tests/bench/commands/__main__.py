@@ -8,6 +8,7 @@ with their ratio. Where ROS 1 is not installed, only rosz is measured.
 from __future__ import annotations
 
 import contextlib
+import signal
 import statistics
 import subprocess
 import sys
@@ -21,6 +22,7 @@ ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from cli.side_by_side.worlds import Ros1, Rosz, World  # noqa: E402  # found by the line above
+from network import TIMEOUT  # noqa: E402
 
 ROS1 = "ROS 1"
 AIM = "0.6"
@@ -92,17 +94,15 @@ def truths(world: World) -> Iterator[Figure]:
     for rate in RATES:
         pacer = world.start(sys.executable, str(Path(__file__).with_name("pacer.py")), str(rate))
         hz = world.start(*world.command("topic hz -w 1000000 /paced"))
-        assert pacer.stdout is not None
-        assert hz.stdout is not None
-        hz.stdout.readline()  # that it has subscribed
-        pacer.stdout.readline()
-        told = [float(pacer.stdout.readline()) for _ in range(SECONDS)]
-        for process in (hz, pacer):
-            process.terminate()
+        hz.wait_for("")  # that it has subscribed
+        pacer.wait_for("", 2 * SECONDS + TIMEOUT, after=SECONDS)
+        told = [float(line) for line in pacer.lines[1 : SECONDS + 1]]
+        for program in (hz, pacer):
+            program.send(signal.SIGTERM)
+            program.exit_code()
         said = [
-            float(line.partition(":")[2]) for line in hz.stdout if line.startswith("average rate")
+            float(line.partition(":")[2]) for line in hz.lines if line.startswith("average rate")
         ]
-        pacer.wait()
         figure = Figure(f"topic hz of what goes out at {rate} Hz", "Hz", {"publisher": "1 ± 0.01"})
         figure.add(OWN, said[-1])
         figure.add("publisher", statistics.mean(told))

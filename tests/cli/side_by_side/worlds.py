@@ -9,13 +9,13 @@ import signal
 import subprocess
 import sys
 import tempfile
-import threading
+from contextlib import closing, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import Self
 
 import msgspec
-from network import eventually, free_port
+from network import Program, eventually, free_port
 from oracle import PYTHON, is_installed, require
 
 from rosz.session import is_listening
@@ -68,7 +68,7 @@ class World:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text)
         self.environ["ROS_PACKAGE_PATH"] = f"{self.folder}/src:/usr/share"
-        self._programs: list[subprocess.Popen[str]] = []
+        self._programs: list[Program] = []
 
     def command(self, line: str) -> list[str]:
         """Return what runs a line such as ``topic list``."""
@@ -76,41 +76,30 @@ class World:
 
     def run(self, line: str, *, interrupt: bool = False) -> Outcome:
         """Run a command to its end, or as long as it takes to say something."""
-        with subprocess.Popen(
+        environ = {**self.environ, "PYTHONUNBUFFERED": "1"}
+        if interrupt:
+            with closing(Program(self.command(line), environ, self.folder, separate=True)) as run:
+                return _beginning(run)
+        done = subprocess.run(
             self.command(line),
-            env={**self.environ, "PYTHONUNBUFFERED": "1"},
+            env=environ,
             cwd=self.folder,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            capture_output=True,
             text=True,
-        ) as process:
-            if interrupt:
-                out, err = _beginning(process)
-            else:
-                out, err = process.communicate(timeout=_TIMEOUT)
-            return Outcome(process.wait(_TIMEOUT), out, err)
-
-    def start(self, *command: str) -> subprocess.Popen[str]:
-        """Start a program that ends with this world."""
-        process = subprocess.Popen(
-            command,
-            env=self.environ,
-            cwd=self.folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            start_new_session=True,
+            timeout=_TIMEOUT,
+            check=False,
         )
-        self._programs.append(process)
-        return process
+        return Outcome(done.returncode, done.stdout, done.stderr)
+
+    def start(self, *command: str) -> Program:
+        """Start a program that ends with this world."""
+        self._programs.append(Program(command, self.environ, self.folder, separate=True))
+        return self._programs[-1]
 
     def __enter__(self) -> Self:
         for name in ("talker", "listener"):
-            process = self.start(*self._interpreter, str(_NODES), name)
-            assert process.stdout is not None
-            line = process.stdout.readline()
-            assert line == "ready\n", f"{self._interpreter[0]} {name} says '{line}'"
+            self.start(*self._interpreter, str(_NODES), name).wait_for("ready", _TIMEOUT)
         return self
 
     def __exit__(
@@ -120,15 +109,11 @@ class World:
         traceback: TracebackType | None,
     ) -> None:
         while self._programs:
-            process = self._programs.pop()
-            process.send_signal(signal.SIGINT)
-            try:
-                process.wait(_TIMEOUT)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-            if process.stdout is not None:
-                process.stdout.close()
+            program = self._programs.pop()
+            program.send(signal.SIGINT)
+            with suppress(subprocess.TimeoutExpired):
+                program.process.wait(_TIMEOUT)
+            program.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
@@ -178,27 +163,17 @@ class Rosz(World):
         return [sys.executable, "-m", "rosz", *split(line)]
 
 
-def _beginning(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """Return the first lines of what goes on for ever, and end it then, or when it complains."""
-    assert process.stdout is not None
-    assert process.stderr is not None
-    complaints: list[str] = []
-
-    def listen(stream: IO[str]) -> None:
-        for line in stream:
-            if not complaints:
-                process.send_signal(signal.SIGINT)
-            complaints.append(line)
-
-    listener = threading.Thread(target=listen, args=(process.stderr,), daemon=True)
-    listener.start()
-    said: list[str] = []
-    for line in process.stdout:
-        said.append(line)
-        if len(said) == _SOME:
-            process.send_signal(signal.SIGINT)
-    listener.join(_TIMEOUT)
-    return "".join(said[:_SOME]), "".join(complaints)
+def _beginning(program: Program) -> Outcome:
+    """Return the first lines of what does not end by itself; end it then or at an error."""
+    assert program.process.stdin is not None
+    program.process.stdin.close()
+    program.wait_until(lambda: len(program.lines) >= _SOME or program.errors, _TIMEOUT)
+    program.send(signal.SIGINT)
+    code = program.exit_code(_TIMEOUT)
+    out, err = (
+        "".join(f"{line}\n" for line in lines) for lines in (program.lines[:_SOME], program.errors)
+    )
+    return Outcome(code, out, err)
 
 
 def split(line: str) -> list[str]:

@@ -6,15 +6,13 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 import sys
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
-from network import free_port
+from network import Program, free_port
 
 from rosz.launch.plan import SystemContext, plan
 from rosz.packages import PackageIndex
@@ -94,43 +92,8 @@ def packages(tmp_path: Path) -> Path:
     return tmp_path / "packages"
 
 
-class Streams:
-    """The output of a process, line by line."""
-
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        self.process = process
-        self.lines: list[tuple[str, str]] = []
-        self._changed = threading.Condition()
-        self._threads = [
-            threading.Thread(target=self._read, args=(name,)) for name in ("stdout", "stderr")
-        ]
-        for thread in self._threads:
-            thread.start()
-
-    def _read(self, name: str) -> None:
-        for line in getattr(self.process, name):
-            with self._changed:
-                self.lines.append((name, line))
-                self._changed.notify_all()
-
-    def expect(self, pattern: str) -> None:
-        def seen() -> bool:
-            return any(re.search(pattern, line) for _, line in self.lines)
-
-        with self._changed:
-            assert self._changed.wait_for(seen, TIMEOUT), (pattern, self.lines)
-
-    def finish(self) -> None:
-        self.process.wait(TIMEOUT)
-        for thread in self._threads:
-            thread.join(TIMEOUT)
-
-    def text(self, name: str) -> str:
-        return "".join(line for stream, line in self.lines if stream == name)
-
-
 @contextmanager
-def started(command: list[str], folder: Path, packages: Path) -> Iterator[Streams]:
+def started(command: list[str], folder: Path, packages: Path) -> Iterator[Program]:
     environ = {
         **os.environ,
         "HOME": str(folder),
@@ -141,16 +104,13 @@ def started(command: list[str], folder: Path, packages: Path) -> Iterator[Stream
         "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
         "PYTHONPATH": str(ROOT) if command[0] == sys.executable else "",
     }
-    with subprocess.Popen(
-        command, env=environ, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        streams = Streams(process)
+    with closing(Program(command, environ, separate=True)) as program:
         try:
-            yield streams
+            yield program
         finally:
-            if process.poll() is None:
-                process.send_signal(signal.SIGTERM)
-            streams.finish()
+            if program.process.poll() is None:
+                program.send(signal.SIGTERM)
+                program.exit_code(TIMEOUT)
 
 
 def ours(folder: Path, packages: Path, options: str) -> list[str]:
@@ -166,9 +126,10 @@ def theirs(folder: Path, *options: str) -> list[str]:
     return ["roslaunch", *options, str(folder / "test.launch")]
 
 
-def plain(text: str, folder: Path) -> list[str]:
+def plain(output: list[str], folder: Path) -> list[str]:
     """Return the sorted messages without the parts that differ from run to run."""
-    text = re.sub(r"\x1b\[\d*m|\x1b\]2;.*?\x07", "", text.partition("\nDIED\n")[0])
+    text = "\n".join([*output, ""]).partition("\nDIED\n")[0]
+    text = re.sub(r"\x1b\[\d*m|\x1b\]2;.*?\x07", "", text)
     # roslaunch's threads and its nodes print into each other's lines.
     text = re.sub(r"(?=\[[\w/]+-\d+\] (?:killing|escalating|process has))", "\n", text)
     text = re.sub(r"(process\[.*?\]: started with pid \[\d+\])", r"\n\1\n", text)
@@ -188,10 +149,10 @@ def test_all_ends_of_a_node(tmp_path: Path, packages: Path) -> None:
     for command in (theirs(tmp_path, *timeouts), ours(tmp_path, packages, options)):
         with started(command, tmp_path, packages) as run:
             for pattern in SEEN:
-                run.expect(pattern)
-            run.process.send_signal(signal.SIGINT)
-            run.finish()
-        said.append([plain(run.text(name), tmp_path) for name in ("stdout", "stderr")])
+                run.wait_for(re.compile(pattern), TIMEOUT)
+            run.send(signal.SIGINT)
+            run.exit_code(TIMEOUT)
+        said.append([plain(lines, tmp_path) for lines in (run.lines, run.errors)])
     real, rosz = said
     assert rosz[0] == real[0]
     # The summary at the end says in other words what is left of the shutdown's errors.
@@ -204,8 +165,8 @@ def test_required(tmp_path: Path, packages: Path) -> None:
     said = []
     for command in (theirs(tmp_path), ours(tmp_path, packages, "{}")):
         with started(command, tmp_path, packages) as run:
-            run.finish()
-        said.append([plain(run.text(name), tmp_path) for name in ("stdout", "stderr")])
+            run.exit_code(TIMEOUT)
+        said.append([plain(lines, tmp_path) for lines in (run.lines, run.errors)])
     real, rosz = said
     # roslaunch says that it kills the process that has just died, too.
     assert rosz[0] == [line for line in real[0] if line != "[vital-N] killing on exit"]

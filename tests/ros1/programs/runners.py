@@ -10,12 +10,13 @@ import sys
 import threading
 from ast import literal_eval
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 from xmlrpc.client import ServerProxy
 
 import pytest
-from network import Network, eventually, free_port
+from network import Network, Program, eventually, free_port
 from oracle import PYTHON, require
 
 from .scenarios import Part, Scenario
@@ -26,6 +27,8 @@ SCRIPTS = Path(__file__).parent / "scripts"
 PACKAGES = Path(__file__).parent / "packages"
 _GENPY = Path("/usr/lib/genpy")
 _TIMEOUT = 25.0
+_LOOKS = 10
+"""A thread that still computes is seen at it: it sleeps for the interpreter lock only."""
 _NEEDED = (
     *("genpy", "rospy", "rosmaster", "rosgraph_msgs", "std_srvs", "geometry_msgs", "nav_msgs"),
     *("sensor_msgs", "diagnostic_msgs", "roscpp.srv", "numpy"),
@@ -54,73 +57,6 @@ class Outcome(NamedTuple):
     code: int
 
 
-class _Running:
-    """A running program and its output."""
-
-    def __init__(self, command: Sequence[str], variables: dict[str, str], folder: Path) -> None:
-        self._changed = threading.Condition()
-        self._texts = {"stdout": "", "stderr": ""}
-        self.process = subprocess.Popen(
-            command,
-            env=variables,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-        self._readers = [self._follow("stdout"), self._follow("stderr")]
-
-    def _follow(self, name: str) -> threading.Thread:
-        stream: IO[str] = getattr(self.process, name)
-
-        def read() -> None:
-            for line in stream:
-                with self._changed:
-                    self._texts[name] += line
-                    self._changed.notify_all()
-
-        thread = threading.Thread(target=read, daemon=True)
-        thread.start()
-        return thread
-
-    def wait_for(self, line: str) -> None:
-        """Wait until the program has written a line to stdout."""
-
-        def written() -> bool:
-            ended = not self._readers[0].is_alive()
-            return ended or line in self._texts["stdout"].splitlines()
-
-        with self._changed:
-            while not written():
-                if not self._changed.wait(_TIMEOUT):
-                    break
-
-    def outcome(self, ignored: Sequence[str]) -> Outcome:
-        """Wait for the end of the program; remove lines that contain an ignored text."""
-        try:
-            code = self.process.wait(_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            self.close()
-            code = 999
-        for reader in self._readers:
-            reader.join(_TIMEOUT)
-        texts = [normalize(text, str(SCRIPTS), ignored) for text in self._texts.values()]
-        return Outcome(texts[0], texts[1], code)
-
-    def close(self) -> None:
-        """Kill the program if it still runs."""
-        if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait()
-        for reader in self._readers:
-            reader.join(_TIMEOUT)
-        for stream in (self.process.stdout, self.process.stderr):
-            if stream is not None:
-                stream.close()
-
-
 class _Runner:
     """Base class of what runs programs."""
 
@@ -134,20 +70,20 @@ class _Runner:
 
     def run(self, scenario: Scenario, folder: Path) -> list[Outcome]:
         """Run the programs of a scenario."""
-        running: list[_Running] = []
+        running: list[Program] = []
         try:
             for part in scenario.parts:
                 if part.after:
-                    running[-1].wait_for(part.after)
+                    running[-1].wait_for(_whole(part.after), _TIMEOUT)
                 variables = self.variables() | dict(part.variables)
-                running.append(_Running(self.command(part), variables, folder))
+                running.append(Program(self.command(part), variables, folder, separate=True))
             for part, program in zip(scenario.parts, running, strict=True):
                 if part.interrupt_at:
-                    program.wait_for(part.interrupt_at)
-                    # The program announces a wait that begins right after the line.
-                    threading.Event().wait(0.3)
-                    program.process.send_signal(part.signal)
-            return [program.outcome(scenario.ignored) for program in running]
+                    program.wait_for(_whole(part.interrupt_at), _TIMEOUT)
+                    if part.waits:
+                        eventually(partial(_is_waiting, program.pid), "the wait", _TIMEOUT)
+                    program.send(part.signal)
+            return [_outcome(program, scenario.ignored) for program in running]
         finally:
             for program in running:
                 program.close()
@@ -267,6 +203,31 @@ class Rosz(_Runner):
         for name in ("PYTHONWARNINGS", "PYTHONFAULTHANDLER"):
             del variables[name]
         return variables
+
+
+def _whole(line: str) -> re.Pattern[str]:
+    return re.compile(f"^{re.escape(line)}$")
+
+
+def _is_waiting(pid: int) -> bool:
+    """Return whether the main thread of a process sleeps each time when looked at."""
+    status = Path(f"/proc/{pid}/stat")
+    pause = threading.Event()
+    for _ in range(_LOOKS):
+        if status.read_text().rpartition(")")[2].split()[0] != "S":
+            return False
+        pause.wait(0.01)
+    return True
+
+
+def _outcome(program: Program, ignored: Sequence[str]) -> Outcome:
+    """Wait for the end of a program; remove lines that contain an ignored text."""
+    code = program.exit_code(_TIMEOUT)
+    stdout, stderr = (
+        normalize("\n".join([*lines, ""]), str(SCRIPTS), ignored)
+        for lines in (program.lines, program.errors)
+    )
+    return Outcome(stdout, stderr, code)
 
 
 def normalize(text: str, folder: str, ignored: Sequence[str] = ()) -> str:

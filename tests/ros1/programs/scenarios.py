@@ -17,6 +17,7 @@ class Part(NamedTuple):
         variables: Environment variables.
         after: Line that the previous program must write before this one starts.
         interrupt_at: Line of this program after which it gets the signal.
+        waits: Whether its main thread waits after that line, and must do so before the signal.
         signal: The signal.
     """
 
@@ -25,6 +26,7 @@ class Part(NamedTuple):
     variables: tuple[tuple[str, str], ...] = ()
     after: str = ""
     interrupt_at: str = ""
+    waits: bool = True
     signal: signal.Signals = signal.SIGINT
 
 
@@ -53,9 +55,13 @@ def _alone(
 
 
 def _interrupted(
-    script: str, *arguments: str, number: signal.Signals = signal.SIGINT, name: str = ""
+    script: str,
+    *arguments: str,
+    number: signal.Signals = signal.SIGINT,
+    name: str = "",
+    waits: bool = True,
 ) -> Scenario:
-    part = Part(f"{script}.py", arguments, interrupt_at="ready", signal=number)
+    part = Part(f"{script}.py", arguments, interrupt_at="ready", waits=waits, signal=number)
     return Scenario(name or "_".join([script, *arguments]), (part,))
 
 
@@ -165,7 +171,7 @@ SCENARIOS = (
     _interrupted("interrupt_waits", "message_timeout"),
     _interrupted("interrupt_waits", "service"),
     _interrupted("interrupt_waits", "service_timeout"),
-    _interrupted("interrupt_busy"),
+    _interrupted("interrupt_busy", waits=False),
     _interrupted("interrupt_service"),
     _interrupted("interrupt_disabled"),
     _interrupted("interrupt_disabled", "shutdown"),

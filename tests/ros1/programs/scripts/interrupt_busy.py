@@ -4,8 +4,9 @@
 import rospy
 
 rospy.init_node("busy")
-print("ready")
 count = 0
 while not rospy.is_shutdown():
     count += 1
+    if count == 1:
+        print("ready")
 print("counted", count > 0)
