@@ -41,7 +41,7 @@ FORKED = (
 Hook = Callable[[str], object]
 """A function that is called with the reason of the end."""
 
-_CLOSED_BY = 10.0
+_CLOSE_TIMEOUT = 10.0
 """Seconds that a second caller of `Lifecycle.close` waits for the first."""
 
 _log = logging.getLogger("rosz.lifecycle")
@@ -234,10 +234,10 @@ class Lifecycle:
 
     def _wait_for_closer(self) -> bool:
         """Wait for the first caller, so that the main thread does not end before it."""
-        if _wait(self._until_closed, _CLOSED_BY):
+        if _wait(self._until_closed, _CLOSE_TIMEOUT):
             return True
         self._log.warning(
-            "closing %s takes more than %g s: a hook blocks it", self._what, _CLOSED_BY
+            "closing %s takes more than %g s: a hook blocks it", self._what, _CLOSE_TIMEOUT
         )
         return False
 

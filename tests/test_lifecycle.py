@@ -177,7 +177,7 @@ def test_second_caller_waits() -> None:
 def test_second_caller_gives_up(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(lifecycle, "_CLOSED_BY", 0.01)
+    monkeypatch.setattr(lifecycle, "_CLOSE_TIMEOUT", 0.01)
     life = Lifecycle("the node")
     first, release = held(life)
     assert not life.close()

@@ -16,7 +16,7 @@ __all__ = ("read",)
 _END_OF_OPTIONS = "--"
 
 
-class _NotSound(Exception):  # it does not leave this module
+class _NotSimple(Exception):  # it does not leave this module
     """The command line has to be read by typer."""
 
 
@@ -31,7 +31,7 @@ def read(app: App, argv: Sequence[str]) -> Callable[[], Any] | None:
     try:
         positional = _read_options(command, parameters, words, values)
         _assign(parameters, positional, values)
-    except _NotSound:
+    except _NotSimple:
         return None
     for one in parameters:
         if one.mark is None:
@@ -55,7 +55,7 @@ def _read_options(
             name, given, text = word.partition("=") if word.startswith("--") else (word, "", "")
             one = options.get(name)
             if one is None:
-                raise _NotSound
+                raise _NotSimple
             _read_option(one, text if given else None, left, values)
         else:
             positional.append(word)
@@ -69,13 +69,13 @@ def _read_option(
 ) -> None:
     if one.kind is bool:
         if text is not None:
-            raise _NotSound
+            raise _NotSimple
         values[one.name] = True
         return
     if text is None:
         text = next(left, _END_OF_OPTIONS)
         if text.startswith("-") and text != "-":
-            raise _NotSound
+            raise _NotSimple
     value = _convert(one, text)
     if one.many:
         values.setdefault(one.name, []).append(value)
@@ -92,11 +92,11 @@ def _assign(parameters: Sequence[Parameter], words: Sequence[str], values: dict[
             values[one.name] = found if one.many else found[0]
             words = words[len(taken) :]
     if words:
-        raise _NotSound
+        raise _NotSimple
 
 
 def _convert(one: Parameter, word: str) -> Any:
     try:
         return one.kind(word)
     except ValueError:
-        raise _NotSound from None
+        raise _NotSimple from None

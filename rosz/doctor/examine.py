@@ -12,18 +12,18 @@ from rosz.doctor.machine import (
     LEAST_FREE,
     check_connect,
     check_rendezvous,
-    check_room,
     check_segments,
+    check_shared_memory,
     check_socket_files,
     check_stopped,
 )
 from rosz.doctor.replies import (
     check_clocks,
     check_replicas,
-    check_sight,
     check_silent,
     check_stamps,
     check_versions,
+    check_visibility,
     query_nodes,
 )
 from rosz.doctor.tokens import (
@@ -69,7 +69,7 @@ class Examination(msgspec.Struct, kw_only=True):
 def examine(examination: Examination) -> Iterator[Finding]:
     """Yield findings as the checks find them."""
     environment = examination.environment
-    yield from check_room(examination.memory, examination.least_free)
+    yield from check_shared_memory(examination.memory, examination.least_free)
     yield from check_segments(examination.memory)
     yield from check_socket_files(environment)
     yield from check_connect(environment)
@@ -109,7 +109,7 @@ def _examine_network(session: Session, examination: Examination) -> Iterator[Fin
     yield from check_one_sided(survey)
     replies = query_nodes(session, environment.domain) if survey.processes else {}
     yield from check_silent(session, survey, replies)
-    yield from check_sight(session, survey, replies)
+    yield from check_visibility(session, survey, replies)
     yield from check_clocks(survey, replies)
     yield from check_replicas(session, environment.domain)
     yield from check_stamps(session, survey, examination.listen)

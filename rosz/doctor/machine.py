@@ -30,8 +30,8 @@ __all__ = (
     "LEAST_FREE",
     "check_connect",
     "check_rendezvous",
-    "check_room",
     "check_segments",
+    "check_shared_memory",
     "check_socket_files",
     "check_stopped",
     "stopped_note",
@@ -45,7 +45,7 @@ _LOCK_SECONDS = 2.0
 """Seconds in which the process that creates a segment locks it."""
 
 
-def check_room(folder: Path = SEGMENTS, least: int = LEAST_FREE) -> Iterator[Finding]:
+def check_shared_memory(folder: Path = SEGMENTS, least: int = LEAST_FREE) -> Iterator[Finding]:
     """Find shared memory that is full.
 
     Args:

@@ -29,10 +29,10 @@ from rosz.wire import Kind, Token, entity_key, read_attachment
 __all__ = (
     "check_clocks",
     "check_replicas",
-    "check_sight",
     "check_silent",
     "check_stamps",
     "check_versions",
+    "check_visibility",
     "query_nodes",
 )
 
@@ -72,15 +72,15 @@ def query_nodes(session: Session, domain: int) -> dict[_Node, _NodeReply]:
     for reply in session.query(key, timeout=_NODE_TIMEOUT, payload=request):
         if not reply.ok:
             continue
-        journey = time.monotonic_ns() - began
+        round_trip = time.monotonic_ns() - began
         try:
             info = msgspec.msgpack.decode(reply.payload, type=NodeInfo)
             zid, number = reply.key.split("/")[-2:]
             node = zid, int(number)
         except (msgspec.MsgspecError, ValueError):  # not the reply of a node
             continue
-        offset = info.now - asked - journey // 2 if info.now else 0
-        replies[node] = _NodeReply(info, offset, journey // 2)
+        offset = info.now - asked - round_trip // 2 if info.now else 0
+        replies[node] = _NodeReply(info, offset, round_trip // 2)
     return replies
 
 
@@ -124,7 +124,7 @@ def _barred(
     return {node for node in silent if node in known and known[node] not in speak}
 
 
-def check_sight(
+def check_visibility(
     session: Session, survey: Survey, replies: dict[_Node, _NodeReply]
 ) -> Iterator[Finding]:
     """Find nodes that do not see other running nodes."""

@@ -7,8 +7,8 @@ import math
 import re
 
 from rosz.idl.catalog import Catalog
-from rosz.idl.decode import Decoder
-from rosz.idl.encode import Encoder
+from rosz.idl.decoder_source import Decoder
+from rosz.idl.encoder_source import Encoder
 from rosz.idl.hashes import message_hash, message_md5, service_hash, service_md5
 from rosz.idl.names import ModuleNames, attribute, class_name
 from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec

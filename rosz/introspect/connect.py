@@ -115,7 +115,7 @@ def _open_client(
     """
     peers = LocalPeers.read(environment.rendezvous)
     beyond = _reaches_beyond(environment)
-    if not beyond and not peers.is_anybody_there and peers.why_unanswered:
+    if not beyond and not peers.has_peers and peers.why_unanswered:
         raise TransportError(peers.why_unanswered)
     if allowed and (
         beyond

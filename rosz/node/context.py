@@ -78,7 +78,7 @@ class Context:
         self.permissions: LocalPermissions | None = _permissions(config)
         peers = LocalPeers.read(config.rendezvous)
         alone = config.mode == "peer" and not (
-            config.connect or config.listen or config.multicast or peers.is_anybody_there
+            config.connect or config.listen or config.multicast or peers.has_peers
         )
         self.clock: Clock = Clock()
         self._ids = itertools.count()

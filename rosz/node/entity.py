@@ -97,7 +97,7 @@ class Entity:
         """
         context, node = self.node.context, self.node
         rules = context.permissions
-        if rules and (objection := rules.objection(self.token.kind, self.name)):
+        if rules and (objection := rules.describe_objection(self.token.kind, self.name)):
             node.log.warning("%s", objection)
         if watch:
             context.incompatible.watch(self.token, node.log)

@@ -535,8 +535,8 @@ class _Queue:
     def __init__(self, depth: int) -> None:
         self.items: deque[_Item] = deque(maxlen=depth)
         self.closed = False
-        self._bell = threading.Lock()
-        self._bell.acquire()
+        self._notifier = threading.Lock()
+        self._notifier.acquire()
         self._wakers: tuple[Callable[[], None], ...] = ()
 
     def put(self, item: _Item) -> None:
@@ -546,16 +546,16 @@ class _Queue:
 
     def wake(self) -> None:
         """Wake one waiter, and all event loops."""
-        if self._bell.locked():
+        if self._notifier.locked():
             # Another thread may wake the waiter between the look and the release.
             with suppress(RuntimeError):
-                self._bell.release()
+                self._notifier.release()
         for waker in self._wakers:
             waker()
 
     def wait(self, timeout: float = -1) -> None:
         """Wait until an item was added or the queue was closed since the last wait."""
-        self._bell.acquire(timeout=timeout)
+        self._notifier.acquire(timeout=timeout)
 
     def pop(self) -> _Item | None:
         """Remove and return the oldest item; ``None`` if there is none."""

@@ -57,9 +57,9 @@ def _is_newer(node: NodeCore, other: ProcessToken) -> bool:
     except (RoszError, msgspec.DecodeError):
         infos = []
     if infos:
-        journey = time.monotonic() - asked
-        lead = asked + journey / 2 - node.began - infos[0].age
-        if abs(lead) > max(_TOGETHER, journey):
+        round_trip = time.monotonic() - asked
+        lead = asked + round_trip / 2 - node.began - infos[0].age
+        if abs(lead) > max(_TOGETHER, round_trip):
             return lead > 0
     # They started together, or the other one did not respond: compare the times in their tokens.
     return other.newer_than(node.process)

@@ -189,7 +189,7 @@ class Params:
         return self._replica.watch(self._path(name), callback)
 
     def origin(self, name: str) -> str:
-        """Return the writer of a parameter, as shown to people; empty if nobody set it."""
+        """Return the writer of a parameter, as shown to users; empty if nobody set it."""
         return self._replica.origin(self._path(name))
 
     def __repr__(self) -> str:

@@ -37,7 +37,7 @@ class ParamClient:
     Args:
         session: Session of the client; it stays open.
         domain: ROS domain.
-        origin: Writer, as shown to people; this process by default.
+        origin: Writer, as shown to users; this process by default.
         timeout: Time limit in seconds of each call.
 
     Raises:
@@ -137,7 +137,7 @@ class ParamClient:
 
     @property
     def silent(self) -> list[str]:
-        """The replicas that were asked and did not answer in time, as shown to people."""
+        """The replicas that were asked and did not answer in time, as shown to users."""
         return sorted(member.label for member in self._silent.values())
 
     def _get(self, name: str) -> ClientReply:

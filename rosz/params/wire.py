@@ -94,7 +94,7 @@ class Member(msgspec.Struct, frozen=True, order=True):
     Attributes:
         start: Time when it started, by its own clock, in nanoseconds.
         zid: Zenoh id of its session.
-        label: Process, as shown to people.
+        label: Process, as shown to users.
     """
 
     start: int
@@ -211,7 +211,7 @@ class Batch(msgspec.Struct, array_like=True):
     Attributes:
         time: Time of the stamp in nanoseconds.
         clock: Clock that gave the time.
-        origin: Writer, as shown to people.
+        origin: Writer, as shown to users.
         puts: Path and value of each put.
         deletions: Path of each deletion.
     """
@@ -251,7 +251,7 @@ class Record(msgspec.Struct, array_like=True):
         path: Path that is written.
         time: Time of the stamp in nanoseconds.
         clock: Clock that gave the time.
-        origin: Writer, as shown to people.
+        origin: Writer, as shown to users.
         value: One value, or nothing for a deletion.
     """
 
@@ -341,7 +341,7 @@ class ClientReply(msgspec.Struct, omit_defaults=True):
             ``refused``.
         value: Result; if the parameter is missing, the names in its namespace.
         text: Reason if it is refused.
-        origin: Writer of the value, as shown to people.
+        origin: Writer of the value, as shown to users.
         slow: Replicas that did not acknowledge a write in time.
     """
 

@@ -64,7 +64,7 @@ class Write(msgspec.Struct, frozen=True):
         time: Time of the hybrid logical clock, in nanoseconds since the epoch.
         clock: Clock that gave the time; no two clocks have the same name.
         value: New value, or `DELETED`. It belongs to the store and must not be changed.
-        origin: Writer, as shown to people.
+        origin: Writer, as shown to users.
     """
 
     path: Path

@@ -44,7 +44,7 @@ class Choice(msgspec.Struct, frozen=True):
     Attributes:
         name: Name that people write instead of the value.
         value: Value.
-        description: Meaning, as shown to people.
+        description: Meaning, as shown to users.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Setting(msgspec.Struct, frozen=True):
     Attributes:
         name: Name: a letter, then letters, digits and underscores.
         default: Value if the parameter store has none.
-        description: Purpose, as shown to people.
+        description: Purpose, as shown to users.
         level: Bits that the node's callback gets when the setting changes.
         min: Least value of a number.
         max: Greatest value of a number.
@@ -171,7 +171,7 @@ def enumeration(choices: Iterable[Choice], description: str = "") -> str:
 
     Args:
         choices: Values, all of one type.
-        description: Meaning of the enumeration, as shown to people.
+        description: Meaning of the enumeration, as shown to users.
     """
     rows = [
         {

@@ -146,7 +146,7 @@ class LocalPermissions:
                 return cls(holder, permit, keys.rules_file)
         return None
 
-    def objection(self, kind: Kind, name: str) -> str:
+    def describe_objection(self, kind: Kind, name: str) -> str:
         """Return why an entity has no effect beyond the machine; empty if it has, or the next time.
 
         Args:

@@ -34,11 +34,11 @@ __all__ = (
     "LocalPeers",
     "LocalRegistration",
     "describe_process",
+    "find_listener",
     "how_to_resume",
     "is_stopped",
     "pid_of_peer",
     "tcp_ports",
-    "which_listens",
 )
 
 _LOOPBACK = "127.0.0.1"
@@ -135,7 +135,7 @@ class LocalPeers:
         return any(not peer.is_stopped for peer in self._peers)
 
     @property
-    def is_anybody_there(self) -> bool:
+    def has_peers(self) -> bool:
         """Whether there is anybody to meet, with a session of rosz or not, who is not stopped."""
         if self.is_any_running:
             return True
@@ -145,7 +145,7 @@ class LocalPeers:
     def stopped_holder(self) -> int | None:
         """The id of the stopped process that listens at the rendezvous, if there is one."""
         pids = [peer.pid for peer in self.stopped]
-        return which_listens(Endpoint(self.rendezvous), pids) if pids else None
+        return find_listener(Endpoint(self.rendezvous), pids) if pids else None
 
     @property
     def is_router_stopped(self) -> bool:
@@ -285,7 +285,7 @@ def how_to_resume(pid: int) -> str:
     )
 
 
-def which_listens(endpoint: Endpoint, candidates: Iterable[int]) -> int | None:
+def find_listener(endpoint: Endpoint, candidates: Iterable[int]) -> int | None:
     """Return the process that listens at an endpoint of this machine, if it is a candidate.
 
     Args:

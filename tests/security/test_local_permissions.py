@@ -68,12 +68,12 @@ def permissions(rules: str, host: str = "laptop", folder: str = "keys") -> Local
 def test_what_is_allowed(kind: Kind, name: str, allowed: bool) -> None:
     found = permissions(RULES)
     assert found is not None
-    text = found.objection(kind, name)
+    text = found.describe_objection(kind, name)
     assert (text == "") == allowed
     if not allowed:
         assert f"'{name}'" in text
         assert "'/etc/rules.yaml' does not allow 'laptop'" in text
-    assert found.objection(kind, name) == ""  # told once
+    assert found.describe_objection(kind, name) == ""  # told once
 
 
 def test_which_rules_apply() -> None:
@@ -84,7 +84,7 @@ def test_which_rules_apply() -> None:
     assert LocalPermissions.find(KeyFolder(Path("/home/keys"), None), "laptop") is None
     everything = permissions("laptop: all\n")
     assert everything is not None
-    assert everything.objection(Kind.SERVICE, "/a/b") == ""
+    assert everything.describe_objection(Kind.SERVICE, "/a/b") == ""
 
 
 def test_forbidden_declarations_are_logged(world: World, authority: Authority) -> None:

@@ -13,7 +13,7 @@ from network import Network, Program, eventually
 
 from rosz.errors import TransportError
 from rosz.session import LocalPeers, Session, SessionConfig, describe_process, is_stopped
-from rosz.session.local_peers import LocalRegistration, which_listens
+from rosz.session.local_peers import LocalRegistration, find_listener
 from rosz.wire import Endpoint
 
 LISTEN = """
@@ -111,10 +111,10 @@ def test_who_listens_somewhere(network: Network, kind: str) -> None:
     program = network.program(LISTEN, kind, str(network.folder / "s"))
     place = program.wait_for("at ").split()[1]
     endpoint = f"unixsock-stream/{place}" if kind == "unix" else f"tcp/localhost:{place}"
-    assert which_listens(Endpoint(endpoint), [os.getpid(), program.pid]) == program.pid
-    assert which_listens(Endpoint(endpoint), [os.getpid()]) is None
+    assert find_listener(Endpoint(endpoint), [os.getpid(), program.pid]) == program.pid
+    assert find_listener(Endpoint(endpoint), [os.getpid()]) is None
     program.kill()
-    assert which_listens(Endpoint(endpoint), [os.getpid(), program.pid]) is None
+    assert find_listener(Endpoint(endpoint), [os.getpid(), program.pid]) is None
 
 
 def peers(network: Network) -> LocalPeers:
@@ -144,16 +144,16 @@ def test_a_registration_is_there_before_its_session(network: Network) -> None:
 
 
 def test_nobody_is_there_where_all_are_stopped(network: Network) -> None:
-    assert not peers(network).is_anybody_there
+    assert not peers(network).has_peers
     program = network.program(NODE, "a")
     program.wait_for("up")
-    assert peers(network).is_anybody_there
+    assert peers(network).has_peers
     assert peers(network).why_unanswered == ""
     stop(program)
-    assert not peers(network).is_anybody_there
+    assert not peers(network).has_peers
     assert f"'kill -CONT {program.pid}'" in peers(network).why_unanswered
     program.send(signal.SIGCONT)
-    eventually(lambda: peers(network).is_anybody_there, "it runs again")
+    eventually(lambda: peers(network).has_peers, "it runs again")
 
 
 def test_sessions_that_are_out_of_reach(network: Network) -> None:
@@ -182,13 +182,13 @@ def test_sockets_of_the_program_are_left_alone(network: Network, held: str) -> N
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "ended"])
 def test_registrations_end_with_their_process(network: Network, number: signal.Signals) -> None:
-    assert not peers(network).is_anybody_there
+    assert not peers(network).has_peers
     program = network.program(OLD, "a")
     program.wait_for("up")
-    assert peers(network).is_anybody_there
+    assert peers(network).has_peers
     program.send(number)
     program.exit_code()
-    assert not peers(network).is_anybody_there
+    assert not peers(network).has_peers
 
 
 def test_a_newcomer_right_after_the_death_of_the_first(network: Network) -> None:

@@ -27,7 +27,7 @@ from rosz.launch.run.protocol import Setup
 from rosz.launch.run.remote import Machines
 from rosz.launch.run.supervisor import Process, Supervisor, Timeouts
 
-__all__ = ("Options", "Runner", "apply_options", "describe_casualties", "describe_plan")
+__all__ = ("Options", "Runner", "apply_options", "describe_failures", "describe_plan")
 
 _RUN_ID_PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]{0,63}")
 _MAX_VALUE_WIDTH = 20
@@ -284,7 +284,7 @@ class Runner:
         console = self._console
         console.say("shutting down processing monitor...")
         console.say("... shutting down processing monitor complete")
-        text = describe_casualties(supervisor.casualties)
+        text = describe_failures(supervisor.failures)
         if text:
             console.error(text)
         console.strong("done")
@@ -329,7 +329,7 @@ def _shorten(value: Any) -> str:
     return "<...>"
 
 
-def describe_casualties(processes: Iterable[Process]) -> str:
+def describe_failures(processes: Iterable[Process]) -> str:
     """Return which processes failed or died, why, and their last output; "" if none did."""
     parts = []
     for process in processes:

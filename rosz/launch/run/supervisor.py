@@ -317,7 +317,7 @@ class Supervisor:
 
     Attributes:
         processes: All processes, in order.
-        casualties: Processes that failed or died, in that order.
+        failures: Processes that failed or died, in that order.
         failed: Whether a node could not be started, or a required one failed.
         closing: Whether the end of the launch has begun.
     """
@@ -342,7 +342,7 @@ class Supervisor:
         self._begun = False
         self._callbacks: dict[int, list[Callable[[], None]]] = {}
         self.failed = False
-        self.casualties: list[Process] = []
+        self.failures: list[Process] = []
         self.processes = [
             Process(node, number, host_of(node), self) for number, node in enumerate(nodes, 1)
         ]
@@ -431,7 +431,7 @@ class Supervisor:
         what = f"{node.package}/{node.type}" if node.package else node.full_name
         self._console.error(f"ERROR: cannot launch node of type [{what}]: {error}")
         self.failed = True
-        self.casualties.append(process)
+        self.failures.append(process)
         if node.required and not self.closing:
             self._console.error(f"REQUIRED process [{process.label}] cannot be started\n")
             self.shutdown()
@@ -439,8 +439,8 @@ class Supervisor:
     def died(self, process: Process) -> None:
         """Report that a process ended by itself, and end the others if it was required."""
         text = self._describe_death(process)
-        if process not in self.casualties and (process.code or process.node.required):
-            self.casualties.append(process)
+        if process not in self.failures and (process.code or process.node.required):
+            self.failures.append(process)
         if process.node.required:
             self._console.error(
                 f"{_RULE}REQUIRED process [{process.label}] has died!\n{text}\n"
@@ -473,8 +473,8 @@ class Supervisor:
     def escalating(self, process: Process, number: int) -> None:
         """Report that a process did not end in time and gets a stronger signal."""
         self._console.error(f"[{process.label}] escalating to {signal.Signals(number).name}")
-        if process.killed and process not in self.casualties:
-            self.casualties.append(process)
+        if process.killed and process not in self.failures:
+            self.failures.append(process)
 
     def finished(self, process: Process) -> None:
         """Handle the final end of a process and its descendants."""

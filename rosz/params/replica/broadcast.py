@@ -164,11 +164,11 @@ class WriteBroadcaster:
         Args:
             changes: Batch; of two changes, the deeper one comes later.
             stamp: Stamp of the batch.
-            origin: Writer, as shown to people.
+            origin: Writer, as shown to users.
             timeout: Time limit in seconds; 0 does not wait.
 
         Returns:
-            The replicas that did not acknowledge it in time, as shown to people.
+            The replicas that did not acknowledge it in time, as shown to users.
 
         Raises:
             ClosedError: The session is closed.

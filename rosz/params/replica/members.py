@@ -58,7 +58,7 @@ class Members:
         self._on_change = on_change
         self._watch = self._session.watch_tokens(self._keys.tokens, self._on_token)
 
-    def drop_ghosts(self) -> None:
+    def drop_stale(self) -> None:
         """Forget replicas that went before the watch began; call it some time after that."""
         for zid in self.zids - self._watched:
             member = self._found.get(zid)
@@ -70,7 +70,7 @@ class Members:
         return sorted(self._found.copy().values())
 
     def label(self, zid: str) -> str:
-        """Return the process of a replica, as shown to people."""
+        """Return the process of a replica, as shown to users."""
         member = self._found.get(zid)
         return member.label if member is not None else f"session {zid}"
 

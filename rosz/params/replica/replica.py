@@ -61,7 +61,7 @@ class Outcome(msgspec.Struct, frozen=True):
 
     Attributes:
         time: Time of the write, in nanoseconds since the epoch.
-        slow: Replicas that did not acknowledge it in time, as shown to people.
+        slow: Replicas that did not acknowledge it in time, as shown to users.
     """
 
     time: int
@@ -69,7 +69,7 @@ class Outcome(msgspec.Struct, frozen=True):
 
 
 def process_label() -> str:
-    """Return this process as shown to people: its program, process id and host."""
+    """Return this process as shown to users: its program, process id and host."""
     program = PurePath(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
     # A file name may be other than UTF-8, but the label is sent to others.
     program = program.encode(errors="surrogateescape").decode(errors="replace")
@@ -123,13 +123,13 @@ class Replica(_Copy):
     Args:
         session: Session of the replica; `close` leaves it open.
         domain: ROS domain.
-        label: Process as shown to people, in warnings and as the origin of its writes.
+        label: Process as shown to users, in warnings and as the origin of its writes.
         settled: Event that is set when the session is linked to all its neighbours; without it, the
             constructor does not wait for that.
         storage: Storage that holds the parameters when the process has ended.
 
     Attributes:
-        label: Process as shown to people.
+        label: Process as shown to users.
         zid: Zenoh id of the session.
 
     Raises:
@@ -180,7 +180,7 @@ class Replica(_Copy):
         Args:
             name: Global name or its path.
             value: New value.
-            origin: Writer, as shown to people; this process by default.
+            origin: Writer, as shown to users; this process by default.
             timeout: Time limit in seconds of the wait for the other replicas.
 
         Raises:
@@ -222,7 +222,7 @@ class Replica(_Copy):
         Args:
             changes: Paths with normalised values or `DELETED`. If one path lies below another, the
                 upper one comes first (`rosz.params.condense`).
-            origin: Writer, as shown to people; this process by default.
+            origin: Writer, as shown to users; this process by default.
             stamp: Stamp of the batch; a new one by default.
             timeout: Time limit in seconds of the wait for the other replicas.
 

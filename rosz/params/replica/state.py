@@ -380,7 +380,7 @@ class TreeReader:
         return climb(name, node, self.has)
 
     def origin(self, name: str | Path) -> str:
-        """Return the writer of a value, as shown to people; empty if nobody wrote it."""
+        """Return the writer of a value, as shown to users; empty if nobody wrote it."""
         with self._state as history:
             write = history.source(to_path(name))
         return write.origin if write is not None else ""

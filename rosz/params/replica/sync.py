@@ -379,7 +379,7 @@ class _RefusedWrites:
 
         Args:
             zid: Session of the replica.
-            label: Process of the replica, as shown to people.
+            label: Process of the replica, as shown to users.
         """
         paths = self._unreported.pop(zid, [])
         if paths:
@@ -443,7 +443,7 @@ class AntiEntropy:
         now = time.monotonic()
         late = now - self._last - _TICK
         self._last = now
-        self._sync.members.drop_ghosts()
+        self._sync.members.drop_stale()
         self._sync.state.apply_deferred()
         if late > _STOPPED or now >= self._compare_at:
             self._compare_at = now + random.uniform(*_COMPARE_EVERY)  # noqa: S311  # see above

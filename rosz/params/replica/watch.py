@@ -45,7 +45,7 @@ class Changed(msgspec.Struct, frozen=True):
             name below it that was written.
         old: Value before; ``None`` if it was not set.
         new: Value now; ``None`` if it is not set any more.
-        origin: Writer, as shown to people.
+        origin: Writer, as shown to users.
         time: Time of the write by the writer's clock, in nanoseconds since the epoch.
     """
 

@@ -118,7 +118,7 @@ class Group:
             name: A letter, then letters, digits and underscores.
             paramtype: ``int_t``, ``double_t``, ``str_t`` or ``bool_t``.
             level: Bits that a server's callback gets when the parameter changes.
-            description: Purpose, as shown to people.
+            description: Purpose, as shown to users.
             default: Default value: 0, empty or false if not given.
             min: Least value of a number.
             max: Greatest value of a number.
@@ -199,7 +199,7 @@ class ParameterGenerator:
             name: Name of the constant.
             type: ``int_t``, ``double_t``, ``str_t`` or ``bool_t``.
             value: Value of the constant.
-            descr: Meaning, as shown to people.
+            descr: Meaning, as shown to users.
 
         Raises:
             ParamError: The name is not legal, or the value does not fit the type.
