@@ -236,7 +236,9 @@ class _FrontFinder(MetaPathFinder):
         if not files:
             return None
         if inner:
-            return _alias(name, lambda: _config(name, files)) if inner.endswith("Config") else None
+            from rosz.ros1.dynamic_reconfigure.cfgfile import load
+
+            return _alias(name, lambda: load(name, files)) if inner.endswith("Config") else None
         generated = PathFinder.find_spec(name, path)
         spec = ModuleSpec(name, None, is_package=True)
         spec.submodule_search_locations = [
@@ -270,12 +272,6 @@ class _EndFinder(MetaPathFinder):
         spec = ModuleSpec(fullname, None, is_package=True)
         spec.submodule_search_locations = [str(code)] if code.is_dir() else []
         return spec
-
-
-def _config(name: str, files: Sequence[Path]) -> ModuleType:
-    from rosz.ros1.dynamic_reconfigure.cfgfile import load
-
-    return load(name, files)
 
 
 def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:

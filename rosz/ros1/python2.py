@@ -65,15 +65,7 @@ _METHODS = {
 
 
 def explain(error: SyntaxError, path: str) -> SourceError | None:
-    """Return an error that explains Python 2 syntax.
-
-    Args:
-        error: Error of compiling the script.
-        path: Path of the script.
-
-    Returns:
-        The error, or None if Python 2 is not the cause.
-    """
+    """Return an error that explains Python 2 syntax, or None if that is not the cause."""
     line, column = error.lineno or 0, error.offset or 0
     if isinstance(error, TabError):
         reason = (

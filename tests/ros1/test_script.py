@@ -1,12 +1,14 @@
-"""A script under ``python -m rosz.ros1`` behaves as under the interpreter."""
+"""A script under ``python -m rosz.ros1`` behaves as under the interpreter, also on Ctrl-C."""
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from network import Network
 
 ROOT = Path(__file__).parents[2]
 
@@ -188,15 +190,54 @@ def test_usage_errors(tmp_path: Path) -> None:
     ],
 )
 def test_errors_of_rosz_are_one_line_with_a_place(tmp_path: Path, line: str, text: str) -> None:
-    script = tmp_path / "node.py"
-    script.write_text(f"\n{line}\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "rosz.ros1", str(script)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run(tmp_path, f"\n{line}\n")
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
-    assert done.stderr.startswith(f"rosz: {script}:2: ")
+    assert done.stderr.startswith(f"rosz: {tmp_path}/node.py:2: ")
     assert text in done.stderr
+
+
+SLOW = "import os, sys, time\nos.write(1, b'loading\\n')\ntime.sleep(600)\n"
+
+
+@pytest.mark.parametrize("module", ["rosz.script", "rosz.ros1"])
+def test_ctrl_c_during_imports(network: Network, module: str) -> None:
+    (network.folder / "slow.py").write_text(SLOW)
+    script = network.folder / "script.py"
+    script.write_text("import slow\n")
+    program = network.run("-P", "-m", module, str(script))
+    program.wait_for("loading")
+    program.send(signal.SIGINT)
+    assert program.exit_code() == -signal.SIGINT
+    assert program.output == "loading"
+
+
+def test_ctrl_c_while_rosz_loads(network: Network) -> None:
+    # The folder comes before that of the real msgspec on the path.
+    (network.folder / "msgspec.py").write_text(SLOW)
+    script = network.folder / "script.py"
+    script.write_text("print('begun')\n")
+    path = f"{network.folder}:{ROOT}"
+    program = network.run("-P", "-m", "rosz.script", str(script), PYTHONPATH=path)
+    program.wait_for("loading")
+    program.send(signal.SIGINT)
+    assert program.exit_code() == -signal.SIGINT
+    assert program.output == "loading"
+
+
+@pytest.mark.parametrize("module", ["rosz.script", "rosz.ros1"])
+def test_a_running_script_catches_ctrl_c(network: Network, module: str) -> None:
+    script = network.folder / "script.py"
+    script.write_text(
+        "import time\n"
+        "try:\n"
+        "    print('begun', flush=True)\n"
+        "    time.sleep(600)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('caught')\n"
+    )
+    program = network.run("-P", "-m", module, str(script))
+    program.wait_for("begun")
+    program.send(signal.SIGINT)
+    assert program.exit_code() == 0
+    assert program.lines == ["begun", "caught"]

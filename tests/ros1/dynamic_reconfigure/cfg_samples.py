@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-__all__ = ("BROKEN", "SAMPLES")
+from pathlib import Path
+
+__all__ = ("BROKEN", "OLD", "SAMPLES", "write_package", "write_samples")
 
 TUTORIALS = """\
 #!/usr/bin/env python
@@ -107,6 +109,21 @@ SAMPLES = {
     "Loops": LOOPS,
 }
 """Name to text; `OLD` is none of them, as ROS 1's old generator needs a package of rosbuild."""
+
+
+def write_samples(folder: Path) -> None:
+    """Write the files, and the module that one of them imports, to a new folder."""
+    folder.mkdir(parents=True)
+    (folder / "beside_it.py").write_text(BESIDE)
+    for name, text in SAMPLES.items():
+        (folder / f"{name}.cfg").write_text(text)
+
+
+def write_package(folder: Path) -> None:
+    """Write a package with the files in ``cfg``."""
+    write_samples(folder / "cfg")
+    (folder / "package.xml").write_text("<package><name>sample</name></package>")
+
 
 _HEAD = (
     "from dynamic_reconfigure.parameter_generator_catkin import *\n"

@@ -18,7 +18,7 @@ import pytest
 from network import Network, Program, eventually, free_port
 from oracle import PYTHON, require
 
-from .cfg_samples import BESIDE, SAMPLES
+from .cfg_samples import write_package
 
 pytestmark = [pytest.mark.ros1, pytest.mark.timeout(300)]
 
@@ -84,12 +84,7 @@ class Side:
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A package of ours, and what ROS 1 generates from it."""
     folder = tmp_path_factory.mktemp("beside")
-    cfg = folder / "src" / "sample" / "cfg"
-    cfg.mkdir(parents=True)
-    (cfg.parent / "package.xml").write_text("<package><name>sample</name></package>")
-    (cfg / "beside_it.py").write_text(BESIDE)
-    for name, text in SAMPLES.items():
-        (cfg / f"{name}.cfg").write_text(text)
+    write_package(folder / "src" / "sample")
     return folder
 
 

@@ -20,7 +20,7 @@ from rosz.ros1.dynamic_reconfigure.cfgfile import load
 from rosz.ros1.importer import install, uninstall
 from rosz.ros1.modules import submodule
 
-from .cfg_samples import BESIDE, SAMPLES
+from .cfg_samples import SAMPLES, write_samples
 
 pytestmark = pytest.mark.ros1
 
@@ -32,10 +32,7 @@ NAMES = [*SAMPLES, "Test"]
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("sample") / "cfg"
-    folder.mkdir()
-    (folder / "beside_it.py").write_text(BESIDE)
-    for name, text in SAMPLES.items():
-        (folder / f"{name}.cfg").write_text(text)
+    write_samples(folder)
     return sorted(folder.glob("*.cfg"))
 
 

@@ -11,7 +11,7 @@ from network import Network, Program, eventually
 
 from rosz.reconfigure import Client, Config, Description, Server, Setting
 
-from .cfg_samples import BESIDE, SAMPLES
+from .cfg_samples import write_package
 
 PROGRAMS = Path(__file__).with_name("programs")
 HEAD = """
@@ -25,11 +25,7 @@ HEAD = """
 def source(network: Network) -> Path:
     """The folder of a package with ``.cfg`` files and programs."""
     folder = network.folder / "src" / "sample"
-    (folder / "cfg").mkdir(parents=True)
-    (folder / "package.xml").write_text("<package><name>sample</name></package>")
-    (folder / "cfg" / "beside_it.py").write_text(BESIDE)
-    for name, text in SAMPLES.items():
-        (folder / "cfg" / f"{name}.cfg").write_text(text)
+    write_package(folder)
     (folder / "scripts").mkdir()
     for program in PROGRAMS.glob("*.py"):
         target = folder / "scripts" / program.name

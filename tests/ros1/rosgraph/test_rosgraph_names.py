@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import dedent
+
 import pytest
 from oracle import same
 
@@ -14,38 +16,31 @@ ONE = ("canonicalize_name", "is_legal_name", "is_legal_base_name", "is_legal_rem
 ARGUMENTS = ["a:=b", "_a:=b", "__name:=x", "a:=", ":=b", "/a:=~b", "a:=b:=c", "x", "a:= b ", "1:=2"]
 
 
+def same_names(snippet: str) -> None:
+    head = "import rosgraph\nfrom rosgraph import names, network\n"
+    same(head + dedent(snippet), "rosgraph", "python3-rosgraph")
+
+
 @pytest.mark.ros1
 @pytest.mark.parametrize("function", ONE)
 def test_functions_of_one_argument(function: str) -> None:
     skipped = "[1:-1]" if function == "namespace" else ""
-    same(
-        f"""
-        from rosgraph import names
+    same_names(f"""
         result = [tried(names.{function}, name) for name in {NAMES}{skipped} if name is not None]
-        """,
-        "rosgraph",
-        "python3-rosgraph",
-    )
+        """)
 
 
 @pytest.mark.ros1
 @pytest.mark.parametrize("function", ["is_global", "is_private"])
 def test_predicates(function: str) -> None:
-    same(
-        f"""
-        from rosgraph import names
+    same_names(f"""
         result = [bool(names.{function}(name)) for name in {NAMES} if name is not None]
-        """,
-        "rosgraph",
-        "python3-rosgraph",
-    )
+        """)
 
 
 @pytest.mark.ros1
 def test_join_and_resolve() -> None:
-    same(
-        f"""
-        from rosgraph import names
+    same_names(f"""
         known = [name for name in {NAMES} if name is not None]
         result = [
             [tried(names.ns_join, n, name) for n in ["", "/", "/ns", "ns/", "~"] for name in known],
@@ -57,18 +52,12 @@ def test_join_and_resolve() -> None:
             [tried(names.script_resolve_name, "script", name) for name in known],
             [tried(names.make_caller_id, name) for name in known],
         ]
-        """,
-        "rosgraph",
-        "python3-rosgraph",
-    )
+        """)
 
 
 @pytest.mark.ros1
 def test_command_lines() -> None:
-    same(
-        f"""
-        import rosgraph
-        from rosgraph import names
+    same_names(f"""
         result = [
             tried(names.load_mappings, [one]) for one in {ARGUMENTS}
         ] + [
@@ -80,10 +69,7 @@ def test_command_lines() -> None:
             rosgraph.get_master_uri({{"ROS_MASTER_URI": "http://y:2"}}, []),
             rosgraph.get_master_uri({{}}, []),
         ]
-        """,
-        "rosgraph",
-        "python3-rosgraph",
-    )
+        """)
 
 
 def test_anonymous_names_are_legal() -> None:
@@ -120,14 +106,9 @@ def test_addresses() -> None:
     assert network.get_local_addresses()
     assert network.is_local_address("127.0.0.1")
     assert network.get_local_address() in network.get_local_addresses()
-    same(
-        """
-        from rosgraph import network
+    same_names("""
         result = [
             tried(network.parse_http_host_and_port, url)
             for url in ["http://a:1/", "http://a", "a:3"]
         ]
-        """,
-        "rosgraph",
-        "python3-rosgraph",
-    )
+        """)
