@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from copy import deepcopy
+from functools import partial
 from typing import Any
 
 from rosz.errors import TransformArgument
@@ -78,15 +79,9 @@ class TransformListener:
         self._node = node
         self._remove_hook = node.clock.on_jump(lambda _: buffer.clear())
         self._subscriptions = [
-            node.subscription("/tf", TFMessage, self._receive_moving, qos=_QUEUE),
-            node.subscription("/tf_static", TFMessage, self._receive_static, qos=_STATIC_QUEUE),
+            node.subscription(topic, TFMessage, partial(self._receive, static=static), qos=qos)
+            for topic, static, qos in (("/tf", False, _QUEUE), ("/tf_static", True, _STATIC_QUEUE))
         ]
-
-    def _receive_moving(self, message: TFMessage) -> None:
-        self._receive(message, static=False)
-
-    def _receive_static(self, message: TFMessage) -> None:
-        self._receive(message, static=True)
 
     def _receive(self, message: TFMessage, *, static: bool) -> None:
         for one in message.transforms:

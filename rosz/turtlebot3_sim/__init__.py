@@ -1,7 +1,6 @@
 """A small TurtleBot3 on a flat floor, with a laser and obstacles.
 
-`world` is pure geometry, `messages` makes the messages, and `simulator` is the node and the
-program.
+`world` is pure geometry; `simulator` is the node and the program.
 """
 
 from rosz.turtlebot3_sim.world import ARENAS, Arena, Pillar, Robot, Wall

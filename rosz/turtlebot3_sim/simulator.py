@@ -5,20 +5,39 @@ The simulation runs in steps of 10 ms; the parameter ``~real_time_factor`` sets 
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import Any
 
 from rosz.errors import UsageError, near_miss
-from rosz.msgs.geometry_msgs.msg import Twist
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
 from rosz.msgs.nav_msgs.msg import Odometry
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.sensor_msgs.msg import Imu, JointState, LaserScan
+from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import Node
-from rosz.turtlebot3_sim import messages
-from rosz.turtlebot3_sim.world import ARENAS, Robot
+from rosz.turtlebot3_sim.world import (
+    ARENAS,
+    BEAMS,
+    LASER_X,
+    RANGE_MAX,
+    RANGE_MIN,
+    Robot,
+)
 
 __all__ = ("STEP_NS", "Simulator", "main")
 
@@ -31,6 +50,24 @@ _MAX_DELAY = 0.25
 """Seconds of wall time that the simulation catches up with; a longer delay is skipped."""
 _RESETS = ("reset_world", "gazebo/reset_world")
 """Names of Gazebo's service in ROS 2 and in ROS 1."""
+
+_SCAN_PERIOD = 0.2
+"""Seconds between two scans."""
+_GRAVITY = 9.80665
+_UNKNOWN = 1e6
+"""Variance of what wheels cannot measure: height, roll and pitch."""
+
+
+def _diagonal(*values: float) -> list[float]:
+    size = len(values)
+    return [values[row] if row == column else 0.0 for row in range(size) for column in range(size)]
+
+
+_POSE_COVARIANCE = _diagonal(1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
+_TWIST_COVARIANCE = _diagonal(1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
+_ATTITUDE_COVARIANCE = _diagonal(1e-6, 1e-6, 1e-6)
+_RATE_COVARIANCE = _diagonal(4e-8, 4e-8, 4e-8)
+_ACCELERATION_COVARIANCE = _diagonal(2.9e-4, 2.9e-4, 2.9e-4)
 
 
 class Simulator:
@@ -89,7 +126,7 @@ class Simulator:
         self._imu = node.publisher("imu", Imu, queue_size=1)
         self._scan = node.publisher("scan", LaserScan, queue_size=1)
         mounts = node.publisher("/tf_static", TFMessage, latch=True)
-        mounts.publish(TFMessage(messages.mounts(self._stamp())))
+        mounts.publish(TFMessage(_mounts(self._stamp())))
         node.subscription("cmd_vel", Twist, self._command, queue_size=1)
         for name in _RESETS:
             node.service(name, Empty, self._reset)
@@ -122,19 +159,19 @@ class Simulator:
         with self._lock:
             self._robot.step(STEP_NS / _SECOND)
             before, self._time = self._time, self._time + STEP_NS
-            self._clock.publish(Clock(messages.stamp(self._time)))
+            self._clock.publish(Clock(_stamp(self._time)))
             now = self._stamp()
             if _passes(before, self._time, _ODOMETRY_HZ):
-                self._odometry.publish(messages.odometry(self._robot, now))
-                self._tf.publish(TFMessage([messages.transform(self._robot, now)]))
-                self._joints.publish(messages.joints(self._robot, now))
-                self._imu.publish(messages.imu(self._robot, now))
-            if _passes(before, self._time, 1 / messages.SCAN_PERIOD):
-                self._scan.publish(messages.scan(self._robot, now))
+                self._odometry.publish(_odometry(self._robot, now))
+                self._tf.publish(TFMessage([_transform(self._robot, now)]))
+                self._joints.publish(_joints(self._robot, now))
+                self._imu.publish(_imu(self._robot, now))
+            if _passes(before, self._time, 1 / _SCAN_PERIOD):
+                self._scan.publish(_scan(self._robot, now))
 
     def _stamp(self) -> Any:
         simulated = self._node.clock.simulated
-        return messages.stamp(self._time if simulated else time.time_ns())
+        return _stamp(self._time if simulated else time.time_ns())
 
 
 def main() -> None:
@@ -148,3 +185,88 @@ def main() -> None:
 def _passes(before: int, now: int, hz: float) -> bool:
     """Return whether a periodic event is due between two times in nanoseconds."""
     return int(before * hz // _SECOND) != int(now * hz // _SECOND)
+
+
+def _stamp(nanoseconds: int) -> Time:
+    """Return a time in nanoseconds as a message."""
+    return Time(*divmod(nanoseconds, _SECOND))
+
+
+def _odometry(robot: Robot, now: Time) -> Odometry:
+    """Return the pose of the robot in frame ``odom``, and its speed in its own frame."""
+    pose = Pose(Point(robot.x, robot.y, 0.0), _heading(robot.theta))
+    twist = Twist(Vector3(x=robot.speed), Vector3(z=robot.turn))
+    return Odometry(
+        Header(stamp=now, frame_id="odom"),
+        "base_footprint",
+        PoseWithCovariance(pose, _POSE_COVARIANCE),
+        TwistWithCovariance(twist, _TWIST_COVARIANCE),
+    )
+
+
+def _transform(robot: Robot, now: Time) -> TransformStamped:
+    """Return the pose of the robot in frame ``odom`` as a transform."""
+    place = Transform(Vector3(robot.x, robot.y, 0.0), _heading(robot.theta))
+    return TransformStamped(Header(stamp=now, frame_id="odom"), "base_footprint", place)
+
+
+def _mounts(now: Time) -> list[TransformStamped]:
+    """Return the static transforms of the parts of the robot."""
+    upright = Quaternion(w=1.0)
+    rolled = Quaternion(x=-math.sqrt(0.5), w=math.sqrt(0.5))
+    places = (
+        ("base_footprint", "base_link", (0.0, 0.0, 0.01), upright),
+        ("base_link", "base_scan", (LASER_X, 0.0, 0.172), upright),
+        ("base_link", "imu_link", (-0.032, 0.0, 0.068), upright),
+        ("base_link", "wheel_left_link", (0.0, 0.08, 0.023), rolled),
+        ("base_link", "wheel_right_link", (0.0, -0.08, 0.023), rolled),
+    )
+    return [
+        TransformStamped(
+            Header(stamp=now, frame_id=parent), child, Transform(Vector3(*position), rotation)
+        )
+        for parent, child, position, rotation in places
+    ]
+
+
+def _scan(robot: Robot, now: Time) -> LaserScan:
+    """Return a scan of the laser."""
+    return LaserScan(
+        Header(stamp=now, frame_id="base_scan"),
+        angle_min=0.0,
+        angle_max=math.tau * (BEAMS - 1) / BEAMS,
+        angle_increment=math.tau / BEAMS,
+        time_increment=0.0,
+        scan_time=_SCAN_PERIOD,
+        range_min=RANGE_MIN,
+        range_max=RANGE_MAX,
+        ranges=list(robot.scan()),
+    )
+
+
+def _imu(robot: Robot, now: Time) -> Imu:
+    """Return heading, angular speed, and acceleration by gravity and by the curve."""
+    return Imu(
+        Header(stamp=now, frame_id="imu_link"),
+        _heading(robot.theta),
+        _ATTITUDE_COVARIANCE,
+        Vector3(z=robot.turn),
+        _RATE_COVARIANCE,
+        Vector3(y=robot.speed * robot.turn, z=_GRAVITY),
+        _ACCELERATION_COVARIANCE,
+    )
+
+
+def _joints(robot: Robot, now: Time) -> JointState:
+    """Return the angles and speeds of the wheels."""
+    return JointState(
+        Header(stamp=now),
+        ["wheel_left_joint", "wheel_right_joint"],
+        [robot.wheel_left, robot.wheel_right],
+        list(robot.wheel_speeds()),
+        [],
+    )
+
+
+def _heading(theta: float) -> Quaternion:
+    return Quaternion(z=math.sin(theta / 2), w=math.cos(theta / 2))

@@ -14,8 +14,6 @@ from rosz.turtlesim.world import UNIT_PIXELS, Turtle
 
 __all__ = ("Patch", "encode_png", "paint", "patches", "render")
 
-_CORNERS = 20
-
 
 class Patch(msgspec.Struct, frozen=True):
     """A convex polygon of one color.
@@ -29,39 +27,30 @@ class Patch(msgspec.Struct, frozen=True):
     outline: tuple[Point, ...]
 
 
-class _Palette(msgspec.Struct, frozen=True):
-    """The colors of one kind of turtle."""
-
-    skin: Color
-    rim: Color
-    shell: Color
-    plate: Color
-
-
 _KINDS = (
-    _Palette((126, 186, 96), (56, 94, 40), (92, 142, 62), (148, 190, 104)),
-    _Palette((222, 178, 108), (104, 62, 26), (160, 102, 48), (206, 152, 84)),
-    _Palette((108, 190, 178), (22, 84, 92), (38, 128, 132), (104, 190, 180)),
-    _Palette((226, 146, 120), (112, 34, 34), (172, 62, 52), (226, 120, 92)),
-    _Palette((196, 160, 214), (74, 40, 104), (118, 72, 152), (174, 128, 202)),
-    _Palette((214, 206, 120), (98, 92, 24), (152, 144, 48), (208, 200, 104)),
+    ((126, 186, 96), (56, 94, 40), (92, 142, 62), (148, 190, 104)),
+    ((222, 178, 108), (104, 62, 26), (160, 102, 48), (206, 152, 84)),
+    ((108, 190, 178), (22, 84, 92), (38, 128, 132), (104, 190, 180)),
+    ((226, 146, 120), (112, 34, 34), (172, 62, 52), (226, 120, 92)),
+    ((196, 160, 214), (74, 40, 104), (118, 72, 152), (174, 128, 202)),
+    ((214, 206, 120), (98, 92, 24), (152, 144, 48), (208, 200, 104)),
 )
+"""Colors of skin, rim, shell and plates of each kind of turtle."""
 _EYE = (24, 24, 24)
 
 
-def _oval(center: Point, radii: Point, turned: float = 0.0) -> tuple[Point, ...]:
+def _oval(center: Point, radii: Point, turned: float = 0.0, corners: int = 20) -> tuple[Point, ...]:
     cos, sin = math.cos(turned), math.sin(turned)
-    corners: list[Point] = []
-    for number in range(_CORNERS):
-        angle = math.tau * number / _CORNERS
+    outline: list[Point] = []
+    for number in range(corners):
+        angle = math.tau * number / corners
         x, y = radii[0] * math.cos(angle), radii[1] * math.sin(angle)
-        corners.append((center[0] + cos * x - sin * y, center[1] + sin * x + cos * y))
-    return tuple(corners)
+        outline.append((center[0] + cos * x - sin * y, center[1] + sin * x + cos * y))
+    return tuple(outline)
 
 
 def _plate(x: float, y: float, size: float) -> tuple[Point, ...]:
-    angles = (math.tau * number / 6 for number in range(6))
-    return tuple((x + size * math.cos(angle), y + size * math.sin(angle)) for angle in angles)
+    return _oval((x, y), (size, size), corners=6)
 
 
 # A turtle that looks along x; one unit is one turtle length.
@@ -86,17 +75,11 @@ _PLATES = (
 
 def patches(turtle: Turtle) -> Iterator[Patch]:
     """Yield the polygons of a turtle at its position, from the lowest to the uppermost."""
-    palette = _KINDS[turtle.kind % len(_KINDS)]
+    skin, rim, shell, plate = _KINDS[turtle.kind % len(_KINDS)]
     at_x, at_y = turtle.pixel
     ahead = UNIT_PIXELS * math.cos(turtle.theta)
     aside = UNIT_PIXELS * math.sin(turtle.theta)
-    layers = (
-        (palette.skin, _LIMBS),
-        (_EYE, _EYES),
-        (palette.rim, (_RIM,)),
-        (palette.shell, (_SHELL,)),
-        (palette.plate, _PLATES),
-    )
+    layers = ((skin, _LIMBS), (_EYE, _EYES), (rim, (_RIM,)), (shell, (_SHELL,)), (plate, _PLATES))
     for color, outlines in layers:
         for outline in outlines:
             placed = (

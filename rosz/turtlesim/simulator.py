@@ -189,8 +189,7 @@ class Simulator:
         with self._lock:
             if self._ended:
                 return
-            for bump in self._world.step(time.monotonic()):
-                x, y = bump.goal
+            for _name, (x, y) in self._world.step(time.monotonic()):
                 # ROS 1 counts y from above here.
                 self._node.log.warning(
                     "Oh no! I hit the wall! (Clamping from [x=%f, y=%f])", x, SIZE - y

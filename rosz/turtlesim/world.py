@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import msgspec
@@ -21,7 +21,6 @@ __all__ = (
     "START",
     "STEP_SECONDS",
     "UNIT_PIXELS",
-    "Bump",
     "Pen",
     "Turtle",
     "World",
@@ -56,14 +55,6 @@ class Pen(msgspec.Struct, frozen=True):
     on: bool = True
 
 
-class _Teleport(msgspec.Struct, frozen=True):
-    """A teleport: to a place, or by an angle and a distance from the current place."""
-
-    theta: float
-    to: Point | None = None
-    length: float = 0.0
-
-
 @dataclass
 class Turtle:
     """A turtle.
@@ -90,7 +81,7 @@ class Turtle:
     pen: Pen = field(default_factory=Pen)
     sees: Color = (0, 0, 0)
     _commanded: float = -math.inf
-    _teleports: list[_Teleport] = field(default_factory=list)
+    _jumps: list[Callable[[], None]] = field(default_factory=list)
 
     @property
     def pixel(self) -> Point:
@@ -125,7 +116,11 @@ class Turtle:
             UsageError: An argument is infinite or not a number.
         """
         check_finite(x=x, y=y, theta=theta)
-        self._teleports.append(_Teleport(theta, (x, min(y, SIZE))))
+
+        def jump() -> None:
+            self.x, self.y, self.theta = x, min(y, SIZE), theta
+
+        self._jumps.append(jump)
 
     def teleport_by(self, length: float, theta: float) -> None:
         """Rotate, then move forward, at the next step.
@@ -134,7 +129,13 @@ class Turtle:
             UsageError: An argument is infinite or not a number.
         """
         check_finite(linear=length, angular=theta)
-        self._teleports.append(_Teleport(theta, length=length))
+
+        def jump() -> None:
+            self.theta += theta
+            self.x += math.cos(self.theta) * length
+            self.y += math.sin(self.theta) * length
+
+        self._jumps.append(jump)
 
     def step(self, picture: Field, now: float) -> Point | None:
         """Move for `STEP_SECONDS`, and draw.
@@ -146,9 +147,11 @@ class Turtle:
         Returns:
             The place behind the wall where the turtle was going, if a wall stopped it.
         """
-        for teleport in self._teleports:
-            self._jump(teleport, picture)
-        self._teleports.clear()
+        for jump in self._jumps:
+            before = self.x, self.y
+            jump()
+            self._draw(picture, before)
+        self._jumps.clear()
         if now - self._commanded > COMMAND_SECONDS:
             self.forward = self.left = self.turn = 0.0
         before = self.x, self.y
@@ -160,17 +163,6 @@ class Turtle:
         self.sees = picture.color_at(*self.pixel)
         self._draw(picture, before)
         return goal if goal != (self.x, self.y) else None
-
-    def _jump(self, teleport: _Teleport, picture: Field) -> None:
-        before = self.x, self.y
-        if teleport.to is None:
-            self.theta += teleport.theta
-            self.x += math.cos(self.theta) * teleport.length
-            self.y += math.sin(self.theta) * teleport.length
-        else:
-            self.theta = teleport.theta
-            self.x, self.y = teleport.to
-        self._draw(picture, before)
 
     def _draw(self, picture: Field, before: Point) -> None:
         if self.pen.on and before != (self.x, self.y):
@@ -204,18 +196,6 @@ FIRST = "turtle1"
 """Name of the first turtle."""
 (START,) = struct.unpack("f", struct.pack("f", SIZE / 2))
 """Initial x and y of the first turtle: the middle, in the single precision of messages."""
-
-
-class Bump(msgspec.Struct, frozen=True):
-    """A collision with a wall.
-
-    Attributes:
-        turtle: Name of the turtle.
-        goal: Place behind the wall where the turtle was going.
-    """
-
-    turtle: str
-    goal: Point
 
 
 class World:
@@ -258,10 +238,6 @@ class World:
         self._spawned += 1
         return name
 
-    def spawn_first(self) -> str:
-        """Add the first turtle, in the middle of the field."""
-        return self.spawn(START, START, 0.0)
-
     def free_name(self) -> str:
         """Return the next name for a turtle without one."""
         while True:
@@ -293,15 +269,18 @@ class World:
         self.turtles.clear()
         self._named = self._spawned = 0
         self.clear(background)
-        return self.spawn_first()
+        return self.spawn(START, START, 0.0)
 
-    def step(self, now: float) -> Iterator[Bump]:
-        """Move all turtles by one step, and yield the collisions.
+    def step(self, now: float) -> Iterator[tuple[str, Point]]:
+        """Move all turtles by one step.
 
         Args:
             now: Time in seconds, as for `Turtle.command`.
+
+        Yields:
+            Name of a turtle that hit a wall, and the place behind the wall where it was going.
         """
         for name, turtle in self.turtles.items():
             goal = turtle.step(self.field, now)
             if goal is not None:
-                yield Bump(name, goal)
+                yield name, goal

@@ -7,7 +7,7 @@ import pytest
 
 from rosz.turtlesim import picture
 from rosz.turtlesim.picture import Patch, patches
-from rosz.turtlesim.world import BACKGROUND, SIZE, Turtle, World
+from rosz.turtlesim.world import BACKGROUND, SIZE, START, Turtle, World
 
 from . import png
 
@@ -31,7 +31,7 @@ def test_an_empty_field_has_one_color() -> None:
 
 def test_the_turtle_is_in_the_picture_and_not_on_the_field() -> None:
     world = World()
-    world.spawn_first()
+    world.spawn(START, START, 0.0)
     before = bytes(world.field.pixels)
     image = png.read(taken(world))
     changed = [(x, y) for y in range(500) for x in range(500) if image.at(x, y) != BACKGROUND]
@@ -58,7 +58,7 @@ def test_the_head_is_ahead(theta: float, ahead: tuple[int, int]) -> None:
 
 def test_the_line_is_below_the_turtle() -> None:
     world = World()
-    world.spawn_first()
+    world.spawn(START, START, 0.0)
     world.turtles["turtle1"].teleport_by(3.0, 0.0)
     assert list(world.step(0.0)) == []
     image = png.read(taken(world))

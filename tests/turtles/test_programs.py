@@ -108,7 +108,7 @@ def test_the_launch_line_of_the_lecture(network: Network, rosz: Callable[..., Pr
 
 def test_the_square_on_a_world_without_network() -> None:
     world, square = World(), Square()
-    turtle = world.turtles[world.spawn_first()]
+    turtle = world.turtles[world.spawn(START, START, 0.0)]
     corners: list[tuple[float, float]] = []
     for number in range(3000):
         now = number * STEP_SECONDS

@@ -150,7 +150,7 @@ def test_numbers_that_are_not_finite_are_refused(value: float) -> None:
 @pytest.fixture
 def world() -> World:
     made = World()
-    made.spawn_first()
+    made.spawn(START, START, 0.0)
     return made
 
 
@@ -212,6 +212,6 @@ def test_reset_starts_over(world: World) -> None:
 def test_bumps_name_the_turtle(world: World) -> None:
     world.spawn(0.0, 5.0, math.pi, "west")
     world.turtles["west"].command(0.0, forward=1.0, left=0.0, turn=0.0)
-    (bump,) = world.step(0.0)
-    assert bump.turtle == "west"
-    assert bump.goal == pytest.approx((-0.016, 5.0))
+    ((turtle, goal),) = world.step(0.0)
+    assert turtle == "west"
+    assert goal == pytest.approx((-0.016, 5.0))

@@ -170,18 +170,15 @@ class TransformerROS(Transformer):
 
     def transformPoint(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
         """Transform a PointStamped to another frame."""
-        found = self._lookup(target_frame, ps.header)
-        return tf2_geometry_msgs.do_transform_point(ps, found)
+        return tf2_geometry_msgs.do_transform_point(ps, self._lookup(target_frame, ps.header))
 
     def transformVector3(self, target_frame: str, v3s: Any) -> Any:  # noqa: N802  # ROS 1's
         """Rotate a Vector3Stamped to another frame."""
-        found = self._lookup(target_frame, v3s.header)
-        return tf2_geometry_msgs.do_transform_vector3(v3s, found)
+        return tf2_geometry_msgs.do_transform_vector3(v3s, self._lookup(target_frame, v3s.header))
 
     def transformPose(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
         """Transform a PoseStamped to another frame."""
-        found = self._lookup(target_frame, ps.header)
-        return tf2_geometry_msgs.do_transform_pose(ps, found)
+        return tf2_geometry_msgs.do_transform_pose(ps, self._lookup(target_frame, ps.header))
 
     def transformQuaternion(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
         """Transform a QuaternionStamped to another frame."""

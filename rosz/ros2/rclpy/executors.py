@@ -10,7 +10,6 @@ from __future__ import annotations
 import inspect
 import threading
 import time
-from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -58,30 +57,22 @@ class ExternalShutdownException(RoszError):
         super().__init__("the context was shut down by a signal")
 
 
-class CallbackGroup(ABC):
+class CallbackGroup:
     """A set of callbacks that says which of them may run at the same time.
 
     Only executors with several threads look at it.
     """
 
-    @abstractmethod
     def enter(self) -> bool:
         """Begin a callback of the group, and return whether it may run now."""
+        return True
 
-    @abstractmethod
     def leave(self) -> None:
         """End a callback of the group."""
 
 
 class ReentrantCallbackGroup(CallbackGroup):
     """Callbacks that may all run at the same time."""
-
-    def enter(self) -> bool:
-        """Begin a callback."""
-        return True
-
-    def leave(self) -> None:
-        """Do nothing."""
 
 
 class MutuallyExclusiveCallbackGroup(CallbackGroup):

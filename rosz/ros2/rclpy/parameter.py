@@ -105,9 +105,8 @@ class Parameter:
     def get_parameter_value(self) -> ParameterValue:
         """Return the value as a message, which has one field for each type."""
         message = ParameterValue(type=int(self._type))
-        field = _FIELDS.get(self._type)
-        if field is not None:
-            setattr(message, field, self._value)
+        if self._type is not _Type.NOT_SET:
+            setattr(message, _field(self._type), self._value)
         return message
 
     def to_parameter_msg(self) -> ParameterMessage:
@@ -118,8 +117,7 @@ class Parameter:
     def from_parameter_msg(cls, param_msg: ParameterMessage) -> Parameter:
         """Return the parameter of a message."""
         kind = cls.Type(param_msg.value.type)
-        field = _FIELDS.get(kind)
-        value: Any = None if field is None else getattr(param_msg.value, field)
+        value = None if kind is _Type.NOT_SET else getattr(param_msg.value, _field(kind))
         if isinstance(value, array.array):
             value = value.tolist()
         return cls(param_msg.name, kind, value)
@@ -153,17 +151,11 @@ _ARRAYS = {
     str: _Type.STRING_ARRAY,
     bytes: _Type.BYTE_ARRAY,
 }
-_FIELDS = {
-    _Type.BOOL: "bool_value",
-    _Type.INTEGER: "integer_value",
-    _Type.DOUBLE: "double_value",
-    _Type.STRING: "string_value",
-    _Type.BYTE_ARRAY: "byte_array_value",
-    _Type.BOOL_ARRAY: "bool_array_value",
-    _Type.INTEGER_ARRAY: "integer_array_value",
-    _Type.DOUBLE_ARRAY: "double_array_value",
-    _Type.STRING_ARRAY: "string_array_value",
-}
+
+
+def _field(kind: Parameter.Type) -> str:
+    """Return the name of the field of messages for values of a type."""
+    return f"{kind.name.lower()}_value"
 
 
 def _type_of(value: Any) -> Parameter.Type:
