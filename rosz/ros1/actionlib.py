@@ -78,10 +78,7 @@ class SimpleActionClient:
 
         self.stop_tracking_goal()
         self._goal = self._client.send(
-            goal,
-            on_done=on_done,
-            on_active=active_cb,
-            on_feedback=feedback_cb,
+            goal, on_done=on_done, on_active=active_cb, on_feedback=feedback_cb
         )
 
     def send_goal_and_wait(

@@ -9,13 +9,7 @@ from typing import Any
 
 from rosz.ros1 import rospy
 
-__all__ = (
-    "ApproximateTimeSynchronizer",
-    "Cache",
-    "SimpleFilter",
-    "Subscriber",
-    "TimeSynchronizer",
-)
+__all__ = ("ApproximateTimeSynchronizer", "Cache", "SimpleFilter", "Subscriber", "TimeSynchronizer")
 
 
 class SimpleFilter:

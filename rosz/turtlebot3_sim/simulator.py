@@ -30,14 +30,7 @@ from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import Node
-from rosz.turtlebot3_sim.world import (
-    ARENAS,
-    BEAMS,
-    LASER_X,
-    RANGE_MAX,
-    RANGE_MIN,
-    Robot,
-)
+from rosz.turtlebot3_sim.world import ARENAS, BEAMS, LASER_X, RANGE_MAX, RANGE_MIN, Robot
 
 __all__ = ("STEP_NS", "Simulator", "main")
 

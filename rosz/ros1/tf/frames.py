@@ -86,11 +86,7 @@ class Transformer:
             Exception: The transform is not known in time; the text tells the reason.
         """
         known, reason = self._buffer.can_transform(
-            _strip(target_frame),
-            _strip(source_frame),
-            time,
-            timeout,
-            return_debug_tuple=True,
+            _strip(target_frame), _strip(source_frame), time, timeout, return_debug_tuple=True
         )
         if not known:
             raise Exception(reason)  # tf's own

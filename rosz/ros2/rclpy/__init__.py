@@ -6,16 +6,7 @@ waitables and event handlers are missing: using them raises an ``AttributeError`
 (``rclpy.publisher``, ``rclpy.duration``, …) are listed in ``rosz.ros1.modules``.
 """
 
-from rosz.ros2.rclpy import (
-    context,
-    exceptions,
-    executors,
-    logging,
-    node,
-    parameter,
-    qos,
-    time,
-)
+from rosz.ros2.rclpy import context, exceptions, executors, logging, node, parameter, qos, time
 from rosz.ros2.rclpy import executors as callback_groups
 from rosz.ros2.rclpy import executors as task
 from rosz.ros2.rclpy import program as utilities

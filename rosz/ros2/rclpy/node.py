@@ -130,11 +130,7 @@ class Node(NodeParameters):
     # Entities
 
     def create_publisher(
-        self,
-        msg_type: type[Any],
-        topic: str,
-        qos_profile: QoSProfile | int = 10,
-        **_options: Any,
+        self, msg_type: type[Any], topic: str, qos_profile: QoSProfile | int = 10, **_options: Any
     ) -> Publisher:
         """Create a publisher.
 
