@@ -8,14 +8,6 @@ executes them one at a time. May import nodes and everything below them.
 
 from rosz.actions.client import ActionClient, ClientGoal
 from rosz.actions.server import ActionServer, ServerGoal
-from rosz.actions.types import RUNNING, TERMINAL, ActionTypes
+from rosz.actions.types import ActionTypes
 
-__all__ = (
-    "RUNNING",
-    "TERMINAL",
-    "ActionClient",
-    "ActionServer",
-    "ActionTypes",
-    "ClientGoal",
-    "ServerGoal",
-)
+__all__ = ("ActionClient", "ActionServer", "ActionTypes", "ClientGoal", "ServerGoal")

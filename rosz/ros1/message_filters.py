@@ -63,11 +63,6 @@ class Subscriber(SimpleFilter):
         return getattr(self.sub, key)
 
 
-def _now() -> Any:
-    """Return the current ROS time."""
-    return rospy.Time.now()
-
-
 def _stamp_of(msg: Any, allow_headerless: bool) -> Any:
     """Return the stamp of a message; without one, the current time if allowed, else None."""
     header = getattr(msg, "header", None)
@@ -75,7 +70,7 @@ def _stamp_of(msg: Any, allow_headerless: bool) -> Any:
     if stamp is not None:
         return stamp
     if allow_headerless:
-        return _now()
+        return rospy.Time.now()
     rospy.logwarn(
         "Cannot use message filters with non-stamped messages. Use the 'allow_headerless'"
         " constructor option to auto-assign ROS time to headerless messages."
@@ -143,7 +138,7 @@ class TimeSynchronizer(SimpleFilter):
     def _reset_after_jump(self, queue: Queue, index: int | None) -> None:
         if not self.enable_reset or index is None:
             return
-        moment = _now().to_nsec()
+        moment = rospy.Time.now().to_nsec()
         if moment < self._latest.get(index, 0):
             queue.clear()
         self._latest[index] = moment
@@ -197,7 +192,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
                 self._signal(found)
 
     def _reset_all_after_jump(self) -> None:
-        moment = _now().to_nsec()
+        moment = rospy.Time.now().to_nsec()
         if moment < self._last_added:
             for queue in self.queues:
                 queue.clear()

@@ -222,8 +222,8 @@ class Buffer:
             ExtrapolationNeeded: The time is before or after all known transforms.
         """
         with self._changed:
-            for name, role in ((target, "target_frame"), (source, "source_frame")):
-                self._check_frame(name, role)
+            self._check_frame(target, "target_frame")
+            self._check_frame(source, "source_frame")
             if stamp == 0:
                 stamp = self.latest_common(target, source)
             if target == source:
@@ -258,8 +258,8 @@ class Buffer:
             FramesNotConnected: The frames belong to separate trees.
         """
         with self._changed:
-            for name, role in ((target, "target_frame"), (source, "source_frame")):
-                self._check_frame(name, role)
+            self._check_frame(target, "target_frame")
+            self._check_frame(source, "source_frame")
             if target == source:
                 history = self._frames.get(target)
                 return 0 if history is None else history.latest

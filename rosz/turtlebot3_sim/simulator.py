@@ -56,8 +56,7 @@ def _diagonal(*values: float) -> list[float]:
     return [values[row] if row == column else 0.0 for row in range(size) for column in range(size)]
 
 
-_POSE_COVARIANCE = _diagonal(1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
-_TWIST_COVARIANCE = _diagonal(1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
+_PLANAR_COVARIANCE = _diagonal(1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
 _ATTITUDE_COVARIANCE = _diagonal(1e-6, 1e-6, 1e-6)
 _RATE_COVARIANCE = _diagonal(4e-8, 4e-8, 4e-8)
 _ACCELERATION_COVARIANCE = _diagonal(2.9e-4, 2.9e-4, 2.9e-4)
@@ -152,7 +151,7 @@ class Simulator:
         with self._lock:
             self._robot.step(STEP_NS / _SECOND)
             before, self._time = self._time, self._time + STEP_NS
-            self._clock.publish(Clock(_stamp(self._time)))
+            self._clock.publish(Clock(_message_time(self._time)))
             now = self._stamp()
             if _passes(before, self._time, _ODOMETRY_HZ):
                 self._odometry.publish(_odometry(self._robot, now))
@@ -164,7 +163,7 @@ class Simulator:
 
     def _stamp(self) -> Any:
         simulated = self._node.clock.simulated
-        return _stamp(self._time if simulated else time.time_ns())
+        return _message_time(self._time if simulated else time.time_ns())
 
 
 def main() -> None:
@@ -180,8 +179,7 @@ def _passes(before: int, now: int, hz: float) -> bool:
     return int(before * hz // _SECOND) != int(now * hz // _SECOND)
 
 
-def _stamp(nanoseconds: int) -> Time:
-    """Return a time in nanoseconds as a message."""
+def _message_time(nanoseconds: int) -> Time:
     return Time(*divmod(nanoseconds, _SECOND))
 
 
@@ -192,8 +190,8 @@ def _odometry(robot: Robot, now: Time) -> Odometry:
     return Odometry(
         Header(stamp=now, frame_id="odom"),
         "base_footprint",
-        PoseWithCovariance(pose, _POSE_COVARIANCE),
-        TwistWithCovariance(twist, _TWIST_COVARIANCE),
+        PoseWithCovariance(pose, _PLANAR_COVARIANCE),
+        TwistWithCovariance(twist, _PLANAR_COVARIANCE),
     )
 
 
@@ -223,7 +221,6 @@ def _mounts(now: Time) -> list[TransformStamped]:
 
 
 def _scan(robot: Robot, now: Time) -> LaserScan:
-    """Return a scan of the laser."""
     return LaserScan(
         Header(stamp=now, frame_id="base_scan"),
         angle_min=0.0,
@@ -251,7 +248,6 @@ def _imu(robot: Robot, now: Time) -> Imu:
 
 
 def _joints(robot: Robot, now: Time) -> JointState:
-    """Return the angles and speeds of the wheels."""
     return JointState(
         Header(stamp=now),
         ["wheel_left_joint", "wheel_right_joint"],

@@ -1,6 +1,6 @@
 """Turtles that draw: ROS 1's turtlesim, with or without a window, and its other programs.
 
-`field`, `world` and `picture` are pure: pixels and physics. `simulator` is the node. `snapshot`,
+`world` and `picture` are pure: physics and pixels. `simulator` is the node. `snapshot`,
 which serves and fetches pictures, and the programs `program`, `teleop` and `drivers` are public
 modules, because each is loaded alone.
 """

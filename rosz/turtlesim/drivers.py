@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import msgspec
-
 from rosz.errors import RoszError
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node, TimerEvent, serve_loggers
 
-__all__ = ("Move", "Square", "draw_square", "mimic")
+__all__ = ("Square", "draw_square", "mimic")
 
 _SIDE = 2.0
 _SPEED = 1.0
@@ -24,16 +22,8 @@ _PERIOD = 0.016
 _RESET_SECONDS = 5.0
 
 
-class Move(msgspec.Struct, frozen=True):
-    """A speed.
-
-    Attributes:
-        forward: Forward speed in units per second.
-        turn: Angular speed in rad/s.
-    """
-
-    forward: float = 0.0
-    turn: float = 0.0
+def _move(forward: float = 0.0, turn: float = 0.0) -> Twist:
+    return Twist(Vector3(x=forward), Vector3(z=turn))
 
 
 class Square:
@@ -50,8 +40,8 @@ class Square:
         self._moves = self._plan()
         self._pose = Pose()
 
-    def next(self, pose: Pose) -> Move:
-        """Return the next move.
+    def next(self, pose: Pose) -> Twist:
+        """Return the next speed.
 
         Args:
             pose: Current pose of the turtle.
@@ -59,24 +49,24 @@ class Square:
         self._pose = pose
         return next(self._moves)
 
-    def _plan(self) -> Iterator[Move]:
+    def _plan(self) -> Iterator[Twist]:
         while True:
             at = self._pose
             cos, sin = math.cos(at.theta), math.sin(at.theta)
             self._set_goal(at.x + _SIDE * cos, at.y + _SIDE * sin, at.theta)
             while self._distance_left() >= _NEAR:
-                yield Move(forward=_SPEED)
+                yield _move(forward=_SPEED)
             yield from self._stop()
             at = self._pose
             self._set_goal(at.x, at.y, math.remainder(at.theta + math.pi / 2, math.tau))
             while self._angle_left() >= _NEAR_ANGLE:
-                yield Move(turn=_TURN_SPEED)
+                yield _move(turn=_TURN_SPEED)
             yield from self._stop()
 
-    def _stop(self) -> Iterator[Move]:
-        yield Move()
+    def _stop(self) -> Iterator[Twist]:
+        yield _move()
         while self._pose.linear_velocity or self._pose.angular_velocity:
-            yield Move()
+            yield _move()
         self.messages.append("Reached goal")
 
     def _set_goal(self, x: float, y: float, theta: float) -> None:
@@ -112,7 +102,7 @@ def draw_square() -> None:
                 for text in square.messages:
                     node.log.info("%s", text)
                 square.messages.clear()
-                commands.publish(Twist(Vector3(x=move.forward), Vector3(z=move.turn)))
+                commands.publish(move)
 
         def receive(pose: Pose) -> None:
             poses[:] = [pose]
@@ -134,9 +124,7 @@ def mimic() -> None:
         commands = node.publisher(output, Twist, queue_size=1)
 
         def follow(pose: Pose) -> None:
-            commands.publish(
-                Twist(Vector3(x=pose.linear_velocity), Vector3(z=pose.angular_velocity))
-            )
+            commands.publish(_move(pose.linear_velocity, pose.angular_velocity))
 
         node.subscription(f"{node.resolve('input')}/pose", Pose, follow, queue_size=1)
         node.spin()

@@ -9,8 +9,7 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 
-from rosz.turtlesim.field import Color, Field, Point, span
-from rosz.turtlesim.world import UNIT_PIXELS, Turtle
+from rosz.turtlesim.world import UNIT_PIXELS, Color, Field, Point, Turtle, span
 
 __all__ = ("Patch", "encode_png", "paint", "patches", "render")
 

@@ -72,13 +72,12 @@ class Window:
         self._root.after(_REFRESH_MS, self._refresh)
 
     def _show(self) -> None:
-        view = self._simulator.view(self._version)
-        if view.pixels is not None:
+        pixels, self._version, turtles = self._simulator.view(self._version)
+        if pixels is not None:
             header = f"P6 {FIELD_PIXELS} {FIELD_PIXELS} 255\n".encode()
-            self._image.configure(data=header + view.pixels, format="ppm")
-            self._version = view.version
+            self._image.configure(data=header + pixels, format="ppm")
         self._canvas.delete("turtle")
-        for turtle in view.turtles:
+        for turtle in turtles:
             for patch in patches(turtle):
                 color = "#{:02x}{:02x}{:02x}".format(*patch.color)
                 self._canvas.create_polygon(patch.outline, fill=color, tags="turtle")

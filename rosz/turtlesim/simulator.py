@@ -12,8 +12,6 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-import msgspec
-
 from rosz.errors import NotFoundError, RoszError, ServiceError, UsageError
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_srvs.srv import Empty, EmptyRequest
@@ -40,7 +38,7 @@ from rosz.turtlesim.world import BACKGROUND, FIRST, SIZE, START, STEP_SECONDS, P
 if TYPE_CHECKING:
     from rosz.node import Node
 
-__all__ = ("Simulator", "View")
+__all__ = ("Simulator",)
 
 Work = Callable[[Turtle], None]
 
@@ -103,32 +101,16 @@ class _TurtleTopics:
         self._change(self._name, change_pen)
 
     def _teleport_to(self, request: TeleportAbsoluteRequest) -> None:
-        x, y, theta = request.x, request.y, request.theta
-        self._move(lambda turtle: turtle.teleport_to(x, y, theta))
+        self._move(lambda turtle: turtle.teleport_to(request.x, request.y, request.theta))
 
     def _teleport_by(self, request: TeleportRelativeRequest) -> None:
-        length, theta = request.linear, request.angular
-        self._move(lambda turtle: turtle.teleport_by(length, theta))
+        self._move(lambda turtle: turtle.teleport_by(request.linear, request.angular))
 
     def _move(self, work: Work) -> None:
         try:
             self._change(self._name, work)
         except UsageError as error:
             raise ServiceError(str(error)) from error
-
-
-class View(msgspec.Struct, frozen=True):
-    """The state of the world for a window.
-
-    Attributes:
-        pixels: Pixels of the field; None if they have not changed.
-        version: Version of the field.
-        turtles: Copies of the turtles, from the lowest to the uppermost.
-    """
-
-    pixels: bytes | None
-    version: int
-    turtles: tuple[Turtle, ...]
 
 
 class Simulator:
@@ -170,16 +152,20 @@ class Simulator:
         # Without the lock: rendering takes longer than a step.
         return Picture(self._node.name, render(field, turtles))
 
-    def view(self, known: int) -> View:
-        """Return the state of the world.
+    def view(self, known: int) -> tuple[bytes | None, int, tuple[Turtle, ...]]:
+        """Return the state of the world for a window.
 
         Args:
             known: Version of the field that the caller has.
+
+        Returns:
+            Pixels of the field, or None if they have not changed; version of the field; copies of
+            the turtles, from the lowest to the uppermost.
         """
         with self._lock:
             field = self._world.field
             pixels = bytes(field.pixels) if field.version != known else None
-            return View(pixels, field.version, self._copies())
+            return pixels, field.version, self._copies()
 
     def _copies(self) -> tuple[Turtle, ...]:
         turtles = self._world.turtles.values()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rosz.turtlesim.field import Field, Point, span
+from rosz.turtlesim.world import Field, Point, span
 
 BLACK, WHITE = (0, 0, 0), (255, 255, 255)
 SIZE = 24

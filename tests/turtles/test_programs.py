@@ -9,7 +9,7 @@ from network import Network, Program
 
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
-from rosz.turtlesim.drivers import Move, Square
+from rosz.turtlesim.drivers import Square
 from rosz.turtlesim.world import START, STEP_SECONDS, World
 
 from .conftest import Watcher
@@ -113,7 +113,7 @@ def test_the_square_on_a_world_without_network() -> None:
     for number in range(3000):
         now = number * STEP_SECONDS
         move = square.next(Pose(turtle.x, turtle.y, turtle.theta, turtle.speed, turtle.turn))
-        turtle.command(now, forward=move.forward, left=0.0, turn=move.turn)
+        turtle.command(now, forward=move.linear.x, left=0.0, turn=move.angular.z)
         assert list(world.step(now)) == []
         corners += [(turtle.x, turtle.y)] * square.messages.count("Reached goal")
         square.messages.clear()
@@ -125,10 +125,10 @@ def test_the_square_on_a_world_without_network() -> None:
 
 def test_the_square_waits_until_the_turtle_stands() -> None:
     square = Square()
-    assert square.next(Pose()) == Move(forward=1.0)
-    assert square.next(Pose(x=1.95, linear_velocity=1.0)) == Move()
-    assert square.next(Pose(x=1.96, linear_velocity=1.0)) == Move()
-    assert square.next(Pose(x=1.97)) == Move(turn=0.4)
+    assert square.next(Pose()) == Twist(Vector3(x=1.0))
+    assert square.next(Pose(x=1.95, linear_velocity=1.0)) == Twist()
+    assert square.next(Pose(x=1.96, linear_velocity=1.0)) == Twist()
+    assert square.next(Pose(x=1.97)) == Twist(angular=Vector3(z=0.4))
     assert square.messages == [
         "New goal [2.000000 0.000000, 0.000000]",
         "Reached goal",

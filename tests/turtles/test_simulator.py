@@ -262,5 +262,5 @@ def test_reset_may_be_called_as_soon_as_it_is_served(
         return service
 
     monkeypatch.setattr(node, "service", serve_and_call)
-    (turtle,) = Simulator(node).view(0).turtles
+    _, _, (turtle,) = Simulator(node).view(0)
     assert (turtle.x, turtle.y) == (START, START)

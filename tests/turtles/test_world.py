@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rosz.errors import NotFoundError, UsageError
-from rosz.turtlesim.field import Field
-from rosz.turtlesim.world import BACKGROUND, SIZE, START, STEP_SECONDS, Pen, Turtle, World
+from rosz.turtlesim.world import BACKGROUND, SIZE, START, STEP_SECONDS, Field, Pen, Turtle, World
 
 BLUE = (69, 86, 255)
 MIDDLE = SIZE / 2

@@ -116,14 +116,9 @@ class Transformer:
         Raises:
             Exception: The transform is not known; the subclass tells the reason.
         """
+        target, source, fixed = map(_strip, (target_frame, source_frame, fixed_frame))
         return _parts(
-            self._buffer.lookup_transform_full(
-                _strip(target_frame),
-                target_time,
-                _strip(source_frame),
-                source_time,
-                _strip(fixed_frame),
-            )
+            self._buffer.lookup_transform_full(target, target_time, source, source_time, fixed)
         )
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> Any:  # noqa: N802  # ROS 1's
@@ -223,10 +218,7 @@ class TransformBroadcaster:
             child: Name of the frame.
             parent: Name of the parent.
         """
-        transform = Transform(
-            Vector3(*(float(part) for part in translation)),
-            Quaternion(*(float(part) for part in rotation)),
-        )
+        transform = Transform(Vector3(*map(float, translation)), Quaternion(*map(float, rotation)))
         self.sendTransformMessage(
             TransformStamped(Header(stamp=time, frame_id=parent), child, transform)
         )

@@ -144,20 +144,17 @@ def to_qos(profile: QoSProfile | int) -> QoS:
         return QoS(depth=profile)
     if not isinstance(profile, QoSProfile):
         raise UsageError(f"expected a QoSProfile or a depth, got {type(profile).__name__}")
+    best_effort = profile.reliability is ReliabilityPolicy.BEST_EFFORT
+    transient = profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    manual = profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
     return QoS(
         depth=profile.depth,
-        reliability="best_effort"
-        if profile.reliability is ReliabilityPolicy.BEST_EFFORT
-        else "reliable",
-        durability="transient_local"
-        if profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
-        else "volatile",
+        reliability="best_effort" if best_effort else "reliable",
+        durability="transient_local" if transient else "volatile",
         history="keep_all" if profile.history is HistoryPolicy.KEEP_ALL else "keep_last",
         deadline=_span(profile.deadline),
         lifespan=_span(profile.lifespan),
-        liveliness="manual_by_topic"
-        if profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
-        else "automatic",
+        liveliness="manual_by_topic" if manual else "automatic",
         lease=_span(profile.liveliness_lease_duration),
     )
 
@@ -166,18 +163,12 @@ def _span(duration: Duration) -> int:
     return duration.nanoseconds or FOREVER
 
 
-_LAST = HistoryPolicy.KEEP_LAST
-
 qos_profile_system_default = QoSProfile(history=HistoryPolicy.SYSTEM_DEFAULT, depth=10)
-qos_profile_sensor_data = QoSProfile(
-    history=_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
-)
-qos_profile_services_default = QoSProfile(history=_LAST, depth=10)
-qos_profile_parameters = QoSProfile(history=_LAST, depth=1000)
-qos_profile_parameter_events = QoSProfile(history=_LAST, depth=1000)
-qos_profile_action_status_default = QoSProfile(
-    history=_LAST, depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+qos_profile_services_default = QoSProfile(depth=10)
+qos_profile_parameters = QoSProfile(depth=1000)
+qos_profile_parameter_events = QoSProfile(depth=1000)
+qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class QoSPresetProfiles(Enum):
