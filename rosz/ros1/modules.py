@@ -209,17 +209,12 @@ def explain_missing(name: str, module: ModuleType) -> None:
 
 
 def attribute(name: str, module: ModuleType, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Make the ``__getattr__`` of a module.
+    """Return the ``__getattr__`` of a module; its errors say what to use instead.
 
     Args:
         name: Name of the module in error texts.
         module: The module.
-        homes: Further names of the module, and the modules that define them, which are imported
-            when the name is first used.
-
-    Returns:
-        A function that loads such a name, or raises an AttributeError that says what to use
-        instead.
+        homes: Names that are loaded when they are first used, and the modules that define them.
     """
 
     def get(wanted: str) -> Any:

@@ -51,11 +51,7 @@ class Script:
             self._code = _compile(self._file)
 
     def run(self, arguments: Sequence[str]) -> None:
-        """Run the script as the main module of this process; whatever it raises is passed on.
-
-        Args:
-            arguments: Arguments of the script, without its name.
-        """
+        """Run the script as the main module of this process; whatever it raises is passed on."""
         sys.argv[:] = [self._path, *arguments]
         folder = str(self._file.resolve().parent)
         if sys.flags.safe_path:

@@ -122,8 +122,7 @@ def run_hooks(reason: str) -> None:
     As in rospy, the node does not count as shut down while the hooks of the program run, so they
     may publish, call services and sleep. A second caller waits for the first.
 
-    Args:
-        reason: Reason of the shutdown: a text, or the name of a signal.
+    The reason is a text, or the name of a signal.
     """
     if reason in signal.Signals.__members__:
         reason = f"signal-{signal.Signals[reason].value}"

@@ -53,8 +53,7 @@ def get_parameter_names(descr: Any) -> list[str]:
 def find_files(folder: Path) -> list[Path]:
     """Return the sorted ``.cfg`` files of a package that describe parameters.
 
-    Args:
-        folder: Folder of the package; other files with such names (``setup.cfg``) are left out.
+    Other files with such names (``setup.cfg``) are left out.
     """
     return [file for file in sorted(folder.rglob("*.cfg")) if _describes_parameters(file)]
 

@@ -27,9 +27,6 @@ _SUFFIX = "Config"
 def run(path: Path) -> list[Generated]:
     """Run a file, and return what it describes.
 
-    Args:
-        path: Path of the file.
-
     Raises:
         SourceError: The file cannot be read, is not Python 3, fails, or describes nothing; the
             message names the line.

@@ -209,10 +209,7 @@ def check_running() -> None:
 
 
 def deadline_of(timeout: float | DurationValue | None) -> float:
-    """Return the time of ``time.monotonic()`` at which a wait ends.
-
-    Args:
-        timeout: Time limit in seconds; 30 days when not given.
+    """Return the time of ``time.monotonic()`` at which a wait of some seconds ends.
 
     Raises:
         UsageError: The timeout is not a number.
@@ -366,11 +363,7 @@ class PythonLogHandler(logging.Handler):
 
     @classmethod
     def install(cls, level: int) -> None:
-        """Add a handler to the logger ``rosout``.
-
-        Args:
-            level: Least level that the node logs.
-        """
+        """Add a handler to the logger ``rosout``, with the level of the node."""
         python = logging.getLogger(_BASE)
         if not any(isinstance(handler, cls) for handler in python.handlers):
             python.addHandler(cls())
