@@ -142,23 +142,30 @@ class Program:
             return bool(condition())
 
     def wait_for(
-        self, text: str | re.Pattern[str], timeout: float = TIMEOUT, *, after: int = 0
+        self,
+        text: str | re.Pattern[str],
+        timeout: float = TIMEOUT,
+        *,
+        after: int = 0,
+        times: int = 1,
     ) -> str:
-        """Wait for a line with a text in it, and return the first such line.
+        """Wait for a line with a text in it, and return it.
 
         Args:
             text: Text or regular expression to look for.
             timeout: Time limit in seconds.
             after: Number of lines to leave out at the beginning.
+            times: Number of lines with the text to wait for; the last of them is returned.
         """
         pattern = re.compile(re.escape(text)) if isinstance(text, str) else text
 
         def found() -> list[str]:
             return [line for line in self.lines[after:] + self.errors if pattern.search(line)]
 
-        if not self.wait_until(found, timeout):
-            pytest.fail(f"no line with '{pattern.pattern}' from the program, only:\n{self.output}")
-        return found()[0]
+        if not self.wait_until(lambda: len(found()) >= times, timeout):
+            missing = text if isinstance(text, str) else text.pattern
+            pytest.fail(f"'{missing}' is in {len(found())} lines, not {times}, of:\n{self.output}")
+        return found()[times - 1]
 
     def say(self, line: str) -> None:
         """Write a line to its standard input."""

@@ -25,6 +25,7 @@ with rosz.Node("talker") as node:
         chatter.publish(String(data=node.name))
 """
 STUBBORN = "#!/bin/sh\ntrap '' INT TERM\necho up\nwhile :; do sleep 1; done\n"
+UP = re.compile("^up$")
 EXPECTED = re.compile(
     r"up$|$|\.\.\. |SUMMARY|=+$|NODES|  /|    n\d+ \(|auto-starting|process\[|setting /run_id"
     r"|\[n\d+-\d+\] killing on exit$|shutting down|done$"
@@ -48,10 +49,7 @@ def fleet(folder: Path, script: str, count: int) -> str:
 def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
     count = repeats(26, 100)  # more than form a mesh
     run = launch(fleet(network.folder, TALKER, count))
-    try:
-        eventually(lambda: run.lines.count("up") == count, "all nodes up", 100)
-    except pytest.fail.Exception as error:
-        raise AssertionError(run.output) from error
+    run.wait_for(UP, 100, times=count)
     pids = started(run)
     run.send(signal.SIGINT)
     assert run.exit_code(40) == 0
@@ -64,7 +62,7 @@ def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
 def test_twenty_stubborn_nodes_end_in_time(launch: Start, network: Network) -> None:
     file = fleet(network.folder, STUBBORN, 20)
     run = launch("--sigint-timeout", "0.5", "--sigterm-timeout", "0.5", file)
-    eventually(lambda: run.lines.count("up") == 20, "all nodes up")
+    run.wait_for(UP, times=20)
     begin = time.monotonic()
     run.send(signal.SIGINT)
     assert run.exit_code() == 0

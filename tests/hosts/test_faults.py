@@ -16,6 +16,8 @@ from hosts.world import World
 LISTEN = "tcp/0.0.0.0:7447"
 AGAIN_BY = 5.0
 """Seconds after which all is as it was when a link has been healed."""
+_KEEP_ALIVE = 2.1
+"""Seconds in which a link that carries nothing else carries a message of Zenoh each way."""
 
 
 def start_core(host: Host, *options: str) -> HostProgram:
@@ -132,11 +134,11 @@ def test_a_link_that_was_just_given_up_holds_up_nothing(world: World, linked: st
     seconds = []
     for _ in range(repeats(2, 10)):
         pair.laptop.link.cut()
-        time.sleep(8.6)
+        time.sleep(8.6)  # Zenoh has given up the link 8 s after the last message
         healed = time.monotonic()
         pair.laptop.link.heal()
         seconds.append(pair.hears_again(30, healed))
-        time.sleep(2.1)  # a word each way, so that the next cut is no part of this one
+        time.sleep(_KEEP_ALIVE)  # each side hears the other, so that the next cut is a new one
     print(f"link cut for 8.6 s, linked by {linked}: topics after {max(seconds):.2f} s at most")
     assert max(seconds) < 3 * slack()
 

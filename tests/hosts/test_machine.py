@@ -201,7 +201,7 @@ def test_a_node_there_respawns_and_is_required(scene: Scene) -> None:
         '<node pkg="tools" type="fail.sh" name="fail" machine="far" respawn="true"/>'
         '<node pkg="tools" type="sleeper.sh" name="sleeper" machine="far" required="true"/>'
     )
-    eventually(lambda: run.output.count("[fail-1] restarting process") > 1, "respawns")
+    run.wait_for("[fail-1] restarting process", times=2)
     (pid,) = scene.robot.run("pgrep", "-x", "sleep").split()
     scene.robot.run("kill", "-9", pid)
     assert run.exit_code() == 1
@@ -312,7 +312,7 @@ def test_a_link_that_comes_back_in_time_is_no_loss(scene: Scene) -> None:
     run = scene.launch(SLEEPER.format('required="true"'), "--lost-after", "20")
     run.wait_for("asleep on robot")
     scene.robot.link.cut()
-    time.sleep(2)
+    time.sleep(2)  # how long the link is cut
     scene.robot.link.heal()
     (pid,) = scene.robot.run("pgrep", "-x", "sleep").split()
     scene.robot.run("kill", "-9", pid)

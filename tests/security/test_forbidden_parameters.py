@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 from hosts.host import Host
-from network import eventually
 
 from rosz.security.authority import Authority
 
 WRITER = """
     import logging, sys
     import rosz
+    from rosz.params import condense, spread
     from rosz.params.replica import sync
     logging.basicConfig()
     sync._COMPARE_EVERY = (0.2, 0.2)
@@ -25,11 +25,11 @@ WRITER = """
     with rosz.Node("writer") as node:
         store = node.context.params
         store._broadcaster.send = lambda *_: ()  # as if the link were cut
-        store.merge("/", {
+        store.write(condense(spread("/", {
             "gains": {f"g{n}": n for n in range(2000)},
             "secrets": {"pin": 1, "word": "x"},
             "gains_too": 1,
-        })
+        })))
         print("wrote", flush=True)
         for line in sys.stdin:
             for _ in range(int(line)):
@@ -50,7 +50,7 @@ def test_forbidden_parameters_delay_nothing_and_are_logged_once(
     assert f" and {2 if permitted else 2002} more" in warning
     begun = len(writer.lines)
     writer.say("5")
-    eventually(lambda: writer.output.count("compared") == 5, "5 comparisons", 60)
+    writer.wait_for("compared", 60, times=5)
     assert "compared True" in writer.output  # those that the keeper is at already say False
     assert [line for line in writer.lines[begun:] if line.startswith("sent")] == []
     assert writer.output.count("differs there from now on") == 1

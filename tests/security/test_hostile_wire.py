@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 import pytest
 from interop.plain import Plain, plain_session
-from network import Network, Program, eventually
+from network import Network, Program
 
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_msgs.msg import String
@@ -138,7 +138,7 @@ def memory(victim: Program) -> int:
     """Return the memory of the victim in megabytes; it must still have its parameter."""
     before = victim.output.count("memory ")
     victim.say("")
-    eventually(lambda: victim.output.count("memory ") > before, "the victim's answer", 60)
+    victim.wait_for("memory ", 60, times=before + 1)
     said = [line for line in victim.output.splitlines() if line.startswith("memory ")]
     _, megabytes, value, _ = said[-1].split()
     assert value == "1"

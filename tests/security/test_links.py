@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from hosts.host import HostProgram
 from hosts.world import World
-from network import eventually
 
 from rosz.security.authority import Authority
 
@@ -142,7 +141,7 @@ def test_rules_allow_only_what_they_say(pair: Pair) -> None:
     laptop.wait_for("heard map")
     for _ in range(3):
         laptop.say("publish")
-    eventually(lambda: robot.output.count("got cmd_vel go") == 3, "three orders")
+    robot.wait_for("got cmd_vel go", times=3)
     laptop.say("call reset")
     laptop.wait_for("answer reset")
     laptop.say("call format")

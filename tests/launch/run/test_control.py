@@ -100,7 +100,7 @@ def test_a_launch_that_ends_refuses_requests(
     tmp_path: Path, network: Network, client: StatusClient
 ) -> None:
     ready = tmp_path / "ready"
-    slow = shell("s", f"trap 'sleep 0.7; exit 0' INT; touch {ready}; sleep 600 & wait")
+    slow = shell("s", f"trap 'kill $!; sleep 0.7; exit 0' INT; touch {ready}; sleep 600 & wait")
     with launch(tmp_path, slow, network=network) as run:
         run.pid("s-1")
         eventually(ready.exists, "trap")
