@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from rosz.actions.types import RUNNING, TERMINAL, ActionTypes
+from rosz.actions.types import RUNNING, TERMINAL, ActionTypes, run_callback
 from rosz.errors import WaitTimeout
 from rosz.graph import View
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
@@ -156,13 +156,7 @@ class ClientGoal:
         self.forget()
 
     def _call(self, callback: Callable[..., object] | None, *arguments: Any) -> None:
-        if callback is None:
-            return
-        try:
-            callback(*arguments)
-        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
-            client = self._client
-            client.node.log.report(f"callback of action '{client.name}' failed", error)
+        run_callback(self._client.node, self._client.name, callback, *arguments)
 
 
 class ActionClient:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from rosz.actions.types import RUNNING, TERMINAL, ActionTypes
+from rosz.actions.types import RUNNING, TERMINAL, ActionTypes, run_callback
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
@@ -100,14 +100,10 @@ class ActionServer:
     def start(self) -> None:
         """Begin to receive goals."""
         node, types = self.node, self._types
-        message_types: dict[str, type[Any]] = {
-            "status": GoalStatusArray,
-            "result": types.action_result,
-            "feedback": types.action_feedback,
-        }
         self._publishers = {
-            topic: node.publisher(f"{self.name}/{topic}", message_type, qos=_QUEUE)
-            for topic, message_type in message_types.items()
+            "status": node.publisher(f"{self.name}/status", GoalStatusArray, qos=_QUEUE),
+            "result": node.publisher(f"{self.name}/result", types.action_result, qos=_QUEUE),
+            "feedback": node.publisher(f"{self.name}/feedback", types.action_feedback, qos=_QUEUE),
         }
         node.subscription(f"{self.name}/cancel", GoalID, self._receive_cancel, qos=_QUEUE)
         node.subscription(f"{self.name}/goal", types.action_goal, self._receive_goal, qos=_QUEUE)
@@ -202,8 +198,8 @@ class ActionServer:
             self._changed.notify_all()
         self._publish_status()
         if preempts:
-            self._call(self.on_preempt)
-        self._call(self.on_goal)
+            run_callback(self.node, self.name, self.on_preempt)
+        run_callback(self.node, self.name, self.on_goal)
 
     def _receive_cancel(self, message: GoalID) -> None:
         until = message.stamp.to_nsec()
@@ -223,7 +219,7 @@ class ActionServer:
             self._changed.notify_all()
         self._publish_status()
         if current:
-            self._call(self.on_preempt)
+            run_callback(self.node, self.name, self.on_preempt)
 
     def _end_current(self, status: int, result: Any, text: str) -> None:
         with self._changed:
@@ -281,11 +277,3 @@ class ActionServer:
                 self.name,
             )
             self.set_aborted(None, "No terminal state was set.")
-
-    def _call(self, callback: Callable[[], object] | None) -> None:
-        if callback is None:
-            return
-        try:
-            callback()
-        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
-            self.node.log.report(f"callback of action '{self.name}' failed", error)

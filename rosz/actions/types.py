@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
 
 from rosz.errors import UsageError
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
+from rosz.node import Node
 
-__all__ = ("RUNNING", "TERMINAL", "ActionTypes")
+__all__ = ("RUNNING", "TERMINAL", "ActionTypes", "run_callback")
 
 RUNNING = frozenset({GoalStatus.ACTIVE, GoalStatus.PREEMPTING})
 """States of a goal that the server is executing."""
@@ -48,11 +50,22 @@ class ActionTypes(msgspec.Struct, frozen=True):
         """
         whole = action_type()
         try:
-            goal, result, feedback = (
-                whole.action_goal, whole.action_result, whole.action_feedback
-            )  # fmt: skip
+            goal, result = whole.action_goal, whole.action_result
+            feedback = whole.action_feedback
             return cls(type(goal), type(result), type(feedback), type(result.result))
         except AttributeError as error:
             raise UsageError(
                 f"{action_type.__name__} is not an action; expected a class such as FibonacciAction"
             ) from error
+
+
+def run_callback(
+    node: Node, action: str, callback: Callable[..., object] | None, *arguments: Any
+) -> None:
+    """Call a function of the program, if there is one, and log its failure."""
+    if callback is None:
+        return
+    try:
+        callback(*arguments)
+    except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+        node.log.report(f"callback of action '{action}' failed", error)

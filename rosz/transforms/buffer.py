@@ -23,6 +23,7 @@ _SECOND = 1_000_000_000
 _MAX_DEPTH = 1000
 """Largest depth of the tree; a deeper one must contain a loop."""
 
+_LOOP = "The tf tree is invalid because it contains a loop."
 _UNIT_TOLERANCE = 1e-3
 _CHECK_PERIOD = 0.05
 
@@ -271,7 +272,7 @@ class Buffer:
                     stamps += [stamp for _, stamp in up[: above[frame]]]
                     return min((stamp for stamp in stamps if stamp), default=0)
                 stamps.append(latest)
-            raise self._unconnected(target, source)
+            raise _unconnected(target, source)
 
     def why_not(self, target: str, source: str, stamp: int = 0) -> str:
         """Return why a transform is not known; empty if it is."""
@@ -330,7 +331,7 @@ class Buffer:
                 return
             yield frame, history.latest
             frame = history.newest.parent
-        raise self._loop()
+        raise TransformError(_LOOP)
 
     def _walk(self, target: str, source: str, stamp: int) -> Pose:
         """Go up from both frames to their common ancestor."""
@@ -356,21 +357,19 @@ class Buffer:
                 pose = compose(place.pose, pose)
                 frame = place.parent
             else:
-                raise self._loop()
+                raise TransformError(_LOOP)
         if beyond:
             raise ExtrapolationNeeded(
                 f"{beyond}, when looking up transform from frame [{source}] to frame [{target}]"
             )
-        raise self._unconnected(target, source)
+        raise _unconnected(target, source)
 
-    def _unconnected(self, target: str, source: str) -> FramesNotConnected:
-        return FramesNotConnected(
-            f"Could not find a connection between '{target}' and '{source}' because they are not"
-            " part of the same tree.Tf has two or more unconnected trees."
-        )
 
-    def _loop(self) -> TransformError:
-        return TransformError("The tf tree is invalid because it contains a loop.")
+def _unconnected(target: str, source: str) -> FramesNotConnected:
+    return FramesNotConnected(
+        f"Could not find a connection between '{target}' and '{source}' because they are not"
+        " part of the same tree.Tf has two or more unconnected trees."
+    )
 
 
 def _check(parent: str, child: str, pose: Pose) -> None:

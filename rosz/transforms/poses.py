@@ -73,17 +73,13 @@ def interpolate(before: Pose, after: Pose, fraction: float) -> Pose:
     """
     (ax, ay, az), (bx, by, bz) = before.translation, after.translation
     middle = (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)
-    return Pose(middle, _slerp(before.rotation, after.rotation, fraction))
-
-
-def _slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
-    cosine = sum(p * q for p, q in zip(a, b, strict=True))
+    one, two = before.rotation, after.rotation
+    cosine = sum(p * q for p, q in zip(one, two, strict=True))
     sign = 1.0 if cosine >= 0.0 else -1.0
-    cosine = abs(cosine)
-    if cosine > _NEARLY_ONE:
-        return a
-    angle = math.acos(cosine)
+    if abs(cosine) > _NEARLY_ONE:
+        return Pose(middle, one)
+    angle = math.acos(abs(cosine))
     early = math.sin((1.0 - fraction) * angle) / math.sin(angle)
     late = sign * math.sin(fraction * angle) / math.sin(angle)
-    x, y, z, w = (early * p + late * q for p, q in zip(a, b, strict=True))
-    return x, y, z, w
+    x, y, z, w = (early * p + late * q for p, q in zip(one, two, strict=True))
+    return Pose(middle, (x, y, z, w))

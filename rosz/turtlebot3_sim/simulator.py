@@ -132,9 +132,7 @@ class Simulator:
 
     def _reset(self, _: Any) -> None:
         with self._lock:
-            robot = self._robot
-            robot.x, robot.y, robot.theta = self._start
-            robot.forward = robot.turn = robot.speed = robot.wheel_left = robot.wheel_right = 0.0
+            self._robot = Robot(self._robot.arena, *self._start)
 
     def _run(self) -> None:
         """Run steps at the pace of wall time times the factor."""

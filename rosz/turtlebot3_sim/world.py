@@ -8,7 +8,7 @@ in metres, angles in rad.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -99,15 +99,14 @@ class Pillar(msgspec.Struct, frozen=True):
         return length if length >= 0 else math.inf
 
 
-class Arena:
+class Arena(msgspec.Struct, frozen=True):
     """A floor with obstacles.
 
-    Args:
+    Attributes:
         obstacles: Walls and pillars.
     """
 
-    def __init__(self, obstacles: Iterable[Wall | Pillar] = ()) -> None:
-        self.obstacles: tuple[Wall | Pillar, ...] = tuple(obstacles)
+    obstacles: Sequence[Wall | Pillar] = ()
 
     def clearance(self, x: float, y: float) -> float:
         """Return the distance from a point to the nearest surface; infinity without obstacles."""

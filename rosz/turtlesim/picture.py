@@ -155,14 +155,8 @@ def encode_png(pixels: bytes | bytearray, width: int, height: int) -> bytes:
     # Each row begins with the number of its filter; 0 is none.
     rows = b"".join(b"\0" + pixels[at : at + stride] for at in range(0, stride * height, stride))
     header = struct.pack(">2I5B", width, height, *_TRUE_COLOR_8)
-    return b"".join(
-        (
-            _SIGNATURE,
-            _chunk(b"IHDR", header),
-            _chunk(b"IDAT", zlib.compress(rows, 6)),
-            _chunk(b"IEND", b""),
-        )
-    )
+    data = zlib.compress(rows, 6)
+    return _SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", data) + _chunk(b"IEND", b"")
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

@@ -46,13 +46,7 @@ _CHANNELS = ("~background_r", "~background_g", "~background_b")
 
 
 class _TurtleTopics:
-    """The topics and services of a turtle.
-
-    Args:
-        node: Node of the simulation.
-        name: Name of the turtle.
-        change: Function that runs a change of the turtle of a name under the lock.
-    """
+    """The topics and services of a turtle; `change` changes a turtle under the lock."""
 
     def __init__(self, node: Node, name: str, change: Callable[[str, Work], None]) -> None:
         self._node = node
@@ -70,12 +64,10 @@ class _TurtleTopics:
         )
 
     def publish(self, turtle: Turtle) -> None:
-        """Publish the pose of the turtle and the color below it."""
         self._pose.publish(Pose(turtle.x, turtle.y, turtle.theta, turtle.speed, turtle.turn))
         self._color.publish(Color(*turtle.sees))
 
     def close(self) -> None:
-        """Close all topics and services."""
         for part in reversed(self._parts):
             part.close()
 
@@ -230,12 +222,7 @@ class Simulator:
         return ServiceError(text)
 
     def _add(self, x: float, y: float, theta: float, name: str) -> str:
-        """Add a turtle with its topics and services, and return its name.
-
-        Raises:
-            UsageError: The name is taken, or a number is not finite.
-            InvalidName: The name is not legal in a topic.
-        """
+        """Add a turtle with its topics and services, and return its name."""
         if name:
             self._node.resolve(f"{name}/pose")
         with self._lock:

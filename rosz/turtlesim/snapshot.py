@@ -43,7 +43,7 @@ def serve(node: Node, take: Callable[[], Picture]) -> None:
         take: Function that takes a picture; called on a thread of its own.
     """
     context = node.context
-    key = _key(context.domain, context.session.zid, str(node.node_id))
+    key = own_key(context.domain, "picture", context.session.zid, str(node.node_id))
 
     def reply(query: Query) -> None:
         with query:
@@ -69,7 +69,7 @@ def fetch(session: Session, domain: int, node: str = "") -> Picture:
         UsageError: There are several, and no name is given.
         RoszError: A reply is damaged.
     """
-    replies = session.get(_key(domain, "*", "*"), timeout=_TIMEOUT)
+    replies = session.get(own_key(domain, "picture", "*", "*"), timeout=_TIMEOUT)
     try:
         found = [msgspec.msgpack.decode(r.payload, type=Picture) for r in replies if r.ok]
     except msgspec.DecodeError as error:
@@ -85,7 +85,3 @@ def fetch(session: Session, domain: int, node: str = "") -> Picture:
     if len(found) > 1 and not node:
         raise UsageError(f"several turtlesims are running: name one by --node: {', '.join(names)}")
     return found[0]
-
-
-def _key(domain: int, zid: str, node_id: str) -> str:
-    return own_key(domain, "picture", zid, node_id)

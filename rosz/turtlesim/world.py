@@ -296,11 +296,7 @@ def _normal(angle: float) -> float:
 
 
 def _check_finite(**numbers: float) -> None:
-    """Check that numbers are finite.
-
-    Raises:
-        UsageError: A number is infinite or not a number; the text names it.
-    """
+    """Raise a UsageError if a number is infinite or not a number."""
     for name, value in numbers.items():
         if not math.isfinite(value):
             raise UsageError(f"{name} is '{value}': expected a finite number")

@@ -455,11 +455,7 @@ _CLOSE = 1e-8
 
 
 def _eigenvector(matrix: Array, value: float, *, last: bool = True) -> Array:
-    """Return an eigenvector of an eigenvalue.
-
-    Raises:
-        ValueError: The matrix has no such eigenvalue.
-    """
+    """Return an eigenvector of an eigenvalue, or raise a ValueError if there is none."""
     values, vectors = np.linalg.eig(matrix)
     (found,) = np.nonzero(abs(np.real(values) - value) < _CLOSE)
     if not len(found):
@@ -468,7 +464,6 @@ def _eigenvector(matrix: Array, value: float, *, last: bool = True) -> Array:
 
 
 def _fixed_point(matrix: Array) -> Array:
-    """Return a fixed point of a matrix in homogeneous coordinates."""
     point = _eigenvector(matrix, 1.0)
     return point / point[3]
 

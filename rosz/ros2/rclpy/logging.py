@@ -122,14 +122,8 @@ class RcutilsLogger:
             return False
         if options.get("skip_first") and self._is_first():
             return True
-        self._logger.log(
-            level,
-            "%s",
-            message,
-            stacklevel=3,
-            once=bool(options.get("once")),
-            throttle=options.get("throttle_duration_sec"),
-        )
+        once, throttle = bool(options.get("once")), options.get("throttle_duration_sec")
+        self._logger.log(level, "%s", message, stacklevel=3, once=once, throttle=throttle)
         return True
 
     def _is_first(self) -> bool:
@@ -142,13 +136,7 @@ class RcutilsLogger:
 
 
 class _Console(LogHandler):
-    """Write lines like rclpy: all to stderr, in the format that the environment sets.
-
-    Args:
-        name: Name of the node's logger.
-        on_problem: See `LogHandler`.
-        text_format: Format of a line, as in ``RCUTILS_CONSOLE_OUTPUT_FORMAT``.
-    """
+    """Write lines like rclpy: all to stderr, in the format that the environment sets."""
 
     def __init__(self, name: str, on_problem: Callable[[str], object], text_format: str) -> None:
         super().__init__(on_problem)
