@@ -39,6 +39,8 @@ def pytest_configure() -> None:
 
 _HOSTS = Path(__file__).parent / "hosts"
 _SYSTEM = {"course", "faults", "hosts", "interop"}
+_MANY_PROCESSES = {"hosts", "security"}
+"""Folders of tests that take over 15 s, and several times that on a busy machine."""
 _ROS_1 = {"genpy", "ros", "ros1", "roslaunch"}
 """Fixtures that start real ROS 1."""
 
@@ -54,6 +56,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.system)
         if fixtures & _ROS_1:
             item.add_marker(pytest.mark.ros1)
+        if folder in _MANY_PROCESSES and item.get_closest_marker("timeout") is None:
+            item.add_marker(pytest.mark.timeout(240))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
