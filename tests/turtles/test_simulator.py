@@ -22,7 +22,7 @@ from rosz.turtlesim.simulator import Simulator
 from rosz.turtlesim.world import SIZE, START
 
 from . import png
-from .conftest import Scene, wait_for_turtle
+from .conftest import Scene, Watcher, wait_for_turtle
 
 FORWARD = Twist(Vector3(x=2.0), Vector3())
 
@@ -220,7 +220,7 @@ def test_pictures_by_name(network: Network) -> None:
         fetch(session, domain)
     for namespace in ("one", "two"):
         Simulator(network.node("sim", namespace=namespace))
-        wait_for_turtle(user, f"/{namespace}/turtle1")
+        Watcher(user, f"/{namespace}/turtle1").wait_for()  # published after pictures are served
     assert fetch(session, domain, "/two/sim").node == "/two/sim"
     with pytest.raises(UsageError, match="by --node: /one/sim, /two/sim"):
         fetch(session, domain)
