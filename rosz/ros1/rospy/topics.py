@@ -10,9 +10,10 @@ import threading
 import traceback
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Self
 
-from rosz.errors import ClosedError, EncodeError, RoszError
+from rosz.errors import ClosedError, EncodeError, RoszError, WaitTimeout
 from rosz.message import Message
 from rosz.names import check, is_valid
 from rosz.node import MessageInfo, Node, SubscriberLink, Subscription
@@ -39,6 +40,7 @@ _NO_NODE = "ROS node has not been initialized yet. Please call init_node() first
 _Member = tuple[object, Callable[..., object] | None, Any]
 _NO_LIMIT = 10_000
 """Queue size when none is given: more messages than TCP and a publisher's queue hold in rospy."""
+_ORIGIN_TIMEOUT = 1.0
 _HEADER = "_connection_header"
 _LOGS = frozenset({"/rosout", "/rosout_agg"})
 """Topics of the log in ROS 1."""
@@ -467,9 +469,20 @@ class _SharedSubscription(_Shared):
             return 0
         return len(subscription.publishers())
 
-    def connection_header(self, info: MessageInfo) -> dict[str, str]:
-        """Return the connection header of a message, in the terms of rospy."""
+    def connection_header(self, info: MessageInfo, timeout: float = 0.0) -> dict[str, str]:
+        """Return the connection header of a message, in the terms of rospy.
+
+        Args:
+            info: Information about the message.
+            timeout: Seconds to wait for the token of the publisher, which a message may precede.
+        """
         origin = self._origin(info.gid)
+        if origin is None and timeout:
+            with suppress(WaitTimeout, ClosedError):
+                context().graph.wait_for(
+                    lambda _: self._origin(info.gid) is not None, timeout, "the publisher"
+                )
+            origin = self._origin(info.gid)
         latching = origin is not None and origin.qos is not None and origin.qos.latched
         header = {
             "callerid": origin.node_name if origin else "",
@@ -547,7 +560,7 @@ def _connection_header(message: Message) -> dict[str, str]:
         raise AttributeError(
             f"'{type(message).__name__}' has its {_HEADER} only in the callback it is passed to"
         )
-    header: dict[str, str] = delivery[1].connection_header(delivery[2])
+    header: dict[str, str] = delivery[1].connection_header(delivery[2], _ORIGIN_TIMEOUT)
     return header
 
 

@@ -246,6 +246,33 @@ def test_slow_callbacks_receive_the_newest_messages(printed: Printed) -> None:
     assert (first, last) == ("[0, 1999]", "True")
 
 
+def test_the_header_of_a_message_waits_for_the_token_of_its_publisher(printed: Printed) -> None:
+    (line,) = printed("""
+    import threading, time
+    from rosz.qos import QoS
+    from rosz.ros1.state import context
+    from rosz.wire import Kind, Token, entity_key, format_token, gid, pack_attachment
+    session = context().session
+    kind = "std_msgs/msg/String", String._type_hash
+    domain = context().domain
+    token = Token(domain=domain, zid=session.zid, node_id=900, entity_id=901, kind=Kind.PUBLISHER,
+                  namespace="/", node="late", name="/x", type_name=kind[0], type_hash=kind[1],
+                  qos=QoS())
+    callers, tokens = [], []
+    def declare():
+        tokens.append(session.token(format_token(token)))
+    def receive(message):
+        threading.Thread(target=declare).start()
+        callers.append(message._connection_header["callerid"])
+    rospy.Subscriber("x", String, receive)
+    attachment = pack_attachment(1, time.time_ns(), gid(format_token(token)))
+    session.put(entity_key(domain, "/x", *kind), String._encode(String("a")), attachment=attachment)
+    until(lambda: callers)
+    print(callers)
+""")
+    assert line == "['/late']"
+
+
 def test_any_message(printed: Printed) -> None:
     lines = printed("""
     got, known = [], []
