@@ -29,12 +29,13 @@ settings.load_profile("rosz")
 
 
 def pytest_configure() -> None:
-    """Take Ctrl-C even in the background of a script, where the shell has it ignored.
+    """Handle signals that the shell ignores in the background of a script, or with nohup.
 
-    What is started would inherit that, and not end when told to.
+    Programs that tests start would inherit that, and not end when told to.
     """
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in (signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
 
 
 _HOSTS = Path(__file__).parent / "hosts"

@@ -16,11 +16,12 @@ from .command import package
 from .launching import Start, runs, started
 
 TALKER = """#!/usr/bin/env python3
+import os
 import rosz
 from std_msgs.msg import String
 with rosz.Node("talker") as node:
     chatter = node.publisher("chatter", String)
-    print("up", flush=True)
+    os.write(1, b"up\\n")  # one write, which those of other nodes cannot part
     for _ in node.rate(2):
         chatter.publish(String(data=node.name))
 """

@@ -90,7 +90,7 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
     linked = threading.Event()
     strangers = {"somebody who is linked late"}
     monkeypatch.setattr(
-        MeshReadiness, "_neighbours", lambda *_: set() if linked.is_set() else strangers
+        MeshReadiness, "_missing", lambda *_: set() if linked.is_set() else strangers
     )
     monkeypatch.setattr(Context, "MESH_TIMEOUT", TIMEOUT)
     publisher = network.node("talker").publisher("chatter", String)
@@ -105,7 +105,7 @@ def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.Monkey
     network.context()
     subscription = network.node("listener").subscription("chatter", String)
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)
-    monkeypatch.setattr(MeshReadiness, "_neighbours", lambda *_: {"somebody who is never linked"})
+    monkeypatch.setattr(MeshReadiness, "_missing", lambda *_: {"somebody who is never linked"})
     monkeypatch.setattr(Context, "MESH_TIMEOUT", 1.0)
     began = time.monotonic()
     network.node("talker").publisher("chatter", String).publish("hello")
