@@ -6,6 +6,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from rosz.errors import ClosedError, EncodeError, ServiceError, ServiceNotFound, WaitTimeout
@@ -25,9 +26,6 @@ __all__ = ("Service", "ServiceException", "ServiceProxy", "wait_for_service")
 
 _THREADS = 1000
 _BUFF_SIZE = 65536
-_CALLER_SECONDS = 1.0
-"""Seconds to wait for the token of a client whose first request came before it."""
-_LOOK_AGAIN = 0.01
 _REFUSED = "responded with an error: "
 _MISMATCH = "is not available: "
 
@@ -143,15 +141,20 @@ class Service(_ServiceBase):
         if not self._shut_down.is_set():
             self._service = node.keep(_Server(node, self))
 
-    def connection_header(self, caller: bytes) -> dict[str, str]:
+    def connection_header(self, caller: bytes, timeout: float = 0.0) -> dict[str, str]:
         """Return the connection header of a request, in the terms of rospy.
 
         Args:
             caller: GID of the client.
+            timeout: Seconds to wait for the token of the client, which a request may precede.
         """
-        deadline = time.monotonic() + _CALLER_SECONDS
-        while not (name := self._name_of(caller)) and time.monotonic() < deadline:
-            time.sleep(_LOOK_AGAIN)
+        name = self._name_of(caller)
+        if not name and timeout:
+            with suppress(WaitTimeout, ClosedError):
+                context().graph.wait_for(
+                    lambda _: bool(self._name_of(caller)), timeout, "the caller"
+                )
+            name = self._name_of(caller)
         return {
             "callerid": name,
             "md5sum": self.service_class._md5sum,

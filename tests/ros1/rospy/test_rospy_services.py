@@ -233,3 +233,16 @@ def test_invalid_timeouts_are_refused(network: Network) -> None:
     )
     told = "UsageError | timeout is 'nan': expected a number of seconds"
     assert lines == [f"message -> {told}", f"service -> {told}"]
+
+
+def test_the_header_of_a_request_names_its_caller(printed: Printed) -> None:
+    lines = printed("""
+    headers = []
+    def answer(request):
+        headers.append(request._connection_header)
+        return True, ""
+    rospy.Service("s", SetBool, answer)
+    rospy.ServiceProxy("s", SetBool)(True)
+    print([headers[0][key] for key in ("callerid", "service", "type", "md5sum")])
+""")
+    assert lines == ["['/services', '/s', 'std_srvs/SetBool', '09fb03525b03e7ea1fd3992bafd87e16']"]
