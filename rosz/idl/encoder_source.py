@@ -285,7 +285,8 @@ class Encoder:
     def _one(self, field: Field, value: str) -> None:
         kind = field.type
         if kind.base in SCALAR_CODES:
-            self._out.scalar(SCALAR_CODES[kind.base], value)
+            code = SCALAR_CODES[kind.base]
+            self._out.scalar(code, self._scalar(code, value))
         elif kind.base == "string":
             self._string(kind, value, repeating=field.name in _REPEATING)
         elif kind.base == "wstring":
@@ -296,6 +297,10 @@ class Encoder:
             self._message(self._catalog.message(kind.base), local)
         else:
             self._message(self._catalog.message(kind.base), value)
+
+    def _scalar(self, code: str, value: str) -> str:
+        """Return the expression of a primitive; ``struct`` takes any object for a bool."""
+        return f"{self._module.use('TRUTH')}[{value}]" if code == "?" else value
 
     def _many(self, field: Field, value: str, local: str) -> None:
         kind = field.type
@@ -434,7 +439,10 @@ class Encoder:
                     outer[leaf[:depth]] = "e_" + "_".join(leaf[:depth])
                     inner = f"{outer[leaf[: depth - 1]]}.{attribute(leaf[depth - 1])}"
                     loops.append(f"for {outer[leaf[:depth]]} in ({inner},)")
-        values = ", ".join(f"{outer[leaf[:-1]]}.{attribute(leaf[-1])}" for leaf, _ in layout.leaves)
+        values = ", ".join(
+            self._scalar(code, f"{outer[leaf[:-1]]}.{attribute(leaf[-1])}")
+            for leaf, code in layout.leaves
+        )
         self._out.piece(f'b"".join([{pack}({values}) {" ".join(loops)}])')
         self._out.offset.plus_elements(count, layout.size)
 

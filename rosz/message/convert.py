@@ -149,7 +149,10 @@ class _Filler:
             if slot.kind in OCTETS:
                 return bytes(element & 0xFF for element in elements)
             if slot.kind in ARRAY_CODES:
-                return numbers(elements, ARRAY_CODES[slot.kind])
+                try:
+                    return numbers(elements, ARRAY_CODES[slot.kind])
+                except OverflowError:
+                    self._refuse(path, f"elements in the range of {slot.kind}", value)
         return elements
 
     def _one(self, slot: Slot, value: Any, path: str, before: Any) -> Any:

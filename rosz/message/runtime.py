@@ -13,11 +13,21 @@ from collections.abc import Callable
 from typing import Any, TypeAlias, TypeVar
 
 from rosz.message.schema_codec import FAULTS, decode_plainly, encode_plainly
-from rosz.message.sequences import StringList, Texts, flags, numbers, octets, pack_wide, read_wide
+from rosz.message.sequences import (
+    TRUTH,
+    StringList,
+    Texts,
+    flags,
+    numbers,
+    octets,
+    pack_wide,
+    read_wide,
+)
 
 __all__ = (
     "FAULTS",
     "PADDING",
+    "TRUTH",
     "Stride",
     "StringList",
     "Template",

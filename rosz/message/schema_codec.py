@@ -21,7 +21,15 @@ from rosz.message.base import (
     Slot,
     slots,
 )
-from rosz.message.sequences import flags, numbers, octets, pack_wide, put_text, read_wide
+from rosz.message.sequences import (
+    TRUTH,
+    flags,
+    numbers,
+    octets,
+    pack_wide,
+    put_text,
+    read_wide,
+)
 
 __all__ = ("FAULTS", "decode_plainly", "encode_plainly", "shown")
 
@@ -186,7 +194,7 @@ class _Writer:
             except FAULTS as fault:
                 why = "" if isinstance(fault, TypeError) else str(fault)
                 self._refuse(f"{path}[{index}]", kind, number, why)
-        if kind not in OCTETS:
+        if kind in ARRAY_CODES:
             self._refuse(path, f"a sequence of {kind}", value, str(error))
         return b"".join(packed)
 
@@ -209,8 +217,8 @@ def _number(kind: str, value: Any) -> Any:
         TypeError: The value is of another kind.
         OverflowError: The value is outside the range of the type.
     """
-    if kind == "bool":
-        return bool(value)
+    if kind == "bool" and value in TRUTH:
+        return TRUTH[value]
     if kind in ("float32", "float64"):
         if isinstance(value, str | bytes | bytearray):
             raise TypeError(f"'{type(value).__name__}' is not a number")
@@ -224,6 +232,8 @@ def _number(kind: str, value: Any) -> Any:
     if not hasattr(value, "__index__"):
         raise TypeError(f"'{type(value).__name__}' is not an integer")
     number = value.__index__()
+    if kind == "bool":
+        return bool(number)
     low, high = INTEGER_RANGES[kind]
     if not low <= number <= high:
         raise OverflowError(f"the range of the type is {low} to {high}")

@@ -6,12 +6,13 @@ Numeric sequences become buffers of the right element type, whatever sequence a 
 from __future__ import annotations
 
 from array import array
-from math import inf
+from collections.abc import Callable
 from struct import Struct
 from struct import error as struct_error
 from typing import Any
 
 __all__ = (
+    "TRUTH",
     "StringList",
     "Texts",
     "flags",
@@ -21,6 +22,9 @@ __all__ = (
     "put_text",
     "read_wide",
 )
+
+TRUTH = {False: False, True: True}
+"""The values of a bool, and what equals them, such as numpy's; any other one is a KeyError."""
 
 _OCTET_FORMATS = frozenset({"B", "b", "c", "?"})
 
@@ -37,22 +41,50 @@ def numbers(value: Any, code: str, size: int = -1) -> array[Any] | memoryview:
         size: Number of elements that it must have; -1 for any.
 
     Raises:
-        TypeError: The value is not a sequence of such numbers.
-        OverflowError: A number is outside the range of the type.
+        TypeError: The value is not a sequence.
+        struct.error: An element is not such a number, or is outside the range of the type.
+        OverflowError: A number is too large for a float32.
         ValueError: The number of elements is wrong.
     """
-    found = _view(value, code)
-    if found is None:
-        if isinstance(value, str | bytes | bytearray | dict | set):
-            raise TypeError(f"'{type(value).__name__}' is not a sequence of numbers")
-        _refuse_iterator(value)
-        plain = _flat(value.tolist()) if hasattr(value, "tolist") else list(value)
-        found = array(code, plain)
-        if code == "f":
-            _refuse_overflow(found, plain)
+    if type(value) is list or type(value) is tuple:
+        found: array[Any] | memoryview = array(code, _packers[code, len(value)](*value))
+    else:
+        view = _view(value, code)
+        found = _converted(value, code) if view is None else view
     if len(found) != size >= 0:
         raise ValueError(f"expected {size} elements, got {len(found)}")
     return found
+
+
+class _ListPackers(dict[tuple[str, int], Callable[..., bytes]]):
+    """Functions that pack so many numbers of a type, which is faster than an array's constructor.
+
+    Those of long lists are not kept, and a full cache is emptied.
+    """
+
+    def __missing__(self, key: tuple[str, int]) -> Callable[..., bytes]:
+        code, count = key
+        # Only the portable format checks the range of a float32.
+        pack = Struct(f"{'=' if code == 'f' else '@'}{count}{code}").pack
+        if count <= _LONGEST_LIST:
+            if len(self) >= _MOST_LISTS:
+                self.clear()
+            self[key] = pack
+        return pack
+
+
+_LONGEST_LIST = 4096
+_MOST_LISTS = 1024
+_packers = _ListPackers()
+
+
+def _converted(value: Any, code: str) -> array[Any]:
+    """Return the numbers of any other sequence, converted one by one."""
+    if isinstance(value, str | bytes | bytearray | dict | set):
+        raise TypeError(f"'{type(value).__name__}' is not a sequence of numbers")
+    _refuse_iterator(value)
+    plain = _flat(value.tolist()) if hasattr(value, "tolist") else list(value)
+    return array(code, _packers[code, len(plain)](*plain))
 
 
 def _view(value: Any, code: str) -> array[Any] | memoryview | None:
@@ -92,14 +124,6 @@ def _refuse_iterator(value: Any) -> None:
         raise TypeError(f"'{type(value).__name__}' is not a sequence")
 
 
-def _refuse_overflow(found: array[float], given: list[Any]) -> None:
-    """Refuse float32 values that became infinite by the conversion."""
-    if inf in found or -inf in found:
-        for before, after in zip(given, found, strict=True):
-            if after in (inf, -inf) and before not in (inf, -inf):
-                raise OverflowError(f"{before!r} is outside the range of float32")
-
-
 def octets(value: Any, size: int = -1) -> bytes | memoryview:
     """Return octets as a buffer.
 
@@ -135,16 +159,20 @@ def flags(value: Any, size: int = -1) -> bytes:
     """Return truth values as octets, 0 and 1.
 
     Raises:
-        TypeError: The value is not a sequence.
-        ValueError: The number of elements is wrong.
+        TypeError: The value is not a sequence of truth values.
+        ValueError: A number is not in 0..255, or the number of elements is wrong.
     """
     if isinstance(value, str | dict | set):
         raise TypeError(f"'{type(value).__name__}' is not a sequence of truth values")
     _refuse_iterator(value)
-    found = bytes(map(bool, value))
+    plain = _flat(value.tolist()) if hasattr(value, "tolist") else value
+    found = bytes(plain).translate(_ONES)
     if len(found) != size >= 0:
         raise ValueError(f"expected {size} elements, got {len(found)}")
     return found
+
+
+_ONES = b"\0" + b"\1" * 255
 
 
 _pack_count = Struct("<I").pack
@@ -164,7 +192,11 @@ def put_text(value: Any) -> bytes:
     """
     octets: bytes = value.encode()
     if 0 in octets:
-        raise ValueError("it holds a NUL character")
+        at = value.index("\0")
+        raise ValueError(
+            f"the character at index {at} is NUL, which ends a string on the wire; "
+            "send bytes in a field of type uint8[]"
+        )
     return octets + b"\0"
 
 

@@ -16,7 +16,7 @@ from rosz.message.convert import from_json, from_plain, from_yaml, to_json, to_p
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Point, PoseStamped, Twist, Vector3
 from rosz.msgs.rcl_interfaces.msg import ParameterValue
-from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, JointState
+from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from rosz.msgs.std_msgs.msg import Byte, Float64, Header, Int8, String, UInt8, UInt8MultiArray
 from rosz.typestore import TypeStore
 
@@ -140,6 +140,11 @@ BAD: list[tuple[type[Message], str, str]] = [
     (JointState, "{name: foo}", "JointState.name: expected a list of string, got str 'foo'"),
     (JointState, "{name: [a, 1]}", "JointState.name[1]: expected string (quote it: \"'1'\")"),
     (JointState, "{position: [1, b]}", "JointState.position[1]: expected float64, got str 'b'"),
+    (
+        LaserScan,
+        "{ranges: [1.0e+39]}",
+        "LaserScan.ranges: expected elements in the range of float32, got list [1e+39]",
+    ),
     (CameraInfo, "{K: [1]}", "sensor_msgs/CameraInfo.K: expected 9 elements, got list [1]"),
     (Header, "{stamp: 1.5}", "Header.stamp: expected nanoseconds as an integer"),
     (ParameterValue, "{bool_value: maybe}", "bool_value: expected bool, got str 'maybe'"),

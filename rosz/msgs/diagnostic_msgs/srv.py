@@ -7,6 +7,7 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -92,7 +93,7 @@ class AddDiagnosticsResponse(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t2[n1]
-            return f2(256, m.success, n1, b1)
+            return f2(256, _TRUTH[m.success], n1, b1)
         except _FAULTS:
             return _plain(m, AddDiagnosticsResponse)
 

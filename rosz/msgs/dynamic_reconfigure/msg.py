@@ -7,6 +7,7 @@ from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -54,7 +55,7 @@ class BoolParameter(_Message):
         try:
             n1, b1 = _texts[m.name]
             f2, p3 = _t1[n1]
-            return f2(256, n1, b1, m.value)
+            return f2(256, n1, b1, _TRUTH[m.value])
         except _FAULTS:
             return _plain(m, BoolParameter)
 
@@ -238,7 +239,7 @@ class GroupState(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            return _t5[n1](256, n1, b1, m.state, m.id, m.parent)
+            return _t5[n1](256, n1, b1, _TRUTH[m.state], m.id, m.parent)
         except _FAULTS:
             return _plain(m, GroupState)
 
@@ -302,7 +303,7 @@ class Config(_Message):
             for bools_one in bools:
                 n3, b3 = _texts[bools_one.name]
                 f4, p5 = _t6[p2, n3]
-                out.append(f4(n3, b3, bools_one.value))
+                out.append(f4(n3, b3, _TRUTH[bools_one.value]))
                 p2 = p5
             ints = m.ints
             n6 = len(ints)
@@ -342,7 +343,8 @@ class Config(_Message):
             for groups_one in groups:
                 n26, b26 = _texts[groups_one.name]
                 f27, p28 = _t11[p25, n26]
-                out.append(f27(n26, b26, groups_one.state, groups_one.id, groups_one.parent))
+                out.append(f27(n26, b26, _TRUTH[groups_one.state], groups_one.id,
+                    groups_one.parent))
                 p25 = p28
             return b"".join(out)
         except _FAULTS:
@@ -677,7 +679,7 @@ class ConfigDescription(_Message):
             for bools_one in bools:
                 n23, b23 = _texts[bools_one.name]
                 f24, p25 = _t6[p22, n23]
-                out.append(f24(n23, b23, bools_one.value))
+                out.append(f24(n23, b23, _TRUTH[bools_one.value]))
                 p22 = p25
             ints = max_2.ints
             n26 = len(ints)
@@ -717,7 +719,8 @@ class ConfigDescription(_Message):
             for groups_one_2 in groups_2:
                 n46, b46 = _texts[groups_one_2.name]
                 f47, p48 = _t11[p45, n46]
-                out.append(f47(n46, b46, groups_one_2.state, groups_one_2.id, groups_one_2.parent))
+                out.append(f47(n46, b46, _TRUTH[groups_one_2.state], groups_one_2.id,
+                    groups_one_2.parent))
                 p45 = p48
             min_2 = m.min
             bools_2 = min_2.bools
@@ -727,7 +730,7 @@ class ConfigDescription(_Message):
             for bools_one_2 in bools_2:
                 n51, b51 = _texts[bools_one_2.name]
                 f52, p53 = _t6[p50, n51]
-                out.append(f52(n51, b51, bools_one_2.value))
+                out.append(f52(n51, b51, _TRUTH[bools_one_2.value]))
                 p50 = p53
             ints_2 = min_2.ints
             n54 = len(ints_2)
@@ -767,7 +770,8 @@ class ConfigDescription(_Message):
             for groups_one_3 in groups_3:
                 n74, b74 = _texts[groups_one_3.name]
                 f75, p76 = _t11[p73, n74]
-                out.append(f75(n74, b74, groups_one_3.state, groups_one_3.id, groups_one_3.parent))
+                out.append(f75(n74, b74, _TRUTH[groups_one_3.state], groups_one_3.id,
+                    groups_one_3.parent))
                 p73 = p76
             dflt = m.dflt
             bools_3 = dflt.bools
@@ -777,7 +781,7 @@ class ConfigDescription(_Message):
             for bools_one_3 in bools_3:
                 n79, b79 = _texts[bools_one_3.name]
                 f80, p81 = _t6[p78, n79]
-                out.append(f80(n79, b79, bools_one_3.value))
+                out.append(f80(n79, b79, _TRUTH[bools_one_3.value]))
                 p78 = p81
             ints_3 = dflt.ints
             n82 = len(ints_3)
@@ -817,7 +821,7 @@ class ConfigDescription(_Message):
             for groups_one_4 in groups_4:
                 n102, b102 = _texts[groups_one_4.name]
                 f103, p104 = _t11[p101, n102]
-                out.append(f103(n102, b102, groups_one_4.state, groups_one_4.id,
+                out.append(f103(n102, b102, _TRUTH[groups_one_4.state], groups_one_4.id,
                     groups_one_4.parent))
                 p101 = p104
             return b"".join(out)

@@ -8,6 +8,7 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -69,7 +70,7 @@ class ReconfigureRequest(_Message):
             for bools_one in bools:
                 n3, b3 = _texts[bools_one.name]
                 f4, p5 = _t1[p2, n3]
-                out.append(f4(n3, b3, bools_one.value))
+                out.append(f4(n3, b3, _TRUTH[bools_one.value]))
                 p2 = p5
             ints = config.ints
             n6 = len(ints)
@@ -109,7 +110,8 @@ class ReconfigureRequest(_Message):
             for groups_one in groups:
                 n26, b26 = _texts[groups_one.name]
                 f27, p28 = _t6[p25, n26]
-                out.append(f27(n26, b26, groups_one.state, groups_one.id, groups_one.parent))
+                out.append(f27(n26, b26, _TRUTH[groups_one.state], groups_one.id,
+                    groups_one.parent))
                 p25 = p28
             return b"".join(out)
         except _FAULTS:
@@ -211,7 +213,7 @@ class ReconfigureResponse(_Message):
             for bools_one in bools:
                 n3, b3 = _texts[bools_one.name]
                 f4, p5 = _t1[p2, n3]
-                out.append(f4(n3, b3, bools_one.value))
+                out.append(f4(n3, b3, _TRUTH[bools_one.value]))
                 p2 = p5
             ints = config.ints
             n6 = len(ints)
@@ -251,7 +253,8 @@ class ReconfigureResponse(_Message):
             for groups_one in groups:
                 n26, b26 = _texts[groups_one.name]
                 f27, p28 = _t6[p25, n26]
-                out.append(f27(n26, b26, groups_one.state, groups_one.id, groups_one.parent))
+                out.append(f27(n26, b26, _TRUTH[groups_one.state], groups_one.id,
+                    groups_one.parent))
                 p25 = p28
             return b"".join(out)
         except _FAULTS:

@@ -8,6 +8,7 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -139,7 +140,7 @@ class GetGeoPathResponse(_Message):
             poses = plan.poses
             n5 = len(poses)
             f6, p7 = _t2[p4, n2]
-            out = [f3(256, m.success, n1, b1, stamp.sec, stamp.nanosec), f6(n2, b2, n5)]
+            out = [f3(256, _TRUTH[m.success], n1, b1, stamp.sec, stamp.nanosec), f6(n2, b2, n5)]
             p8 = p7
             for poses_one in poses:
                 header_2 = poses_one.header
@@ -329,7 +330,7 @@ class GetGeographicMapResponse(_Message):
             max_pt = bounds.max_pt
             points = map_2.points
             n5 = len(points)
-            out = [f3(256, m.success, n1, b1, stamp.sec, stamp.nanosec),
+            out = [f3(256, _TRUTH[m.success], n1, b1, stamp.sec, stamp.nanosec),
                 _t6[p4, n2](n2, b2, uuid, min_pt.latitude, min_pt.longitude, min_pt.altitude,
                 max_pt.latitude, max_pt.longitude, max_pt.altitude, n5)]
             p6 = 4
@@ -605,7 +606,7 @@ class GetRoutePlanResponse(_Message):
                 uuid = bytes(_octets(uuid, 16))
             segments = plan.segments
             n3 = len(segments)
-            out = [_t11[n1](256, m.success, n1, b1, stamp.sec, stamp.nanosec),
+            out = [_t11[n1](256, _TRUTH[m.success], n1, b1, stamp.sec, stamp.nanosec),
                 _t12[n2](n2, b2, uuid, n3)]
             for segments_one in segments:
                 uuid_2 = segments_one.uuid
@@ -943,7 +944,7 @@ class UpdateGeographicMapResponse(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t15[n1]
-            return f2(256, m.success, n1, b1)
+            return f2(256, _TRUTH[m.success], n1, b1)
         except _FAULTS:
             return _plain(m, UpdateGeographicMapResponse)
 

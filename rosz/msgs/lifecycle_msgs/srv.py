@@ -8,6 +8,7 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
@@ -90,7 +91,7 @@ class ChangeStateResponse(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.success)
+            return _p1(256, _TRUTH[m.success])
         except _FAULTS:
             return _plain(m, ChangeStateResponse)
 

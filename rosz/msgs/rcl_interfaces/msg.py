@@ -13,6 +13,7 @@ from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
@@ -410,8 +411,8 @@ class ParameterValue(_Message):
             string_array_value, k = m.string_array_value, _s3.written
             b14 = k[1] if string_array_value == k[0] else _s3.put(string_array_value)
             n14 = len(b14)
-            return b"".join((f3(256, m.type, m.bool_value, m.integer_value, m.double_value, n1, b1,
-                n2), byte_array_value, f6(n5), bool_array_value, f9(n8),
+            return b"".join((f3(256, m.type, _TRUTH[m.bool_value], m.integer_value, m.double_value,
+                n1, b1, n2), byte_array_value, f6(n5), bool_array_value, f9(n8),
                 (_PADDING[-(p10) & 7] if n8 else b""), integer_array_value, _p3(n12),
                 (_PADDING[-(p11 + n8 * 8 + 4) & 7] if n12 else b""), double_array_value, b14))
         except _FAULTS:
@@ -513,10 +514,11 @@ class Parameter(_Message):
             string_array_value, k = value.string_array_value, _s4.written
             b15 = k[1] if string_array_value == k[0] else _s4.put(string_array_value)
             n15 = len(b15)
-            return b"".join((f4(256, n1, b1, value.type, value.bool_value, value.integer_value,
-                value.double_value, n2, b2, n3), byte_array_value, f7(n6), bool_array_value,
-                f10(n9), (_PADDING[-(p11) & 7] if n9 else b""), integer_array_value, _p3(n13),
-                (_PADDING[-(p12 + n9 * 8 + 4) & 7] if n13 else b""), double_array_value, b15))
+            return b"".join((f4(256, n1, b1, value.type, _TRUTH[value.bool_value],
+                value.integer_value, value.double_value, n2, b2, n3), byte_array_value, f7(n6),
+                bool_array_value, f10(n9), (_PADDING[-(p11) & 7] if n9 else b""),
+                integer_array_value, _p3(n13), (_PADDING[-(p12 + n9 * 8 + 4) & 7] if n13 else b""),
+                double_array_value, b15))
         except _FAULTS:
             return _plain(m, Parameter)
 
@@ -633,7 +635,7 @@ class ParameterDescriptor(_Message):
             if n10 > 1: raise ValueError
             p11 = 0 if n10 else p9 + n6 * 24 + 4
             return b"".join((f4(256, n1, b1, m.type, n2, b2),
-                f7(n3, b3, m.read_only, m.dynamic_typing, n6),
+                f7(n3, b3, _TRUTH[m.read_only], _TRUTH[m.dynamic_typing], n6),
                 (_PADDING[-(p8) & 7] if n6 else b""),
                 b"".join([_p4(e.from_value, e.to_value, e.step) for e in floating_point_range]),
                 _p3(n10), (_PADDING[-(p9 + n6 * 24 + 4) & 7] if n10 else b""),
@@ -750,7 +752,7 @@ class ParameterEvent(_Message):
                 string_array_value, k = value.string_array_value, _s5.written
                 b20 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
                 n20 = len(b20)
-                out += (f9(n6, b6, value.type, value.bool_value, value.integer_value,
+                out += (f9(n6, b6, value.type, _TRUTH[value.bool_value], value.integer_value,
                     value.double_value, n7, b7, n8), byte_array_value, f12(n11), bool_array_value,
                     f15(n14), (_PADDING[-(p16) & 7] if n14 else b""), integer_array_value,
                     _p3(n18), (_PADDING[-(p17 + n14 * 8 + 4) & 7] if n18 else b""),
@@ -793,10 +795,10 @@ class ParameterEvent(_Message):
                 string_array_value_2, k = value_2.string_array_value, _s6.written
                 b39 = k[1] if string_array_value_2 == k[0] else _s6.put(string_array_value_2)
                 n39 = len(b39)
-                out += (f28(n25, b25, value_2.type, value_2.bool_value, value_2.integer_value,
-                    value_2.double_value, n26, b26, n27), byte_array_value_2, f31(n30),
-                    bool_array_value_2, f34(n33), (_PADDING[-(p35) & 7] if n33 else b""),
-                    integer_array_value_2, _p3(n37),
+                out += (f28(n25, b25, value_2.type, _TRUTH[value_2.bool_value],
+                    value_2.integer_value, value_2.double_value, n26, b26, n27),
+                    byte_array_value_2, f31(n30), bool_array_value_2, f34(n33),
+                    (_PADDING[-(p35) & 7] if n33 else b""), integer_array_value_2, _p3(n37),
                     (_PADDING[-(p36 + n33 * 8 + 4) & 7] if n37 else b""), double_array_value_2, b39)
                 p24 = p38 + n37 * 8 + n39 & 7
             deleted_parameters = m.deleted_parameters
@@ -836,10 +838,10 @@ class ParameterEvent(_Message):
                 string_array_value_3, k = value_3.string_array_value, _s7.written
                 b58 = k[1] if string_array_value_3 == k[0] else _s7.put(string_array_value_3)
                 n58 = len(b58)
-                out += (f47(n44, b44, value_3.type, value_3.bool_value, value_3.integer_value,
-                    value_3.double_value, n45, b45, n46), byte_array_value_3, f50(n49),
-                    bool_array_value_3, f53(n52), (_PADDING[-(p54) & 7] if n52 else b""),
-                    integer_array_value_3, _p3(n56),
+                out += (f47(n44, b44, value_3.type, _TRUTH[value_3.bool_value],
+                    value_3.integer_value, value_3.double_value, n45, b45, n46),
+                    byte_array_value_3, f50(n49), bool_array_value_3, f53(n52),
+                    (_PADDING[-(p54) & 7] if n52 else b""), integer_array_value_3, _p3(n56),
                     (_PADDING[-(p55 + n52 * 8 + 4) & 7] if n56 else b""), double_array_value_3, b58)
                 p43 = p57 + n56 * 8 + n58 & 7
             return b"".join(out)
@@ -1052,8 +1054,9 @@ class ParameterEventDescriptors(_Message):
                 if n12 > 1: raise ValueError
                 p13 = 0 if n12 else p11 + n8 * 24 + 4
                 out += (f6(n3, b3, new_parameters_one.type, n4, b4),
-                    f9(n5, b5, new_parameters_one.read_only, new_parameters_one.dynamic_typing,
-                    n8), (_PADDING[-(p10) & 7] if n8 else b""),
+                    f9(n5, b5, _TRUTH[new_parameters_one.read_only],
+                    _TRUTH[new_parameters_one.dynamic_typing], n8),
+                    (_PADDING[-(p10) & 7] if n8 else b""),
                     b"".join([_p4(e.from_value, e.to_value,
                     e.step) for e in floating_point_range]), _p3(n12),
                     (_PADDING[-(p11 + n8 * 24 + 4) & 7] if n12 else b""),
@@ -1082,8 +1085,8 @@ class ParameterEventDescriptors(_Message):
                 if n25 > 1: raise ValueError
                 p26 = 0 if n25 else p24 + n21 * 24 + 4
                 out += (f19(n16, b16, changed_parameters_one.type, n17, b17),
-                    f22(n18, b18, changed_parameters_one.read_only,
-                    changed_parameters_one.dynamic_typing, n21),
+                    f22(n18, b18, _TRUTH[changed_parameters_one.read_only],
+                    _TRUTH[changed_parameters_one.dynamic_typing], n21),
                     (_PADDING[-(p23) & 7] if n21 else b""),
                     b"".join([_p4(e.from_value, e.to_value,
                     e.step) for e in floating_point_range_2]), _p3(n25),
@@ -1113,8 +1116,8 @@ class ParameterEventDescriptors(_Message):
                 if n38 > 1: raise ValueError
                 p39 = 0 if n38 else p37 + n34 * 24 + 4
                 out += (f32(n29, b29, deleted_parameters_one.type, n30, b30),
-                    f35(n31, b31, deleted_parameters_one.read_only,
-                    deleted_parameters_one.dynamic_typing, n34),
+                    f35(n31, b31, _TRUTH[deleted_parameters_one.read_only],
+                    _TRUTH[deleted_parameters_one.dynamic_typing], n34),
                     (_PADDING[-(p36) & 7] if n34 else b""),
                     b"".join([_p4(e.from_value, e.to_value,
                     e.step) for e in floating_point_range_3]), _p3(n38),
@@ -1319,7 +1322,7 @@ class SetLoggerLevelsResult(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t13[n1]
-            return f2(256, m.successful, n1, b1)
+            return f2(256, _TRUTH[m.successful], n1, b1)
         except _FAULTS:
             return _plain(m, SetLoggerLevelsResult)
 
@@ -1360,7 +1363,7 @@ class SetParametersResult(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t13[n1]
-            return f2(256, m.successful, n1, b1)
+            return f2(256, _TRUTH[m.successful], n1, b1)
         except _FAULTS:
             return _plain(m, SetParametersResult)
 

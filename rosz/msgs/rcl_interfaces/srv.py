@@ -13,6 +13,7 @@ from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -153,7 +154,8 @@ class DescribeParametersResponse(_Message):
                 if n12 > 1: raise ValueError
                 p13 = 0 if n12 else p11 + n8 * 24 + 4
                 out += (f6(n3, b3, descriptors_one.type, n4, b4),
-                    f9(n5, b5, descriptors_one.read_only, descriptors_one.dynamic_typing, n8),
+                    f9(n5, b5, _TRUTH[descriptors_one.read_only],
+                    _TRUTH[descriptors_one.dynamic_typing], n8),
                     (_PADDING[-(p10) & 7] if n8 else b""),
                     b"".join([_p3(e.from_value, e.to_value,
                     e.step) for e in floating_point_range]), _p1(n12),
@@ -524,10 +526,10 @@ class GetParametersResponse(_Message):
                 string_array_value, k = values_one.string_array_value, _s5.written
                 b16 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
                 n16 = len(b16)
-                out += (f5(values_one.type, values_one.bool_value, values_one.integer_value,
-                    values_one.double_value, n3, b3, n4), byte_array_value, f8(n7),
-                    bool_array_value, f11(n10), (_PADDING[-(p12) & 7] if n10 else b""),
-                    integer_array_value, _p1(n14),
+                out += (f5(values_one.type, _TRUTH[values_one.bool_value],
+                    values_one.integer_value, values_one.double_value, n3, b3, n4),
+                    byte_array_value, f8(n7), bool_array_value, f11(n10),
+                    (_PADDING[-(p12) & 7] if n10 else b""), integer_array_value, _p1(n14),
                     (_PADDING[-(p13 + n10 * 8 + 4) & 7] if n14 else b""), double_array_value, b16)
                 p2 = p15 + n14 * 8 + n16 & 7
             return b"".join(out)
@@ -802,7 +804,7 @@ class SetLoggerLevelsResponse(_Message):
                 if 0 in b3: raise ValueError
                 n3 = len(b3) + 1
                 f4, p5 = _t8[p2, n3]
-                out.append(f4(results_one.successful, n3, b3))
+                out.append(f4(_TRUTH[results_one.successful], n3, b3))
                 p2 = p5
             return b"".join(out)
         except _FAULTS:
@@ -902,7 +904,7 @@ class SetParametersRequest(_Message):
                 string_array_value, k = value.string_array_value, _s9.written
                 b17 = k[1] if string_array_value == k[0] else _s9.put(string_array_value)
                 n17 = len(b17)
-                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value,
+                out += (f6(n3, b3, value.type, _TRUTH[value.bool_value], value.integer_value,
                     value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value,
                     f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value,
                     _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""),
@@ -989,7 +991,7 @@ class SetParametersResponse(_Message):
                 if 0 in b3: raise ValueError
                 n3 = len(b3) + 1
                 f4, p5 = _t8[p2, n3]
-                out.append(f4(results_one.successful, n3, b3))
+                out.append(f4(_TRUTH[results_one.successful], n3, b3))
                 p2 = p5
             return b"".join(out)
         except _FAULTS:
@@ -1088,7 +1090,7 @@ class SetParametersAtomicallyRequest(_Message):
                 string_array_value, k = value.string_array_value, _s10.written
                 b17 = k[1] if string_array_value == k[0] else _s10.put(string_array_value)
                 n17 = len(b17)
-                out += (f6(n3, b3, value.type, value.bool_value, value.integer_value,
+                out += (f6(n3, b3, value.type, _TRUTH[value.bool_value], value.integer_value,
                     value.double_value, n4, b4, n5), byte_array_value, f9(n8), bool_array_value,
                     f12(n11), (_PADDING[-(p13) & 7] if n11 else b""), integer_array_value,
                     _p1(n15), (_PADDING[-(p14 + n11 * 8 + 4) & 7] if n15 else b""),
@@ -1175,7 +1177,7 @@ class SetParametersAtomicallyResponse(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t10[n1]
-            return f2(256, result.successful, n1, b1)
+            return f2(256, _TRUTH[result.successful], n1, b1)
         except _FAULTS:
             return _plain(m, SetParametersAtomicallyResponse)
 

@@ -13,6 +13,7 @@ from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
@@ -200,8 +201,9 @@ class BatteryState(_Message):
             f8, p9 = _t3[p7, n5]
             return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.voltage,
                 m.temperature, m.current, m.charge, m.capacity, m.design_capacity, m.percentage,
-                m.power_supply_status, m.power_supply_health, m.power_supply_technology, m.present,
-                n2), cell_voltage, _p1(n3), cell_temperature, f6(n4, b4), f8(n5, b5)))
+                m.power_supply_status, m.power_supply_health, m.power_supply_technology,
+                _TRUTH[m.present], n2), cell_voltage, _p1(n3), cell_temperature, f6(n4, b4),
+                f8(n5, b5)))
         except _FAULTS:
             return _plain(m, BatteryState)
 
@@ -273,7 +275,7 @@ class RegionOfInterest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.x_offset, m.y_offset, m.height, m.width, m.do_rectify)
+            return _p2(256, m.x_offset, m.y_offset, m.height, m.width, _TRUTH[m.do_rectify])
         except _FAULTS:
             return _plain(m, RegionOfInterest)
 
@@ -409,7 +411,7 @@ class CameraInfo(_Message):
             return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2,
                 n3), (_PADDING[-(p5) & 7] if n3 else b""), d, _t5[p6 + n3 * 8 & 7](), k_2, r, p_2,
                 _p3(m.binning_x, m.binning_y, roi.x_offset, roi.y_offset, roi.height, roi.width,
-                roi.do_rectify)))
+                _TRUTH[roi.do_rectify])))
         except _FAULTS:
             return _plain(m, CameraInfo)
 
@@ -1838,7 +1840,8 @@ class PointCloud2(_Message):
             if type(data_2) is not bytes:
                 data_2 = _octets(data_2)
             n4 = len(data_2)
-            out += (_p13(m.is_bigendian, m.point_step, m.row_step, n4), data_2, _p14(m.is_dense))
+            out += (_p13(_TRUTH[m.is_bigendian], m.point_step, m.row_step, n4), data_2,
+                _p14(_TRUTH[m.is_dense]))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, PointCloud2)

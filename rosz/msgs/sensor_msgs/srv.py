@@ -10,6 +10,7 @@ from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -81,7 +82,7 @@ class SetCameraInfoRequest(_Message):
                 camera_info.width, n2, b2, n3), (_PADDING[-(p5) & 7] if n3 else b""), d,
                 _t2[p6 + n3 * 8 & 7](), k_2, r, p_2,
                 _p1(camera_info.binning_x, camera_info.binning_y, roi.x_offset, roi.y_offset,
-                roi.height, roi.width, roi.do_rectify)))
+                roi.height, roi.width, _TRUTH[roi.do_rectify])))
         except _FAULTS:
             return _plain(m, SetCameraInfoRequest)
 
@@ -143,7 +144,7 @@ class SetCameraInfoResponse(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t3[n1]
-            return f2(256, m.success, n1, b1)
+            return f2(256, _TRUTH[m.success], n1, b1)
         except _FAULTS:
             return _plain(m, SetCameraInfoResponse)
 

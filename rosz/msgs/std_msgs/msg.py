@@ -12,6 +12,7 @@ from rosz.message import Sequenced as _Sequenced
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import empty as _empty
@@ -82,7 +83,7 @@ class Bool(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p1(256, m.data)
+            return _p1(256, _TRUTH[m.data])
         except _FAULTS:
             return _plain(m, Bool)
 

@@ -7,6 +7,7 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from struct import Struct as _Struct
@@ -117,7 +118,7 @@ class SetBoolRequest(_Message):
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
-            return _p2(256, m.data)
+            return _p2(256, _TRUTH[m.data])
         except _FAULTS:
             return _plain(m, SetBoolRequest)
 
@@ -155,7 +156,7 @@ class SetBoolResponse(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t1[n1]
-            return f2(256, m.success, n1, b1)
+            return f2(256, _TRUTH[m.success], n1, b1)
         except _FAULTS:
             return _plain(m, SetBoolResponse)
 
@@ -238,7 +239,7 @@ class TriggerResponse(_Message):
             if 0 in b1: raise ValueError
             n1 = len(b1) + 1
             f2, p3 = _t1[n1]
-            return f2(256, m.success, n1, b1)
+            return f2(256, _TRUTH[m.success], n1, b1)
         except _FAULTS:
             return _plain(m, TriggerResponse)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from msgspec import field as _field
 from rosz.message import Message as _Message
 from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -95,8 +96,8 @@ class DisparityImage(_Message):
                 stamp_2.nanosec, n2, b2, image.height, image.width),
                 _t2[n3](n3, b3, image.is_bigendian, image.step, n4), data_2,
                 _t3[n4 & 3](m.f, m.t, valid_window.x_offset, valid_window.y_offset,
-                valid_window.height, valid_window.width, valid_window.do_rectify, m.min_disparity,
-                m.max_disparity, m.delta_d)))
+                valid_window.height, valid_window.width, _TRUTH[valid_window.do_rectify],
+                m.min_disparity, m.max_disparity, m.delta_d)))
         except _FAULTS:
             return _plain(m, DisparityImage)
 

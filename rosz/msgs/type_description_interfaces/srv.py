@@ -8,6 +8,7 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import texts as _texts
@@ -64,7 +65,7 @@ class GetTypeDescriptionRequest(_Message):
             n2 = len(b2) + 1
             f3, p4 = _t1[n1]
             f5, p6 = _t2[p4, n2]
-            return b"".join((f3(256, n1, b1), f5(n2, b2, m.include_type_sources)))
+            return b"".join((f3(256, n1, b1), f5(n2, b2, _TRUTH[m.include_type_sources])))
         except _FAULTS:
             return _plain(m, GetTypeDescriptionRequest)
 
@@ -133,7 +134,7 @@ class GetTypeDescriptionResponse(_Message):
             fields = type_description_2.fields
             n5 = len(fields)
             f6, p7 = _t4[p4, n2]
-            out = [f3(256, m.successful, n1, b1), f6(n2, b2, n5)]
+            out = [f3(256, _TRUTH[m.successful], n1, b1), f6(n2, b2, n5)]
             p8 = p7
             for fields_one in fields:
                 n9, b9 = _texts[fields_one.name]

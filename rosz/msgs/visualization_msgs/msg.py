@@ -11,6 +11,7 @@ from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -510,12 +511,13 @@ class Marker(_Message):
             return b"".join((_t5[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2, m.id,
                 m.type, m.action, position.x, position.y, position.z, orientation.x, orientation.y,
                 orientation.z, orientation.w, scale.x, scale.y, scale.z, color.r, color.g, color.b,
-                color.a, lifetime.sec, lifetime.nanosec, m.frame_locked, n3),
+                color.a, lifetime.sec, lifetime.nanosec, _TRUTH[m.frame_locked], n3),
                 b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n4),
                 b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
                 f7(n5, b5, stamp_2.sec, stamp_2.nanosec), f11(n6, b6, n9, b9, n10), data_2,
                 f14(n13), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f18(n16, b16),
-                f21(n17, b17), f24(n20, b20, n23), data_3, _p6(m.mesh_use_embedded_materials)))
+                f21(n17, b17), f24(n20, b20, n23), data_3,
+                _p6(_TRUTH[m.mesh_use_embedded_materials])))
         except _FAULTS:
             return _plain(m, Marker)
 
@@ -679,7 +681,8 @@ class InteractiveMarkerControl(_Message):
             markers = m.markers
             n2 = len(markers)
             out = [_t11[n1](256, n1, b1, orientation.x, orientation.y, orientation.z,
-                orientation.w, m.orientation_mode, m.interaction_mode, m.always_visible, n2)]
+                orientation.w, m.orientation_mode, m.interaction_mode, _TRUTH[m.always_visible],
+                n2)]
             p3 = 0
             for markers_one in markers:
                 header = markers_one.header
@@ -734,19 +737,19 @@ class InteractiveMarkerControl(_Message):
                     markers_one.type, markers_one.action, position.x, position.y, position.z,
                     orientation_2.x, orientation_2.y, orientation_2.z, orientation_2.w, scale.x,
                     scale.y, scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
-                    lifetime.nanosec, markers_one.frame_locked, n6),
+                    lifetime.nanosec, _TRUTH[markers_one.frame_locked], n6),
                     b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n7),
                     b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
                     f10(n8, b8, stamp_2.sec, stamp_2.nanosec), f14(n9, b9, n12, b12, n13), data_2,
                     f17(n16), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f21(n19, b19),
                     f24(n20, b20), f27(n23, b23, n26), data_3,
-                    _p6(markers_one.mesh_use_embedded_materials))
+                    _p6(_TRUTH[markers_one.mesh_use_embedded_materials]))
                 p3 = p28 + n26 + 1 & 7
             b29 = m.description.encode()
             if 0 in b29: raise ValueError
             n29 = len(b29) + 1
             f30, p31 = _t13[p3, n29]
-            out.append(f30(m.independent_marker_orientation, n29, b29))
+            out.append(f30(_TRUTH[m.independent_marker_orientation], n29, b29))
             return b"".join(out)
         except _FAULTS:
             return _plain(m, InteractiveMarkerControl)
@@ -937,7 +940,7 @@ class InteractiveMarker(_Message):
                 n21 = len(markers)
                 out.append(_t18[p19, n20](n20, b20, orientation_2.x, orientation_2.y,
                     orientation_2.z, orientation_2.w, controls_one.orientation_mode,
-                    controls_one.interaction_mode, controls_one.always_visible, n21))
+                    controls_one.interaction_mode, _TRUTH[controls_one.always_visible], n21))
                 p22 = 0
                 for markers_one in markers:
                     header_2 = markers_one.header
@@ -993,19 +996,19 @@ class InteractiveMarker(_Message):
                         position_2.y, position_2.z, orientation_3.x, orientation_3.y,
                         orientation_3.z, orientation_3.w, scale.x, scale.y, scale.z, color.r,
                         color.g, color.b, color.a, lifetime.sec, lifetime.nanosec,
-                        markers_one.frame_locked, n25),
+                        _TRUTH[markers_one.frame_locked], n25),
                         b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n26),
                         b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
                         f29(n27, b27, stamp_3.sec, stamp_3.nanosec), f33(n28, b28, n31, b31, n32),
                         data_2, f36(n35), b"".join([_p5(e.u, e.v) for e in uv_coordinates]),
                         f40(n38, b38), f43(n39, b39), f46(n42, b42, n45), data_3,
-                        _p6(markers_one.mesh_use_embedded_materials))
+                        _p6(_TRUTH[markers_one.mesh_use_embedded_materials]))
                     p22 = p47 + n45 + 1 & 7
                 b48 = controls_one.description.encode()
                 if 0 in b48: raise ValueError
                 n48 = len(b48) + 1
                 f49, p50 = _t13[p22, n48]
-                out.append(f49(controls_one.independent_marker_orientation, n48, b48))
+                out.append(f49(_TRUTH[controls_one.independent_marker_orientation], n48, b48))
                 p19 = p50
             return b"".join(out)
         except _FAULTS:
@@ -1232,7 +1235,7 @@ class InteractiveMarkerFeedback(_Message):
             return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, n2, b2), f7(n3, b3),
                 _t20[p8, n6](n6, b6, m.event_type, position.x, position.y, position.z,
                 orientation.x, orientation.y, orientation.z, orientation.w, m.menu_entry_id,
-                mouse_point.x, mouse_point.y, mouse_point.z, m.mouse_point_valid)))
+                mouse_point.x, mouse_point.y, mouse_point.z, _TRUTH[m.mouse_point_valid])))
         except _FAULTS:
             return _plain(m, InteractiveMarkerFeedback)
 
@@ -1348,7 +1351,7 @@ class InteractiveMarkerInit(_Message):
                     n24 = len(markers_2)
                     out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y,
                         orientation_2.z, orientation_2.w, controls_one.orientation_mode,
-                        controls_one.interaction_mode, controls_one.always_visible, n24))
+                        controls_one.interaction_mode, _TRUTH[controls_one.always_visible], n24))
                     p25 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
@@ -1404,20 +1407,20 @@ class InteractiveMarkerInit(_Message):
                             position_2.x, position_2.y, position_2.z, orientation_3.x,
                             orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y,
                             scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
-                            lifetime.nanosec, markers_one_2.frame_locked, n28),
+                            lifetime.nanosec, _TRUTH[markers_one_2.frame_locked], n28),
                             b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29),
                             b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
                             f32(n30, b30, stamp_3.sec, stamp_3.nanosec),
                             f36(n31, b31, n34, b34, n35), data_2, f39(n38),
                             b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41),
                             f46(n42, b42), f49(n45, b45, n48), data_3,
-                            _p6(markers_one_2.mesh_use_embedded_materials))
+                            _p6(_TRUTH[markers_one_2.mesh_use_embedded_materials]))
                         p25 = p50 + n48 + 1 & 7
                     b51 = controls_one.description.encode()
                     if 0 in b51: raise ValueError
                     n51 = len(b51) + 1
                     f52, p53 = _t13[p25, n51]
-                    out.append(f52(controls_one.independent_marker_orientation, n51, b51))
+                    out.append(f52(_TRUTH[controls_one.independent_marker_orientation], n51, b51))
                     p22 = p53
                 p3 = p22
             return b"".join(out)
@@ -1729,7 +1732,7 @@ class InteractiveMarkerUpdate(_Message):
                     n24 = len(markers_2)
                     out.append(_t18[p22, n23](n23, b23, orientation_2.x, orientation_2.y,
                         orientation_2.z, orientation_2.w, controls_one.orientation_mode,
-                        controls_one.interaction_mode, controls_one.always_visible, n24))
+                        controls_one.interaction_mode, _TRUTH[controls_one.always_visible], n24))
                     p25 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
@@ -1785,20 +1788,20 @@ class InteractiveMarkerUpdate(_Message):
                             position_2.x, position_2.y, position_2.z, orientation_3.x,
                             orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y,
                             scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
-                            lifetime.nanosec, markers_one_2.frame_locked, n28),
+                            lifetime.nanosec, _TRUTH[markers_one_2.frame_locked], n28),
                             b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n29),
                             b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
                             f32(n30, b30, stamp_3.sec, stamp_3.nanosec),
                             f36(n31, b31, n34, b34, n35), data_2, f39(n38),
                             b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f43(n41, b41),
                             f46(n42, b42), f49(n45, b45, n48), data_3,
-                            _p6(markers_one_2.mesh_use_embedded_materials))
+                            _p6(_TRUTH[markers_one_2.mesh_use_embedded_materials]))
                         p25 = p50 + n48 + 1 & 7
                     b51 = controls_one.description.encode()
                     if 0 in b51: raise ValueError
                     n51 = len(b51) + 1
                     f52, p53 = _t13[p25, n51]
-                    out.append(f52(controls_one.independent_marker_orientation, n51, b51))
+                    out.append(f52(_TRUTH[controls_one.independent_marker_orientation], n51, b51))
                     p22 = p53
                 p3 = p22
             poses = m.poses
@@ -2085,12 +2088,13 @@ class MarkerArray(_Message):
                     markers_one.type, markers_one.action, position.x, position.y, position.z,
                     orientation.x, orientation.y, orientation.z, orientation.w, scale.x, scale.y,
                     scale.z, color.r, color.g, color.b, color.a, lifetime.sec, lifetime.nanosec,
-                    markers_one.frame_locked, n5), b"".join([_p1(e.x, e.y, e.z) for e in points]),
-                    _p3(n6), b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
+                    _TRUTH[markers_one.frame_locked], n5),
+                    b"".join([_p1(e.x, e.y, e.z) for e in points]), _p3(n6),
+                    b"".join([_p2(e.r, e.g, e.b, e.a) for e in colors]),
                     f9(n7, b7, stamp_2.sec, stamp_2.nanosec), f13(n8, b8, n11, b11, n12), data_2,
                     f16(n15), b"".join([_p5(e.u, e.v) for e in uv_coordinates]), f20(n18, b18),
                     f23(n19, b19), f26(n22, b22, n25), data_3,
-                    _p6(markers_one.mesh_use_embedded_materials))
+                    _p6(_TRUTH[markers_one.mesh_use_embedded_materials]))
                 p2 = p27 + n25 + 1 & 7
             return b"".join(out)
         except _FAULTS:

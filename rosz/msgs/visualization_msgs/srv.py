@@ -8,6 +8,7 @@ from rosz.message import Message as _Message
 from rosz.message import Service as _Service
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
@@ -164,7 +165,7 @@ class GetInteractiveMarkersResponse(_Message):
                     n23 = len(markers_2)
                     out.append(_t6[p21, n22](n22, b22, orientation_2.x, orientation_2.y,
                         orientation_2.z, orientation_2.w, controls_one.orientation_mode,
-                        controls_one.interaction_mode, controls_one.always_visible, n23))
+                        controls_one.interaction_mode, _TRUTH[controls_one.always_visible], n23))
                     p24 = 0
                     for markers_one_2 in markers_2:
                         header_2 = markers_one_2.header
@@ -220,20 +221,20 @@ class GetInteractiveMarkersResponse(_Message):
                             position_2.x, position_2.y, position_2.z, orientation_3.x,
                             orientation_3.y, orientation_3.z, orientation_3.w, scale.x, scale.y,
                             scale.z, color.r, color.g, color.b, color.a, lifetime.sec,
-                            lifetime.nanosec, markers_one_2.frame_locked, n27),
+                            lifetime.nanosec, _TRUTH[markers_one_2.frame_locked], n27),
                             b"".join([_p3(e.x, e.y, e.z) for e in points]), _p5(n28),
                             b"".join([_p4(e.r, e.g, e.b, e.a) for e in colors]),
                             f31(n29, b29, stamp_3.sec, stamp_3.nanosec),
                             f35(n30, b30, n33, b33, n34), data_2, f38(n37),
                             b"".join([_p6(e.u, e.v) for e in uv_coordinates]), f42(n40, b40),
                             f45(n41, b41), f48(n44, b44, n47), data_3,
-                            _p7(markers_one_2.mesh_use_embedded_materials))
+                            _p7(_TRUTH[markers_one_2.mesh_use_embedded_materials]))
                         p24 = p49 + n47 + 1 & 7
                     b50 = controls_one.description.encode()
                     if 0 in b50: raise ValueError
                     n50 = len(b50) + 1
                     f51, p52 = _t12[p24, n50]
-                    out.append(f51(controls_one.independent_marker_orientation, n50, b50))
+                    out.append(f51(_TRUTH[controls_one.independent_marker_orientation], n50, b50))
                     p21 = p52
                 p2 = p21
             return b"".join(out)

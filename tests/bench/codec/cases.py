@@ -62,6 +62,16 @@ def joint_state(n: int) -> Plain:
     }
 
 
+def lists(make: Callable[[int], Plain]) -> Callable[[int], Plain]:
+    """Return a maker of the same messages, with lists of numbers as rospy's users write them."""
+
+    def listed(n: int) -> Plain:
+        plain = make(n)
+        return {k: list(v) if isinstance(v, array) else v for k, v in plain.items()}
+
+    return listed
+
+
 def laser_scan(n: int) -> Plain:
     limits = ("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time")
     return {
@@ -138,6 +148,8 @@ CASES: list[tuple[str, str, Callable[[int], Plain], int]] = [
     ("Odometry", "nav_msgs/Odometry", odometry, 500),
     ("JointState (7)", "sensor_msgs/JointState", joint_state, 500),
     ("LaserScan (360)", "sensor_msgs/LaserScan", laser_scan, 200),
+    ("JointState, lists", "sensor_msgs/JointState", lists(joint_state), 500),
+    ("LaserScan, lists", "sensor_msgs/LaserScan", lists(laser_scan), 200),
     ("TFMessage (10)", "tf2_msgs/TFMessage", tf_message, 100),
     ("DiagnosticArray", "diagnostic_msgs/DiagnosticArray", diagnostic_array, 50),
     ("Image VGA", "sensor_msgs/Image", image, 20),

@@ -174,6 +174,8 @@ def _build_rosbags(store: Any, type_name: str, plain: Plain) -> Any:
             member = [_build_rosbags(store, details[0][1], one) for one in member]
         elif isinstance(member, array):
             member = np.array(member, member.typecode)
+        elif isinstance(member, list) and member and isinstance(member[0], float):
+            member = np.array(member, "f" if "float32" in str(details) else "d")
         elif isinstance(member, bytes):
             member = np.frombuffer(member, np.uint8)
         members.append(member)
