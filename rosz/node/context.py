@@ -220,8 +220,8 @@ class Context:
                 if self._params is not None:
                     self._params.close()
                 self.graph.close()
+        finally:  # an open session would abort the process at its end
             self.session.close()
-        finally:
             atexit.unregister(self.close)
 
     def _forked(self) -> None:

@@ -64,6 +64,10 @@ def open_channel() -> Any:
 class Declared:
     """One declaration, which is undeclared at most once.
 
+    Zenoh refuses to undeclare a declaration while a thread is inside a method of it. So `_calls`
+    has an item for each such thread, and the last of them undeclares what was closed meanwhile.
+    Nobody waits, since to append to a list and to pop from it are atomic.
+
     Args:
         what: The name of the declaration in error texts.
         entity: The object of Zenoh that was declared.
@@ -71,17 +75,50 @@ class Declared:
 
     def __init__(self, what: str, entity: Any) -> None:
         self._what = what
-        self._entity: Any = entity
+        self._entities = [entity]
+        self._calls: list[None] = []
+        self._closed = False
 
     def close(self) -> None:
         """Undeclare it; a second call, or one after the end of the session, has no effect.
 
-        No other thread may be inside another method of it meanwhile.
+        If another thread is inside a method of it, that thread undeclares it when it leaves.
         """
-        entity, self._entity = self._entity, None
-        if entity is None:
+        self._closed = True
+        self._undeclare()
+
+    @contextmanager
+    def _call(self, doing: str) -> Iterator[None]:
+        """Return a context for calling a method of Zenoh's object.
+
+        Args:
+            doing: The operation, as a verb with its object.
+
+        Raises:
+            ClosedError: The declaration or the session is closed.
+            TransportError: Zenoh reported another error.
+        """
+        try:
+            self._calls.append(None)
+            if self._closed:
+                raise ClosedError(f"cannot {doing}: the {self._what} is closed")
+            with translate_errors(doing):
+                yield
+        finally:
+            self._calls.pop()
+            if self._closed:
+                self._undeclare()
+
+    def _undeclare(self) -> None:
+        """Undeclare it unless a call is going on, or another thread has begun to."""
+        ending = ENDING.is_set()
+        if self._calls and not ending:
             return
-        if ENDING.is_set():
+        try:
+            entity = self._entities.pop()
+        except IndexError:
+            return
+        if ending:
             leak_at_exit(entity)
         else:
             # The session may close at this very moment, and undeclares everything.
@@ -163,6 +200,7 @@ class RawPublisher(Declared):
     def __init__(self, key: str, entity: Any) -> None:
         super().__init__(f"publisher '{key}'", entity)
         self.key = key
+        self._entity = entity
         self._put = entity.put
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
@@ -172,13 +210,18 @@ class RawPublisher(Declared):
             ClosedError: The publisher or the session is closed.
             TransportError: Zenoh cannot send the sample.
         """
-        if self._entity is None:
-            raise ClosedError(f"cannot publish on '{self.key}': the publisher is closed")
-        try:
+        try:  # as in `_call`, without the time that entering a context takes
+            self._calls.append(None)
+            if self._closed:
+                raise ClosedError(f"cannot publish on '{self.key}': the publisher is closed")
             self._put(payload, attachment=attachment)
         except zenoh.ZError:
             with translate_errors(f"publish on '{self.key}'"):
                 raise
+        finally:
+            self._calls.pop()
+            if self._closed:
+                self._undeclare()
 
     @property
     def matched(self) -> bool:
@@ -187,7 +230,5 @@ class RawPublisher(Declared):
         Raises:
             ClosedError: The publisher or the session is closed.
         """
-        if self._entity is None:
-            raise ClosedError(f"'{self.key}' has no subscribers: the publisher is closed")
-        with translate_errors(f"look for subscribers of '{self.key}'"):
+        with self._call(f"look for subscribers of '{self.key}'"):
             return bool(self._entity.matching_status.matching)

@@ -11,7 +11,7 @@ import zenoh
 
 from rosz.errors import TransportError, UsageError
 from rosz.session.at_exit import ENDING, ClosedSession, leak_at_exit
-from rosz.session.declared import Declared, open_channel, translate_errors
+from rosz.session.declared import Declared, open_channel
 from rosz.session.samples import Sample, Stamp, to_timestamp
 
 __all__ = (
@@ -142,16 +142,13 @@ class Querier(Declared):
         """Send the query, and return the replies as they come; see `Session.query`.
 
         Raises:
-            ClosedError: The session is closed, or ``cancel`` was cancelled.
+            ClosedError: The querier or the session is closed, or ``cancel`` was cancelled.
         """
         token = cancel.token
-        try:
+        with self._call(f"query '{self._key}'"):
             handler = self._get(
                 open_channel(), payload=payload, attachment=attachment, cancellation_token=token
             )
-        except zenoh.ZError:
-            with translate_errors(f"query '{self._key}'"):
-                raise
         return Replies(handler)
 
 

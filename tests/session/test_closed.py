@@ -1,14 +1,16 @@
-"""A closed session refuses everything with one kind of error, which says what was refused."""
+"""What is closed refuses everything with one kind of error, which says what was refused."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from typing import Any
 
 import pytest
-from network import Network
+from network import TIMEOUT, Network
 
 from rosz.errors import ClosedError
-from rosz.session import Session
+from rosz.session import Cancellation, Session
 
 CALLS: dict[str, Callable[[Session], object]] = {
     "put": lambda session: session.put("a", b""),
@@ -40,3 +42,48 @@ def test_nothing_works_after_close(network: Network, call: Callable[[Session], o
     assert session.closed
     with pytest.raises(ClosedError, match="the session is closed"):
         call(session)
+
+
+DECLARED: dict[str, tuple[Callable[[Session], Any], Callable[[Any], object]]] = {
+    "put": (lambda session: session.publisher("a"), lambda one: one.put(bytes(100_000))),
+    "put with a cache": (
+        lambda session: session.publisher("a", cache=1),
+        lambda one: one.put(bytes(100_000)),
+    ),
+    "matched": (lambda session: session.publisher("a"), lambda one: one.matched),
+    "query": (
+        lambda session: session.querier("a", timeout=1),
+        lambda one: one.query(b"", b"", Cancellation()),
+    ),
+}
+
+
+@pytest.mark.parametrize(("declare", "call"), DECLARED.values(), ids=DECLARED)
+def test_closed_while_other_threads_use_it(
+    network: Network, declare: Callable[[Session], Any], call: Callable[[Any], object]
+) -> None:
+    """Zenoh refuses to undeclare what a thread is using; the last one to leave does it."""
+    session = network.session()
+    ends: list[BaseException] = []
+
+    def use(declared: Any, inside: threading.Barrier) -> None:
+        try:
+            call(declared)
+            inside.wait(TIMEOUT)
+            while True:
+                call(declared)
+        except BaseException as error:  # noqa: BLE001  # compared below
+            ends.append(error)
+
+    for _ in range(10):
+        declared, inside = declare(session), threading.Barrier(4)
+        users = [threading.Thread(target=use, args=(declared, inside)) for _ in range(3)]
+        for user in users:
+            user.start()
+        inside.wait(TIMEOUT)
+        declared.close()
+        for user in users:
+            user.join(TIMEOUT)
+        assert not declared._entities, "it was not undeclared"
+    assert {type(error) for error in ends} == {ClosedError}
+    assert len(ends) == 30
