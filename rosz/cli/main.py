@@ -182,7 +182,7 @@ def _version() -> str:
 
 
 def _fail(what: object, code: int) -> int:
-    sys.stderr.write(f"rosz: {what}\n")
+    sys.stderr.write(f"ERROR: {what}\n")
     return code
 
 

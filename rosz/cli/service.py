@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result, until_stopped, warn
 from rosz.cli.declare import Argument, Json, Option, seconds, values_last
-from rosz.errors import EncodeError, UsageError
+from rosz.errors import EncodeError, RoszError, UsageError
 
 if TYPE_CHECKING:
     from rosz.node import Client
@@ -95,7 +96,8 @@ def find_command(
 @app.command("args")
 def args_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the arguments of a service."""
-    names = _arguments(call, _server(call, service))
+    with _failing():
+        names = _arguments(call, _server(call, service))
     print_result([names], {"args": names.split()}, as_json=json)
 
 
@@ -122,9 +124,7 @@ def _server(call: Call, service: str) -> Token:
 
 
 def _arguments(call: Call, token: Token) -> str:
-    from rosz.introspect.arguments import list_arguments
-
-    return list_arguments(call.types.service(token.type_name).Request)
+    return " ".join(call.types.service(token.type_name).Request.__slots__)
 
 
 @app.command("call", arrange=values_last("--timeout"))
@@ -155,7 +155,7 @@ def call_command(
 
     arguments = read_arguments(values or ())
     # A command that waits joins as a peer, so that it outlives the process at the rendezvous.
-    with until_stopped() as ready, call.context(lasting=wait) as context:
+    with _failing(), until_stopped() as ready, call.context(lasting=wait) as context:
         ready()
         name = call.resolve(service, _TOOL)
         if wait:
@@ -172,6 +172,15 @@ def call_command(
         ):
             for request in _requests(arguments, service_type.Request):
                 _send(client, request, verbose=verbose, as_json=json)
+
+
+@contextmanager
+def _failing() -> Iterator[None]:
+    """Report an error of the block with rosservice's exit code for it, that of wrong usage."""
+    try:
+        yield
+    except RoszError as error:
+        raise UsageError(str(error)) from error
 
 
 def _requests(arguments: list[Any], request_type: Any) -> Iterable[list[Any]]:

@@ -1,9 +1,13 @@
-"""``python -m rosz.ros1 SCRIPT [ARGUMENTS]``: run a Python script with ROS 1's names importable."""
+"""``python -m rosz.ros1 SCRIPT [ARGUMENTS]``: run a Python script with ROS 1's names importable.
+
+A name of a command of ROS 1, such as ``rosparam``, runs that command of rosz, unless it is a file.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from rosz.errors import RoszError
 
@@ -25,13 +29,21 @@ def main(argv: Sequence[str], begin: Callable[[], object] | None = None) -> None
         sys.exit(0 if argv else 2)
     try:
         install()
-        script = Script(argv[0])
+        script = Script(_script(argv[0]))
     except RoszError as error:
-        sys.stderr.write(f"rosz: {error}\n")
+        sys.stderr.write(f"ERROR: {error}\n")
         sys.exit(1)
     if begin is not None:
         begin()
     script.run(argv[1:])
+
+
+def _script(word: str) -> str:
+    """Return the path of a script, which may be given as the name of a command of ROS 1."""
+    command = Path(__file__).parents[1] / "share" / word / word
+    if "/" not in word and not Path(word).exists() and command.is_file():
+        return str(command)
+    return word
 
 
 if __name__ == "__main__":

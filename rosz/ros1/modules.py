@@ -173,7 +173,12 @@ _NEEDS_TCPROS = (
     " set_topic_manager TCPROSHandler TCPROSTransport"
 )
 _REASONS = {
+    "rosmsgmain": "run 'rosz msg'",
+    "rosnodemain": "run 'rosz node'",
+    "rosservicemain": "run 'rosz service'",
+    "rostopicmain": "run 'rosz topic'",
     "start_node": "use rospy.init_node()",
+    "yamlmain": "run 'rosz param'",
     **dict.fromkeys(_NEEDS_MASTER.split(), _NO_MASTER),
     **dict.fromkeys(_NEEDS_TCPROS.split(), _NO_TCPROS),
 }

@@ -108,13 +108,13 @@ def get_service_class_by_name(service_name: str) -> type[Any]:
 
 
 def get_service_args(service_name: str) -> str:
-    """Return the names of the values in a request of a service, separated by spaces.
+    """Return the names of the fields in a request of a service, separated by spaces.
 
     Raises:
         ROSServiceException: No node serves it, or the definition of its type is not found.
     """
     found = get_service_class_by_name(script_resolve_name(NAME, service_name))
-    return get_printable_message_args(found.Request())
+    return get_printable_message_args(found.Request)
 
 
 def has_service_args(service_name: str, service_class: type[Any] | None = None) -> bool:

@@ -97,12 +97,12 @@ def _excepthook(show: _Hook, main: ModuleType) -> _Hook:
             return  # Ctrl-C during an import, where a traceback does not help
         if isinstance(error, RoszError):
             # Its text needs no traceback, only the place in the script.
-            sys.stderr.write(f"rosz: {_place(trace, main)}{error}\n")
+            sys.stderr.write(f"ERROR: {_place(trace, main)}{error}\n")
             return
         show(kind, error.with_traceback(trace), trace)
         advice = hint(error)
         if advice:
-            sys.stderr.write(f"rosz: {advice}\n")
+            sys.stderr.write(f"ERROR: {advice}\n")
 
     return hook
 

@@ -174,7 +174,7 @@ def _run_config(file: Path, environ: Mapping[str, str]) -> Iterator[Problem]:
 
 
 def _without_place(text: str, file: Path) -> str:
-    return re.sub(rf"^(rosz: )?({re.escape(str(file))}(:\d+)*: )?", "", text)
+    return re.sub(rf"^(ERROR: )?({re.escape(str(file))}(:\d+)*: )?", "", text)
 
 
 class _DryContext(SystemContext):

@@ -103,8 +103,8 @@ def test_a_command_loads_what_it_needs(network: Network, line: str, needs: set[s
     ("argv", "code", "text"),
     [
         (["parma"], 2, "'parma' is not a command; did you mean 'param'?"),
-        (["param", "gte"], 2, "rosz: no such command 'gte'; did you mean 'get'?\n"),
-        (["param", "get"], 2, "rosz: missing argument 'NAME'; see 'rosz param get --help'\n"),
+        (["param", "gte"], 2, "ERROR: no such command 'gte'; did you mean 'get'?\n"),
+        (["param", "get"], 2, "ERROR: missing argument 'NAME'; see 'rosz param get --help'\n"),
     ],
 )
 def test_wrong_usage(
@@ -123,7 +123,7 @@ def test_an_invalid_setting_is_one_line(
     monkeypatch.setenv("ROS_DOMAIN_ID", "many")
     assert run(["topic", "list"]) == 2
     assert capsys.readouterr().err == (
-        "rosz: ROS_DOMAIN_ID is 'many'; expected a number from 0 to 232\n"
+        "ERROR: ROS_DOMAIN_ID is 'many'; expected a number from 0 to 232\n"
     )
 
 
@@ -138,7 +138,7 @@ def test_a_deleted_working_folder_is_reported(network: Network) -> None:
         text=True,
         check=False,
     )
-    expected = "rosz: the working folder has been deleted: change to another one with 'cd'\n"
+    expected = "ERROR: the working folder has been deleted: change to another one with 'cd'\n"
     assert (done.returncode, done.stderr) == (1, expected)
 
 
@@ -149,7 +149,7 @@ def test_a_full_disk_is_reported_with_the_file(network: Network) -> None:
     done = subprocess.run(
         [*line, "/dev/full"], env=network.variables(), capture_output=True, text=True, check=False
     )
-    assert (done.returncode, done.stderr) == (1, "rosz: /dev/full: No space left on device\n")
+    assert (done.returncode, done.stderr) == (1, "ERROR: /dev/full: No space left on device\n")
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"], ids=["buffered", "unbuffered"])
@@ -167,7 +167,7 @@ def test_a_full_disk_is_reported_with_standard_output(
             text=True,
             check=False,
         )
-    expected = "rosz: cannot write to standard output: No space left on device\n"
+    expected = "ERROR: cannot write to standard output: No space left on device\n"
     assert (done.returncode, done.stderr) == (1, expected)
 
 
@@ -230,11 +230,11 @@ def test_a_refused_setting_is_reported_beside_a_live_node(
         check=False,
     )
     assert done.returncode == code
-    assert done.stderr.startswith(f"rosz: {reason}")
+    assert done.stderr.startswith(f"ERROR: {reason}")
 
 
 def test_a_topic_without_a_name(network: Network, capsys: pytest.CaptureFixture[str]) -> None:
     del network
     assert run(["topic", "type", ""]) == 1
-    expected = "rosz: '' is not a valid name: it is empty; expected the name of a topic\n"
+    expected = "ERROR: '' is not a valid name: it is empty; expected the name of a topic\n"
     assert capsys.readouterr().err == expected

@@ -66,7 +66,7 @@ def test_an_occupied_endpoint_is_one_line_that_names_it(shell: Shell, network: N
     network.node("holder")
     result = shell("core")
     assert result.code == 1
-    assert result.err.startswith(f"rosz: '{network.rendezvous}' is occupied")
+    assert result.err.startswith(f"ERROR: '{network.rendezvous}' is occupied")
     assert result.err.count("\n") == 1
 
 

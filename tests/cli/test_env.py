@@ -47,6 +47,15 @@ def test_all_programs_may_be_executed() -> None:
     assert all(path.stat().st_mode & 0o111 == 0o111 for path in BIN.iterdir())
 
 
+def test_rosparam_is_the_same_by_every_route(network: Network) -> None:
+    python = f"{sys.executable} -P -m rosz"
+    routes = f"{python} param", "rosparam", "rosrun rosparam rosparam", f"{python}.ros1 rosparam"
+    rosz, *others = (evaluate(network, "bash", f"{route} list") for route in routes)
+    assert rosz.returncode == 1
+    assert rosz.stderr.startswith("ERROR: nobody answers at ")
+    assert [(one.returncode, one.stderr) for one in others] == [(1, rosz.stderr)] * len(others)
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_ros_1_names_mean_rosz(network: Network, shell: str) -> None:
     network.node("talker")
@@ -136,7 +145,7 @@ def test_errors_are_reported(network: Network, line: str) -> None:
     done = evaluate(network, "bash", line)
     assert done.returncode in {1, 2}
     assert not done.stdout
-    reasons = "usage: ", "package 'nope' not found", "rosz: no workspace: "
+    reasons = "usage: ", "package 'nope' not found", "ERROR: no workspace: "
     assert any(reason in done.stderr for reason in reasons)
 
 

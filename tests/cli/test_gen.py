@@ -98,7 +98,7 @@ def test_a_package_without_definitions(shell: Shell, package: Path) -> None:
     (package.parent / "bare" / "package.xml").write_text("<package><name>bare</name></package>")
     result = shell("gen", "bare")
     assert result.code == 1
-    told = "rosz: package 'bare' has no types of its own that modules could be made of"
+    told = "ERROR: package 'bare' has no types of its own that modules could be made of"
     assert result.err == f"{told}\n"
     result = shell("gen", "std_msgs")
     told = told.replace("bare", "std_msgs")

@@ -94,7 +94,7 @@ def test_help_of_what_is_run_belongs_to_it(
         assert told(capsys, "run", *words).startswith("Usage: rosz run ")
     for words in (["nope", "x", "-h"], ["-p", "gdb", "nope", "-h"]):
         assert run(["run", *words]) == 1
-        assert capsys.readouterr().err.startswith("rosz: package 'nope' not found")
+        assert capsys.readouterr().err.startswith("ERROR: package 'nope' not found")
 
 
 def test_a_mistake_points_at_the_help_of_its_command(capsys: pytest.CaptureFixture[str]) -> None:
@@ -125,7 +125,7 @@ def test_the_manual_prints_a_page(topic: str, capsys: pytest.CaptureFixture[str]
 def test_an_unknown_page(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["help", "securty"]) == 1
     assert capsys.readouterr().err == (
-        "rosz: no page of the manual is called 'securty'; did you mean 'security'?\n"
+        "ERROR: no page of the manual is called 'securty'; did you mean 'security'?\n"
     )
 
 

@@ -36,7 +36,7 @@ def test_check_reports_what_is_wrong(tmp_path: Path) -> None:
     assert "WRONG: others may read" in checked.stdout
     started = rosz(tmp_path, "topic", "list", variables={"ROSZ_KEYS": str(keys / "robot")})
     assert started.returncode == 2
-    assert started.stderr.startswith("rosz: others may read ")
+    assert started.stderr.startswith("ERROR: others may read ")
 
 
 def test_mistakes(tmp_path: Path) -> None:
@@ -44,7 +44,7 @@ def test_mistakes(tmp_path: Path) -> None:
     assert none.returncode == 2
     assert (
         none.stderr
-        == f"rosz: no authority in '{tmp_path}': 'rosz keys init {tmp_path}' makes one\n"
+        == f"ERROR: no authority in '{tmp_path}': 'rosz keys init {tmp_path}' makes one\n"
     )
     two = rosz(tmp_path, "keys", "add", "a", "b", "--address", "10.0.0.1", "--dir", str(tmp_path))
     assert two.returncode == 2
@@ -61,7 +61,7 @@ def test_keys_in_the_folder_keys_are_suggested(tmp_path: Path) -> None:
         done = rosz(tmp_path, "keys", *words)
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr == (
-            f"rosz: no keys in '{tmp_path}', but in './keys': '{meant}', or set ROSZ_KEYS\n"
+            f"ERROR: no keys in '{tmp_path}', but in './keys': '{meant}', or set ROSZ_KEYS\n"
         )
         assert rosz(tmp_path, *meant.split()[1:]).returncode == 0
     done = rosz(tmp_path, "keys", "list", variables={"ROSZ_KEYS": str(tmp_path / "none")})

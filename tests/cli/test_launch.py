@@ -111,7 +111,7 @@ def test_a_node_can_be_restarted_from_another_terminal(launch: Start, network: N
     assert not runs(after["publisher"])
     refused = rosz(network, "launch", "--stop", "/publisherr")
     assert refused.stderr == (
-        "rosz: no launch runs a node '/publisherr'; did you mean '/publisher'?\n"
+        "ERROR: no launch runs a node '/publisherr'; did you mean '/publisher'?\n"
     )
     assert refused.returncode == 1
 

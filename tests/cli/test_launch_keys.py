@@ -29,6 +29,6 @@ def test_a_folder_without_keys_starts_nothing(tmp_path: Path) -> None:
     workspace(tmp_path)
     done = rosz(tmp_path, "launch", "show.launch", "--keys", "src")
     assert done.returncode == 2
-    assert done.stderr.startswith(f"rosz: no key in '{tmp_path}/src'")
+    assert done.stderr.startswith(f"ERROR: no key in '{tmp_path}/src'")
     assert done.stderr.count("\n") == 1
     assert "process[" not in done.stdout

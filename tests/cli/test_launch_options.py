@@ -108,7 +108,8 @@ def test_several_files_share_nothing_but_the_plan(network: Network, demo: Path) 
     done = rosz(network, "launch", "--dump-params", first, second)
     assert done.returncode == 1
     assert done.stderr == (
-        f"rosz: {second}:1:32: arg 'a' is not set; declare it before: <arg name='a' default='…'/>\n"
+        f"ERROR: {second}:1:32: arg 'a' is not set;"
+        " declare it before: <arg name='a' default='…'/>\n"
     )
 
 

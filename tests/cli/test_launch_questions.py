@@ -74,28 +74,28 @@ def test_a_package_around_the_file_is_found(tmp_path: Path) -> None:
 
 
 ERRORS = {
-    ("nope.launch",): (1, "rosz: launch file 'nope.launch' is not there; give its path, or a pac"),
+    ("nope.launch",): (1, "ERROR: launch file 'nope.launch' is not there; give its path, or a pac"),
     ("demo.launch",): (1, "; package 'demo' has it: rosz launch demo demo.launch\n"),
     ("demo",): (
         1,
         "'demo' is a package: name one of its launch files as well, such as demo.launch\n",
     ),
     ("rosz_tutorials",): (1, "'rosz_tutorials' is a package, and has no launch files\n"),
-    ("src",): (1, "rosz: 'src' is a folder; name a launch file in it\n"),
-    ("src/demo",): (1, "rosz: 'src/demo' is a folder; name a launch file in it\n"),
-    ("dem", "demo.launch"): (1, "rosz: package 'dem' not found"),
+    ("src",): (1, "ERROR: 'src' is a folder; name a launch file in it\n"),
+    ("src/demo",): (1, "ERROR: 'src/demo' is a folder; name a launch file in it\n"),
+    ("dem", "demo.launch"): (1, "ERROR: package 'dem' not found"),
     ("demo", "dem.launch"): (1, "has no file 'dem.launch'; did you mean 'demo.launch'?\n"),
-    ("demo", "demo.launch", "x.launch", "topic:=a"): (1, "rosz: launch file 'x.launch' is not"),
+    ("demo", "demo.launch", "x.launch", "topic:=a"): (1, "ERROR: launch file 'x.launch' is not"),
     ("demo", "demo.launch"): (1, "topic"),
-    (): (2, "rosz: no launch file is given: rosz launch PACKAGE FILE, or rosz launch PATH\n"),
-    ("-", "-"): (2, "rosz: '-' is given twice; standard input can be read only once\n"),
-    ("--nodes", "--files", "x"): (2, "rosz: --nodes, --files: only one of them can be answered"),
-    ("-p", "11312", "x"): (2, "rosz: there is no master, and so no port: 'rosz core'"),
+    (): (2, "ERROR: no launch file is given: rosz launch PACKAGE FILE, or rosz launch PATH\n"),
+    ("-", "-"): (2, "ERROR: '-' is given twice; standard input can be read only once\n"),
+    ("--nodes", "--files", "x"): (2, "ERROR: --nodes, --files: only one of them can be answered"),
+    ("-p", "11312", "x"): (2, "ERROR: there is no master, and so no port: 'rosz core'"),
     ("--sigint-timeout", "0", "demo", "demo.launch", "topic:=a"): (2, "--sigint-timeout is 0; e"),
-    ("--sigterm-timeout", "x"): (2, "rosz: invalid value for '--sigterm-timeout'"),
-    ("--nope",): (2, "rosz: no such option: --nope"),
-    ("--status", "x"): (2, "rosz: --status, --restart and --stop stand alone"),
-    ("--status", "--stop", "/x"): (2, "rosz: --status, --restart and --stop stand alone"),
+    ("--sigterm-timeout", "x"): (2, "ERROR: invalid value for '--sigterm-timeout'"),
+    ("--nope",): (2, "ERROR: no such option: --nope"),
+    ("--status", "x"): (2, "ERROR: --status, --restart and --stop stand alone"),
+    ("--status", "--stop", "/x"): (2, "ERROR: --status, --restart and --stop stand alone"),
     ("--args", "/a/talkr", "demo", "demo.launch", "topic:=a"): (1, "did you mean '/a/talker'?\n"),
 }
 
@@ -120,7 +120,7 @@ def test_no_launch_is_running(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     done = rosz(tmp_path, "launch", "--status", variables={"ROSZ_RENDEZVOUS": endpoint})
     assert done.returncode == 1
-    assert done.stderr == f"rosz: no launch is running: nobody answers at {endpoint}\n"
+    assert done.stderr == f"ERROR: no launch is running: nobody answers at {endpoint}\n"
 
 
 def test_help(tmp_path: Path) -> None:
@@ -133,5 +133,5 @@ def test_help(tmp_path: Path) -> None:
 @pytest.mark.parametrize("option", ["--args", "--find-node", "--restart", "--stop"])
 def test_a_node_without_a_name_starts_nothing(workspace: Path, option: str) -> None:
     done = rosz(workspace, "launch", "demo", "demo.launch", "topic:=x", option, "")
-    expected = f"rosz: {option} is ''; expected the name of a node\n"
+    expected = f"ERROR: {option} is ''; expected the name of a node\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", expected)

@@ -149,4 +149,4 @@ def test_a_wrong_definition_is_reported_with_its_place(shell: Shell, package: Pa
     file.write_text("int8 a\nPear b\n")
     result = shell("msg", "show", "counting/Bad")
     assert result.code == 1
-    assert result.err.startswith(f"rosz: {file}:2:1: type 'Pear' of field 'b'")
+    assert result.err.startswith(f"ERROR: {file}:2:1: type 'Pear' of field 'b'")

@@ -160,7 +160,7 @@ def test_machine(shell: Shell, talker: Node) -> None:
     assert shell("node", "machine", "--json", host).json == ["/talker"]
     result = shell("node", "machine", "elsewhere")
     assert result.code == 1
-    assert result.err == f"rosz: no node runs on 'elsewhere'; nodes run on {host}\n"
+    assert result.err == f"ERROR: no node runs on 'elsewhere'; nodes run on {host}\n"
 
 
 def test_kill(shell: Shell, network: Network) -> None:
@@ -220,4 +220,4 @@ def test_ping_without_a_node_where_none_runs(shell: Shell) -> None:
     with shell.network.session():
         result = shell("node", "ping")
     assert (result.code, result.out) == (2, "")
-    assert result.err == "rosz: no node is given; none is running\n"
+    assert result.err == "ERROR: no node is given; none is running\n"

@@ -311,16 +311,16 @@ def test_loading_is_all_or_nothing(replica: Replica, param: Command, tmp_path: P
     assert param("load", "bad.yaml") == (
         1,
         "",
-        "rosz: bad.yaml:4:5: null is not a parameter value; "
+        "ERROR: bad.yaml:4:5: null is not a parameter value; "
         "delete the parameter, or set '' or {} instead\n",
     )
     (tmp_path / "bad.yaml").write_bytes(b"a: 2\nb: \xff\n")
     assert param("load", "bad.yaml")[2] == (
-        "rosz: bad.yaml:2: byte 0xff is not UTF-8; save the file as UTF-8\n"
+        "ERROR: bad.yaml:2: byte 0xff is not UTF-8; save the file as UTF-8\n"
     )
     (tmp_path / "bad.yaml").write_text("a: 2\n~private: 3\n")
     assert "the key '~private' in '/' is private" in param("load", "bad.yaml")[2]
-    assert param("set", "/a", "{b: [1}")[2].startswith("rosz: <value>:1:7: while parsing")
+    assert param("set", "/a", "{b: [1}")[2].startswith("ERROR: <value>:1:7: while parsing")
     assert param("set", "/a", "null")[0] == 1
     assert replica.root == {"a": 1}
 

@@ -57,7 +57,7 @@ def test_invalid_names(tmp_path: Path, name: str) -> None:
     done = rosz(tmp_path, "pkg", "create", name)
     assert done.returncode == 2
     assert done.stderr == (
-        f"rosz: '{name}' is not a valid package name; expected lower-case letters, digits and"
+        f"ERROR: '{name}' is not a valid package name; expected lower-case letters, digits and"
         " '_', a letter first\n"
     )
     assert list(tmp_path.iterdir()) == []
@@ -67,7 +67,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
     done = rosz(tmp_path, "pkg", "create", "taken")
     assert done.returncode == 1
-    assert done.stderr == f"rosz: '{tmp_path}/taken' exists already; choose another name\n"
+    assert done.stderr == f"ERROR: '{tmp_path}/taken' exists already; choose another name\n"
 
 
 @pytest.mark.parametrize("dependencies", [(), ("std_msgs",), ("rospy",), ("roscpp", "std_msgs")])

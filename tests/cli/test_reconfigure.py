@@ -133,7 +133,7 @@ def test_groups_are_set_by_name(shell: Shell, robot: Robot) -> None:
 def test_errors(shell: Shell, words: list[str], code: int, text: str) -> None:
     result = shell("reconfigure", *words)
     assert (result.code, result.out) == (code, "")
-    assert result.err.startswith(f"rosz: {text}")
+    assert result.err.startswith(f"ERROR: {text}")
     assert result.err.count("\n") == 1
 
 

@@ -49,9 +49,9 @@ ERRORS = {
     ("demo", "plain"): (1, "is not executable; run: chmod +x {0}/src/demo/scripts/plain\n"),
     ("demo", "odd"): (1, "Exec format error; if it is a script, its first line must name what"),
     ("-p", "nogdb", "demo", "show"): (1, "cannot run 'nogdb': No such file or directory; is it in"),
-    ("demo",): (2, "rosz: no executable of package 'demo' is given: node.py, odd, show\n"),
-    (): (2, "rosz: no package is given: rosz run PACKAGE EXECUTABLE [ARGS]\n"),
-    ("--nope",): (2, "rosz: no such option: --nope"),
+    ("demo",): (2, "ERROR: no executable of package 'demo' is given: node.py, odd, show\n"),
+    (): (2, "ERROR: no package is given: rosz run PACKAGE EXECUTABLE [ARGS]\n"),
+    ("--nope",): (2, "ERROR: no such option: --nope"),
     ("demo", "scripts/shaw"): (1, "package 'demo' has no file '{0}/src/demo/scripts/shaw'"),
 }
 

@@ -83,8 +83,8 @@ def test_find(shell: Shell) -> None:
 @pytest.mark.parametrize("question", ["type", "args", "node", "uri", "info", "call"])
 def test_an_unknown_service_names_the_near_miss(shell: Shell, question: str) -> None:
     result = shell("service", question, "/robot/triger")
-    assert result.code == 1
-    assert result.err == ("rosz: unknown service '/robot/triger'; did you mean '/robot/trigger'?\n")
+    assert result.code == (2 if question in {"args", "call"} else 1)
+    assert result.err == "ERROR: unknown service '/robot/triger'; did you mean '/robot/trigger'?\n"
 
 
 @pytest.mark.parametrize("values", [["1", "2"], ["{a: 1, b: 2}"], ["b: 3"]])
@@ -113,7 +113,7 @@ def test_calls_from_standard_input(shell: Shell) -> None:
 
 def test_call_of_a_failing_service(shell: Shell) -> None:
     result = shell("service", "call", "/robot/fail", "true")
-    assert result.code == 1
+    assert result.code == 2
     assert "service [/robot/fail] responded with an error" in result.err
     assert "out of order" in result.err
 
@@ -121,10 +121,10 @@ def test_call_of_a_failing_service(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("values", "code", "text"),
     [
-        (["1"], 1, "AddTwoIntsRequest: expected 2 values for the fields (a, b), got 1\n"),
-        (["{c: 1}"], 1, "AddTwoIntsRequest: it has no field 'c'; it has a, b\n"),
+        (["1"], 2, "AddTwoIntsRequest: expected 2 values for the fields (a, b), got 1\n"),
+        (["{c: 1}"], 2, "AddTwoIntsRequest: it has no field 'c'; it has a, b\n"),
         (["-x"], 2, "no such option: -x; see 'rosz service call --help'\n"),
-        (["1", "x"], 1, "expected int64, got str 'x'"),
+        (["1", "x"], 2, "expected int64, got str 'x'"),
         (["[1"], 2, "value 1, '[1', is not YAML"),
         (["--timeout", "0", "1", "2"], 2, "--timeout is 0"),
         (["--timeout", "inf", "1", "2"], 2, "--timeout is inf; expected seconds above 0"),
@@ -153,7 +153,7 @@ def test_call_waits_for_a_service(shell: Shell, server: Node) -> None:
 def test_call_ends_at_its_timeout(shell: Shell, server: Node) -> None:
     server.service("/slow", Trigger, lambda _: server.sleep(60))
     result = shell("service", "call", "--timeout", "0.2", "/slow")
-    assert result.code == 1
+    assert result.code == 2
     assert "no answer of service '/slow' within 0.2 s" in result.err
 
 

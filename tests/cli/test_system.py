@@ -261,7 +261,7 @@ def test_a_full_disk_is_reported(network: Network, talker: Node) -> None:
             check=False,
         )
     assert done.returncode == 1
-    assert done.stderr == "rosz: cannot write to standard output: No space left on device\n"
+    assert done.stderr == "ERROR: cannot write to standard output: No space left on device\n"
 
 
 ENDING = """

@@ -103,7 +103,7 @@ def test_info_as_json(shell: Shell, talker: Node) -> None:
 def test_info_of_an_unknown_topic_names_the_near_miss(shell: Shell) -> None:
     result = shell("topic", "info", "/robot/tekst")
     assert result.code == 1
-    assert result.err == ("rosz: unknown topic '/robot/tekst'; did you mean '/robot/text'?\n")
+    assert result.err == "ERROR: unknown topic '/robot/tekst'; did you mean '/robot/text'?\n"
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_a_filter(shell: Shell, talker: Node) -> None:
     assert done.out == "data: True\n---\n"
     wrong = shell("topic", "echo", "-1", "--filter", "m.dat", "/yes")
     assert wrong.code == 1
-    assert wrong.err.startswith("rosz: filter 'm.dat' failed: AttributeError")
+    assert wrong.err.startswith("ERROR: filter 'm.dat' failed: AttributeError")
     assert shell("topic", "echo", "--filter", "m.data >", "/yes").code == 2
 
 

@@ -135,7 +135,7 @@ def test_no_values_on_a_terminal(shell: Shell) -> None:
 
 def test_a_negative_value_without_two_dashes(shell: Shell) -> None:
     result = shell("topic", "pub", "/x", "std_msgs/Float64", "-2")
-    expected = "rosz: no such option: -2; write '--' before a negative value; see 'rosz topic pub"
+    expected = "ERROR: no such option: -2; write '--' before a negative value; see 'rosz topic pub"
     assert (result.code, result.out) == (2, "")
     assert result.err.startswith(expected)
 

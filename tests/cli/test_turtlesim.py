@@ -44,7 +44,7 @@ def test_errors(shell: Shell) -> None:
     assert "did you mean '/turtlesim'?" in unknown.err
     lost = shell("turtlesim", "snapshot", "nowhere/field.png")
     assert lost.code == 1
-    assert lost.err == "rosz: nowhere/field.png: No such file or directory\n"
+    assert lost.err == "ERROR: nowhere/field.png: No such file or directory\n"
 
 
 def test_no_turtlesim_runs(shell: Shell, network: Network) -> None:

@@ -75,7 +75,7 @@ def test_no_type_is_given(
 ) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
     assert run(["msg", verb]) == 2
-    assert capsys.readouterr().err == f"rosz: no {what} is given\n"
+    assert capsys.readouterr().err == f"ERROR: no {what} is given\n"
 
 
 @pytest.mark.ros1

@@ -331,7 +331,7 @@ def refused(scene: Scene, machine: str = 'address="robot"', within: float = 15) 
     assert "process[" not in run.output
     assert "Traceback" not in run.output
     assert nodes_on(scene.laptop) == []
-    return next(line for line in run.lines if line.startswith("rosz: "))
+    return next(line for line in run.lines if line.startswith("ERROR: "))
 
 
 def test_an_unknown_host_key(scene: Scene) -> None:
@@ -339,7 +339,7 @@ def test_an_unknown_host_key(scene: Scene) -> None:
     right = known.read_text()
     known.unlink()
     assert refused(scene) == (
-        "rosz: machine 'far': the host key of 'robot' is not known: run 'ssh robot' once, and"
+        "ERROR: machine 'far': the host key of 'robot' is not known: run 'ssh robot' once, and"
         " compare its fingerprint"
     )
     scene.laptop.run("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", f"{known}.key")
@@ -350,7 +350,7 @@ def test_an_unknown_host_key(scene: Scene) -> None:
 
 def test_a_user_who_may_not_come_in(scene: Scene) -> None:
     assert refused(scene, 'address="robot" user="nobody"') == (
-        "rosz: machine 'far': 'robot' does not let user 'nobody' in without a password: run:"
+        "ERROR: machine 'far': 'robot' does not let user 'nobody' in without a password: run:"
         " ssh-copy-id nobody@robot"
     )
 
@@ -367,9 +367,9 @@ def test_a_password_is_not_used(scene: Scene) -> None:
 def test_no_rosz_there(scene: Scene) -> None:
     (scene.robot.home / "bin/rosz").unlink()
     (scene.robot.home / ".profile").write_text("export PATH=/usr/bin:/bin\necho welcome\n")
-    assert refused(scene).startswith("rosz: machine 'far': no rosz on 'robot': install it there")
+    assert refused(scene).startswith("ERROR: machine 'far': no rosz on 'robot': install it there")
     told = refused(scene, 'address="robot" env-loader="/no/env.sh"')
-    assert told.startswith("rosz: machine 'far': env-loader '/no/env.sh' cannot be run on 'robot'")
+    assert told.startswith("ERROR: machine 'far': env-loader '/no/env.sh' cannot be run on 'robot'")
 
 
 def test_a_version_that_does_not_fit(scene: Scene) -> None:

@@ -133,7 +133,7 @@ PYTHON_2 = {
 def test_python_2_syntax_is_explained_in_one_line(tmp_path: Path, script: str) -> None:
     done = run(tmp_path, script)
     path = tmp_path / "node.py"
-    assert done.stderr.startswith(f"rosz: {path}{PYTHON_2[script]}")
+    assert done.stderr.startswith(f"ERROR: {path}{PYTHON_2[script]}")
     assert done.stderr.endswith(f"with: 2to3 -w {path} (or futurize -w {path})\n")
     assert done.stderr.count("\n") == 1
     assert done.returncode == 1
@@ -142,7 +142,7 @@ def test_python_2_syntax_is_explained_in_one_line(tmp_path: Path, script: str) -
 def test_mixed_tabs_and_spaces_are_explained_in_one_line(tmp_path: Path) -> None:
     done = run(tmp_path, "def f():\n\tif 1:\n        return 2\n")
     assert done.stderr == (
-        f"rosz: {tmp_path}/node.py:3:1: indented by tabs and spaces in turn, as Python 2 allowed;"
+        f"ERROR: {tmp_path}/node.py:3:1: indented by tabs and spaces in turn, as Python 2 allowed;"
         f" write 8 columns for each tab with: expand -i -t 8 {tmp_path}/node.py\n"
     )
     assert done.returncode == 1
@@ -160,13 +160,13 @@ HINTS = {
 def test_python_2_names_are_explained_after_the_traceback(tmp_path: Path, script: str) -> None:
     done = run(tmp_path, script)
     expected = plain(tmp_path)
-    assert done.stderr == f"{expected.stderr}rosz: {HINTS[script]}\n"
+    assert done.stderr == f"{expected.stderr}ERROR: {HINTS[script]}\n"
     assert done.returncode == 1
 
 
 @pytest.mark.parametrize("name", ["print_input", "xrange2"])
 def test_other_names_are_not_explained(tmp_path: Path, name: str) -> None:
-    assert "rosz:" not in run(tmp_path, f"{name}()\n").stderr
+    assert "ERROR:" not in run(tmp_path, f"{name}()\n").stderr
 
 
 def test_usage_errors(tmp_path: Path) -> None:
@@ -179,7 +179,7 @@ def test_usage_errors(tmp_path: Path) -> None:
         [*command, gone], capture_output=True, env=environ, timeout=30, check=False
     )
     assert done.returncode == 1
-    assert done.stderr.decode() == f"rosz: cannot run '{gone}': No such file or directory\n"
+    assert done.stderr.decode() == f"ERROR: cannot run '{gone}': No such file or directory\n"
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_errors_of_rosz_are_one_line_with_a_place(tmp_path: Path, line: str, tex
     done = run(tmp_path, f"\n{line}\n")
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
-    assert done.stderr.startswith(f"rosz: {tmp_path}/node.py:2: ")
+    assert done.stderr.startswith(f"ERROR: {tmp_path}/node.py:2: ")
     assert text in done.stderr
 
 

@@ -57,7 +57,7 @@ def test_dump_does_not_write_through_links(network: Network) -> None:
 def test_load_reads_files_alone(tmp_path: Path, file: str) -> None:
     done = rosz(tmp_path, "param", "load", file)
     assert done.returncode == 1
-    assert done.stderr == f"rosz: file '{file}' is not a regular file\n"
+    assert done.stderr == f"ERROR: file '{file}' is not a regular file\n"
 
 
 def test_links_that_lead_round(tmp_path: Path) -> None:

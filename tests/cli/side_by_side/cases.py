@@ -65,6 +65,7 @@ service find std_srvs/SetBool
 service find nothing/Nothing
 service args /power
 service args /robot/reset
+service args /robot/plan
 service args /nowhere
 service node /power
 service uri /power
@@ -73,7 +74,11 @@ service call /power {data: false}
 service call /power
 service call /power 1 2
 service call /robot/reset
+service call /robot/plan {tolerance: 0.5}
+service call /robot/plan {tolerance: far}
+service call /robot/plan {width: 1}
 service call /nowhere
+service info /robot/plan
 node list
 node list -a
 node list -u
@@ -142,9 +147,7 @@ DIFFERENCES = {
     "topic delay /counter": "a topic without a header is told once and ends it, not per message",
     "topic pub -1 /cmd std_msgs/Int32 hello": "rosz refuses a value that ROS 1 quietly drops",
     "topic nothing": _USAGE,
-    "service args /nowhere": "what is not there is code 1; ROS 1's 2 means wrong usage here",
-    "service call /power 1 2": "a call that fails has code 1; ROS 1's 2 means wrong usage here",
-    "service call /nowhere": "a call that fails has code 1; ROS 1's 2 means wrong usage here",
+    "service call /robot/plan {tolerance: far}": "ROS 1 ends in a traceback, with Python's code",
     "node info /listener": "tells the command line; a link to another node has no socket to tell",
     "node info /nowhere": _REFUSED,
     "node ping -c 1 /nowhere": _REFUSED,

@@ -8,6 +8,7 @@ import sys
 
 import rospy
 from geometry_msgs.msg import PoseStamped
+from nav_msgs.srv import GetPlan
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int32, String
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
@@ -44,6 +45,7 @@ def listener() -> None:
     rospy.Subscriber("chatter", String, lambda _: None)
     rospy.Subscriber("robot/odd", String, lambda _: None)
     rospy.Service("power", SetBool, lambda request: SetBoolResponse(request.data, "as you wish"))
+    rospy.Service("robot/plan", GetPlan, lambda _: None)
     rospy.Service("robot/reset", Empty, lambda _: EmptyResponse())
     sys.stdout.write("ready\n")
     sys.stdout.flush()

@@ -35,6 +35,8 @@ _PLACES = (
 _VALUES = (
     (re.compile(r"xmlrpc reply from"), "reply from"),
     (re.compile(r"time=[\d.]+ms"), "time=<t>"),
+    (re.compile(r"^Pid: \d+", re.MULTILINE), "Pid: <pid>"),
+    (re.compile(r"outbound \(\d+ - [\d.]+:\d+\) \[\d+\]"), "outbound <socket>"),
     (re.compile(r"seq: \d+"), "seq: <n>"),
     (re.compile(r"^(\d+),\d+,(?=\d+,)", re.MULTILINE), r"\1,<n>,"),
     (re.compile(r"^\d{19}(?=,)", re.MULTILINE), "<now>"),

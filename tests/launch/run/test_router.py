@@ -109,4 +109,4 @@ def test_a_router_that_does_not_start_is_explained(
         LaunchError, match="ended with exit code 1; ROSZ_MODE=peer starts them without"
     ):
         RouterProcess(environment, variables)
-    assert capfd.readouterr().err.startswith("rosz: ")
+    assert capfd.readouterr().err.startswith("ERROR: ")

@@ -109,7 +109,7 @@ def test_a_file_that_fails_is_one_line(network: Network, source: Path) -> None:
     )
     assert program.exit_code() == 1
     assert program.lines == [
-        f"rosz: {source}/node.py:2: {file}:8: 'int_param' has type int, but default is '50'"
+        f"ERROR: {source}/node.py:2: {file}:8: 'int_param' has type int, but default is '50'"
     ]
 
 
