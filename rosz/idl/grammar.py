@@ -31,6 +31,7 @@ __all__ = ("parse_action", "parse_message", "parse_service")
 _TYPE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 _WORD = re.compile(r"[^\s#=]+")
+_TYPE_WORD = re.compile(r"([^\s#]*)(?:[ \t]+([A-Za-z][A-Za-z0-9_]*))?")
 _DIGITS = re.compile(r"[0-9]+", re.ASCII)
 _BLANK = re.compile(r"[ \t]*")
 _SEPARATOR = "---"
@@ -167,10 +168,11 @@ class _Line:
         self._path = path
         self._package = package
         self._at = 0
+        self._subject = ""
 
     def _fail(self, reason: str, at: int | None = None) -> NoReturn:
         column = (self._at if at is None else at) + 1
-        raise DefinitionError(reason, self._path, self._number, column)
+        raise DefinitionError(self._subject + reason, self._path, self._number, column)
 
     def _skip(self) -> bool:
         """Skip blanks, and return whether there were any."""
@@ -196,19 +198,16 @@ class _Line:
         kind = self._type()
         if not self._skip() and not self._done():
             self._fail(f"expected a blank between type and name, got '{self._rest()}'")
+        self._subject = ""
         if self._done():
             self._fail(f"expected a name after type '{kind.written}{kind.suffix}'")
         name = self._name()
-        spaced = self._skip()
-        if self._text.startswith("=", self._at):
+        self._skip()
+        constant = self._text.startswith("=", self._at)
+        self._subject = f"{'constant' if constant else 'field'} '{name}': "
+        if constant:
             return self._constant(kind, name, column)
-        default = None
-        if not self._done():
-            if not spaced:
-                self._fail(
-                    f"character '{self._text[self._at]}' in name; expected letters, digits or '_'"
-                )
-            default = self._default(kind)
+        default = None if self._done() else self._default(kind)
         return Field(name, kind, default, self._number, column)
 
     def _type(self) -> FieldType:
@@ -217,12 +216,19 @@ class _Line:
         if match is None:
             self._fail(f"expected a type, got '{self._rest()}'")
         written = match[0]
+        self._subject = self._shown_type(start)
         self._at = match.end()
         base = self._resolve(written, start)
         bound = self._bound(base)
         shape, size = self._array()
         written += f"<={bound}" if bound else ""
         return FieldType(base, bound, shape, size, written)
+
+    def _shown_type(self, start: int) -> str:
+        """Return the beginning of an error about a type: its whole word, and the field's name."""
+        found = _TYPE_WORD.match(self._text, start)
+        word, name = (found[1], found[2]) if found else ("", None)
+        return f"type '{word}' of '{name}': " if name else f"type '{word}': "
 
     def _resolve(self, written: str, start: int) -> str:
         if written in PRIMITIVES:
@@ -238,9 +244,7 @@ class _Line:
             return f"{parts[0]}/msg/{parts[1]}"
         if len(parts) == 3 and parts[1] in ("msg", "action"):  # noqa: PLR2004  # package/msg/Name
             return written
-        return self._fail(
-            f"expected a type such as 'pkg/Name' or 'pkg/msg/Name', got '{written}'", start
-        )
+        return self._fail("expected a type such as 'pkg/Name' or 'pkg/msg/Name'", start)
 
     def _bound(self, base: str) -> int:
         if not self._text.startswith("<", self._at):
@@ -248,7 +252,7 @@ class _Line:
         if base not in _STRINGS:
             self._fail(f"only strings have a bound '<=N'; write '{base}[<=N]' for a sequence")
         if not self._text.startswith("<=", self._at):
-            self._fail(f"expected '<=' and a number, got '{self._rest()}'")
+            self._fail("expected '<=' and a number as bound")
         self._at += 2
         return self._size("bound of a string")
 
@@ -276,8 +280,7 @@ class _Line:
     def _size(self, what: str) -> int:
         digits = _DIGITS.match(self._text, self._at)
         if digits is None:
-            got = self._rest() or "nothing"
-            self._fail(f"expected a number as {what}, got '{got}'")
+            self._fail(f"expected a number as {what}")
         size = int(digits[0])
         if not 1 <= size <= _MOST:
             self._fail(f"expected a {what} from 1 to {_MOST}, got {digits[0]}")
@@ -291,9 +294,10 @@ class _Line:
         end = match.end()
         if end < len(self._text) and self._text[end] not in " \t=#":
             bad = self._text[end]
+            word = match[0] + self._text[end:].split()[0].partition("#")[0]
             hint = "; the array part belongs to the type" if bad == "[" else ""
             self._fail(
-                f"character '{bad}' in name '{match[0]}'; expected letters, digits or '_'{hint}",
+                f"character '{bad}' in name '{word}'; expected letters, digits or '_'{hint}",
                 end,
             )
         self._at = end
@@ -302,7 +306,12 @@ class _Line:
     def _constant(self, kind: FieldType, name: str, column: int) -> Constant:
         if not kind.primitive or kind.shape != "one":
             self._fail(
-                f"a constant has a primitive type; '{kind.written}{kind.suffix}' is not one",
+                f"its type has to be a primitive one; '{kind.written}{kind.suffix}' is not",
+                column - 1,
+            )
+        if kind.bound:
+            self._fail(
+                f"only fields have bounded strings; write '{kind.base}' for '{kind.written}'",
                 column - 1,
             )
         self._at += 1
@@ -356,7 +365,9 @@ class _Line:
                 if self._done():
                     self._fail("the list is not closed; expected ']'", start)
                 if self._text[self._at] != ",":
-                    self._fail(f"expected ',' or ']' in the list, got '{self._text[self._at]}'")
+                    bare = _BARE.match(self._text, self._at)
+                    got = bare[0] if bare else self._text[self._at]
+                    self._fail(f"expected ',' or ']' in the list, got '{got}'")
                 self._at += 1
                 self._skip()
             values.append(self._element(kind))
