@@ -7,6 +7,7 @@ values (`values`), names (`paths`), writes and batches of them (`writes`), the t
 `PUBLIC_MODULES` are imported by name, because start-up needs one of them at a time:
 
 - `wire`: keys and messages of the store on the network (pure);
+- `ros2_file`: the nodes that values of a ROS 2 parameter file belong to (pure);
 - `yaml`: parameters as YAML text, and any YAML text read safely (pure, needs PyYAML);
 - `replica`: the replicated store of one process (fourth floor);
 - `remote`: the store as seen by a process that has no replica (fourth floor);
@@ -19,7 +20,7 @@ from rosz.params.tree import MISSING, Difference, Missing, leaves, lookup, previ
 from rosz.params.values import Value, normalise, type_name
 from rosz.params.writes import DELETED, Change, Deleted, Write, condense, spread
 
-PUBLIC_MODULES = ("api", "remote", "replica", "wire", "yaml")
+PUBLIC_MODULES = ("api", "remote", "replica", "ros2_file", "wire", "yaml")
 
 __all__ = (
     "DELETED",

@@ -26,6 +26,7 @@ from typing import Any, Final
 import yaml
 
 from rosz.errors import ParamError, YamlError
+from rosz.params.ros2_file import assign
 from rosz.params.values import MAX_DEPTH, Value, normalise, type_name, unsound_text
 
 __all__ = (
@@ -151,6 +152,8 @@ def load_documents(
 ) -> list[tuple[str, Value]]:
     """Return the documents of a parameter file, each with its namespace.
 
+    A document in the form of ROS 2 gives one entry for each node (`rosz.params.ros2_file`).
+
     Args:
         text: YAML text.
         namespace: Global namespace. The ``_ns`` of a document is appended, or replaces it if
@@ -173,7 +176,10 @@ def load_documents(
                     f"_ns is {inner!r}, expected the name of a namespace", path, line + 1, 1
                 )
             space = inner if inner.startswith("/") else f"{namespace.rstrip('/')}/{inner}"
-        found.append((space, value))
+        try:
+            found += assign(value, space)
+        except ParamError as error:
+            raise YamlError(str(error), path, line + 1, 1) from error
     return found
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Literal
 
 from rosz import names
-from rosz.errors import LaunchError, YamlError, near_miss
+from rosz.errors import LaunchError, ParamError, YamlError, near_miss
 from rosz.launch.plan.context import LaunchContext
 from rosz.launch.plan.document import TagError, TextError
 from rosz.launch.plan.model import PlanBuilder, SetupPlan
@@ -167,6 +167,8 @@ def read_rosparam(tag: Tag, builder: PlanBuilder) -> None:
 def _load(
     tag: Tag, builder: PlanBuilder, name: str, file: str | None, *, substitute: bool, named: bool
 ) -> None:
+    from rosz.params.ros2_file import assign
+
     text = tag.element.text
     if file is not None:
         if not file:
@@ -183,12 +185,17 @@ def _load(
     except YamlError as error:
         line, column = max(error.line - 1, 0), max(error.column - 1, 0)
         raise _locate(tag, file, error.reason, line, column) from error
+    try:
+        found = assign(value, name)
+    except ParamError as error:
+        raise _locate(tag, file, str(error), 0, 0) from error
     if not named and not isinstance(value, dict):
         tag.fail(
             f"<rosparam> without 'param' needs a dict, got {type(value).__name__}: {value!r:.60}"
         )
     try:
-        builder.add_params(name, value, tag.place)
+        for space, inner in found:
+            builder.add_params(space, inner, tag.place)
     except TextError as error:
         raise _locate(tag, file, error.reason, 0, 0) from error
 

@@ -34,6 +34,7 @@ from rosz.ros1.rospy.core import (
     on_shutdown,
     signal_shutdown,
     wait_for_shutdown,
+    warn_of_illegal_name,
 )
 from rosz.ros1.rospy.names import get_namespace
 from rosz.ros1.rospy.topics import Subscriber
@@ -265,6 +266,7 @@ def set_param(param_name: str, param_value: Any) -> None:
     """
     if not isinstance(param_name, str):
         raise TypeError(f"expected a name, got {type(param_name).__name__} {param_name!r}")
+    warn_of_illegal_name(param_name, 2)
     try:
         params().set(param_name or get_namespace(), param_value)
     except ParamError as error:

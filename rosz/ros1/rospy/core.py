@@ -13,12 +13,14 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from functools import partial
 from types import FrameType
 from typing import Any
 from urllib.parse import urlparse
 
+from rosz.names import is_valid
 from rosz.node import of_program
 from rosz.ros1.exceptions import (
     ROSException,
@@ -196,6 +198,21 @@ def add_shutdown_hook(h: Callable[[str], object]) -> None:
         TypeError: The argument cannot be called.
     """
     _add_hook("shutdown", h, "")
+
+
+def warn_of_illegal_name(name: str, stacklevel: int) -> None:
+    """Warn of a name that ROS 1 takes, but not all of its tools.
+
+    Args:
+        name: Name as the caller gave it.
+        stacklevel: Number of frames up to the caller's, 1 for the caller of this function.
+    """
+    if not is_valid(name):
+        warnings.warn(
+            f"'{name}' is not a legal ROS graph resource name. This may cause problems with"
+            " other ROS tools",
+            stacklevel=stacklevel + 1,
+        )
 
 
 def check_running() -> None:

@@ -15,11 +15,12 @@ from typing import Any, Self
 
 from rosz.errors import ClosedError, EncodeError, RoszError, WaitTimeout
 from rosz.message import Message
-from rosz.names import check, is_valid
+from rosz.names import check
 from rosz.node import MessageInfo, Node, SubscriberLink, Subscription
 from rosz.node import Publisher as NodePublisher
 from rosz.qos import QoS
 from rosz.ros1.exceptions import ROSException, ROSSerializationException
+from rosz.ros1.rospy.core import warn_of_illegal_name
 from rosz.ros1.rospy.msg import AnyMsg, args_kwds_to_message, in_words_of_genpy, to_ros1_log
 from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
 from rosz.ros1.state import context, has_node, is_shutdown, state, when_ready
@@ -75,12 +76,7 @@ class Topic:
             raise ValueError(
                 f"data_class [{type(data_class).__name__}] is not a message data class"
             )
-        if not is_valid(name):
-            warnings.warn(
-                f"'{name}' is not a legal ROS graph resource name. This may cause problems with"
-                " other ROS tools",
-                stacklevel=4,
-            )
+        warn_of_illegal_name(name, 4)
         resolve = resolve_name if has_node() else resolve_name_without_node_name
         self.name = self.resolved_name = check(resolve(name))
         self.type: str = data_class._type

@@ -12,7 +12,8 @@ from typing import Any
 import msgspec
 
 from rosz import remap
-from rosz.errors import NotFoundError, UsageError, YamlError
+from rosz.errors import NotFoundError, ParamError, UsageError, YamlError
+from rosz.params.ros2_file import sections
 from rosz.params.yaml import read_plain
 from rosz.remap import Arguments
 
@@ -138,24 +139,8 @@ def _read(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
     except UnicodeDecodeError as error:
         raise YamlError("the file is not UTF-8", path) from error
     tree = next(read_plain(text, path), None) or {}
-    yield from _nodes(tree, "", path)
-
-
-def _nodes(tree: Any, name: str, path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    if not isinstance(tree, dict):
-        raise YamlError(f"'{name}' has no 'ros__parameters'", path)
-    for key, inner in tree.items():
-        if key == "ros__parameters":
-            if not isinstance(inner, dict | None):
-                raise YamlError(f"'ros__parameters' of '{name}' is not a dictionary", path)
-            yield ("" if name in {"/**", "**"} else name), dict(_flatten(inner or {}, ""))
-        else:
-            yield from _nodes(inner, f"{name.rstrip('/')}/{key}" if name else str(key), path)
-
-
-def _flatten(tree: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            yield from _flatten(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
+    try:
+        for name, values in sections(tree):
+            yield ("" if name in {"/**", "**"} else name), values
+    except ParamError as error:
+        raise YamlError(str(error), path) from error

@@ -176,6 +176,24 @@ def test_wrong_ros2_tags_are_refused(body: str, message: str) -> None:
     assert message in str(caught.value)
 
 
+ROS2_FILE = "/g/n: {ros__parameters: {a.b: 2}}\n/**: {ros__parameters: {a: {b: 1, c: 1}}}"
+
+
+def test_parameter_files_of_ros2_are_for_nodes() -> None:
+    outside = FakeContext({"p.yaml": ROS2_FILE})
+    node = '<node pkg="p" type="t" name="{}"><rosparam file="p.yaml"/></node>'
+    found = plan_of(f'<group ns="g">{node.format("n")}</group>{node.format("m")}', outside)
+    assert {param.name: param.value for param in found.params} == {
+        "/g/n/a/b": 2,
+        "/g/n/a/c": 1,
+        "/m/a/b": 1,
+        "/m/a/c": 1,
+    }
+    with pytest.raises(LaunchFileError) as caught:
+        plan_of('<rosparam file="p.yaml"/>', outside)
+    assert "p.yaml:1:1: '/**' in this parameter file of ROS 2 means any node" in str(caught.value)
+
+
 def test_warnings_have_the_place_of_their_cause() -> None:
     outside = FakeContext(
         {"inc": '<launch>\n<nod/>\n  <node pkg="p" type="t" name="n" respwan="1"/></launch>'}

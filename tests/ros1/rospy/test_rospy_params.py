@@ -18,6 +18,24 @@ def printed(network: Network) -> Printed:
     return lambda script: run(network, BEGIN + script)
 
 
+def test_names_that_only_some_tools_take(network: Network) -> None:
+    lines = run(
+        network,
+        BEGIN
+        + """
+    import warnings
+    warnings.simplefilter("always")
+    warnings.showwarning = lambda message, *_: print(message, flush=True)
+    rospy.set_param("/p/bad name", 1)
+    rospy.set_param("1p", 2)
+    rospy.set_param("~fine", 3)
+    print(rospy.get_param("/p/bad name"), rospy.get_param("/1p"), rospy.has_param("~fine"))
+""",
+    )
+    problem = "is not a legal ROS graph resource name. This may cause problems with other ROS tools"
+    assert lines == [f"'/p/bad name' {problem}", f"'1p' {problem}", "1 2 True"]
+
+
 def test_parameters(network: Network) -> None:
     lines = run(
         network,
