@@ -89,11 +89,12 @@ def test_multi_turtle(desk: Desk) -> None:
     command = "geometry_msgs/Twist '[2.0, 0.0, 0.0]' '[0.0, 0.0, 1.8]'"
     other.start(f"rostopic pub -r 10 /turtlesim1/turtle1/cmd_vel {command}")
     third = desk.terminal()
-    moved = third.type("rostopic echo -n 1 /turtlesim2/turtle1/cmd_vel")
-    assert moved == (
+    third.start("rostopic echo /turtlesim2/turtle1/cmd_vel")  # zeros until turtle1 moves
+    third.wait_for(
         "linear: \n  x: 2.0\n  y: 0.0\n  z: 0.0\n"
         "angular: \n  x: 0.0\n  y: 0.0\n  z: 1.7999999523162842\n---\n"
     )
+    third.interrupt()
     nodes = third.type("rosnode list").split()
     assert {"/mimic", "/turtlesim1/sim", "/turtlesim2/sim"} <= set(nodes)
     other.interrupt()

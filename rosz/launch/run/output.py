@@ -25,9 +25,7 @@ from rosz.launch.run.loop import Loop, Timer
 
 __all__ = ("Output", "RunFolder", "Streams")
 
-_DRAIN_TIMEOUT = 0.5
-"""Time in seconds to wait for the last lines of a process before its end is reported."""
-_CLOSE_TIMEOUT = 5.0
+_SCREEN_TIMEOUT = 5.0
 """Time in seconds to wait for a screen that accepts nothing, such as a paused terminal."""
 _MIN_LIFE = 1.0
 """Time in seconds: a relay that ends sooner is not started again."""
@@ -225,7 +223,7 @@ class Output:
             owner: Number of the process.
             done: Called on the loop, after half a second at the latest.
         """
-        timer = self._loop.later(_DRAIN_TIMEOUT, lambda: self._drained(owner, ()))
+        timer = self._loop.later(_SCREEN_TIMEOUT, lambda: self._drained(owner, ()))
         self._waiting[owner] = (done, timer)
         self._send({"op": "drain", "id": owner})
 
@@ -271,7 +269,7 @@ class Output:
         self._send({"op": "end"})
         self._requests.close()
         try:
-            self._process.wait(_CLOSE_TIMEOUT)
+            self._process.wait(_SCREEN_TIMEOUT)
         except subprocess.TimeoutExpired:  # its screen accepts nothing
             self._process.kill()
             self._process.wait()
