@@ -11,8 +11,7 @@ from contextlib import suppress
 import pytest
 from network import Network, Program
 
-from rosz.launch.run.command import TAG
-from rosz.launch.run.host import ProcessTree
+from rosz.launch.run.process_tree import TAG, ProcessTree
 from rosz.msgs.geometry_msgs.msg import Point, Pose, PoseStamped, Twist
 from rosz.msgs.std_msgs.msg import Header, String
 from rosz.node import Node

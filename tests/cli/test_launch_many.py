@@ -60,6 +60,15 @@ def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
     assert not any(map(runs, pids.values()))
 
 
+def test_a_killed_launch_takes_its_core_along(launch: Start, network: Network) -> None:
+    run = launch(fleet(network.folder, STUBBORN, 1), ROSZ_CONNECT="tcp/127.0.0.1:9")
+    run.wait_for(UP)
+    pids = [int(pid) for pid in re.findall(r"started with pid \[(\d+)\]", run.output)]
+    assert len(pids) == 2
+    run.send(signal.SIGKILL)
+    eventually(lambda: not any(map(runs, pids)), "the end of both")
+
+
 def test_twenty_stubborn_nodes_end_in_time(launch: Start, network: Network) -> None:
     file = fleet(network.folder, STUBBORN, 20)
     run = launch("--sigint-timeout", "0.5", "--sigterm-timeout", "0.5", file)

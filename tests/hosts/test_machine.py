@@ -268,6 +268,32 @@ def test_a_killed_launch_leaves_nothing_there(scene: Scene, again: int) -> None:
     print(f"killed launch: nothing left there after {time.monotonic() - began:.2f} s")
 
 
+def test_a_killed_agent_takes_its_nodes_along(scene: Scene) -> None:
+    run = scene.launch(
+        SLEEPER.format("")
+        + '<node pkg="tools" type="stubborn.sh" name="s" machine="far" output="screen"/>'
+        + '<node pkg="rosz_tutorials" type="publisher.py" name="pub" machine="far" required="true"'
+        ' launch-prefix="nice"/>'
+    )
+    run.wait_for("asleep on robot")
+    run.wait_for("still here")
+    run.wait_for("process[pub-3]: started with pid [")
+    began = time.monotonic()
+    os.kill(find_process(scene.robot, f"{sys.executable} -m rosz launch --agent"), signal.SIGKILL)
+    run.wait_for("remote[robot-0]: 'robot' is lost: ")
+    eventually(lambda: nodes_on(scene.robot) == [], "the end of all nodes there")
+    print(f"killed agent: nothing left there after {time.monotonic() - began:.2f} s")
+    assert run.exit_code() == 1
+    found = re.search(
+        r"\[sleeper-1\] process is lost with its machine \[pid \d+ on robot, ", run.output
+    )
+    assert found, run.output
+    assert "exit code unknown, cmd" in run.output
+    assert "REQUIRED process [pub-3] has died!" in run.output
+    assert "has died [pid" not in run.output
+    assert "/sleeper [sleeper-1] is lost with its machine after" in run.output
+
+
 def lost(scene: Scene, lose: Callable[[], None], *, cut: bool) -> None:
     """Lose the robot during a launch, and see where that ends."""
     package(scene.laptop, here="echo here; exec sleep 1000")
@@ -283,7 +309,7 @@ def lost(scene: Scene, lose: Callable[[], None], *, cut: bool) -> None:
     lose()
     run.wait_for("remote[robot-0]: 'robot' is lost: ", 20)
     print(f"lost machine: noticed after {time.monotonic() - began:.2f} s")
-    run.wait_for("[sleeper-1] process has died [pid ")
+    run.wait_for("[sleeper-1] process is lost with its machine [pid ")
     if cut:
         eventually(lambda: nodes_on(scene.robot) == [], "the end of the nodes there", 20)
         print(f"lost machine: its nodes had ended after {time.monotonic() - began:.2f} s")

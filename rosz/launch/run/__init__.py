@@ -7,7 +7,7 @@ those that start-up needs alone.
 
 from rosz.launch.run.command import Command, Workplace, run_command
 from rosz.launch.run.control import LaunchStatus, NodeStatus, StatusClient
-from rosz.launch.run.host import Child, Host, ProcessSpec, ProcessTree
+from rosz.launch.run.host import Child, Host, ProcessSpec
 from rosz.launch.run.loop import interrupted_by_signals
 from rosz.launch.run.machines import MachineOption
 from rosz.launch.run.network import (
@@ -17,6 +17,7 @@ from rosz.launch.run.network import (
     needs_router,
     write_params,
 )
+from rosz.launch.run.process_tree import ProcessTree
 from rosz.launch.run.runner import Options, Runner
 from rosz.launch.run.supervisor import Timeouts
 

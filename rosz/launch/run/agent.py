@@ -21,9 +21,10 @@ import msgspec
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.run.command import Workplace
-from rosz.launch.run.host import Child, LocalHost, ProcessTree
+from rosz.launch.run.host import Child, LocalHost
 from rosz.launch.run.loop import Loop, Timer
 from rosz.launch.run.output import Output, RunFolder
+from rosz.launch.run.process_tree import ProcessTree
 from rosz.launch.run.protocol import (
     PROTOCOL,
     AgentVersion,
@@ -155,7 +156,9 @@ class _Agent:
         if reaches and not _has_connection(environment):
             self._environ["ROSZ_CONNECT"] = reaches
             environment = Environment.read(self._environ)
-        self._output = Output(self._loop, lambda text: self._writer.send(AgentWarning(text)))
+        self._output = Output(
+            self._loop, lambda text: self._writer.send(AgentWarning(text)), (setup.tag,)
+        )
         workplace = Workplace(
             package_index(environment), environment, self._environ, str(Path.cwd())
         )

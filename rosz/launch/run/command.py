@@ -18,10 +18,10 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import ExecutableNotFound
 from rosz.launch.plan import NodePlan, report
+from rosz.launch.run.process_tree import TAG
 from rosz.packages import Package, PackageIndex
 
 __all__ = (
-    "TAG",
     "Command",
     "Workplace",
     "base_environ",
@@ -29,9 +29,6 @@ __all__ = (
     "locate",
     "run_command",
 )
-
-TAG = "ROSZ_LAUNCH"
-"""Environment variable with the tag by which descendants of a launched process are found."""
 
 _SHEBANG_BYTES = 256
 _PYTHON = re.compile(r"python[0-9.]*")

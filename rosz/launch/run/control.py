@@ -14,8 +14,8 @@ from typing import Literal
 import msgspec
 
 from rosz.errors import LaunchError, NotFoundError, RoszError, WaitTimeout, near_miss
-from rosz.launch.run.host import Usage
 from rosz.launch.run.loop import Loop, Timer
+from rosz.launch.run.process_tree import Usage
 from rosz.launch.run.supervisor import Process, Supervisor, describe_exit
 from rosz.lifecycle import Closable
 from rosz.session import Query, Reply, Session
@@ -185,7 +185,7 @@ class StatusServer:
         node = process.node
         detail = process.error
         if process.over and not detail:
-            detail = describe_exit(process.code)
+            detail = describe_exit(process.code, lost=process.lost)
         return NodeStatus(
             name=node.full_name,
             type=f"{node.package}/{node.type}" if node.package else " ".join(node.command),

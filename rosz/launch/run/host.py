@@ -1,20 +1,12 @@
-"""The machines that processes run on: `LocalHost` is this one, `rosz.launch.run.remote` has others.
-
-Everything that a launch starts carries a tag in its environment, which descendants inherit. Where
-the system shows environments (``/proc``), a `ProcessTree` finds them by it, also those that left
-their process group or whose parent has ended.
-"""
+"""The machines that processes run on: `LocalHost` is this one, `remote.RemoteHost` another."""
 
 from __future__ import annotations
 
 import errno
 import getpass
-import math
 import os
-import signal
 import socket
 import subprocess
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -24,9 +16,10 @@ import msgspec
 
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.plan import MachinePlan, NodePlan
-from rosz.launch.run.command import TAG, Command, Workplace
+from rosz.launch.run.command import Command, Workplace
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.output import Output, RunFolder, Streams
+from rosz.launch.run.process_tree import TAG, ProcessTree, Usage, group_alive
 
 __all__ = (
     "Child",
@@ -36,161 +29,19 @@ __all__ = (
     "OnExit",
     "OnStart",
     "ProcessSpec",
-    "ProcessTree",
-    "Usage",
-    "group_alive",
     "is_local",
 )
 
-OnExit = Callable[[int, tuple[str, ...]], None]
-"""Called with the exit code, negative for a signal, and the last lines of the output."""
+OnExit = Callable[[int | None, tuple[str, ...]], None]
+"""Called with the exit code, negative for a signal, and the last lines of the output.
+
+The exit code is None if it is not known, because the machine of the process is lost.
+"""
 
 OnStart = Callable[[RoszError | None], None]
 """Called with None once a process has started, or with the reason why it could not be."""
 
 _LOCAL_NAMES = frozenset({"", "localhost", "127.0.0.1", "::1"})
-
-_PROC = Path("/proc")
-_TICKS = os.sysconf("SC_CLK_TCK")
-_PAGE = os.sysconf("SC_PAGE_SIZE")
-_STATE, _GROUP, _UTIME, _STIME, _VSIZE, _RSS = 0, 2, 11, 12, 20, 21
-_CACHE_SECONDS = 0.05
-_KILL_ATTEMPTS, _KILL_INTERVAL = 10, 0.002
-"""How often to look again for processes without an environment; some never have one."""
-
-
-class Usage(msgspec.Struct, frozen=True):
-    """The resources that a process and its descendants use.
-
-    Attributes:
-        processes: Number of processes.
-        cpu: Processor time so far in seconds.
-        memory: Memory held now in bytes.
-    """
-
-    processes: int = 0
-    cpu: float = 0.0
-    memory: int = 0
-
-
-class ProcessTree:
-    """The processes that carry a tag, or one below it, in their environment.
-
-    Args:
-        tag: The tag.
-    """
-
-    def __init__(self, tag: str) -> None:
-        self.tag = tag
-        self._cached_at = -math.inf
-        self._cached: dict[int, str] = {}
-
-    def tags(self) -> dict[int, str]:
-        """Return the whole tags of the processes by process id."""
-        return self._scan()[0]
-
-    def below(self, tag: str) -> list[int]:
-        """Return the processes that carry a tag or one below it, from a scan a moment ago."""
-        if time.monotonic() - self._cached_at > _CACHE_SECONDS:
-            self._cached = self.tags()
-            self._cached_at = time.monotonic()
-        return [pid for pid, other in self._cached.items() if _is_below(other, tag)]
-
-    def kill(self) -> None:
-        """Kill all processes, including those that appear meanwhile."""
-        killed: set[int] = set()
-        attempts = _KILL_ATTEMPTS
-        while attempts:
-            found, unclear = self._scan()
-            fresh = set(found) - killed
-            for pid in fresh:
-                with suppress(ProcessLookupError, PermissionError):
-                    os.kill(pid, signal.SIGKILL)
-            killed |= fresh
-            if not fresh:
-                if not unclear:
-                    return
-                attempts -= 1
-                time.sleep(_KILL_INTERVAL)
-
-    def usage(self) -> dict[str, Usage]:
-        """Return the resources used by the processes, by whole tag."""
-        totals: dict[str, Usage] = {}
-        for pid, tag in self.tags().items():
-            with suppress(OSError, IndexError, ValueError):  # it ended meanwhile
-                fields = _stat(str(pid))
-                before = totals.get(tag, Usage())
-                totals[tag] = Usage(
-                    before.processes + 1,
-                    before.cpu + (int(fields[_UTIME]) + int(fields[_STIME])) / _TICKS,
-                    before.memory + int(fields[_RSS]) * _PAGE,
-                )
-        return totals
-
-    def _scan(self) -> tuple[dict[int, str], bool]:
-        """Return the whole tags, and whether some process shows no environment at the moment.
-
-        That is so in the instant in which a process executes another program.
-        """
-        found: dict[int, str] = {}
-        unclear = False
-        name = TAG.encode() + b"="
-        wanted = name + self.tag.encode()
-        for pid in _processes():
-            with suppress(OSError):  # it ended meanwhile, or belongs to another user
-                environ = Path(_PROC, pid, "environ").read_bytes()
-                # Ended processes and threads of the kernel have no environment and no memory.
-                unclear = unclear or (not environ and _stat(pid)[_VSIZE] != "0")
-                if wanted not in environ:
-                    continue
-                for variable in environ.split(b"\0"):
-                    tag = variable.removeprefix(name).decode(errors="replace")
-                    if variable.startswith(wanted) and _is_below(tag, self.tag):
-                        found[int(pid)] = tag
-        return found, unclear
-
-
-def _is_below(tag: str, parent: str) -> bool:
-    return tag == parent or tag.startswith(f"{parent}:")
-
-
-def group_alive(group: int) -> bool:
-    """Return whether a process group, whose leader has been reaped, has running members.
-
-    Members that have ended but have not been reaped by their new parent do not count.
-    """
-    with suppress(ChildProcessError):
-        while os.waitpid(-group, os.WNOHANG)[0]:
-            pass
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    pids = _processes()
-    return not pids or any(_runs_in(pid, group) for pid in pids)
-
-
-def _runs_in(pid: str, group: int) -> bool:
-    try:
-        fields = _stat(pid)
-    except OSError:  # it ended meanwhile
-        return False
-    return int(fields[_GROUP]) == group and fields[_STATE] not in {"Z", "X"}
-
-
-def _stat(pid: str) -> list[str]:
-    """Return the fields of ``/proc/PID/stat`` after the name of the program."""
-    text = Path(_PROC, pid, "stat").read_text(errors="replace")
-    return text.rpartition(")")[2].split()
-
-
-def _processes() -> list[str]:
-    try:
-        return [entry.name for entry in _PROC.iterdir() if entry.name.isdigit()]
-    except FileNotFoundError:  # a system without /proc: only process groups are known
-        return []
 
 
 class ProcessSpec(msgspec.Struct, frozen=True):
@@ -352,7 +203,10 @@ class LocalHost:
         self._prefixed = prefixed
 
     def start(
-        self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart | None = None
+        self,
+        spec: ProcessSpec,
+        on_exit: Callable[[int, tuple[str, ...]], None],
+        on_start: OnStart | None = None,
     ) -> LocalChild:
         """Start a process; see `Host.start` for the arguments and errors."""
         del on_start  # the process runs when this returns
@@ -375,6 +229,7 @@ class LocalHost:
             raise _start_error(spec, command, error) from error
         finally:
             streams.close()
+        self._output.started(spec.owner, process.pid)
         logs = self._folder.pattern(spec.label) if self._folder else ""
         child = LocalChild(process, command, self._tree, logs)
 

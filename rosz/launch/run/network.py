@@ -2,13 +2,13 @@
 
 Parameters are written before any node starts, as one change. In a full mesh the number of links
 grows with the square of the number of nodes. Above some number, a launch therefore starts ``rosz
-core`` as a router and makes its nodes clients of it. The router is a process of its own: when the
-launch is killed, the nodes run on.
+core`` as a router and makes its nodes clients of it.
 """
 
 from __future__ import annotations
 
 import re
+import secrets
 import signal
 import socket
 import subprocess
@@ -23,9 +23,9 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import LaunchError, ParamNotFound
 from rosz.launch.plan import Condition, Plan, SetupPlan
-from rosz.launch.run.command import TAG
 from rosz.launch.run.console import Console
 from rosz.launch.run.loop import Loop
+from rosz.launch.run.process_tree import TAG
 from rosz.params import DELETED, Change, condense, normalise, split
 from rosz.session import Session, is_listening
 
@@ -256,6 +256,7 @@ class RouterProcess:
     Attributes:
         environment: Settings of its clients.
         environ: Environment variables of its clients.
+        tag: Tag by which its process is found.
 
     Raises:
         LaunchError: If it does not start.
@@ -264,7 +265,9 @@ class RouterProcess:
     def __init__(self, environment: Environment, environ: Mapping[str, str]) -> None:
         self.environment = msgspec.structs.replace(environment, mode="client")
         self.environ = {**environ, _MODE: "client"}
-        self._own_environ = {name: value for name, value in environ.items() if name != TAG}
+        # Not below the tag of an outer launch, which would wait for it as for a part of its node.
+        self.tag = secrets.token_hex(8)
+        self._own_environ = {**environ, TAG: self.tag}
         self._closing = False
         self._process = self._start()
         try:

@@ -14,7 +14,7 @@ import socket
 import subprocess
 import sys
 import termios
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,6 +22,7 @@ import msgspec
 
 from rosz.errors import LaunchError
 from rosz.launch.run.loop import Loop, Timer
+from rosz.launch.run.process_tree import TAG
 
 __all__ = ("Output", "RunFolder", "Streams")
 
@@ -115,11 +116,14 @@ class Output:
     Args:
         loop: Loop that waits for its replies.
         warn: Function that reports its death.
+        tags: Tags of all that the relay ends when this process is killed: that of the nodes, which
+            are asked to end first, and those of other processes.
     """
 
-    def __init__(self, loop: Loop, warn: Callable[[str], None]) -> None:
+    def __init__(self, loop: Loop, warn: Callable[[str], None], tags: Sequence[str]) -> None:
         self._loop = loop
         self._warn = warn
+        self._tags = tags
         self._waiting: dict[int, tuple[_OnDrained, Timer]] = {}
         self._unread = b""
         self._terminals = (os.isatty(1), os.isatty(2))
@@ -133,11 +137,13 @@ class Output:
         script = Path(__file__).with_name("relay.py")
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-S", str(script), str(theirs.fileno())],
+                [sys.executable, "-I", "-S", str(script), str(theirs.fileno()), *self._tags],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
                 cwd="/",
+                # An outer launch that kills this one must not kill the relay, which ends the rest.
+                env={name: value for name, value in os.environ.items() if name != TAG},
             )
         self._loop.watch(self._requests.fileno(), self._receive)
 
@@ -215,6 +221,15 @@ class Output:
             return False
         self._requests.settimeout(_SEND_TIMEOUT)
         return True
+
+    def started(self, owner: int, pid: int) -> None:
+        """Report the process that uses the streams of an owner, which the relay may have to end."""
+        try:
+            process = os.pidfd_open(pid)
+        except (AttributeError, OSError):  # an older kernel: only tags are known
+            return
+        self._send({"op": "child", "id": owner, "pid": pid}, process)
+        os.close(process)
 
     def drain(self, owner: int, done: _OnDrained) -> None:
         """Show all that a process wrote, then call a function with its last lines.

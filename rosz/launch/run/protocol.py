@@ -13,7 +13,8 @@ from typing import Final
 
 import msgspec
 
-from rosz.launch.run.host import ProcessSpec, Usage
+from rosz.launch.run.host import ProcessSpec
+from rosz.launch.run.process_tree import Usage
 from rosz.launch.run.supervisor import Timeouts
 from rosz.worker import Worker
 

@@ -1,13 +1,14 @@
-"""A program that copies the output of nodes to the screen.
+"""A program that copies the output of nodes to the screen, and ends them if their launch is killed.
 
-It is a process of its own (``python -I -S relay.py``), so that nodes can still write when their
-launch is killed. It ends when the launch requests it, or when the launch and all nodes have ended.
+It is a process of its own (``python -I -S relay.py SOCKET TAG…``), so that it outlives a launch
+that is killed. It ends when the launch requests it, or when the launch and all nodes have ended.
 Lines stay whole: output of two nodes is never mixed within a line. The last lines of each node are
 kept for the summary.
 
 Requests arrive on a stream socket, one JSON object per line, together with descriptors::
 
     {"op": "add", "id": 7, "sink": 1, "prefix": "[talker] "}     with the descriptor to read
+    {"op": "child", "id": 7, "pid": 4711}    with a descriptor of the process, which has started
     {"op": "drain", "id": 7}     the reply, once all is read, is {"id": 7, "tail": […]}
     {"op": "end"}                drain all, then end
 """
@@ -19,13 +20,17 @@ import json
 import os
 import re
 import resource
+import runpy
 import select
 import selectors
 import signal
 import socket
 import sys
+import threading
 import time
 from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 __all__ = ("Relay", "Source", "main")
@@ -86,10 +91,13 @@ class Relay:
 
     Args:
         requests: Socket to the launch.
+        tags: Tags of what to end when the launch is killed, see `end_processes`.
     """
 
-    def __init__(self, requests: socket.socket) -> None:
+    def __init__(self, requests: socket.socket, tags: Sequence[str] = ()) -> None:
         self.requests = requests
+        self.tags = tags
+        self.children: dict[int, tuple[int, int]] = {}
         self.selector = selectors.DefaultSelector()
         self.selector.register(requests, selectors.EVENT_READ, None)
         self.sources: dict[int, Source] = {}
@@ -129,6 +137,8 @@ class Relay:
         self.descriptors.extend(descriptors)
         if not data:
             self._detach()
+            # Output is copied meanwhile, or a node that writes as it ends would wait for ever.
+            threading.Thread(target=self._end_nodes).start()
         *lines, self.unread = (self.unread + data).split(b"\n")
         for line in lines:
             self._handle(json.loads(line))
@@ -137,6 +147,13 @@ class Relay:
         if self.attached:
             self.attached = False
             self.selector.unregister(self.requests)
+
+    def _end_nodes(self) -> None:
+        """End all nodes, because their launch has been killed."""
+        # Loaded when it is needed: rosz itself cannot be imported without site-packages.
+        end = runpy.run_path(str(Path(__file__).with_name("process_tree.py")))["end_processes"]
+        ended, _, _ = select.select([fd for _, fd in self.children.values()], [], [], 0)
+        end(self.tags, {pid for pid, fd in self.children.values() if fd not in ended})
 
     def _handle(self, request: dict[str, Any]) -> None:
         if request["op"] == "add":
@@ -148,14 +165,24 @@ class Relay:
             self.sources[fd] = source
             self.tails.setdefault(source.owner, deque(maxlen=TAIL_LINES))
             self.selector.register(fd, selectors.EVENT_READ, source)
+        elif request["op"] == "child":
+            self._forget(request["id"])
+            if self.descriptors:
+                self.children[request["id"]] = (request["pid"], self.descriptors.popleft())
         elif request["op"] == "drain":
             self._drain(request["id"])
+            self._forget(request["id"])
         else:
             for source in list(self.sources.values()):
                 self._read_all(source)
                 if source.fd in self.sources:
                     self._drop(source)
             self._detach()
+
+    def _forget(self, owner: int) -> None:
+        """Forget a child, which has ended."""
+        if owner in self.children:
+            os.close(self.children.pop(owner)[1])
 
     def _drain(self, owner: int) -> None:
         for source in [s for s in self.sources.values() if s.owner == owner]:
@@ -211,13 +238,13 @@ class Relay:
 
 
 def main() -> None:
-    """Handle the requests from the socket whose descriptor is the first argument."""
+    """Handle the requests from the socket whose descriptor is the first argument; tags follow."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     # It holds two descriptors for each node.
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    Relay(socket.socket(fileno=int(sys.argv[1]))).run()
+    Relay(socket.socket(fileno=int(sys.argv[1])), sys.argv[2:]).run()
 
 
 if __name__ == "__main__":

@@ -13,9 +13,10 @@ import msgspec
 from rosz.errors import LaunchError
 from rosz.launch.plan import MachinePlan
 from rosz.launch.run.console import Console
-from rosz.launch.run.host import OnExit, OnStart, ProcessSpec, Usage
+from rosz.launch.run.host import OnExit, OnStart, ProcessSpec
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.machines import ssh_command, ssh_failure
+from rosz.launch.run.process_tree import Usage
 from rosz.launch.run.protocol import (
     PROTOCOL,
     AgentVersion,
@@ -38,10 +39,7 @@ from rosz.launch.run.protocol import (
     rosz_version,
 )
 
-__all__ = ("LOST", "Machines", "RemoteChild", "RemoteHost")
-
-LOST = 255
-"""Exit code of a process whose machine is lost, the same as that of ssh."""
+__all__ = ("Machines", "RemoteChild", "RemoteHost")
 
 _PINGS = 4
 _KEPT_LINES = 40
@@ -87,8 +85,8 @@ class RemoteChild:
         if on_start is not None:
             on_start(error)
 
-    def exited(self, code: int, tail: tuple[str, ...]) -> None:
-        """Report that it has ended."""
+    def exited(self, code: int | None, tail: tuple[str, ...]) -> None:
+        """Report that it has ended, or that its machine is lost, for which ``code`` is None."""
         on_exit, self._on_exit = self._on_exit, None
         if on_exit is not None:
             on_exit(code, tail)
@@ -326,7 +324,7 @@ class RemoteHost:
             if child.pending:
                 child.started(LaunchError(self.error))
             else:
-                child.exited(LOST, (self.error,))
+                child.exited(None, (self.error,))
 
     def disconnect(self) -> None:
         """Let the agent end with all that it runs, without waiting for it."""

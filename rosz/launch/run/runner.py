@@ -15,14 +15,15 @@ import msgspec
 
 from rosz.errors import LaunchError, ParamNotFound, UsageError
 from rosz.launch.plan import NodePlan, Plan
-from rosz.launch.run.command import TAG, Workplace
+from rosz.launch.run.command import Workplace
 from rosz.launch.run.console import Console, LaunchLog
 from rosz.launch.run.control import StatusServer
-from rosz.launch.run.host import Host, LocalHost, ProcessTree, is_local
+from rosz.launch.run.host import Host, LocalHost, is_local
 from rosz.launch.run.loop import Loop, stopped_by_signals
 from rosz.launch.run.machines import MachineOption, launch_endpoints, move_machines
 from rosz.launch.run.network import RUN_ID, Network, core_params, launch_uri, set_params
 from rosz.launch.run.output import Output, RunFolder
+from rosz.launch.run.process_tree import TAG, ProcessTree
 from rosz.launch.run.protocol import Setup
 from rosz.launch.run.remote import Machines
 from rosz.launch.run.supervisor import Process, Supervisor, Timeouts
@@ -146,7 +147,9 @@ class Runner:
             LaunchError: If the launch cannot run.
             ParamError: If a value is not a parameter value.
         """
-        output = Output(self._loop, self._console.error)
+        router = self._network.router
+        tags = (self._tag, *([router.tag] if router else []))
+        output = Output(self._loop, self._console.error, tags)
         try:
             supervisor = self._prepare(output)
             self._supervise(supervisor)

@@ -68,6 +68,7 @@ class Process:
         state: Current state.
         child: The latest process, or None.
         code: Exit code of the latest process, or None.
+        lost: Whether the latest process is lost with its machine, so that nobody knows its end.
         tail: Last lines of its output.
         error: Reason why it could not be started, or "".
         starts: Number of starts.
@@ -85,6 +86,7 @@ class Process:
         self.state = State.WAITING
         self.child: Child | None = None
         self.code: int | None = None
+        self.lost = False
         self.tail: tuple[str, ...] = ()
         self.error = ""
         self.starts = 0
@@ -153,6 +155,7 @@ class Process:
         self.alive = True
         self._again = False
         self.code = None
+        self.lost = False
         self.tail = ()
         self.starts = which
         self.began = self._loop.now()
@@ -180,11 +183,12 @@ class Process:
         self._supervisor.failed_to_start(self, error)
         self._supervisor.finished(self)
 
-    def _exited(self, which: int, code: int, tail: tuple[str, ...]) -> None:
+    def _exited(self, which: int, code: int | None, tail: tuple[str, ...]) -> None:
         if self._is_outdated(which):
             return
         requested = self.state is State.STOPPING
         self.code = code
+        self.lost = code is None
         self.tail = tail
         self.ended = self._loop.now()
         self.alive = False
@@ -283,7 +287,7 @@ class Process:
         """Return how it ended, in words."""
         if self.state is State.FAILED:
             return f"could not be started: {self.error}"
-        text = describe_exit(self.code)
+        text = describe_exit(self.code, lost=self.lost)
         if self.killed:
             text = "did not end when asked to, and was killed"
         respawns = self.starts - 1
@@ -291,8 +295,15 @@ class Process:
         return f"{text} after {self.ended - self.began:.1f} s{again}"
 
 
-def describe_exit(code: int | None) -> str:
-    """Return the meaning of an exit code in words."""
+def describe_exit(code: int | None, *, lost: bool = False) -> str:
+    """Return the meaning of an exit code in words.
+
+    Args:
+        code: The exit code, or None if there is none.
+        lost: Whether the process is lost with its machine.
+    """
+    if lost:
+        return "is lost with its machine"
     if code is None:
         return "gave no exit code"
     if code >= 0:
@@ -439,32 +450,37 @@ class Supervisor:
     def died(self, process: Process) -> None:
         """Report that a process ended by itself, and end the others if it was required."""
         text = self._describe_death(process)
-        if process not in self.failures and (process.code or process.node.required):
+        if process not in self.failures and (process.code != 0 or process.node.required):
             self.failures.append(process)
         if process.node.required:
             self._console.error(
                 f"{_RULE}REQUIRED process [{process.label}] has died!\n{text}\n"
                 f"Initiating shutdown!\n{_RULE}"
             )
-            self.failed = self.failed or bool(process.code)
+            self.failed = self.failed or process.code != 0
             self.shutdown()
-        elif process.code:
+        elif process.code != 0:
             self._console.error(f"[{process.label}] {text}")
         else:
             self._console.strong(f"[{process.label}] {text}")
 
     @staticmethod
     def _describe_death(process: Process) -> str:
+        child = process.child
         text = "process has finished cleanly"
-        if process.code and process.child is not None:
-            child = process.child
+        if process.lost and child is not None:
+            text = (
+                f"process is lost with its machine [pid {child.pid} on {process.place}, exit code"
+                f" unknown, cmd {child.shown}]."
+            )
+        elif process.code and child is not None:
             text = (
                 f"process has died [pid {child.pid}, exit code {process.code}, cmd {child.shown}]."
             )
-        if process.child is None or not process.child.logs:
+        if child is None or not child.logs:
             return text
         where = f"{process.place}:" if process.place else ""
-        return f"{text}\nlog file: {where}{process.child.logs}"
+        return f"{text}\nlog file: {where}{child.logs}"
 
     def respawning(self, process: Process) -> None:
         """Report that a process starts again."""

@@ -25,8 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT))
 
-from rosz.launch.run.command import TAG  # noqa: E402  # of this tree
-from rosz.launch.run.host import ProcessTree  # noqa: E402
+from rosz.launch.run.process_tree import TAG, ProcessTree  # noqa: E402  # of this tree
 
 ROSZ = [sys.executable, "-P", "-m", "rosz", "launch"]
 TIMEOUT = 60.0

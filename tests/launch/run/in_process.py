@@ -14,8 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rosz.launch.plan.model import NodePlan, Plan
-from rosz.launch.run.command import TAG
-from rosz.launch.run.host import ProcessTree
+from rosz.launch.run.process_tree import TAG, ProcessTree
 
 from .in_thread import TIMEOUT
 

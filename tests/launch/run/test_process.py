@@ -10,8 +10,9 @@ import pytest
 
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.run.console import Console
-from rosz.launch.run.host import OnExit, OnStart, ProcessSpec, Usage
+from rosz.launch.run.host import OnExit, OnStart, ProcessSpec
 from rosz.launch.run.loop import Loop
+from rosz.launch.run.process_tree import Usage
 from rosz.launch.run.supervisor import Process, State, Supervisor, Timeouts
 
 from .in_thread import program

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from network import eventually
 
-from rosz.launch.run.host import ProcessTree, Usage, group_alive
+from rosz.launch.run.process_tree import ProcessTree, Usage, group_alive
 
 from .in_thread import alive
 
@@ -66,7 +66,7 @@ def test_a_process_that_executes_another_program_is_killed(
         entry.mkdir()
         (entry / "environ").write_bytes(b"")
         (entry / "stat").write_text(Path(f"/proc/{changing.pid}/stat").read_text())
-        monkeypatch.setattr("rosz.launch.run.host._PROC", tmp_path)
+        monkeypatch.setattr("rosz.launch.run.process_tree._PROC", tmp_path)
         shown = f"A=1\0ROSZ_LAUNCH={tag}:1\0".encode()
         monkeypatch.setattr(time, "sleep", lambda _: (entry / "environ").write_bytes(shown))
         ProcessTree(tag).kill()

@@ -1,4 +1,4 @@
-"""Signals that end a launch end its nodes too, except SIGKILL."""
+"""Signals that end a launch end its nodes too."""
 
 from __future__ import annotations
 
@@ -104,13 +104,30 @@ def test_nohup_is_honoured(tmp_path: Path) -> None:
         assert run.text.count("killing on exit") == 3
 
 
-def test_a_killed_launch_leaves_its_nodes_running(tmp_path: Path) -> None:
-    with launch_process(tmp_path, *SLEEPERS, options='{"screen": true}') as run:
-        run.expect(r"c-3\]: started with pid")
-        run.expect(r"(up\n(.*\n)*){3}")
+IN_ORDER = "trap 'sleep 0.2; echo in order; exit 0' INT; echo up; while :; do sleep 0.02; done"
+LEAVES_THE_GROUP = "trap '' INT TERM; setsid sleep 600 & echo grandchild $!; echo up; wait"
+
+
+def test_a_killed_launch_takes_its_nodes_along(tmp_path: Path) -> None:
+    """Those that end in order may do so; no other process remains, wherever it has gone."""
+    bare = "trap '' INT TERM; echo up; while :; do sleep 0.02; done"
+    nodes = (
+        shell("orderly", IN_ORDER),
+        shell("leaving", LEAVES_THE_GROUP),
+        program("bare", "env", "-i", "sh", "-c", bare),
+        STUBBORN,
+    )
+    with launch_process(tmp_path, *nodes, options='{"screen": true}') as run:
+        run.expect(r"mule-4\]: started with pid")
+        run.expect(r"(up\n(.*\n)*){4}")
+        pids = [*run.pids(), int(run.expect(r"grandchild (\d+)")[1])]
+        assert all(map(alive, pids))
         run.process.kill()
+        begin = time.monotonic()
+        eventually(lambda: not any(map(alive, pids)), "the end of all nodes")
+        print(f"killed launch: nothing left after {time.monotonic() - begin:.2f} s")
         run.process.wait()
-        assert all(map(alive, run.pids()))
+        run.expect("in order\n")
 
 
 def test_a_killed_node_is_reported_and_others_run_on(tmp_path: Path) -> None:
