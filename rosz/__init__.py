@@ -48,6 +48,9 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'rosz' has no attribute '{name}'")
-    from importlib import import_module
+    from rosz.interrupts import InterruptDeferral
 
-    return getattr(import_module(_HOMES.get(name, "rosz.node")), name)
+    with InterruptDeferral():
+        from importlib import import_module
+
+        return getattr(import_module(_HOMES.get(name, "rosz.node")), name)

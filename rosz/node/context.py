@@ -14,6 +14,7 @@ from rosz import remap
 from rosz.environment import Environment, package_index
 from rosz.errors import ClosedError
 from rosz.graph import Graph
+from rosz.interrupts import InterruptDeferral
 from rosz.lifecycle import Lifecycle
 from rosz.node.clock import Clock
 from rosz.node.direct_delivery import DirectDelivery
@@ -88,13 +89,14 @@ class Context:
         self._flushed = threading.Event()
         self._lifecycle = Lifecycle("the context", log=_log, on_fork=self._forked)
         self.cooperative: bool = False
-        self.session: Session = Session.open(config, peers)
-        try:
-            self._join_network(config, alone=alone)
-        except BaseException:  # Ctrl-C comes anywhere
-            self.session.close()
-            raise
-        atexit.register(self.close)
+        with InterruptDeferral(self.close):
+            self.session: Session = Session.open(config, peers)
+            try:
+                self._join_network(config, alone=alone)
+            except BaseException:
+                self.session.close()
+                raise
+            atexit.register(self.close)
 
     def _join_network(self, config: SessionConfig, *, alone: bool) -> None:
         self.graph: Graph = Graph(self.session, self.domain)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from rosz.errors import ClosedError
+from rosz.interrupts import InterruptDeferral
 from rosz.node import control, signals, standard, takeover
 from rosz.node.client import Client
 from rosz.node.clock import nanoseconds
@@ -59,14 +60,17 @@ class Node(NodeCore):
         argv: Sequence[str] | None = None,
         handle_signals: bool | None = None,
     ) -> None:
-        super().__init__(name, namespace=namespace, anonymous=anonymous, context=context, argv=argv)
-        try:
-            self._begin()
-        except BaseException:
-            self.close()
-            raise
-        if self._owns_context if handle_signals is None else handle_signals:
-            signals.install(self.context)
+        with InterruptDeferral(self.close):
+            super().__init__(
+                name, namespace=namespace, anonymous=anonymous, context=context, argv=argv
+            )
+            try:
+                self._begin()
+            except BaseException:
+                self.close()
+                raise
+            if self._owns_context if handle_signals is None else handle_signals:
+                signals.install(self.context)
 
     def _begin(self) -> None:
         standard.set_initial_params(self)

@@ -21,6 +21,7 @@ import time
 from collections.abc import Callable
 from types import FrameType
 
+from rosz.interrupts import InterruptDeferral, is_interactive
 from rosz.lifecycle import Lifecycle
 from rosz.node.context import Context
 from rosz.worker import start_thread
@@ -42,16 +43,21 @@ def install(context: Context) -> None:
     signal that is ignored is taken too: shells start background jobs of a script like that, and
     ``kill -INT`` must end them nevertheless, as it ends nodes of rospy. A signal that finds all
     contexts shut down does what it would do without rosz.
+
+    Where a person types Python, Ctrl-C interrupts what was typed, and nodes stay open.
     """
     if threading.current_thread() is not threading.main_thread():
         return
     handlers = [signal.getsignal(number) for number in _SIGNALS]
+    handlers = [one.replaced if isinstance(one, InterruptDeferral) else one for one in handlers]
     for present in handlers:
         if isinstance(present, _Handler):
             present.add(context)
             return
     defaults = (signal.default_int_handler, signal.SIG_DFL, signal.SIG_IGN)
     taken = [n for n, present in zip(_SIGNALS, handlers, strict=True) if present in defaults]
+    if is_interactive() and signal.SIGINT in taken:
+        taken.remove(signal.SIGINT)
     if taken:
         handler = _Handler(taken)
         handler.add(context)

@@ -44,6 +44,7 @@ FLOORS = {
     "rosz.typestore": 2,
     "rosz.worker": 3,
     "rosz.environment": 3,
+    "rosz.interrupts": 3,
     "rosz.lifecycle": 3,
     "rosz.security": 3,
     "rosz.security.rules": 1,
