@@ -26,8 +26,10 @@ from rosz.launch.run.process_tree import TAG
 
 __all__ = ("Output", "RunFolder", "Streams")
 
-_SCREEN_TIMEOUT = 5.0
-"""Time in seconds to wait for a screen that accepts nothing, such as a paused terminal."""
+_DRAIN_TIMEOUT = 0.5
+"""Time in seconds to wait for the last lines of a process before its end is reported."""
+_RELAY_TIMEOUT = 5.0
+"""Time in seconds for the relay to start, and to end when its screen accepts nothing."""
 _MIN_LIFE = 1.0
 """Time in seconds: a relay that ends sooner is not started again."""
 _SEND_TIMEOUT = 0.5
@@ -132,6 +134,7 @@ class Output:
 
     def _start(self) -> None:
         self._began = self._loop.now()
+        self._ready = False
         self._requests, theirs = socket.socketpair()
         self._requests.settimeout(_SEND_TIMEOUT)
         script = Path(__file__).with_name("relay.py")
@@ -236,9 +239,10 @@ class Output:
 
         Args:
             owner: Number of the process.
-            done: Called on the loop, after half a second at the latest.
+            done: Called on the loop, after half a second at the latest once the relay has started.
         """
-        timer = self._loop.later(_SCREEN_TIMEOUT, lambda: self._drained(owner, ()))
+        timeout = _DRAIN_TIMEOUT if self._ready else _RELAY_TIMEOUT
+        timer = self._loop.later(timeout, lambda: self._drained(owner, ()))
         self._waiting[owner] = (done, timer)
         self._send({"op": "drain", "id": owner})
 
@@ -257,8 +261,9 @@ class Output:
             self._restart()
         *lines, self._unread = (self._unread + data).split(b"\n")
         for line in lines:
-            reply = json.loads(line)
-            self._drained(reply["id"], tuple(reply["tail"]))
+            self._ready = True
+            if reply := json.loads(line):
+                self._drained(reply["id"], tuple(reply["tail"]))
 
     def _restart(self) -> None:
         """Start the relay again after its death, unless it died right after its start."""
@@ -284,7 +289,7 @@ class Output:
         self._send({"op": "end"})
         self._requests.close()
         try:
-            self._process.wait(_SCREEN_TIMEOUT)
+            self._process.wait(_RELAY_TIMEOUT)
         except subprocess.TimeoutExpired:  # its screen accepts nothing
             self._process.kill()
             self._process.wait()

@@ -11,6 +11,8 @@ Requests arrive on a stream socket, one JSON object per line, together with desc
     {"op": "child", "id": 7, "pid": 4711}    with a descriptor of the process, which has started
     {"op": "drain", "id": 7}     the reply, once all is read, is {"id": 7, "tail": […]}
     {"op": "end"}                drain all, then end
+
+The first line that it sends is ``{}``: it has started.
 """
 
 from __future__ import annotations
@@ -244,7 +246,10 @@ def main() -> None:
     # It holds two descriptors for each node.
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    Relay(socket.socket(fileno=int(sys.argv[1])), sys.argv[2:]).run()
+    requests = socket.socket(fileno=int(sys.argv[1]))
+    with contextlib.suppress(OSError):  # the launch has ended already
+        requests.sendall(b"{}\n")
+    Relay(requests, sys.argv[2:]).run()
 
 
 if __name__ == "__main__":
