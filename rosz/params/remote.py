@@ -113,7 +113,7 @@ class ParamClient:
         if not batch:
             self._find_members()
             return Outcome(0)
-        seen = self._request(ClientRequest("stamp")).value
+        seen = self._request(ClientRequest("stamp"), batch).value
         if type(seen) is not int:
             raise DecodeError("answer about parameters", -1, f"{seen!r}, expected a stamp")
         self._session.clock.observe(Stamp(seen, ""))
@@ -157,7 +157,7 @@ class ParamClient:
 
         Args:
             request: Request to send.
-            batch: Batch in the request, if it writes.
+            batch: Batch that the request is for, if it is about a write.
         """
         deadline = time.monotonic() + self._timeout
         payload = encode(request)

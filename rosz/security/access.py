@@ -92,9 +92,10 @@ def _grants(permit: Permit) -> Iterator[_Grant]:
     yield from _topics(permit.subscribe, "egress", "ingress")
     yield from _services(permit.call, "ingress", "egress")
     yield from _services(permit.serve, "egress", "ingress")
-    if permit.get or permit.set:
+    if permit.get:
         yield from _reading()
-    yield from _setting(permit.set)
+    if permit.set:
+        yield from _setting(permit.set, reads=permit.get)
     if permit.control:
         # A newer process with the name of a node ends the older one.
         yield "ingress", _TOKEN, [f"{_OWN}/node/**"]
@@ -160,14 +161,26 @@ def _reading() -> Iterator[_Grant]:
     yield "egress", _ANSWER, [f"{_OWN}/store/**", f"{_OWN}/param/**"]
 
 
-def _setting(names: Sequence[str]) -> Iterator[_Grant]:
-    """Yield the messages that set parameters; the key of a write says which ones it sets."""
+def _setting(names: Sequence[str], *, reads: bool) -> Iterator[_Grant]:
+    """Yield the messages that set parameters; the key of a write says which ones it sets.
+
+    Args:
+        names: The patterns of the parameters.
+        reads: Whether the holder may read parameters too. If not, its replica sees those here, so
+            that it waits for them, and they do not see it, because it cannot acknowledge writes.
+    """
     # A name, and all names below it.
     places = [at if at.endswith("**") else f"{at}/**" for at in map(_chunks, names)]
     yield "ingress", _DATA, [f"{_OWN}/change/{at}" for at in places]
-    verbs = ("write", "set", "tell")
+    verbs = ("write", "set", "tell") if reads else ("write", "set")
     yield "ingress", _ASK, [f"{_OWN}/store/*/{verb}/{at}" for verb in verbs for at in places]
-    if EVERYTHING in names:
+    if not reads:
+        yield "egress", _TOKEN, [f"{_OWN}/replica/**"]
+        yield "egress", _LISTEN, [f"{_OWN}/change/**"]
+        yield "ingress", _LISTEN, [f"{_OWN}/ack/*"]
+        yield "egress", _DATA, [f"{_OWN}/ack/*"]
+        yield "egress", _ANSWER, [f"{_OWN}/store/*/{verb}/**" for verb in verbs]
+    elif EVERYTHING in names:
         # Only a holder that may set everything is queried for writes that others have missed.
         missed = [f"{_OWN}/store/*/sync", f"{_OWN}/store/*/tell/**"]
         yield "ingress", _ANSWER, missed

@@ -153,7 +153,7 @@ def _allowed(permit: Permit) -> list[str]:
     lines = [
         f"{verb} {', '.join(getattr(permit, verb))}" for verb in NAME_VERBS if getattr(permit, verb)
     ]
-    lines += ["get all parameters"] if permit.get or permit.set else []
+    lines += ["get all parameters"] if permit.get else []
     lines += ["control nodes"] if permit.control else []
     return lines or ["nothing"]
 

@@ -44,7 +44,7 @@ class Permit(msgspec.Struct, frozen=True, kw_only=True):
         subscribe: The topics it may subscribe to.
         call: The services it may call.
         serve: The services it may serve.
-        set: The parameters it may set and delete.
+        set: The parameters it may set and delete, which is not permission to read them.
         get: Whether it may read parameters. They are one store, so that is all of them or none.
         control: Whether it may ping and end nodes, also by starting newer ones of their names, set
             log levels, and query launches.

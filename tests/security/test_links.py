@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -160,6 +161,35 @@ def test_rules_allow_only_what_they_say(pair: Pair) -> None:
     assert "heard camera" not in laptop.output
     assert "heard plan" not in laptop.output
     assert "served format" not in robot.output
+
+
+@pytest.mark.parametrize("pattern", ["/gains/**", "/**"])
+def test_permission_to_set_is_not_permission_to_read(pair: Pair, pattern: str) -> None:
+    pair.rules(f"laptop: {{set: ['{pattern}']}}\n")
+    core, robot = pair.start()
+    laptop = pair.laptop.program(LAPTOP)
+    laptop.wait_for("up")
+    began = time.monotonic()
+    laptop.say("set /gains/p 7")
+    robot.wait_for("param /gains/p 7")
+    laptop.wait_for("set /gains/p")
+    print(f"set by a holder that may not read: {time.monotonic() - began:.2f} s")
+    laptop.say("get /secrets/pin")
+    assert laptop.wait_for("value") == "value None"
+    pair.laptop.ask("param", "set", "/gains/q", "8")
+    robot.wait_for("param /gains/q 8")
+    # Nor does it hear of what others set, and nobody waits for it.
+    began = time.monotonic()
+    pair.robot.ask("param", "set", "/secrets/pin", "4321")
+    print(f"set on the robot meanwhile: {time.monotonic() - began:.2f} s")
+    laptop.say("get /secrets/pin")
+    assert laptop.wait_for("value", times=2) == "value None"
+    reading = pair.laptop.rosz("param", "get", "/secrets/pin")
+    assert reading.exit_code(30) == 1
+    assert "4321" not in reading.output
+    assert pair.laptop.rosz("param", "list").exit_code(30) == 1
+    for program in (core, robot, laptop):
+        assert "WARNING" not in program.output
 
 
 def test_a_holder_that_may_do_everything(pair: Pair) -> None:

