@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated
@@ -50,7 +50,7 @@ def _is_special(word: str) -> bool:
 
 app = App("Get and set parameters.", is_remapping=_is_special)
 
-_Verbose = Annotated[bool, Option("-v", "Print each step to standard error.")]
+_Verbose = Annotated[bool, Option("-v", "Print each step.")]
 _Name = Annotated[str, Argument("NAME", source=suggest.params)]
 _Space = Annotated[str, Argument("NAMESPACE", source=suggest.params)]
 
@@ -86,7 +86,7 @@ def get_command(
     """Print a parameter, or all parameters below a namespace, as YAML."""
     with _client(call) as client:
         full = _resolve(call, name)
-        _log(verbose, f"getting parameter [{full}]")
+        _log(verbose, [f"getting parameter [{full}]"])
         try:
             value = client.get(full)
         except ParamNotFound as error:
@@ -125,7 +125,9 @@ def set_command(
     with _client(call) as client:
         full = _resolve(call, name)
         found = _read_value(value, text_file, binary_file)
-        _write(client, condense(spread(full, normalise(found, full))), verbose)
+        changes = condense(spread(full, normalise(found, full)))
+        _warn_slow(client, client.write(changes))
+    _log(verbose, (f"set parameter [/{'/'.join(path)}] to [{item}]" for path, item in changes))
 
 
 @app.command("delete")
@@ -137,7 +139,8 @@ def delete_command(call: Call, name: _Name, *, verbose: _Verbose = False) -> int
             _warn_slow(client, client.delete(full))
         except ParamNotFound as error:
             return _fail_not_set("parameter", error)
-    _log(verbose, "deleted all parameters" if full == "/" else f"deleted parameter [{full}]")
+    what = "ENTIRE parameter server" if full == "/" else f"parameter [{full}]"
+    _log(verbose, [f"deleted {what}"])
     return 0
 
 
@@ -151,15 +154,17 @@ def dump_command(
     json: Json = False,
 ) -> int:
     """Write parameters to a file as YAML."""
+    from rosz.params import leaves, split
     from rosz.params.yaml import dump
 
     with _client(call) as client:
         full = _resolve(call, namespace)
-        _log(verbose, f"dumping namespace [{full}] to file [{file}]")
+        _log(verbose, [f"dumping namespace [{namespace}] to file [{file or None}]"])
         try:
             value = client.get(full)
         except ParamNotFound as error:
             return _fail_not_set("Parameter", error)
+    _log(verbose, _format_leaves(value, leaves(value, split(full))))
     if json:
         print_json(value)
     elif file in {"", "-"}:
@@ -189,13 +194,19 @@ def load_command(
     source = _STDIN if file == "-" else file
     text = _read_stdin() if file == "-" else _decode(_read_bytes(file, NotFoundError), file)
     with _client(call) as client:
-        _log(verbose, f"reading parameters from [{source}]")
-        documents = load_documents(text, _resolve(call, namespace), source)
-        changes = condense(change for space, value in documents for change in spread(space, value))
+        _log(verbose, [f"reading parameters from {'stdin' if file == '-' else f'[{file}]'}"])
+        own = _resolve(call, namespace)
+        documents = load_documents(text, own, source)
+        spaces = (space for space, _ in documents if space != own)
+        _log(verbose, (f"reading parameters into namespace [{space}]" for space in spaces))
+        set_by = [list(spread(space, value)) for space, value in documents]
+        changes = condense(change for each in set_by for change in each)
         if dry_run:
             _print_preview(preview(client.get("/"), changes), as_json=json)
             return
-        _write(client, changes, verbose)
+        _warn_slow(client, client.write(changes))
+    for (_, value), each in zip(documents, set_by, strict=True):
+        _log(verbose, _format_leaves(value, each))
 
 
 @app.command("search")
@@ -319,10 +330,14 @@ def _decode(content: bytes, file: str) -> str:
 
 
 def _check_target(file: str) -> None:
-    """Refuse to write through a link, which somebody else may have put there."""
+    """Refuse to write through a link, which somebody else may have put there.
+
+    Links of the system, such as ``/dev/stdout`` and those to the pipes of a shell, are followed.
+    """
     from pathlib import Path
 
-    if Path(file).is_symlink():
+    folder = Path(file).absolute().parent.resolve().parts
+    if Path(file).is_symlink() and folder != ("/", "dev") and folder[:2] != ("/", "proc"):
         raise UsageError(f"'{file}' is a link to '{Path(file).readlink()}'; name the file itself")
 
 
@@ -357,10 +372,12 @@ def _fail_not_set(word: str, error: ParamNotFound) -> int:
     return 1
 
 
-def _write(client: ParamClient, changes: list[Change], verbose: bool) -> None:
-    _warn_slow(client, client.write(changes))
-    for path, item in changes:
-        _log(verbose, f"set parameter [/{'/'.join(path)}] to [{item}]")
+def _format_leaves(value: Value, changes: Iterable[Change]) -> Iterator[str]:
+    """Yield the lines in which rosparam lists a tree; a single value has no name there."""
+    if not isinstance(value, dict):
+        yield str(value)
+    else:
+        yield from (f"/{'/'.join(path)}={item}" for path, item in changes)
 
 
 def _warn_slow(client: ParamClient, outcome: Outcome) -> None:
@@ -371,6 +388,7 @@ def _warn_slow(client: ParamClient, outcome: Outcome) -> None:
         warn(f"{label} does not answer")
 
 
-def _log(verbose: bool, text: str) -> None:
+def _log(verbose: bool, lines: Iterable[str]) -> None:
+    """Print to standard output what ``-v`` asks for, as rosparam does."""
     if verbose:
-        print_error(text)
+        print_lines(lines)

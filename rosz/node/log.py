@@ -338,6 +338,11 @@ class NodeLog(NodeLogger):
         if self._rosout is not None:
             self._rosout.publish_to(publish)
 
+    def publish_as_ros1(self) -> None:
+        """Publish what child loggers log under the name of the node, as ROS 1 does."""
+        if self._rosout is not None:
+            self._rosout.names_children = False
+
     def flush(self) -> None:
         """Wait, for a second at most, until what was logged is published on ``/rosout``."""
         if self._rosout is not None:

@@ -382,6 +382,10 @@ class RosoutHandler(logging.Handler):
         clock: Clock that gives the lines their stamps.
         on_problem: Function that gets a sentence when publishing fails for the first time; it may
             log.
+
+    Attributes:
+        names_children: Whether a line of a child logger has its name, as in ROS 2, instead of the
+            node's, as in ROS 1.
     """
 
     def __init__(
@@ -392,6 +396,7 @@ class RosoutHandler(logging.Handler):
         self._base = base
         self._clock = clock
         self._on_problem = on_problem
+        self.names_children = True
         self._publish: PublishLine | None = None
         self._ready = threading.Event()
         self._dropped = 0
@@ -418,10 +423,11 @@ class RosoutHandler(logging.Handler):
         if self._worker.full:
             self._dropped += 1
             return
+        child = record.name.removeprefix(self._base) if self.names_children else ""
         self._worker.submit(
             (
                 severity(record.levelno),
-                self._ros_name + record.name.removeprefix(self._base),
+                self._ros_name + child,
                 self.format(record),
                 record.pathname,
                 record.funcName or "",

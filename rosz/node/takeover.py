@@ -42,7 +42,8 @@ def yield_to_newer(node: NodeCore) -> None:
 def _compare(node: NodeCore, other: ProcessToken) -> None:
     """Shut a node down if another one of its name is newer."""
     if not node.is_shutdown and _is_newer(node, other):
-        node.log.warning("shutdown request: %s (process %d on %s)", _REASON, other.pid, other.host)
+        text = "shutdown request: [%s] Reason: %s (process %d on %s)"
+        node.log.warning(text, node.name, _REASON, other.pid, other.host)
         node.shutdown(_REASON)
 
 

@@ -522,5 +522,6 @@ def _of_math(node: Any) -> Any:
 
 _Loader.add_constructor("!degrees", lambda loader, node: degrees(loader.construct_scalar(node)))
 _Loader.add_constructor("!radians", lambda loader, node: radians(loader.construct_scalar(node)))
-_Loader.add_implicit_resolver("!degrees", re.compile(r"^deg\([^\)]*\)$"), ["d"])
-_Loader.add_implicit_resolver("!radians", re.compile(r"^rad\([^\)]*\)$"), ["r"])
+for _class in _Loader, _Dumper:  # so that a text which looks like an angle is written in quotes
+    _class.add_implicit_resolver("!degrees", re.compile(r"^deg\([^\)]*\)$"), ["d"])
+    _class.add_implicit_resolver("!radians", re.compile(r"^rad\([^\)]*\)$"), ["r"])

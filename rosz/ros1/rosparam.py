@@ -120,7 +120,10 @@ def _upload(name: str, value: Any) -> None:
 
 
 def print_params(params: Any, ns: str) -> None:
-    """Write names and values to stdout, one per line."""
+    """Write names and values to stdout, one per line; what is no dict is written alone."""
+    if not isinstance(params, dict):
+        sys.stdout.write(f"{params}\n")
+        return
     for name, value in _leaves(ns, params):
         sys.stdout.write(f"{name}={value}\n")
 
@@ -135,7 +138,11 @@ def _leaves(name: str, value: Any) -> list[tuple[str, Any]]:
             f"YAML dictionaries must have string keys, got {odd[0]!r}; invalid dictionary is:"
             f"\n{value}"
         )
-    return [leaf for key in value for leaf in _leaves(start + key, value[key])]
+    return [
+        leaf
+        for key in value
+        for leaf in _leaves(key if key.startswith("/") else start + key, value[key])
+    ]
 
 
 def delete_param(param: str, verbose: bool = False) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -280,18 +281,46 @@ def test_names_are_those_of_the_namespace(
     assert replica.get("/robot/x") == 1
 
 
-def test_verbose_messages_go_to_stderr(replica: Replica, param: Command, tmp_path: Path) -> None:
-    (tmp_path / "f.yaml").write_text("a: {b: 1}")
+def test_verbose_messages_go_to_stdout(replica: Replica, param: Command) -> None:
     assert replica.root == {}
-    assert param("load", "-v", "f.yaml", "/n")[1:] == (
+    assert param("load", "-v", "-", "/n", stdin="a: {b: 1}")[1:] == (
+        "reading parameters from stdin\n/n/a/b=1\n",
         "",
-        "reading parameters from [f.yaml]\nset parameter [/n/a/b] to [1]\n",
     )
-    assert param("get", "-v", "/n/a/b")[1:] == ("1\n", "getting parameter [/n/a/b]\n")
-    assert param("set", "-v", "/n/a", "{b: 2}")[2] == "set parameter [/n/a/b] to [2]\n"
-    assert param("dump", "-v", "o.yaml", "/n")[2] == "dumping namespace [/n] to file [o.yaml]\n"
-    assert param("delete", "-v", "/n")[2] == "deleted parameter [/n]\n"
-    assert param("delete", "-v", "/")[2] == "deleted all parameters\n"
+    assert param("get", "-v", "/n/a/b")[1:] == ("getting parameter [/n/a/b]\n1\n", "")
+    assert param("dump", "-v", "o.yaml", "/n/a/b")[1:] == (
+        "dumping namespace [/n/a/b] to file [o.yaml]\n1\n",
+        "",
+    )
+    assert param("delete", "-v", "/n")[1:] == ("deleted parameter [/n]\n", "")
+    assert param("delete", "-v", "/")[1:] == ("deleted ENTIRE parameter server\n", "")
+
+
+def test_a_text_that_looks_like_an_angle_stays_a_text(replica: Replica, param: Command) -> None:
+    for text in "deg(90)", "rad(pi)":
+        param("set", "/a", f"'{text}'")
+        assert param("get", "/a")[1] == f"'{text}'\n\n"  # as rosparam
+        param("dump", "a.yaml")
+        param("load", "a.yaml", "/copy")
+        assert replica.get("/copy/a") == text
+
+
+@pytest.mark.parametrize("target", ["/dev/stdout", ">(cat)", "fifo"])
+def test_dump_to_what_is_no_file(replica: Replica, tmp_path: Path, target: str) -> None:
+    replica.set("/a", 1)
+    os.mkfifo(tmp_path / "fifo")
+    rendezvous = os.environ["ROSZ_RENDEZVOUS"]
+    line = f"{' '.join(ROSZ)} param dump {target} | cat"
+    done = subprocess.run(
+        ["bash", "-c", f"{line} & cat fifo" if target == "fifo" else line],
+        env=environ(tmp_path, ROSZ_RENDEZVOUS=rendezvous),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=40,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("a: 1\n", "")
 
 
 def test_searching(replica: Replica, param: Command) -> None:

@@ -38,7 +38,9 @@ def test_older_process_ends(network: Network) -> None:
     assert program.exit_code() == 0
     assert "because: new node registered with same name" in program.lines
     warning = program.wait_for("shutdown request")
-    assert f"(process {king.process.pid} on {king.process.host})" in warning
+    by = f"(process {king.process.pid} on {king.process.host})"
+    reason = "new node registered with same name"
+    assert warning.endswith(f"shutdown request: [/king] Reason: {reason} {by}")
     assert not king.is_shutdown
     graph = king.context.graph
     graph.wait_for(lambda view: view.nodes() == ["/king"], TIMEOUT, "one king")

@@ -136,6 +136,7 @@ def _open(name: str, *, anonymous: bool, log_level: int | None, signals: bool) -
     if anonymous and "__name" not in arguments().special:
         name = f"{name}_{os.getpid()}_{time.time_ns() // 1_000_000}"
     node = Node(name, context=context(), handle_signals=signals)
+    node.log.publish_as_ros1()
     if log_level is not None:
         node.log.setLevel(LEVELS[log_level])
     node.on_shutdown(_shut_down_process)

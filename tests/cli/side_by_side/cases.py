@@ -109,6 +109,20 @@ param get /robot/text
 param delete /robot/size
 param get /robot/size
 param delete /nowhere
+param set -v /odd/list [1,two,3.5]
+param set -v /odd/more {b: yes, a: rad(pi)}
+param set /odd/angle 'deg(90)'
+param get -v /odd/angle
+param get -v /odd
+param dump -v /dev/stdout /odd
+param dump /dev/stdout /odd/angle
+param dump -v file.yaml /odd
+param load -v file.yaml /copy
+param get /copy
+param load -v src/demo_pkg/param/arms.yaml /spaces
+param get -v /spaces
+param delete -v /copy/list
+param delete -v /copy
 param get
 param nothing
 msg show std_msgs/String

@@ -39,8 +39,9 @@ _PACKAGE = {
         "time taken\nfloat64[] values\nfloat32[3] noise\nstd_msgs/ColorRGBA[2] lamps\nchar c\n"
     ),
     "srv/Ask.srv": "int8 ALL=-1\nstring what\nduration within\n---\nReading[] readings\nbool ok\n",
+    "param/arms.yaml": "_ns: left\nlength: 1.5\n/odd/far: {x: 1}\n---\nname: two\n",
 }
-"""A package of definitions that both have."""
+"""A package of definitions and parameters that both have."""
 
 
 class Outcome(msgspec.Struct, frozen=True):

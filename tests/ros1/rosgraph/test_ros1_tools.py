@@ -144,6 +144,19 @@ def test_rosparam(network: Network, robot: Node) -> None:
     assert not robot.params.has("/speed")
 
 
+def test_rosparam_takes_absolute_keys(network: Network) -> None:
+    network.node("robot")
+    program = network.program("""
+        import rosz.ros1, rosparam
+        rosparam.upload_params("/ns", {"/abs/x": 1, "own": {"/deep": 2}}, verbose=True)
+        rosparam.print_params(7, "/ns")
+        print(rosparam.list_params("/"))
+        """)
+    assert program.exit_code() == 0, program.output
+    expected = ["/abs/x=1", "/deep=2", "7", "['/abs/x', '/deep']"]
+    assert program.lines == expected  # as real rosparam's
+
+
 @pytest.mark.usefixtures("robot")
 def test_rosservice(network: Network) -> None:
     found = ask(

@@ -28,6 +28,7 @@ rospy.sleep(0.3)
 rospy.logdebug("unheard")
 rospy.loginfo("first")
 speak()
+rospy.logwarn("of a part", logger_name="part.wheel")
 rospy.logfatal("last")
 done.wait(10)
 for message in seen:
