@@ -256,10 +256,10 @@ class Message(msgspec.Struct, gc=False):
     _full_text = _Derived(_full_text)
     _slot_types = _Derived(_slot_types)
     _has_header = _Derived(_has_header)
-    __slots__: ClassVar[tuple[str, ...]]  # fields in the order of the definition
+    __slots__: ClassVar[list[str]]  # fields in the order of the definition
 
     def __init_subclass__(cls, **_options: object) -> None:
-        cls.__slots__ = tuple(name for name, _, _ in cls._schema)
+        cls.__slots__ = [name for name, _, _ in cls._schema]
 
     @staticmethod
     def _encode(m: Any) -> bytes:
@@ -333,7 +333,7 @@ class Sequenced(Message):
 
     def __init_subclass__(cls, **options: object) -> None:
         super().__init_subclass__(**options)
-        cls.__slots__ = ("seq", *cls.__slots__)
+        cls.__slots__ = ["seq", *cls.__slots__]
 
     __hash__ = None  # type: ignore[assignment]
 

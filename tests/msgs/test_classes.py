@@ -113,13 +113,13 @@ def test_names_and_hashes() -> None:
 
 
 def test_introspection() -> None:
-    assert JointState.__slots__ == ("header", "name", "position", "velocity", "effort")
+    assert JointState.__slots__ == ["header", "name", "position", "velocity", "effort"]
     assert JointState._slot_types == [
         "std_msgs/Header",
         "string[]",
         *["float64[]"] * 3,
     ]
-    assert Header.__slots__ == ("seq", "stamp", "frame_id")
+    assert Header.__slots__ == ["seq", "stamp", "frame_id"]
     assert Header._slot_types == ["uint32", "time", "string"]
     assert JointState()._get_types() == JointState._slot_types
     assert JointState.get_fields_and_field_types() == {

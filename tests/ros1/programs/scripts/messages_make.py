@@ -40,8 +40,8 @@ Image().data, len(Image().data)
 PointField.FLOAT32, PointField.INT8
 PointCloud2().is_dense
 String._type, String._md5sum, "string data" in String._full_text
-list(String.__slots__), String._slot_types, String._has_header
-list(PoseStamped.__slots__), PoseStamped._slot_types, PoseStamped._has_header
+String.__slots__, String._slot_types, String._has_header
+PoseStamped.__slots__, PoseStamped._slot_types, PoseStamped._has_header
 PoseStamped._type, PoseStamped._md5sum
 SetBool._type, SetBool._md5sum, SetBool._request_class.__name__, SetBool._response_class.__name__
 SetBoolRequest._type, SetBoolRequest._md5sum, SetBoolResponse(True, "x").message

@@ -11,9 +11,9 @@ from wildlife.srv import Count, CountRequest, CountResponse
 print(Animal())
 print(Herd(animals=[Animal(name="emu", legs=2)], corners=[1, 2]))
 print(Animal.FAST, Animal.SLOW, repr(Animal.MOTTO), types.Animal is Animal)
-print(Animal._type, Animal._md5sum, list(Animal.__slots__), Animal._slot_types)
+print(Animal._type, Animal._md5sum, Animal.__slots__, Animal._slot_types)
 print(Herd._type, Herd._md5sum, Herd._slot_types, Herd._has_header)
-print(Count._type, Count._md5sum, list(CountRequest.__slots__), list(CountResponse.__slots__))
+print(Count._type, Count._md5sum, CountRequest.__slots__, CountResponse.__slots__)
 print(CountRequest(legs=2), CountResponse.ENOUGH)
 for make in (lambda: Animal(wings=2), lambda: Herd(1, 2, 3, 4, 5, 6, 7, 8)):
     try:
