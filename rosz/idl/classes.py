@@ -10,7 +10,7 @@ from rosz.idl.catalog import Catalog
 from rosz.idl.decoder_source import Decoder
 from rosz.idl.encoder_source import Encoder
 from rosz.idl.hashes import message_hash, message_md5, service_hash, service_md5
-from rosz.idl.names import ModuleNames, attribute, class_name
+from rosz.idl.names import ClassNames, ModuleNames, attribute, class_name
 from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec
 from rosz.message import ARRAY_CODES, OCTETS
 from rosz.names import short_type
@@ -45,6 +45,7 @@ _PYTHON = {
 _WIDTH = 100
 _TOKEN = re.compile(r'"(?:\\.|[^"\\])*"|[\[\](){}]|, |[^"\[\](){},]+|,')
 _TARGETS = re.compile(r"( *)(\w+(?:, \w+)+) = (.+)")
+_SURROGATE = re.compile("[\ud800-\udfff]")
 _CONDITION = re.compile(r"( *)if (.+ or .+):")
 
 
@@ -58,12 +59,13 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> s
     """
     name = class_name(spec.name)
     base = BASES.get(spec.name, "_Message")
-    body = _docstring(spec.text)
-    body += [_field(field, module) for field in spec.fields]
+    fields = {attribute(field.name) for field in spec.fields}
+    names = ClassNames(module, fields | {attribute(one.name) for one in spec.constants})
+    body = [_field(field, names) for field in spec.fields]
     body += _ros1_fields(spec)
     body += [f"{attribute(one.name)} = {_literal(one.value)}" for one in spec.constants]
     body += _names(spec.name, message_hash(spec, catalog), message_md5(spec, catalog), spec.text)
-    body += [f"_schema = {_schema(spec, module)}", ""]
+    body += [f"_schema = {_schema(spec, names)}", ""]
     body += _codec(
         "_encode(m: _Any) -> bytes", Encoder(spec, catalog, module).lines(), "_plain(m, {0})", name
     )
@@ -74,16 +76,15 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> s
         "_explain(data, {0})",
         name,
     )
-    return "\n".join([f"class {name}({base}):", *_indented(body)])
+    return "\n".join([f"class {name}({base}):", *_docstring(spec.text), *_indented(body)])
 
 
 def service_class(spec: ServiceSpec, catalog: Catalog) -> str:
     """Return the source of a service class, which refers to those of its two messages."""
     name = class_name(spec.name)
-    body = _docstring(spec.text)
-    body += [f"Request = {name}Request", f"Response = {name}Response"]
+    body = [f"Request = {name}Request", f"Response = {name}Response"]
     body += _names(spec.name, service_hash(spec, catalog), service_md5(spec, catalog), spec.text)
-    return "\n".join([f"class {name}(_Service):", *_indented(body)])
+    return "\n".join([f"class {name}(_Service):", *_docstring(spec.text), *_indented(body)])
 
 
 def _indented(lines: list[str]) -> list[str]:
@@ -91,17 +92,26 @@ def _indented(lines: list[str]) -> list[str]:
 
 
 def _docstring(text: str) -> list[str]:
-    """Return the comment at the head of a definition as a docstring."""
+    """Return the comment at the head of a definition as the lines of a docstring."""
     head: list[str] = []
     for line in text.splitlines():
-        if not line.startswith("#") or not line.strip("# "):
+        words = line.strip("# \t")
+        if not line.startswith("#") or not words:
             break
-        head.append(line.strip("# ").replace("\\", "\\\\").replace('"', "'"))
+        head.append(f"    {_escape(words)}")
     if not head:
         return []
-    closed = [f'"""{head[0]}', *head[1:]]
-    closed[-1] += '"""'
-    return [*closed, ""]
+    head[0] = f'    """{head[0].lstrip()}'
+    head[-1] += '"""'
+    return [*head, ""]
+
+
+def _escape(text: str) -> str:
+    """Return a line of a comment as it stands in a docstring; quotes become single ones."""
+    return "".join(
+        one if one.isprintable() and one != "\\" else one.encode("unicode_escape").decode()
+        for one in text.replace('"', "'")
+    )
 
 
 def _names(name: str, type_hash: str, md5: str, text: str) -> list[str]:
@@ -141,22 +151,22 @@ def _ros1_fields(spec: MessageSpec) -> list[str]:
     return [*lines, ""] if lines else []
 
 
-def _schema(spec: MessageSpec, module: ModuleNames) -> str:
+def _schema(spec: MessageSpec, names: ClassNames) -> str:
     entries = []
     for field in spec.fields:
         kind = field.type
         bound = f"<={kind.bound}" if kind.bound else ""
-        base = f'"{kind.base}{bound}"' if kind.primitive else module.cls(kind.base)
+        base = f'"{kind.base}{bound}"' if kind.primitive else names.cls(kind.base)
         entries.append(f'("{attribute(field.name)}", {base}, "{kind.suffix}")')
     return f"({', '.join(entries)}{',' * (len(entries) == 1)})"
 
 
-def _field(field: Field, module: ModuleNames) -> str:
-    return f"{attribute(field.name)}: {_annotation(field.type, module)} = {_default(field, module)}"
+def _field(field: Field, names: ClassNames) -> str:
+    return f"{attribute(field.name)}: {_annotation(field.type, names)} = {_default(field, names)}"
 
 
-def _annotation(kind: FieldType, module: ModuleNames) -> str:
-    element = _python(kind) if kind.primitive else module.cls(kind.base)
+def _annotation(kind: FieldType, names: ClassNames) -> str:
+    element = _python(kind) if kind.primitive else names.cls(kind.base)
     if kind.shape == "one":
         return element
     if kind.base in OCTETS:
@@ -164,45 +174,45 @@ def _annotation(kind: FieldType, module: ModuleNames) -> str:
     return f"_Array[{element}]" if kind.base in ARRAY_CODES else f"list[{element}]"
 
 
-def _default(field: Field, module: ModuleNames) -> str:
+def _default(field: Field, names: ClassNames) -> str:
     if isinstance(field.default, tuple):
-        return _default_list(field.type, field.default)
+        return _default_list(field.type, field.default, names)
     if field.default is not None:
         return _literal(field.default)
     if field.type.shape == "one":
-        return _zero(field.type, module)
-    return _zeros(field.type, module)
+        return _zero(field.type, names)
+    return _zeros(field.type, names)
 
 
-def _zero(kind: FieldType, module: ModuleNames) -> str:
+def _zero(kind: FieldType, names: ClassNames) -> str:
     if not kind.primitive:
-        return f"_field(default_factory={module.cls(kind.base)})"
+        return f"_field(default_factory={names.cls(kind.base)})"
     return {"str": '""', "float": "0.0", "bool": "False", "int": "0"}[_python(kind)]
 
 
-def _zeros(kind: FieldType, module: ModuleNames) -> str:
+def _zeros(kind: FieldType, names: ClassNames) -> str:
     fixed = kind.size if kind.shape == "fixed" else 0
     if kind.base in OCTETS:
-        return module.define("_z", f"bytes({fixed})") if fixed else 'b""'
+        return names.module.define("_z", f"bytes({fixed})") if fixed else 'b""'
     if kind.base in ARRAY_CODES:
         maker, size = ("zeros", f", {fixed}") if fixed else ("empty", "")
-        make = f'{module.use(maker)}("{ARRAY_CODES[kind.base]}"{size})'
-        return f"_field(default_factory={module.define('_d', make)})"
+        make = f'{names.module.use(maker)}("{ARRAY_CODES[kind.base]}"{size})'
+        return f"_field(default_factory={names.module.define('_d', make)})"
     if not fixed:
         return "[]"
     if kind.primitive:
-        return f"_field(default_factory=lambda: [{_zero(kind, module)}] * {fixed})"
-    return f"_field(default_factory=lambda: [{module.cls(kind.base)}() for _ in range({fixed})])"
+        return f"_field(default_factory=lambda: [{_zero(kind, names)}] * {fixed})"
+    return f"_field(default_factory=lambda: [{names.cls(kind.base)}() for _ in range({fixed})])"
 
 
 def _python(kind: FieldType) -> str:
     return _PYTHON.get(kind.base, "int")
 
 
-def _default_list(kind: FieldType, values: tuple[Scalar, ...]) -> str:
+def _default_list(kind: FieldType, values: tuple[Scalar, ...], names: ClassNames) -> str:
     listed = f"[{', '.join(_literal(value) for value in values)}]"
     if kind.base in OCTETS:
-        return repr(bytes(int(value) & 0xFF for value in values))
+        return names.module.define("_z", repr(bytes(int(value) & 0xFF for value in values)))
     if kind.base in ARRAY_CODES:
         return f'_field(default_factory=lambda: _array("{ARRAY_CODES[kind.base]}", {listed}))'
     return f"_field(default_factory=lambda: {listed})"
@@ -211,7 +221,10 @@ def _default_list(kind: FieldType, values: tuple[Scalar, ...]) -> str:
 def _literal(value: object) -> str:
     if isinstance(value, float) and not math.isfinite(value):
         return "_nan" if math.isnan(value) else "_inf" if value > 0 else "-_inf"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    if not isinstance(value, str):
+        return repr(value)
+    text = json.dumps(value, ensure_ascii=False)
+    return _SURROGATE.sub(lambda half: f"\\u{ord(half[0]):x}", text)
 
 
 def _wrap(line: str) -> list[str]:

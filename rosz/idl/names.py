@@ -8,7 +8,7 @@ import re
 
 from rosz.idl.spec import FieldType
 
-__all__ = ("LocalNames", "ModuleNames", "attribute", "class_name")
+__all__ = ("ClassNames", "LocalNames", "ModuleNames", "attribute", "class_name")
 
 
 _RESERVED = re.compile(r"[befhkmnpq][0-9]*")
@@ -109,3 +109,24 @@ class ModuleNames:
         """Return the definitions that are new since the last call."""
         lines, self._fresh = self._fresh, []
         return lines
+
+
+class ClassNames:
+    """The names of a module as the body of a class sees them, where a field may hide a class.
+
+    Args:
+        module: Names of the module.
+        hidden: Names that the class defines.
+
+    Attributes:
+        module: Names of the module.
+    """
+
+    def __init__(self, module: ModuleNames, hidden: set[str]) -> None:
+        self._hidden = hidden
+        self.module = module
+
+    def cls(self, name: str) -> str:
+        """Return the name of a message class; a second one where the first is hidden."""
+        plain = self.module.cls(name)
+        return self.module.define("_c", plain) if plain in self._hidden else plain
