@@ -12,9 +12,15 @@ above is in the set, whatever else may still arrive. Such a write is dropped, an
 remain does not depend on the order of arrival. That makes the store a join-semilattice: merging is
 commutative, associative and idempotent.
 
-Deletions (tombstones) are dropped too once they are old and removing them changes nothing
-(`History.forget`), which bounds the memory. An older put that arrives after that takes effect
-again.
+Deletions (tombstones) are remembered however old they are, so that an older put that arrives late
+stays dead. Only their number is bounded: `History.forget` drops the oldest ones and moves the
+**horizon** to the newest one dropped. A write up to the horizon that is not in the set may be one
+that was deleted, so it is only added if it is proven not to be: if the set holds an older write at
+its path or below, because a forgotten deletion that is newer than the write would have removed that
+one too. Two sets with different horizons become one by `History.merge`: of the writes up to the
+other's horizon, those that the other neither holds nor proves are dropped. So a bounded memory
+never brings back what was deleted. It only loses parameters that are new to the other set and older
+than its horizon.
 
 A digest is `BUCKETS` numbers. Each write belongs to the bucket of its path and is folded into its
 number by exclusive or, so adding and removing cost the same, and equal sets have equal digests.
@@ -25,14 +31,14 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
-from typing import Final
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final, NamedTuple
 
 from rosz.errors import DecodeError
 from rosz.params.paths import Path
 from rosz.params.tree import MISSING, Draft, Missing, Tree, lookup
 from rosz.params.values import Value
-from rosz.params.writes import DELETED, Write, check_write
+from rosz.params.writes import DELETED, Deleted, Order, Write, check_write, put
 
 try:
     # The module behind hashlib; hashlib itself would load OpenSSL in every node.
@@ -40,7 +46,7 @@ try:
 except ImportError:
     from hashlib import blake2b
 
-__all__ = ("BUCKETS", "EMPTY_DIGEST", "History")
+__all__ = ("BUCKETS", "EMPTY_DIGEST", "Differences", "History", "Merge")
 
 BUCKETS: Final = 64
 _MAX_TOGGLED: Final = 1000
@@ -51,6 +57,34 @@ EMPTY_DIGEST: Final = bytes(_DIGEST.size)
 
 def _bucket_of(path: str) -> int:
     return zlib.crc32(path.encode()) % BUCKETS
+
+
+class Differences(NamedTuple):
+    """What differs between two sets.
+
+    Attributes:
+        lacking: Writes that the other set lacks.
+        wanted: Paths of the writes that this set lacks.
+        ahead: Whether the other set has to merge this one, to drop writes up to its horizon.
+        behind: Whether this set has to merge the other one.
+    """
+
+    lacking: list[Write]
+    wanted: list[Path]
+    ahead: bool
+    behind: bool
+
+
+class Merge(NamedTuple):
+    """What `History.merge` did.
+
+    Attributes:
+        new: Writes that were added.
+        dropped: Writes that were dropped, and that nothing newer in the set hides.
+    """
+
+    new: list[Write]
+    dropped: list[Write]
 
 
 class _Node:
@@ -69,11 +103,13 @@ class History:
     Attributes:
         root: Tree; `apply` replaces it and never changes it in place.
         latest: Newest time among all writes ever seen.
+        horizon: Time up to which deletions may be forgotten.
     """
 
     def __init__(self) -> None:
         self.root: Tree = {}
         self.latest: int = 0
+        self.horizon: int = 0
         self._top = _Node()
         self._buckets = [0] * BUCKETS
         # Writes come and go far more often than the digest is read: they are only listed here, and
@@ -139,6 +175,31 @@ class History:
         theirs = _DIGEST.unpack(digest)
         return [index for index, ours in enumerate(self._numbers()) if ours != theirs[index]]
 
+    def compare(
+        self, buckets: Iterable[int], index: Mapping[Path, tuple[int, str]], horizon: int
+    ) -> Differences:
+        """Compare some buckets with those of another set.
+
+        Args:
+            buckets: Buckets to compare.
+            index: Path, and time and clock, of the writes in these buckets of the other set.
+            horizon: Horizon of the other set.
+        """
+        lacking: list[Write] = []
+        wanted: list[Path] = []
+        ahead = behind = False
+        for write in (write for bucket in buckets for write in self.bucket(bucket)):
+            known = index.get(write.path)
+            if known is not None and known >= (write.time, write.clock):
+                continue
+            lacking.append(write)
+            behind = behind or write.time <= horizon
+        for path, (time, clock) in index.items():
+            if not self.hides(Write(path, time, clock, DELETED)):
+                wanted.append(path)
+                ahead = ahead or time <= self.horizon
+        return Differences(lacking, wanted, ahead, behind)
+
     def find(self, path: Path) -> Write | None:
         """Return the write at exactly this path."""
         found = self.source(path)
@@ -155,33 +216,97 @@ class History:
             pass
         return found
 
-    def forget(self, before: int, keep: int) -> int:
-        """Drop old deletions that the tree does not depend on.
+    def forget(self, keep: int) -> int:
+        """Drop the oldest deletions once there are more than twice as many as to keep.
 
         Deletions that shape the tree stay: they remove a part of an older dict that was put as a
         whole, or keep an empty dict. There are never more of them than there are dicts and parts of
         dicts that were put.
 
         Args:
-            before: Time in nanoseconds; older deletions may be dropped.
-            keep: Number of deletions above which the oldest ones may be dropped.
+            keep: Number of the newest deletions that stay.
 
         Returns:
             The number of deletions dropped.
         """
+        # Dropping many at once moves the horizon seldom, and other replicas have to follow it.
+        surplus = len(self._deletions) - keep
+        if surplus <= keep:
+            return 0
         oldest_first = sorted(self._deletions.values(), key=lambda write: write.order)
-        surplus = len(oldest_first) - keep
         dropped = 0
-        for index, write in enumerate(oldest_first):
-            if write.time >= before and index >= surplus:
-                break
+        for write in oldest_first[:surplus]:
             if not self._shapes_tree(write):
                 self._drop(write.path)
+                self.horizon = max(self.horizon, write.time)
                 dropped += 1
         return dropped
 
+    def restore(self, horizon: int) -> None:
+        """Set the horizon of a set that was stored, after its writes have been added."""
+        self.horizon = max(self.horizon, horizon)
+        self.latest = max(self.latest, horizon)
+
+    def merge(self, writes: Iterable[Write], horizon: int) -> Merge:
+        """Become one with another set, of which all writes and the horizon are given.
+
+        Raises:
+            ParamError: The tree cannot hold a write; nothing is changed then.
+        """
+        ours = {write.order: write for write in self.writes()}
+        other = History()
+        other.apply(writes)
+        theirs = {write.order: write for write in other.writes()}
+        kept = _standing(ours, theirs, horizon, other)
+        added = _standing(theirs, ours, self.horizon, self)
+        merged = History()
+        merged.apply([*kept, *added])
+        merged.restore(max(self.horizon, horizon))
+        merged.latest = max(self.latest, merged.latest)
+        self.__dict__.update(merged.__dict__)
+        new = {write.order for write in self.writes()} - ours.keys()
+        return Merge(
+            [write for write in self.writes() if write.order in new],
+            [write for write in ours.values() if not self.hides(write)],
+        )
+
+    def provable(self, write: Write) -> Write | None:
+        """Return what is known to stand of a write up to the horizon.
+
+        If a forgotten deletion were newer than the write and at its path or above, it would have
+        removed every older write there, so an older one proves that there is none. Parts of a dict
+        may have been deleted by themselves. If some are not proven, only that the dict replaced
+        what is older is known to stand: that is a deletion, right after the dict.
+        """
+        if all(self._holds_older(path, write.order) for path in _ends(write.value, write.path)):
+            return write
+        if not self._holds_older(write.path, write.order):
+            return None
+        return put(write.path, (write.time, f"{write.clock}0"), DELETED, write.origin)
+
+    def _holds_older(self, path: Path, order: Order) -> bool:
+        """Tell whether an older write is held at a path or below, or one above holds a part."""
+        node: _Node | None = self._top
+        for part in path:
+            node = node.below.get(part) if node is not None else None
+        stack = [node] if node is not None else []
+        while stack:
+            node = stack.pop()
+            if node.write is not None and node.write.order < order:
+                return True
+            stack.extend(node.below.values())
+        cover = self.source(path)
+        if cover is None or cover.order >= order or cover.value is DELETED:
+            return False
+        return lookup(cover.value, path[len(cover.path) :]) is not MISSING
+
     def _add(self, write: Write) -> list[Write]:
         """Add a write; return the writes to replay for it, which are none if it is not new."""
+        if write.time <= self.horizon:
+            provable = self.provable(write)
+            if provable is None:
+                return []
+            write = provable
         self.latest = max(self.latest, write.time)
         node = self._top
         for part in write.path:
@@ -290,6 +415,32 @@ class History:
             if way[depth].write is not None or way[depth].below:
                 break
             del way[depth - 1].below[path[depth - 1]]
+
+
+def _ends(value: Value | Deleted, path: Path) -> Iterator[Path]:
+    """Yield the path of every leaf and every empty dict in a value; a deletion is one, too."""
+    if type(value) is not dict or not value:
+        yield path
+        return
+    for key, item in value.items():
+        yield from _ends(item, (*path, key))
+
+
+def _standing(
+    writes: Mapping[Order, Write], known: Mapping[Order, Write], horizon: int, other: History
+) -> Iterator[Write]:
+    """Yield the writes of a set that stand when another set is merged.
+
+    Args:
+        writes: Writes of the set.
+        known: Writes of the other set.
+        horizon: Horizon of the other set.
+        other: The other set.
+    """
+    for order, write in writes.items():
+        found = write if write.time > horizon or order in known else other.provable(write)
+        if found is not None:
+            yield found
 
 
 def _comes_after(write: Write, other: Write) -> bool:

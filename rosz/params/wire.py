@@ -11,7 +11,9 @@ The protocol between replicas, and between a replica and its clients:
   other. If the digests differ, it sends the index (path and stamp) of its writes in the buckets
   that differ. The reply holds the writes that it lacks, and the paths of the writes that the other
   lacks, which it then sends on the ``tell`` key. A replica that joins has the empty digest, and
-  gets all writes in the first reply. Deletions are writes as well (**tombstones**).
+  gets all writes in the first reply. Deletions are writes as well (**tombstones**). A replica that
+  has forgotten deletions which the other may not know replies with all its writes, for the other
+  to merge (`rosz.params.history`).
 - **Clients.** A process that has no replica reads on the ``ask`` key of a replica, and writes on
   its ``set`` key, with a stamp of its own.
 
@@ -283,6 +285,19 @@ class Index(msgspec.Struct, array_like=True):
     buckets: list[int]
     entries: list[tuple[str, int, str]]
 
+    @classmethod
+    def of(cls, buckets: list[int], writes: Iterable[Write]) -> Index:
+        """Return the index of the writes in some buckets."""
+        return cls(buckets, [(join_path(write.path), write.time, write.clock) for write in writes])
+
+    def content(self) -> tuple[list[int], dict[Path, tuple[int, str]]]:
+        """Return the buckets, and time and clock of each path.
+
+        Raises:
+            DecodeError: A path has an empty part.
+        """
+        return self.buckets, {split_path(path): (time, clock) for path, time, clock in self.entries}
+
 
 class SyncRequest(msgspec.Struct, omit_defaults=True):
     """A request of one replica to another, to find their differences or to remove them.
@@ -291,11 +306,15 @@ class SyncRequest(msgspec.Struct, omit_defaults=True):
         digest: Digest of the sender's writes.
         index: Index of the sender's writes in the buckets that differ.
         records: Writes that the receiver lacks.
+        horizon: Time up to which the sender may have forgotten deletions.
+        sender: Zenoh id of the sender's session.
     """
 
     digest: bytes | None = None
     index: Index | None = None
     records: list[Record] = []
+    horizon: int = 0
+    sender: str = ""
 
 
 class SyncReply(msgspec.Struct, omit_defaults=True):
@@ -306,12 +325,17 @@ class SyncReply(msgspec.Struct, omit_defaults=True):
         ready: Whether the responder has joined; if not, it is still asking others itself.
         records: Writes that the sender of the request lacks.
         wanted: Paths of writes that the responder lacks.
+        whole: Whether the records are all writes of the responder, which the sender has to merge
+            because the responder may have forgotten deletions that the sender does not know.
+        horizon: Time up to which the responder may have forgotten deletions.
     """
 
     digest: bytes = b""
     ready: bool = True
     records: list[Record] = []
     wanted: list[str] = []
+    whole: bool = False
+    horizon: int = 0
 
 
 class ClientRequest(msgspec.Struct, omit_defaults=True):

@@ -24,6 +24,7 @@ __all__ = (
     "DELETED",
     "Change",
     "Deleted",
+    "Order",
     "Write",
     "check_time",
     "check_write",
@@ -56,6 +57,10 @@ Change = tuple[Path, "Value | Deleted"]
 """One part of a batch: a path, and its new value or `DELETED`."""
 
 
+Order = tuple[int, str, Path]
+"""The time, clock and path of a write; no two writes share all three."""
+
+
 class Write(msgspec.Struct, frozen=True):
     """One put or deletion.
 
@@ -74,7 +79,7 @@ class Write(msgspec.Struct, frozen=True):
     origin: str = ""
 
     @property
-    def order(self) -> tuple[int, str, Path]:
+    def order(self) -> Order:
         """The sort key that puts writes into the order of their replay."""
         return self.time, self.clock, self.path
 

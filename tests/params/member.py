@@ -15,10 +15,11 @@ import timeit
 from pathlib import Path
 from typing import Any
 
-from rosz.params import condense, normalise, spread
+from rosz.params import DELETED, condense, normalise, split, spread
 from rosz.params.api import Params
 from rosz.params.replica import Changed, Replica
 from rosz.params.replica.storage import Storage, StoreFile
+from rosz.params.replica.sync import KEPT_TOMBSTONES
 from rosz.session import (
     HybridClock,
     MeshReadiness,
@@ -94,6 +95,13 @@ class Member:
 
     def do_delete(self, name: str) -> Any:
         return self.replica.delete(name).slow
+
+    def do_clear(self, namespace: str) -> Any:
+        """Delete every parameter in a namespace, each by itself, and forget what is too much."""
+        names = [name for name in self.replica.names() if name.startswith(f"{namespace}/")]
+        self.replica.write([(split(name), DELETED) for name in names], timeout=0.3)
+        self.replica._state.forget(KEPT_TOMBSTONES)
+        return len(names)
 
     def do_get(self, name: str) -> Any:
         return self.replica.get(name)

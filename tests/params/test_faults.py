@@ -14,6 +14,8 @@ from tempfile import TemporaryDirectory
 import pytest
 from network import free_port
 
+from rosz.params.replica.sync import KEPT_TOMBSTONES
+
 from .fleet import Cable, Fleet, Process, until_known, until_same
 
 FULL = os.environ.get("ROSZ_FAULTS", "") == "full"
@@ -116,6 +118,32 @@ def test_two_halves_that_were_cut_apart_become_one(fleet: Fleet, kind: str) -> N
     assert root["doomed"] == {"b": 2, "c": 3}
     assert left[1].do("set", name="/after", value=1)["slow"] == []
     assert right[1].do("get", name="/after") == 1
+    cable.close()
+
+
+@pytest.mark.parametrize("count", [10_500, 25_000])
+def test_many_deletions_on_one_side_of_a_cut_stay_dead(fleet: Fleet, count: int) -> None:
+    port = free_port()
+    cable = Cable(port)
+    left = fleet.start(endpoint=f"tcp/127.0.0.1:{port}", mode="router")
+    right = fleet.start(
+        endpoint=f"tcp/127.0.0.1:{free_port()}",
+        mode="router",
+        connect=[f"tcp/127.0.0.1:{cable.port}"],
+    )
+    until_known([left, right])
+    left.do("load", namespace="/gone", values={f"p{number}": number for number in range(count)})
+    until_same([left, right], f"{count} parameters")
+    cable.cut()
+    assert right.do("set", name="/new/early", value=1, timeout=0.1)
+    assert left.do("clear", namespace="/gone") == count
+    assert right.do("set", name="/new/late", value=2, timeout=0.1)
+    cable.mend()
+    until_known([left, right])
+    until_same([left, right], f"{count} deletions on one side of a cut")
+    # Of more deletions than are remembered, any might be one of what was new here before them.
+    new = {"early": 1, "late": 2} if count < 2 * KEPT_TOMBSTONES else {"late": 2}
+    assert left.do("root") == {"gone": {}, "new": new}
     cable.close()
 
 

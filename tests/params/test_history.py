@@ -108,44 +108,61 @@ def test_a_batch_does_what_its_steps_do(steps: list[tuple[Any, Any]]) -> None:
     steps = [
         (path, {} if not path and not isinstance(value, dict) else value) for path, value in steps
     ]
-    stepwise = of([put(path, (time, "c"), value) for time, (path, value) in enumerate(steps)])
+    stepwise = of([put(path, (time, "c"), value) for time, (path, value) in enumerate(steps, 1)])
     batch = [put(path, (1, "c"), value) for path, value in condense(steps)]
     assert of(batch).root == stepwise.root
     assert of(*([write] for write in reversed(batch))).root == stepwise.root
 
 
-@given(writes(), st.integers(0, 21), st.integers(0, 8))
-def test_forgetting_changes_nothing_now(batch: list[Write], before: int, keep: int) -> None:
+@given(writes(), st.integers(0, 4))
+def test_forgetting_changes_nothing_now(batch: list[Write], keep: int) -> None:
     history = of(batch)
-    gone = history.forget(before, keep)
+    gone = history.forget(keep)
     assert history.root == replay(batch)
     assert history.root == replay(history.writes())
     assert len(history) == len(of(batch)) - gone
     assert is_same(history, of(list(history.writes())))
 
 
-@given(shared(2), st.integers(0, 21))
-def test_forgetting_changes_nothing_for_younger_writes(
-    seen: list[list[Write]], before: int
-) -> None:
+@given(shared(2), st.integers(0, 4))
+def test_forgetting_changes_nothing_for_younger_writes(seen: list[list[Write]], keep: int) -> None:
     batch, late = seen
-    late = [write for write in late if write.time >= before]
     forgetful = of(batch)
-    forgetful.forget(before, 0 if before > 20 else 100)
+    forgetful.forget(keep)
+    late = [write for write in late if write.time > forgetful.horizon]
     forgetful.apply(late)
     assert forgetful.root == replay([*batch, *late])
 
 
-@given(writes(), st.integers(0, 21))
-def test_forgetting_agrees_whatever_the_order(batch: list[Write], before: int) -> None:
-    early, late = History(), of(batch)
-    for write in sorted(batch, key=lambda write: write.order):
-        early.apply([write])
-        early.forget(min(before, write.time), 100)
-    early.forget(before, 100)
-    late.forget(before, 100)
-    assert early.root == late.root
-    assert kept(early) == kept(late)
+@given(shared(2), st.integers(0, 4))
+def test_nothing_older_than_the_horizon_is_added(seen: list[list[Write]], keep: int) -> None:
+    batch, late = seen
+    forgetful = of(batch)
+    forgetful.forget(keep)
+    before = kept(forgetful)
+    forgetful.apply(write for write in late if write.time <= forgetful.horizon)
+    assert kept(forgetful) == before
+
+
+@given(shared(3), st.lists(st.integers(0, 4), min_size=3, max_size=3))
+def test_merging_whole_sets_is_a_join(seen: list[list[Write]], keeps: list[int]) -> None:
+    def forgetful(index: int) -> History:
+        history = of(seen[index])
+        history.forget(keeps[index])
+        return history
+
+    def joined(*order: int) -> History:
+        history = forgetful(order[0])
+        for index in order[1:]:
+            other = forgetful(index)
+            history.merge(other.writes(), other.horizon)
+        return history
+
+    first, *others = (joined(0, 1, 2), joined(2, 1, 0), joined(1, 2, 0, 1, 2))
+    for other in others:
+        assert is_same(first, other)
+        assert first.horizon == other.horizon
+    assert first.root == replay(first.writes())
 
 
 def test_remembered_deletions_are_bounded() -> None:
@@ -154,18 +171,20 @@ def test_remembered_deletions_are_bounded() -> None:
         path = ("ns", f"n{time}")
         history.apply([put(path, (2 * time, "a"), time)])
         history.apply([put(path, (2 * time + 1, "a"), DELETED)])
-        if time % 100 == 0:
-            history.forget(0, 50)
-            assert len(history) <= 51
+        if time % 10 == 0:
+            history.forget(50)
+            assert min(50, time) <= len(history) <= 100
     assert history.root == {"ns": {}}
-    history.forget(1 << 62, 0)
+    assert history.horizon > 2 * 2900 - 200
+    history.forget(0)
     assert len(history) == 1
     assert history.root == {"ns": {}}
 
 
 def test_a_deletion_that_cuts_a_part_from_a_whole_dict_stays() -> None:
     history = of([put(("a",), (1, "c"), {"x": 1, "y": 2}), put(("a", "x"), (2, "c"), DELETED)])
-    assert history.forget(1 << 62, 0) == 0
+    assert history.forget(0) == 0
+    assert history.horizon == 0
     assert history.root == {"a": {"y": 2}}
 
 
@@ -179,7 +198,7 @@ def test_a_leaf_that_became_a_dict_stays_one_when_its_child_goes() -> None:
     history = of([put(("a",), (1, "c"), 5)], [put(("a", "b"), (2, "c"), 1)])
     history.apply([put(("a", "b"), (3, "c"), DELETED)])
     assert history.root == {"a": {}}
-    history.forget(1 << 62, 0)
+    history.forget(0)
     assert history.root == {"a": {}}
 
 

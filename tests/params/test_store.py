@@ -46,7 +46,7 @@ def saved(path: Path, *batches: list[Write]) -> History:
 def loaded(path: Path) -> History:
     history = History()
     with closing(StoreFile(path)) as store:
-        history.apply(store.load())
+        history.apply(store.load()[0])
     return history
 
 
@@ -92,7 +92,7 @@ def test_replacing_drops_all_else(tmp_path: Path) -> None:
     store.save([put(("a",), (1, "c"), 1), put(("b",), (2, "c"), DELETED)])
     moment = dt.datetime(2024, 1, 2, tzinfo=dt.UTC)
     store.replace([put(("c",), (3, "c"), {"when": moment, "raw": b"\x00"})])
-    assert [(write.path, write.value) for write in store.load()] == [
+    assert [(write.path, write.value) for write in store.load()[0]] == [
         (("c",), {"when": moment, "raw": b"\x00"})
     ]
     store.close()
@@ -126,7 +126,7 @@ def test_another_version_is_refused(tmp_path: Path) -> None:
     base = sqlite3.connect(path)
     base.execute("PRAGMA user_version = 7")
     base.close()
-    with pytest.raises(StoreError, match="is of version 7, expected 1"):
+    with pytest.raises(StoreError, match="is of version 7, expected 2"):
         StoreFile(path)
 
 
@@ -222,6 +222,61 @@ def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) ->
     assert loaded(path).root == {"a": 1, "late": 5}
 
 
+def test_a_store_that_was_away_brings_nothing_back(network: Network, tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    keeper = network.replica(storage=Storage(StoreFile(path)))
+    other = network.replica()
+    eventually(lambda: len(keeper.members()) == 1)
+    other.set("/gone", 1)
+    other.set("/kept", 1)
+    keeper.close()
+    eventually(lambda: other.members() == [])
+    other.delete("/gone")
+    assert other._state.forget(0) == 1
+    with closing(StoreFile(path)) as store:
+        store.save([put(("mine",), (time.time_ns(), "c0"), "written while away")])
+    again = network.replica(storage=Storage(StoreFile(path)))
+    expected = {"kept": 1, "mine": "written while away"}
+    eventually(lambda: again.root == other.root == expected)
+    assert again.digest() == other.digest()
+    other.close()
+    again.close()
+    with closing(StoreFile(path)) as store:
+        writes, horizon = store.load()
+    assert sorted(write.path for write in writes) == [("kept",), ("mine",)]
+    assert horizon > 0
+
+
+def test_who_remembers_less_learns_what_others_have_forgotten(network: Network) -> None:
+    one, other = network.replicas(2)
+    one.set("/gone", 1)
+    one.delete("/gone")
+    assert one._state.forget(0) == 1
+    assert other.compare(10)
+    late = network.replica()
+    assert one.digest() == other.digest() == late.digest()
+    for replica in (one, other, late):
+        with replica._state as history:
+            history.apply([put(("gone",), (1, "c0"), 1)])
+            assert history.root == {}
+
+
+def test_a_file_of_the_earlier_form_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    saved(path, [put(("a",), (1, "c"), {"b": 1}), put(("a", "c"), (2, "c"), DELETED)])
+    base = sqlite3.connect(path)
+    base.execute("DROP TABLE horizon")
+    base.execute("PRAGMA user_version = 1")
+    base.close()
+    for _ in range(2):
+        with closing(StoreFile(path)) as store:
+            writes, horizon = store.load()
+            assert (len(writes), horizon) == (2, 0)
+    with closing(StoreFile(path)) as store:
+        store.replace(writes, 7)
+        assert store.load()[1] == 7
+
+
 class Disk(StoreFile):
     """Keeps writes, unless it is full."""
 
@@ -229,15 +284,15 @@ class Disk(StoreFile):
         self.full = full
         self.kept: list[Write] = []
 
-    def load(self) -> list[Write]:
-        return []
+    def load(self) -> tuple[list[Write], int]:
+        return [], 0
 
     def save(self, writes: list[Write]) -> None:
         if self.full:
             raise StoreError("no space left")
         self.kept += writes
 
-    def replace(self, writes: list[Write]) -> None:
+    def replace(self, writes: list[Write], horizon: int = 0) -> None:  # noqa: ARG002  # no need
         self.kept = writes
 
     def close(self) -> None:
@@ -269,7 +324,7 @@ def test_a_file_with_stamps_years_ahead_is_read_and_mended(
         replica.close()
     assert caplog.text.count("years ahead") == 1
     with closing(StoreFile(path)) as store:
-        found = {write.path: write for write in store.load()}
+        found = {write.path: write for write in store.load()[0]}
     assert found[("a",)].value == "new"
     assert found[("a",)].time < time.time_ns() + 10**9
     assert found[("b",)].time == 5
@@ -293,7 +348,7 @@ def test_tidying_up_makes_nobody_wait() -> None:
     storage = Storage(disk)
     go_on, safe = held(storage), threading.Event()
     storage.when_stored(safe.set)
-    storage.compact(list)
+    storage.compact(lambda: ([], 0))
     go_on.set()
     assert safe.wait(10)
     storage.close()

@@ -153,12 +153,13 @@ class Replica(_Copy):
         self._lifecycle = Lifecycle("the parameter store of this process", log=_log)
         self._storage = storage
         if storage is not None:
-            if self._state.restore(storage.load()):
-                storage.compact(self._writes)
+            if self._state.restore(*storage.load()):
+                self._compact()
             self._state.on_new(storage.save)
         keys, sync = self._keys, self._sync
         self._broadcaster = WriteBroadcaster(self._core, storage)
         self._parameter_keys = ParameterKeys(self._core)
+        sync.merge = self._merge
         tell_key = keys.of(session.zid, "tell")
         self._declared: list[Closable] = [
             session.queryable(keys.of(session.zid, "sync"), sync.on_sync, complete=True),
@@ -312,13 +313,17 @@ class Replica(_Copy):
         elif self._sync.ready and member < self._own:
             self._sync.compare_soon(member)
 
-    def _writes(self) -> list[Write]:
+    def _merge(self, writes: list[Write], horizon: int) -> None:
+        self._state.merge(writes, horizon)
+        self._compact()
+
+    def _snapshot(self) -> tuple[list[Write], int]:
         with self._state as history:
-            return list(history.writes())
+            return list(history.writes()), history.horizon
 
     def _compact(self) -> None:
         if self._storage is not None:
-            self._storage.compact(self._writes)
+            self._storage.compact(self._snapshot)
 
     def _wait_until_stored(self, timeout: float) -> None:
         if self._storage is not None and timeout > 0:

@@ -49,6 +49,9 @@ _MAX_TIMEOUT: Final = 60.0
 _MAX_WRITES: Final = 16
 """Writes for clients that wait for acknowledgements at a time; further clients try again."""
 
+_MAX_ID: Final = 32
+"""Digits of a clock in a Zenoh timestamp; `History.provable` makes one with a digit more."""
+
 _STORAGE_TIMEOUT: Final = 1.0
 _STORAGES_ONLY: Final = "_by=replica"
 """Parameter of a query that storages answer and replicas do not."""
@@ -281,7 +284,7 @@ class ParameterKeys:
             for path, value in selected:
                 with self._state as history:
                     source = history.source(path)
-                stamp = None if source is None else Stamp(source.time, source.clock)
+                stamp = None if source is None else Stamp(source.time, source.clock[:_MAX_ID])
                 query.reply(self._keys.param(path), encode_value(value), stamp=stamp)
 
     def _select(self, key: str) -> Iterator[tuple[Path, Value]]:

@@ -27,6 +27,10 @@ _log = logging.getLogger("rosz.params")
 
 NOT_A_PARAMETER: Final = "a replica wrote something that is not a parameter"
 _REFUSED: Final = "a write of a replica is refused"
+_LOST: Final = (
+    "'%s' and %d more parameters are dropped: they were set while this replica was away for more"
+    " deletions than others remember, or deleted since"
+)
 _STORED_AHEAD: Final = "a stored write counts as written just now"
 
 _LOCK_TIMEOUT: Final = 0.002
@@ -194,8 +198,12 @@ class State:
         with self:
             self._apply(self._check_times(writes, _REFUSED)[0])
 
-    def restore(self, writes: Iterable[Write]) -> bool:
+    def restore(self, writes: Iterable[Write], horizon: int = 0) -> bool:
         """Add stored writes; those stamped years ahead get a new stamp.
+
+        Args:
+            writes: The writes.
+            horizon: Horizon of the stored set.
 
         Returns:
             Whether any got a new stamp.
@@ -206,6 +214,7 @@ class State:
         with self:
             sound, ahead = self._check_times(writes, _STORED_AHEAD)
             self._apply(sound)
+            self._history.restore(horizon)
             for write in sorted(ahead, key=lambda write: write.order):
                 now = self._now()
                 self._apply([structs.replace(write, time=now.time, clock=now.id)])
@@ -221,18 +230,30 @@ class State:
         with self:
             return self._now()
 
-    def forget(self, age: int, keep: int) -> int:
-        """Drop deletions that the tree does not depend on.
+    def forget(self, keep: int) -> int:
+        """Drop the oldest deletions if there are far too many; see `History.forget`."""
+        with self as history:
+            return history.forget(keep)
+
+    def merge(self, writes: Iterable[Write], horizon: int) -> None:
+        """Become one with another replica, whose horizon may be later.
 
         Args:
-            age: Age in nanoseconds above which deletions are dropped.
-            keep: Number of deletions above which the oldest ones are dropped.
+            writes: All writes of the other replica.
+            horizon: Its horizon.
 
-        Returns:
-            The number of deletions dropped.
+        Raises:
+            ParamError: The tree cannot hold a write; nothing is changed then.
+            DecodeError: The horizon lies years ahead; nothing is changed then.
         """
         with self as history:
-            return history.forget(self._now().time - age, keep)
+            check_time(Write(ROOT, horizon, "", {}, "another replica"), time.time_ns())
+            old = self._root
+            merge = history.merge(self._check_times(writes, _REFUSED)[0], horizon)
+            self._notify(old, merge.new, merge.dropped)
+        lost = [write for write in merge.dropped if not write.deleted]
+        if lost:
+            _log.warning(_LOST, joined(lost[0].path), len(lost) - 1)
 
     def watch(self, path: Path, callback: Callback) -> Watch:
         """Call a function on all changes of a path from now on."""
@@ -311,13 +332,18 @@ class State:
 
     def _apply(self, writes: Iterable[Write]) -> TreeChange:
         old = self._root
-        new_writes = self._history.apply(writes)
+        return self._notify(old, self._history.apply(writes))
+
+    def _notify(
+        self, old: Tree, new_writes: list[Write], dropped: Iterable[Write] = ()
+    ) -> TreeChange:
+        """Show the tree of the history, and notify everybody of the writes that changed it."""
         self._root = self._history.root
-        change = TreeChange(old, self._root, new_writes)
-        if new_writes:
+        change = TreeChange(old, self._root, [*new_writes, *dropped])
+        if change.writes:
             self.watchers.notify(change)
-            if self._on_new is not None:
-                self._on_new(new_writes)
+        if new_writes and self._on_new is not None:
+            self._on_new(new_writes)
         return change
 
 

@@ -1,8 +1,9 @@
 """Storage of parameters in a file, which survives kills and power cuts.
 
-The file holds one SQLite table of writes, in SQLite's write-ahead mode with full synchronisation:
-when `StoreFile.save` returns, the writes are on the disk. The file is checked before it is used. A
-damaged file is refused by name and left unchanged, so that its content can be rescued.
+The file holds a table of writes and the horizon of the history, in SQLite's write-ahead mode with
+full synchronisation: when `StoreFile.save` returns, the writes are on the disk. The file is checked
+before it is used. A damaged file is refused by name and left unchanged, so that its content can be
+rescued.
 
 `Storage` saves what a replica applies, on a thread of its own, and tells when it is stored.
 """
@@ -30,7 +31,8 @@ _log = logging.getLogger("rosz.params")
 _APPLICATION: Final = 0x726F737A
 """SQLite's application id of a file of parameters: "rosz" in ASCII."""
 
-_VERSION: Final = 1
+_VERSION: Final = 2
+_WITHOUT_HORIZON: Final = 1
 _CHOOSE: Final = "name another file"
 _SCHEMA: Final = """
 CREATE TABLE writes (
@@ -42,6 +44,7 @@ CREATE TABLE writes (
     sum INTEGER NOT NULL
 ) WITHOUT ROWID
 """
+_HORIZON_SCHEMA: Final = "CREATE TABLE horizon (time INTEGER NOT NULL)"
 _HEADER: Final = b"SQLite format 3\0"
 _LOAD: Final = "SELECT path, time, clock, origin, value, sum FROM writes"
 _DELETE_HIDDEN: Final = """
@@ -86,16 +89,17 @@ class StoreFile:
             self._base.close()
             raise
 
-    def load(self) -> list[Write]:
-        """Return the writes in the file.
+    def load(self) -> tuple[list[Write], int]:
+        """Return the writes in the file, and the time up to which deletions may be forgotten.
 
         Raises:
             StoreError: The file is damaged.
         """
         with self._lock, self._errors("read"):
             rows = self._base.execute(_LOAD).fetchall()
+            (horizon,) = self._base.execute("SELECT ifnull(max(time), 0) FROM horizon").fetchone()
         try:
-            return [self._write(*row) for row in rows]
+            return [self._write(*row) for row in rows], horizon
         except DecodeError as error:
             raise self._damaged(str(error)) from error
 
@@ -109,14 +113,20 @@ class StoreFile:
             for write in writes:
                 self._insert(write)
 
-    def replace(self, writes: list[Write]) -> None:
+    def replace(self, writes: list[Write], horizon: int = 0) -> None:
         """Replace everything in the file; when this returns the writes are on the disk.
+
+        Args:
+            writes: All writes.
+            horizon: Time up to which deletions may be forgotten.
 
         Raises:
             StoreError: The writes cannot be saved.
         """
         with self._transaction():
             self._base.execute("DELETE FROM writes")
+            self._base.execute("DELETE FROM horizon")
+            self._base.execute("INSERT INTO horizon VALUES (?)", (horizon,))
             for write in writes:
                 self._insert(write)
 
@@ -146,10 +156,14 @@ class StoreFile:
         (version,) = base.execute("PRAGMA user_version").fetchone()
         if not application and not base.execute("SELECT name FROM sqlite_master").fetchall():
             base.execute(_SCHEMA)
+            base.execute(_HORIZON_SCHEMA)
             base.execute(f"PRAGMA application_id = {_APPLICATION}")
             base.execute(f"PRAGMA user_version = {_VERSION}")
         elif application != _APPLICATION:
             raise StoreError(f"'{self.path}' is a database, but not of parameters; {_CHOOSE}")
+        elif version == _WITHOUT_HORIZON:
+            base.execute(_HORIZON_SCHEMA)
+            base.execute(f"PRAGMA user_version = {_VERSION}")
         elif version != _VERSION:
             raise StoreError(
                 f"'{self.path}' is of version {version}, expected {_VERSION}; {_CHOOSE}, or "
@@ -235,8 +249,8 @@ class Storage:
         self._unsaved: list[Write] = []
         self._waiting: list[Callable[[], None]] = []
 
-    def load(self) -> list[Write]:
-        """Return the stored writes.
+    def load(self) -> tuple[list[Write], int]:
+        """Return the stored writes, and the time up to which deletions may be forgotten.
 
         Raises:
             StoreError: The file is damaged.
@@ -251,7 +265,7 @@ class Storage:
         """Call a function, on the thread of the storage, when all writes so far are stored."""
         self._worker.submit(lambda: self._add([], then))
 
-    def compact(self, snapshot: Callable[[], list[Write]]) -> None:
+    def compact(self, snapshot: Callable[[], tuple[list[Write], int]]) -> None:
         """Replace the content of the file soon, by what a function returns then."""
         self._worker.submit(lambda: self._replace(snapshot))
 
@@ -268,10 +282,10 @@ class Storage:
         if not self._worker.waiting:  # else the next task saves these as well
             self._flush()
 
-    def _replace(self, snapshot: Callable[[], list[Write]]) -> None:
+    def _replace(self, snapshot: Callable[[], tuple[list[Write], int]]) -> None:
         # Writes applied meanwhile are in the snapshot, or are saved after it.
         try:
-            self._file.replace(snapshot())
+            self._file.replace(*snapshot())
         except RoszError as error:
             _log.error("parameters are not saved: %s", error)  # a traceback would add nothing
         self._flush()

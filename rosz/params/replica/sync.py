@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Final
 
 from rosz.errors import DecodeError, RoszError
-from rosz.params.history import EMPTY_DIGEST
+from rosz.params.history import EMPTY_DIGEST, History
 from rosz.params.paths import Path, common_path, joined
 from rosz.params.replica.members import Core, Members
 from rosz.params.replica.serve import ParameterKeys
@@ -34,11 +34,11 @@ from rosz.params.wire import (
     join_path,
     split_path,
 )
-from rosz.params.writes import DELETED, Write
+from rosz.params.writes import Write
 from rosz.session import Query, Reply, Session
 from rosz.worker import Worker, start_thread
 
-__all__ = ("AntiEntropy", "Synchroniser")
+__all__ = ("KEPT_TOMBSTONES", "AntiEntropy", "Synchroniser")
 
 _log = logging.getLogger("rosz.params")
 
@@ -68,8 +68,8 @@ _STOPPED: Final = 3.0
 _COMPARE_EVERY: Final = (10.0, 30.0)
 _FORGET_EVERY: Final = 60.0
 _RECONCILE_EVERY: Final = 30.0
-_TOMBSTONE_AGE: Final = 24 * 3600 * 1_000_000_000
-_MAX_TOMBSTONES: Final = 10_000
+KEPT_TOMBSTONES: Final = 10_000
+"""The newest deletions, which are never forgotten; twice as many are remembered at most."""
 
 
 class Synchroniser:
@@ -82,6 +82,7 @@ class Synchroniser:
         ready: Whether the replica has everything that the others had when it started.
         busy: Replicas that it is comparing itself with.
         refused: Writes that others refuse.
+        merge: Function called with all writes and the horizon of another replica, to merge them.
     """
 
     def __init__(self, core: Core) -> None:
@@ -93,6 +94,7 @@ class Synchroniser:
         self.worker: Worker[Any] = core.worker
         self.busy: set[str] = set()
         self.refused: _RefusedWrites = _RefusedWrites()
+        self.merge: Callable[[list[Write], int], object] = core.state.merge
         self._appeared: set[str] = set()
 
     def join(self) -> None:
@@ -210,28 +212,24 @@ class Synchroniser:
 
     def _compare_digests(self, payload: bytes) -> SyncReply:
         request = decode(payload, SyncRequest)
+        found = None
         with self.state as history:
-            digest = history.digest()
-            writes = list(history.writes()) if request.digest == EMPTY_DIGEST else []
-        reply = SyncReply(digest, self.ready, [Record.of(write) for write in writes])
-        if request.index is not None:
-            self._fill_differences(request.index, reply)
+            digest, horizon = history.digest(), history.horizon
+            if request.index is not None:
+                found = history.compare(*request.index.content(), request.horizon)
+            ahead = request.horizon < horizon or (found is not None and found.ahead)
+            whole = ahead or request.digest == EMPTY_DIGEST
+            writes = list(history.writes()) if whole else found.lacking if found else []
+        if request.horizon > horizon or (found is not None and found.behind):
+            self._merge_soon(request.sender)
+        reply = SyncReply(digest, self.ready, whole=ahead, horizon=horizon)
+        reply.records = [Record.of(write) for write in writes]
+        reply.wanted = [join_path(path) for path in found.wanted] if found else []
         return reply
 
-    def _fill_differences(self, index: Index, reply: SyncReply) -> None:
-        theirs = {path: (time_, clock) for path, time_, clock in index.entries}
-        with self.state as history:
-            ours = [write for bucket in index.buckets for write in history.bucket(bucket)]
-        for write in ours:
-            known = theirs.get(join_path(write.path))
-            if known is None or known < (write.time, write.clock):
-                reply.records.append(Record.of(write))
-        for path, (time_, clock) in theirs.items():
-            write = Write(split_path(path), time_, clock, DELETED)
-            with self.state as history:
-                hidden = history.hides(write)
-            if not hidden:
-                reply.wanted.append(path)
+    def _merge_soon(self, zid: str) -> None:
+        if zid in self.members.zids:
+            self.worker.submit(partial(self._compare, zid))
 
     def _receive(self, key: str, payload: bytes) -> SyncReply:
         reach = self.keys.reach(key, self.keys.of(self.session.zid, "tell"))
@@ -255,19 +253,25 @@ class _Comparison:
 
     def start(self) -> None:
         with self._state as history:
-            digest = history.digest()
-        self._request(SyncRequest(digest=digest), self._on_digest)
+            request = self._compose(history, digest=history.digest())
+        self._request(request, self._on_digest)
+
+    def _compose(
+        self, history: History, digest: bytes | None = None, index: Index | None = None
+    ) -> SyncRequest:
+        return SyncRequest(digest, index, [], history.horizon, self._owner.session.zid)
 
     def _on_digest(self, reply: SyncReply) -> None:
         self._ready = reply.ready
         with self._state as history:
             buckets = history.differing(reply.digest)
             writes = [write for bucket in buckets for write in history.bucket(bucket)]
-        if not buckets:
+            index = Index.of(buckets, writes)
+            request = self._compose(history, index=index)
+        if buckets:
+            self._request(request, self._on_differences)
+        else:
             self._end()
-            return
-        entries = [(join_path(write.path), write.time, write.clock) for write in writes]
-        self._request(SyncRequest(index=Index(buckets, entries)), self._on_differences)
 
     def _on_differences(self, reply: SyncReply) -> None:
         with self._state as history:
@@ -331,7 +335,11 @@ class _Comparison:
             return
         try:
             reply = decode(payloads[0], SyncReply)
-            self._state.apply([record.write() for record in reply.records])
+            writes = [record.write() for record in reply.records]
+            if reply.whole:
+                self._owner.merge(writes, reply.horizon)
+            else:
+                self._state.apply(writes)
             then(reply)
         except DecodeError as error:
             label = self._owner.members.label(self._zid)
@@ -450,7 +458,7 @@ class AntiEntropy:
             self._sync.compare_with_one()
         if now >= self._forget_at:
             self._forget_at = now + _FORGET_EVERY
-            if self._sync.state.forget(_TOMBSTONE_AGE, _MAX_TOMBSTONES):
+            if self._sync.state.forget(KEPT_TOMBSTONES):
                 self._on_forgotten()
         self._reconcile_storages(now)
 
