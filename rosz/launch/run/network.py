@@ -103,6 +103,14 @@ class Network:
         """
         return self._replica.peek(name)
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether nodes that start now take their time from ``/clock``."""
+        try:
+            return self.get("/use_sim_time") is True
+        except ParamNotFound:
+            return False
+
     def has(self, name: str) -> bool:
         """Return whether a parameter is set."""
         return self._replica.has(name)

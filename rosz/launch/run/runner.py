@@ -27,11 +27,16 @@ from rosz.launch.run.process_tree import TAG, ProcessTree
 from rosz.launch.run.protocol import Setup
 from rosz.launch.run.remote import Machines
 from rosz.launch.run.supervisor import Process, Supervisor, Timeouts
+from rosz.lifecycle import Closable
+from rosz.session import Session
+from rosz.wire import entity_key
 
 __all__ = ("Options", "Runner", "apply_options", "describe_failures", "describe_plan")
 
 _RUN_ID_PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]{0,63}")
 _MAX_VALUE_WIDTH = 20
+_CLOCK_TIMEOUT = 5.0
+"""Time in seconds from the start of the nodes until a silent ``/clock`` is reported."""
 
 
 class Options(msgspec.Struct, frozen=True, kw_only=True):
@@ -273,15 +278,40 @@ class Runner:
             supervisor,
             files=self._plan.files,
         )
+        clock = network.session and self._watch_clock(network.session)
         with stopped_by_signals(self._loop, self.stop, supervisor.kill, console.dump_stacks):
             try:
                 supervisor.start()
                 self._loop.run()
             finally:
+                if clock is not None:
+                    clock.close()
                 supervisor.kill()
                 ProcessTree(self._tag).kill()
                 if server is not None:
                     server.close()
+
+    def _watch_clock(self, session: Session) -> Closable | None:
+        """Warn once if nodes take their time from ``/clock`` and nobody publishes it."""
+        if not self._network.is_simulated:
+            return None
+
+        def warn() -> None:
+            clock.close()
+            self._console.error(
+                f"WARNING: /use_sim_time is set, and /clock is silent after {_CLOCK_TIMEOUT:g} s:"
+                " until it ticks, the time of nodes stands still; start the simulator or player, or"
+                " set /use_sim_time to false and start the nodes again"
+            )
+
+        def heard() -> None:
+            timer.cancel()
+            clock.close()
+
+        timer = self._loop.later(_CLOCK_TIMEOUT, warn)
+        key = entity_key(self._network.domain, "/clock", "*", "*")
+        clock = session.subscriber(key, lambda _: self._loop.post(heard))
+        return clock
 
     def _conclude(self, supervisor: Supervisor) -> None:
         console = self._console
