@@ -93,14 +93,18 @@ class Package(msgspec.Struct, frozen=True):
         """Return a file by its name, from anywhere in the package, as ``roslaunch`` does.
 
         Raises:
-            NotFoundError: There is none, or the path leads out of the package.
+            NotFoundError: There is none or several, or the path leads out of the package.
         """
         direct = self.within(name)
-        if direct.is_file():
-            return direct
-        for file in self._files():
-            if file.name == name:
-                return file
+        found = dict.fromkeys([*([direct] if direct.is_file() else []), *self.files(name)])
+        if len(found) > 1:
+            listing = ", ".join(map(str, found))
+            raise NotFoundError(
+                f"package '{self.name}' has {len(found)} files named '{name}': {listing}; give the"
+                " path of one"
+            )
+        if found:
+            return next(iter(found))
         kin = [file.name for file in self._files() if file.suffix == Path(name).suffix]
         raise NotFoundError(
             f"package '{self.name}' ({self.path}) has no file '{name}'{near_miss(name, kin)}"

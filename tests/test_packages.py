@@ -87,6 +87,22 @@ def test_executables(tmp_path: Path) -> None:
         package.file("none.launch")
 
 
+@pytest.mark.parametrize("folders", [("launch", "old"), ("", "old")])
+def test_files_of_one_name_are_listed(tmp_path: Path, folders: tuple[str, str]) -> None:
+    make(tmp_path / "p", "p")
+    files = [tmp_path / "p" / folder / "a.launch" for folder in folders]
+    for file in files:
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("<launch/>")
+    package = PackageIndex([tmp_path]).find("p")
+    with pytest.raises(NotFoundError) as caught:
+        package.file("a.launch")
+    assert str(caught.value) == (
+        f"package 'p' has 2 files named 'a.launch': {files[0]}, {files[1]}; give the path of one"
+    )
+    assert package.file("old/a.launch") == files[1]
+
+
 def test_a_slip_in_the_name_of_what_is_not_executable_yet(tmp_path: Path) -> None:
     make(tmp_path / "p", "p", plain="talker.py")
     with pytest.raises(ExecutableNotFound, match=r"has no executable .* mean 'talker\.py'\?"):

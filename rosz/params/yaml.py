@@ -48,6 +48,7 @@ _SEQ: Final = "tag:yaml.org,2002:seq"
 _BINARY: Final = "tag:yaml.org,2002:binary"
 _STR: Final = "tag:yaml.org,2002:str"
 _MERGE: Final = "tag:yaml.org,2002:merge"
+_NULL: Final = "tag:yaml.org,2002:null"
 _VALUE: Final = "tag:yaml.org,2002:value"
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -117,17 +118,21 @@ _LineDumper.add_representer(str, _LineDumper.represent_text)
 _LineDumper.add_representer(bytes, _LineDumper.represent_bytes)
 
 
-def load_all(text: str, path: str = "<string>") -> list[Value]:
+def load_all(text: str, path: str = "<string>", *, null_as_empty: bool = False) -> list[Value]:
     """Return the values of all documents of a text.
 
     Args:
         text: YAML text.
         path: File that the text is from, for error messages.
+        null_as_empty: Whether a document that is null is an empty dict, as for ``roslaunch``.
 
     Raises:
         YamlError: The text is not YAML, or holds a value that a parameter cannot hold.
     """
-    return [value for value, _ in _read(text, path)]
+    return [
+        {} if null_as_empty and node.tag == _NULL else _Builder(loader, path).build(node)
+        for loader, node in _read_nodes(_Loader, text, path)
+    ]
 
 
 def load(text: str, path: str = "<string>") -> Value:

@@ -35,7 +35,7 @@ def _parse_number(convert: Callable[[str], float], noun: str, text: str) -> floa
         raise ValueError(f"'{text}' is not {noun}") from None
 
 
-def _load_yaml(text: str) -> Any:
+def _load_yaml(text: str, *, null_as_empty: bool = False) -> Any:
     """Return the value of a YAML text; a text without any value is the empty dict.
 
     Raises:
@@ -43,7 +43,7 @@ def _load_yaml(text: str) -> Any:
     """
     from rosz.params.yaml import load_all
 
-    documents = load_all(text, "<string>")
+    documents = load_all(text, "<string>", null_as_empty=null_as_empty)
     if len(documents) > 1:
         raise YamlError(f"it has {len(documents)} documents, expected one", "<string>")
     return documents[0] if documents else {}
@@ -181,7 +181,7 @@ def _load(
         line, column = before.count("\n"), error.index - before.rfind("\n") - 1
         raise _locate(tag, file, error.reason, line, column) from error
     try:
-        value = _load_yaml(text)
+        value = _load_yaml(text, null_as_empty=True)
     except YamlError as error:
         line, column = max(error.line - 1, 0), max(error.column - 1, 0)
         raise _locate(tag, file, error.reason, line, column) from error

@@ -20,7 +20,6 @@ STRICTER = {
     "comprehensions": """<launch><param name="a" value="$(eval [i for i in [1]])"/></launch>""",
     "lambdas": """<launch><param name="a" value="$(eval (lambda: 1)())"/></launch>""",
     "starred elements": """<launch><param name="a" value="$(eval [*[1], 2])"/></launch>""",
-    "a null document": "<launch><rosparam>null</rosparam></launch>",
     "letters beyond ASCII in names": '<launch><remap from="größe" to="b"/></launch>',
     "delays that are no number": """<launch>
       <node pkg="demo_nodes" type="talker.py" name="n" respawn_delay="nan"/></launch>""",
