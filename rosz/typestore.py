@@ -75,7 +75,7 @@ class TypeStore:
 
         Raises:
             TypeNotFound: There is no such type.
-            DefinitionError: A definition in its package is not well-formed.
+            DefinitionError: The type or one in it is not well-formed.
         """
         cls: type[Message] = self._class(name, "msg")
         return cls
@@ -88,7 +88,7 @@ class TypeStore:
 
         Raises:
             TypeNotFound: There is no such type.
-            DefinitionError: A definition in its package is not well-formed.
+            DefinitionError: The type or one in it is not well-formed.
         """
         cls: type[Service] = self._class(name, "srv")
         return cls
@@ -181,9 +181,11 @@ class TypeStore:
     def module(self, package: str, kind: Kind) -> ModuleType:
         """Return the module with all types of one kind that a package has.
 
+        A type that is not well-formed is not in it; to get it from there raises DefinitionError.
+
         Raises:
             TypeNotFound: The package has none.
-            DefinitionError: A definition in it is not well-formed.
+            DefinitionError: None of them is well-formed.
         """
         key = package, kind
         if key not in self._modules:
@@ -291,7 +293,8 @@ class TypeStore:
             ours = import_module(f"rosz.msgs.{package}.{kind}")
             for name in ours.__all__:
                 setattr(compiled, name, getattr(ours, name))
-            compiled.__all__ = tuple(sorted({*ours.__all__, *compiled.__all__}))  # type: ignore[attr-defined]
+            names = {*ours.__all__, *getattr(compiled, "__all__", ())}
+            compiled.__all__ = tuple(sorted(names))  # type: ignore[attr-defined]
         return compiled
 
     def _from_text(self, name: str, text: str, others: Mapping[str, str] | None) -> Any:
@@ -300,6 +303,32 @@ class TypeStore:
         return _TextTypes(self, self._compiler, texts).find(name)
 
     def _compile(self, package: str, kind: Kind, names: list[str]) -> ModuleType:
+        """Return the module of types; those that are not well-formed fail when they are used."""
+        try:
+            return self._load(package, kind, names)
+        except DefinitionError:
+            sound = list(filter(self._is_sound, names))
+            if not sound and not shipped_types(package, kind):
+                raise
+        module = self._load(package, kind, sound) if sound else ModuleType(f"{package}.{kind}")
+
+        def missing(base: str) -> Any:
+            """Raise the error of a type that the module lacks."""
+            if f"{package}/{kind}/{base}" in names:
+                self._catalog.parts(f"{package}/{kind}/{base}")
+            raise AttributeError(f"module '{package}.{kind}' has no attribute '{base}'")
+
+        module.__dict__["__getattr__"] = missing
+        return module
+
+    def _is_sound(self, name: str) -> bool:
+        try:
+            self._catalog.parts(name)
+        except DefinitionError:
+            return False
+        return True
+
+    def _load(self, package: str, kind: Kind, names: list[str]) -> ModuleType:
         definitions = [(name, self.definition(name).text) for name in names]
         stem = f"{package}_{kind}_{self._compiler.digest(definitions)}"
         more = "_more" if shipped_types(package, kind) else ""

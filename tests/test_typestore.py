@@ -125,11 +125,55 @@ def test_unknown_messages(workspace: Path, name: str, expected: str) -> None:
 def test_a_bad_definition_is_shown_with_its_place(workspace: Path) -> None:
     file = workspace / "gripper_msgs" / "msg" / "Bad.msg"
     file.write_text("int32 x\n\n  shared_msgs/Prat p\n")
+    types = store(workspace)
     with pytest.raises(DefinitionError) as caught:
-        store(workspace).message("gripper_msgs/Grip")
+        types.message("gripper_msgs/Bad")
     text = str(caught.value)
     assert text.startswith(f"{file}:3:3: type 'shared_msgs/Prat' of field 'p': type 'shared_msgs/")
     assert text.endswith("has no 'Prat.msg'; did you mean 'Part'?")
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_bad_definitions_fail_alone(workspace: Path, tmp_path: Path, *, kept: bool) -> None:
+    folder = workspace / "gripper_msgs" / "msg"
+    (folder / "Bad.msg").write_text("int32 x y\n")
+    (folder / "HasBad.msg").write_text("int32 n\nBad bad\n")
+    (folder / "Not-a-name.msg").write_text("int32 x\n")
+    (folder / "Latin1.msg").write_bytes(b"# \xe9t\xe9\n")
+    (workspace / "gripper_msgs" / "srv" / "Bad.srv").write_text("Grip g\nBad b\n---\n")
+    cache = tmp_path / "cache" if kept else None
+    for _ in range(2):
+        types = store(workspace, cache)
+        grip = types.message("gripper_msgs/Grip")
+        assert grip.from_cdr(grip().to_cdr()) == grip()
+        assert types.service("gripper_msgs/Close").Request().grip == grip()  # type: ignore[attr-defined]
+        module = types.module("gripper_msgs", "msg")
+        assert module.Point is types.message("gripper_msgs/Point")
+        assert module.__all__ == ("Grip", "Point")
+        with pytest.raises(DefinitionError) as caught:
+            types.message("gripper_msgs/HasBad")
+        assert str(caught.value).startswith(f"{folder}/Bad.msg:1:9: field 'x': expected")
+        with pytest.raises(DefinitionError, match=r"Bad\.msg:1:9: field 'x'"):
+            _ = module.HasBad
+        with pytest.raises(DefinitionError, match=r"Latin1\.msg:1:3: not UTF-8"):
+            types.message("gripper_msgs/Latin1")
+        with pytest.raises(DefinitionError, match=r"name\.msg: 'Not-a-name' cannot name a type"):
+            _ = getattr(module, "Not-a-name")
+        with pytest.raises(DefinitionError, match=r"Bad\.msg:1:9"):
+            types.service("gripper_msgs/Bad")
+        with pytest.raises(AttributeError, match=r"'gripper_msgs\.msg' has no attribute 'Other'"):
+            _ = module.Other
+
+
+def test_a_package_of_bad_definitions_is_refused(tmp_path: Path) -> None:
+    package(tmp_path, "broken_msgs", {"A.msg": "int32\n", "B.msg": "int32\n"})
+    with pytest.raises(DefinitionError, match=r"A\.msg:1:6"):
+        store(tmp_path).module("broken_msgs", "msg")
+    package(tmp_path, "std_msgs", {"Mine.msg": "int32\n"})
+    module = store(tmp_path).module("std_msgs", "msg")
+    assert module.String is String
+    with pytest.raises(DefinitionError, match=r"Mine\.msg:1:6"):
+        _ = module.Mine
 
 
 def test_what_rosz_ships_comes_first(tmp_path: Path) -> None:

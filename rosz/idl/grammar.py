@@ -35,6 +35,7 @@ _TYPE_WORD = re.compile(r"([^\s#]*)(?:[ \t]+([A-Za-z][A-Za-z0-9_]*))?")
 _DIGITS = re.compile(r"[0-9]+", re.ASCII)
 _BLANK = re.compile(r"[ \t]*")
 _SEPARATOR = "---"
+_LONGEST_INTEGER = 80  # characters; 64 binary digits are fewer
 _MOST = (1 << 32) - 1
 _INTEGER = re.compile(r"[+-]?(?:0[xX][0-9a-fA-F]+|0[bB][01]+|0[oO][0-7]+|[0-9]+)")
 _FLOAT = re.compile(
@@ -67,6 +68,7 @@ def parse_message(name: str, text: str, path: str = "<string>") -> MessageSpec:
     Raises:
         DefinitionError: The text does not follow the grammar.
     """
+    _check_name(name, path)
     lines = _lines(text)
     for number, line in enumerate(lines, 1):
         if line.startswith(_SEPARATOR):
@@ -107,12 +109,22 @@ def parse_action(name: str, text: str, path: str = "<string>") -> ActionSpec:
     return ActionSpec(name, goal, result, feedback, text, path)
 
 
+def _check_name(name: str, path: str) -> None:
+    base = name.rpartition("/")[2]
+    if not _NAME.fullmatch(base):
+        raise DefinitionError(
+            f"'{base}' cannot name a type; expected a letter first, then letters, digits or '_'",
+            path,
+        )
+
+
 def _lines(text: str) -> list[str]:
     return text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
 
 
 def _split(name: str, roles: tuple[str, ...], text: str, path: str, what: str) -> list[MessageSpec]:
     """Return the messages in a text, which ``---`` lines separate."""
+    _check_name(name, path)
     parts: list[tuple[int, list[str]]] = [(1, [])]
     for number, line in enumerate(_lines(text), 1):
         if not line.startswith(_SEPARATOR):
@@ -281,7 +293,7 @@ class _Line:
         digits = _DIGITS.match(self._text, self._at)
         if digits is None:
             self._fail(f"expected a number as {what}")
-        size = int(digits[0])
+        size = int(digits[0].lstrip("0")[:_LONGEST_INTEGER] or "0")
         if not 1 <= size <= _MOST:
             self._fail(f"expected a {what} from 1 to {_MOST}, got {digits[0]}")
         self._at = digits.end()
@@ -418,13 +430,15 @@ class _Line:
             return _BOOLEANS[text.lower()]
         is_integer = _INTEGER.fullmatch(text)
         if kind in ("float32", "float64"):
-            if not is_integer and not _FLOAT.fullmatch(text):
+            if _FLOAT.fullmatch(text):
+                return float(text)
+            if not is_integer or len(text) > _LONGEST_INTEGER:
                 self._fail(wrong or f"expected a number of type {kind}, got '{text}'")
-            return float(_integer(text) if is_integer else text)
+            return float(_integer(text))
         if not is_integer:
             self._fail(wrong or f"expected an integer of type {kind}, got '{text}'")
-        value = _integer(text)
         low, high = INTEGER_RANGES[kind]
+        value = _integer(text) if len(text) <= _LONGEST_INTEGER else high + 1
         if not low <= value <= high:
             self._fail(f"{text} is outside the range of {kind} ({low} to {high})")
         return value

@@ -106,9 +106,9 @@ class _Types:
             if not name.startswith("_"):
                 with suppress(PackageError):  # of an unrelated package
                     whole = self.store.module(package, kind)
-            if name not in whole.__dict__:
+            if whole is module:
                 raise AttributeError(f"module '{package}.{kind}' has no attribute '{name}'")
-            return whole.__dict__[name]
+            return getattr(whole, name)
 
         module.__dict__.setdefault("__getattr__", more)
         return module

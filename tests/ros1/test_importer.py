@@ -160,13 +160,16 @@ def test_errors_in_definitions_have_a_place(tmp_path: Path, workspace: Path) -> 
     code = """
         import rosz.ros1
         from rosz.errors import DefinitionError
+        from gripper.msg import Grip
+        print(Grip().part)
         try:
-            import gripper.msg
+            from parts.msg import Bad
         except DefinitionError as error:
             print(error)
     """
     file = workspace / "parts" / "msg" / "Bad.msg"
-    assert run(code, tmp_path, workspace) == f"{file}:2:6: expected a name after type 'int32'\n"
+    expected = f"kind: 0\n{file}:2:6: expected a name after type 'int32'\n"
+    assert run(code, tmp_path, workspace) == expected
 
 
 def test_other_imports_are_unchanged(tmp_path: Path, workspace: Path) -> None:
