@@ -11,8 +11,8 @@ Additions to roslaunch: ``wait_for``, ``wait_timeout``, ``spawn_delay``, ``respa
 - ``<push_ros_namespace namespace="…"/>`` (or with dashes) lasts to the end of its group or file;
   in ROS 2 it also affects the file that includes it.
 - ``<let name="…" value="…"/>`` sets an arg, declared or not, to the end of its group or file.
-- ``<set_env>`` is ``<env>``. ``$(var x)`` is ``$(arg x)``. ``$(find-pkg-share pkg)`` is the folder
-  of a package.
+- ``<set_env>`` is an ``<env>`` that ``$(env)`` and ``$(optenv)`` see, too. ``$(var x)`` is
+  ``$(arg x)``. ``$(find-pkg-share pkg)`` is the folder of a package.
 - ``<executable cmd="…">`` runs a program that is not a node; ``shell`` is not supported.
 
 ``<arg>`` and ``<param>`` keep ROS 1's rules: an included file sees only what is passed to it, and a

@@ -30,6 +30,7 @@ class Scope:
         declared: Names of the declared args, in order.
         anonymous: Names made by ``$(anon)``, by base name.
         env: (name, value) of environment variables, in order.
+        environ: Those of ``<set_env>``, which ``$(env)`` and ``$(optenv)`` see as well.
         private: ``~params`` for the following nodes: (name, value, origin).
         waits: Conditions that the following nodes wait for.
         remaps: (from, to) in order, those of outer scopes first; no name twice.
@@ -45,6 +46,7 @@ class Scope:
         self.declared: list[str] = []
         self.anonymous: dict[str, str] = {}
         self.env: list[tuple[str, str]] = []
+        self.environ: dict[str, str] = {}
         self.private: list[tuple[str, Any, Any]] = []
         self.waits: tuple[Any, ...] = ()
         self.included: bool = False
@@ -66,6 +68,7 @@ class Scope:
         scope.declared = list(self.declared)
         scope.anonymous = dict(self.anonymous)
         scope.env = list(self.env)
+        scope.environ = dict(self.environ)
         # Not a copy unless empty: in roslaunch, nodes see such params from included files.
         scope.private = self.private or []
         scope.waits = self.waits

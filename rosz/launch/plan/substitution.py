@@ -81,7 +81,7 @@ class Substitution:
         if command == "optenv":
             if not words:
                 raise TextError("$(optenv NAME DEFAULT…) needs the name of a variable", index)
-            return self._context.environ.get(words[0], " ".join(words[1:]))
+            return self._environ(scope).get(words[0], " ".join(words[1:]))
         if command == "dirname":
             return self._dirname(scope)
         if len(words) != 1:
@@ -92,7 +92,7 @@ class Substitution:
         try:
             match command:
                 case "env":
-                    return self._env(words[0])
+                    return self._env(words[0], scope)
                 case "anon":
                     return self._anon(words[0], scope)
                 case "find-pkg-share":
@@ -102,8 +102,11 @@ class Substitution:
         except TextError as error:
             raise TextError(error.reason, index) from None
 
-    def _env(self, name: str) -> str:
-        environ = self._context.environ
+    def _environ(self, scope: Scope) -> Mapping[str, str]:
+        return {**self._context.environ, **scope.environ}
+
+    def _env(self, name: str, scope: Scope) -> str:
+        environ = self._environ(scope)
         if name in environ:
             return environ[name]
         hint = near_miss(name, environ) or f"; set it, or write $(optenv {name} DEFAULT)"
@@ -179,9 +182,9 @@ class Substitution:
             "anon": lambda base: self._anon(base, scope),
             "arg": arg,
             "dirname": lambda: self._dirname(scope),
-            "env": self._env,
+            "env": lambda name: self._env(name, scope),
             "find": self._find,
-            "optenv": lambda name, default="": self._context.environ.get(name, default),
+            "optenv": lambda name, default="": self._environ(scope).get(name, default),
             "var": arg,
         }
         try:

@@ -271,6 +271,8 @@ class Tag:
         if not name:
             self.fail("'name' is empty; expected the name of a variable", "name")
         into.env.append((name, value))
+        if self.name == "set_env":
+            into.environ[name] = value
 
     def fail(self, reason: str, attribute: str | None = None, index: int = 0) -> NoReturn:
         """Refuse the file.

@@ -108,6 +108,21 @@ def test_let_and_var() -> None:
     assert [(param.name, param.value) for param in found.params] == [("/in", 23), ("/out", 2)]
 
 
+@pytest.mark.parametrize(
+    "value", ["$(env A)", "$(optenv A)", "$(optenv A x)", "$(eval env('A'))", "$(eval optenv('A'))"]
+)
+def test_substitutions_see_what_set_env_sets(value: str) -> None:
+    text = f'<set_env name="A" value="b"/><group><param name="p" value="{value}"/></group>'
+    assert [one.value for one in plan_of(text).params] == ["b"]
+
+
+def test_substitutions_see_set_env_in_its_scope_alone() -> None:
+    group = '<group><set_env name="A" value="b"/></group>'
+    for text in group, '<env name="A" value="b"/>':  # roslaunch's <env> is for nodes alone
+        with pytest.raises(LaunchFileError, match="variable 'A' is not set"):
+            plan_of(f'{text}<param name="p" value="$(env A)"/>')
+
+
 def test_set_env_is_env() -> None:
     assert plan_of('<set_env name="A" value="1"/>' + NODE.format("")).nodes[0].env == (("A", "1"),)
 
