@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
-from rosz.cli.console import print_error, print_lines, until_stopped
+from rosz.cli.console import count, print_error, print_lines, until_stopped
 from rosz.cli.declare import App, Option
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
     from rosz.params.replica import Replica
     from rosz.params.replica.storage import Storage
+    from rosz.session.router import Router
 
 __all__ = ("LogSummary", "app")
 
@@ -63,6 +64,7 @@ def core_command(
         )
     import msgspec
 
+    from rosz.cli.core_restart import CoreWatch, Handover
     from rosz.environment import Environment
     from rosz.params.replica import Replica
     from rosz.session.router import Router
@@ -73,18 +75,27 @@ def core_command(
     file = Path(store).absolute() if store else None
     logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
     with logging, until_stopped() as ready, ExitStack() as stack:
+        before = Handover.take()
         storage = None if file is None else _open_storage(file, stack)
         router = stack.enter_context(Router(environment, listen or (), connect or ()))
         domain = environment.domain
-        replica = stack.enter_context(closing(Replica(router.session, domain, storage=storage)))
+        replica = Replica(router.session, domain, storage=storage, handover=before.parameters)
+        stack.enter_context(closing(replica))
         _set_core_params(replica)
-        lines = [f"listening on {endpoint}" for endpoint in router.endpoints]
-        lines += [f"connecting to {endpoint}" for endpoint in router.connect]
-        kept = f"kept in {file}" if file else "kept in memory"
-        lines.append(f"parameters of domain {domain} are {kept}")
+        watch = stack.enter_context(closing(CoreWatch(router, replica, domain, before)))
         ready()
-        print_lines([*lines, "started core; press Ctrl-C to end it"])
-        threading.Event().wait()
+        if before.why:
+            kept = count(len(replica.names()), "parameter")
+            print_error(f"{before.why}: started afresh, with {kept}")
+        else:
+            kept = f"parameters of domain {domain} are kept in {file or 'memory'}"
+            print_lines([*_endpoint_lines(router), kept, "started core; press Ctrl-C to end it"])
+        watch.restart_when_needed()
+
+
+def _endpoint_lines(router: Router) -> list[str]:
+    listening = [f"listening on {endpoint}" for endpoint in router.endpoints]
+    return listening + [f"connecting to {endpoint}" for endpoint in router.connect]
 
 
 def _open_storage(file: Path, stack: ExitStack) -> Storage:

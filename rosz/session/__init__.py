@@ -1,6 +1,6 @@
 """The network: sessions, and what is declared on them. No other package imports zenoh.
 
-Only ``rosz core`` needs the module `rosz.session.router`, which is public as well.
+Only ``rosz core`` needs the modules in `PUBLIC_MODULES`.
 """
 
 from rosz.session import at_exit as at_exit  # registers what waits at the exit
@@ -21,7 +21,7 @@ from rosz.session.samples import HybridClock, Sample, Stamp
 from rosz.session.session import Session
 from rosz.session.zenoh_workarounds import SEGMENTS
 
-PUBLIC_MODULES = ("router",)
+PUBLIC_MODULES = ("restart", "router", "split", "standstill")
 """Modules that few programs need, and that others may import as they are."""
 
 __all__ = (

@@ -37,7 +37,7 @@ from rosz.wire import Endpoint
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
 
-__all__ = ("open_raw", "places_of")
+__all__ = ("open_raw", "outlasted_silence", "places_of")
 
 _NOBODY = "Unable to connect to any of"
 _BUSY_TIMEOUT = 60.0
@@ -106,6 +106,18 @@ def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
         for endpoints in found
     )
     return listen, connect
+
+
+def outlasted_silence(config: SessionConfig) -> float:
+    """Return for how many seconds a session may send nothing until others give up its links.
+
+    Raises:
+        TransportError: A configuration value is refused.
+        UsageError: The override text is malformed, or a protocol cannot use keys.
+    """
+    sending = json.loads(_settings(config).get_json("transport/link/tx"))
+    # The last message may be as old as the period in which an idle link sends one.
+    return float(sending["lease"] * (1 - 1 / sending["keep_alive"]) / 1000)
 
 
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:

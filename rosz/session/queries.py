@@ -64,6 +64,7 @@ class QueryOptions(TypedDict, total=False):
     parameters: str
     target: Target
     any_key: bool
+    urgent: bool
     cancel: Cancellation | None
 
 

@@ -19,7 +19,7 @@ from rosz.environment import Environment
 from rosz.errors import RoszError, TransportError
 from rosz.lifecycle import Lifecycle
 from rosz.session.config import SessionConfig
-from rosz.session.opening import places_of
+from rosz.session.opening import outlasted_silence, places_of
 from rosz.session.session import Session
 from rosz.wire import Endpoint
 
@@ -46,6 +46,8 @@ class Router:
     Attributes:
         endpoints: The endpoints that it listens at.
         connect: The endpoints that it connects to.
+        has_rules: Whether rules say what other machines may do.
+        outlasted_silence: Seconds of silence after which others give up its links.
         session: Its session.
 
     Raises:
@@ -66,6 +68,8 @@ class Router:
         self.endpoints: tuple[str, ...]
         self.connect: tuple[str, ...]
         self.endpoints, self.connect = places_of(config)
+        self.has_rules: bool = config.keys is not None and config.keys.rules is not None
+        self.outlasted_silence: float = outlasted_silence(config)
         self._lifecycle = Lifecycle("the router", log=_log)
         try:
             self.session: Session = self._lifecycle.keep(Session.open(config))

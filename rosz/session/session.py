@@ -321,6 +321,7 @@ class Session:
         parameters: str = "",
         target: Target = "all",
         any_key: bool = False,
+        urgent: bool = False,
         cancel: Cancellation | None = None,
     ) -> Replies:
         """Send a query, and return the replies as they come; one that is not ``ok`` is an error.
@@ -334,6 +335,7 @@ class Session:
             parameters: The part of the selector after the ``?``.
             target: Queryables that get the query.
             any_key: Whether replies may be for keys that ``key`` does not match.
+            urgent: Whether it and its replies overtake samples that wait for a slow link.
             cancel: The cancellation that can end the query early; one that was cancelled before
                 makes the query raise `ClosedError`.
         """
@@ -344,6 +346,7 @@ class Session:
                 target=TARGETS[target],
                 consolidation=zenoh.ConsolidationMode.NONE,
                 accept_replies=zenoh.ReplyKeyExpr.ANY if any_key else None,
+                priority=zenoh.Priority.INTERACTIVE_HIGH if urgent else None,
                 timeout=clamp_timeout(timeout),
                 payload=payload,
                 attachment=attachment,

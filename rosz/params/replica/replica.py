@@ -12,7 +12,8 @@ import os
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import PurePath
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Final, Self
@@ -29,7 +30,7 @@ from rosz.params.replica.state import NOT_A_PARAMETER, TreeReader, not_found
 from rosz.params.replica.sync import AntiEntropy, Synchroniser
 from rosz.params.tree import MISSING
 from rosz.params.values import normalise
-from rosz.params.wire import Member
+from rosz.params.wire import Member, Record, SyncReply, decode, encode
 from rosz.params.writes import DELETED, Change, Write
 from rosz.session import Sample, Session, Stamp, clamp_timeout
 from rosz.worker import Worker
@@ -127,6 +128,7 @@ class Replica(_Copy):
         settled: Event that is set when the session is linked to all its neighbours; without it, the
             constructor does not wait for that.
         storage: Storage that holds the parameters when the process has ended.
+        handover: What the replica that this one replaces had; see `frozen`.
 
     Attributes:
         label: Process as shown to users.
@@ -145,6 +147,7 @@ class Replica(_Copy):
         label: str = "",
         settled: threading.Event | None = None,
         storage: Storage | None = None,
+        handover: bytes = b"",
     ) -> None:
         super().__init__(session, domain)
         self.label: str = label or process_label()
@@ -152,9 +155,9 @@ class Replica(_Copy):
         self._own = Member(session.stamp().time, session.zid, self.label)
         self._lifecycle = Lifecycle("the parameter store of this process", log=_log)
         self._storage = storage
+        if self._restore(handover):
+            self._compact()
         if storage is not None:
-            if self._state.restore(*storage.load()):
-                self._compact()
             self._state.on_new(storage.save)
         keys, sync = self._keys, self._sync
         self._broadcaster = WriteBroadcaster(self._core, storage)
@@ -272,6 +275,16 @@ class Replica(_Copy):
         with self._state as history:
             return history.digest()
 
+    @contextmanager
+    def frozen(self) -> Iterator[bytes]:
+        """Return a context in which no write is taken or acknowledged here.
+
+        It gets all writes, for the replica that replaces this one.
+        """
+        with self._state.frozen() as history:
+            records = [Record.of(write) for write in history.writes()]
+            yield encode(SyncReply(records=records, horizon=history.horizon))
+
     @property
     def closed(self) -> bool:
         """Whether the replica is closed, or being closed."""
@@ -312,6 +325,14 @@ class Replica(_Copy):
             self._sync.drop_peer(member.zid)
         elif self._sync.ready and member < self._own:
             self._sync.compare_soon(member)
+
+    def _restore(self, handover: bytes) -> bool:
+        """Restore what is handed over or stored; return whether the storage differs from it."""
+        if handover:
+            reply = decode(handover, SyncReply)
+            self._state.restore([record.write() for record in reply.records], reply.horizon)
+            return True
+        return self._storage is not None and self._state.restore(*self._storage.load())
 
     def _merge(self, writes: list[Write], horizon: int) -> None:
         self._state.merge(writes, horizon)

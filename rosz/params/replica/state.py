@@ -6,7 +6,8 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from msgspec import structs
@@ -225,6 +226,17 @@ class State:
         with self:
             self._on_new = callback
 
+    @contextmanager
+    def frozen(self) -> Iterator[History]:
+        """Return a context in which nothing is written, and which gets the history."""
+        before = self._on_new
+        self.on_new(before or _ignore)  # a message that is deferred would be acknowledged
+        try:
+            with self as history:
+                yield history
+        finally:
+            self._on_new = before
+
     def stamp(self) -> Stamp:
         """Return a stamp that is later than all writes seen."""
         with self:
@@ -345,6 +357,9 @@ class State:
         if new_writes and self._on_new is not None:
             self._on_new(new_writes)
         return change
+
+
+def _ignore(_writes: list[Write]) -> None: ...
 
 
 class TreeReader:

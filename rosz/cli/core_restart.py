@@ -1,0 +1,96 @@
+"""How ``rosz core`` starts itself afresh when its links no longer carry everything."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, NoReturn
+
+import msgspec
+
+from rosz.params.wire import Keys
+from rosz.session.restart import restart_program, take_handover
+from rosz.session.split import SplitWatch
+from rosz.session.standstill import Standstill
+from rosz.wire import processes_key, tokens_key
+
+if TYPE_CHECKING:
+    from rosz.params.replica import Replica
+    from rosz.session.router import Router
+
+__all__ = ("CoreWatch", "Handover")
+
+_LOOK_SECONDS = 1.0
+_CALM_SECONDS = 600.0
+"""Time without a split after which the next one is the first one."""
+
+
+class Handover(msgspec.Struct):
+    """What a core hands over to itself.
+
+    Attributes:
+        why: Reason of the restart; empty if it is the first start.
+        parameters: All writes of its replica; see `Replica.frozen`.
+        splits: Number of restarts because of a split, in a row.
+    """
+
+    why: str = ""
+    parameters: bytes = b""
+    splits: int = 0
+
+    @classmethod
+    def take(cls) -> Handover:
+        """Return what was handed over to this process."""
+        content = take_handover()
+        return cls() if content is None else msgspec.msgpack.decode(content, type=cls)
+
+
+class CoreWatch:
+    """Finds out when a core has to start afresh.
+
+    Args:
+        router: Router of the core.
+        replica: Replica of the core.
+        domain: ROS domain of the replica.
+        before: What was handed over to this process.
+    """
+
+    def __init__(self, router: Router, replica: Replica, domain: int, before: Handover) -> None:
+        self._replica = replica
+        self._splits = before.splits
+        self._standstill = Standstill(router.outlasted_silence)
+        self._began = time.monotonic()
+        self._found = threading.Event()
+        self._why = ""
+        self._split_watch: SplitWatch | None = None
+        if not router.has_rules:
+            keys = Keys(domain, scoped=router.session.secured)
+            tokens = (tokens_key(domain), processes_key(domain), keys.tokens)
+            self._split_watch = SplitWatch(
+                router.session, domain, tokens, self._on_split, self._splits
+            )
+
+    def restart_when_needed(self) -> NoReturn:
+        """Start the program afresh as soon as the links of the core are of no more use.
+
+        Raises:
+            OSError: The program cannot be executed any more.
+        """
+        while not self._found.wait(_LOOK_SECONDS):
+            if seconds := self._standstill.seconds():
+                self._why = f"stood still for {seconds:.0f} s, longer than others keep its links"
+                break
+        with self._replica.frozen() as parameters:
+            handover = Handover(self._why, parameters, self._splits)
+            restart_program(msgspec.msgpack.encode(handover))
+
+    def close(self) -> None:
+        """Stop watching; a second call has no effect."""
+        if self._split_watch is not None:
+            self._split_watch.close()
+
+    def _on_split(self, why: str) -> None:
+        calm = time.monotonic() - self._began > _CALM_SECONDS
+        self._splits = 1 if calm else self._splits + 1
+        self._why = why
+        self._found.set()

@@ -1,0 +1,64 @@
+"""A core that stood still for longer than others keep its links."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from network import TIMEOUT, Program, eventually
+
+from .shell import Shell
+
+_SHORT_LEASE = "transport/link/tx/lease=2000"
+_AFRESH = "started afresh"
+
+
+def stop(program: Program, seconds: float) -> None:
+    """Let a program stand still, and go on."""
+    program.send(signal.SIGSTOP)
+    time.sleep(seconds)
+    program.send(signal.SIGCONT)
+
+
+@pytest.mark.parametrize("stored", [False, True])
+def test_a_core_that_stood_still_starts_afresh(shell: Shell, tmp_path: Path, stored: bool) -> None:
+    options = ["--store", str(tmp_path / "params.db")] if stored else []
+    core = shell.start("core", *options, ZENOH_CONFIG_OVERRIDE=_SHORT_LEASE)
+    core.wait_for("started core")
+    before = shell("param", "get", "/run_id").out
+    assert shell("param", "set", "/tree", "{a: 1, b: [x, 2.5]}").code == 0
+    said = len(core.lines)
+    for times in (1, 2):
+        stop(core, 3.0)
+        line = core.wait_for(_AFRESH, times=times)
+        assert line.startswith("stood still for ")
+        assert line.endswith("started afresh, with 5 parameters")
+    assert len(core.lines) == said + 2
+    assert shell("param", "get", "/run_id").out == before
+    assert shell("param", "get", "/tree").out == "a: 1\nb:\n- x\n- 2.5\n\n"
+    core.send(signal.SIGINT)
+    assert core.exit_code() == 0
+
+
+def test_a_core_that_stood_still_for_a_moment_goes_on(shell: Shell) -> None:
+    core = shell.start("core", ZENOH_CONFIG_OVERRIDE="transport/link/tx/lease=60000")
+    core.wait_for("started core")
+    stop(core, 3.0)
+    assert shell("param", "set", "/x", "1").code == 0
+    core.send(signal.SIGINT)
+    assert core.exit_code() == 0
+    assert _AFRESH not in core.output
+
+
+def test_nodes_find_a_core_that_started_afresh(shell: Shell) -> None:
+    core = shell.start("core", ZENOH_CONFIG_OVERRIDE=_SHORT_LEASE)
+    core.wait_for("started core")
+    node = shell.network.node("robot")
+    assert shell("param", "set", "/x", "1").code == 0
+    stop(core, 3.0)
+    core.wait_for(_AFRESH)
+    eventually(lambda: shell("node", "list").lines == ["/robot"], "the node", TIMEOUT)
+    assert shell("param", "set", "/x", "2").code == 0
+    assert node.params.get("/x") == 2
