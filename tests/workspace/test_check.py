@@ -83,7 +83,11 @@ def test_manifests(workspace: Path, text: str, expected: str) -> None:
     ("name", "text", "expected"),
     [
         ("msg/A.msg", "int8 a\nint3 x\n", "demo/msg/A.msg:2:1: error: type 'int3' of field 'x'"),
-        ("srv/A.srv", "---\nfloat64[ y\n", "demo/srv/A.srv:2:9: error: expected a number"),
+        (
+            "srv/A.srv",
+            "---\nfloat64[ y\n",
+            "demo/srv/A.srv:2:9: error: type 'float64[' of 'y': expected a number",
+        ),
         ("action/A.action", "int8 a\n", "demo/action/A.action:"),
         (
             "action/A.action",
