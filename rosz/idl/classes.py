@@ -58,11 +58,12 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> s
         module: Names of the module that the class will be part of.
     """
     name = class_name(spec.name)
-    base = BASES.get(spec.name, "_Message")
+    renamed = _ros1_names(spec)
+    base = "_Renamed" if renamed else BASES.get(spec.name, "_Message")
     fields = {attribute(field.name) for field in spec.fields}
     names = ClassNames(module, fields | {attribute(one.name) for one in spec.constants})
     body = [_field(field, names) for field in spec.fields]
-    body += _ros1_fields(spec)
+    body += _ros1_fields(renamed)
     body += [f"{attribute(one.name)} = {_literal(one.value)}" for one in spec.constants]
     body += _names(spec.name, message_hash(spec, catalog), message_md5(spec, catalog), spec.text)
     body += [f"_schema = {_schema(spec, names)}", ""]
@@ -138,9 +139,16 @@ def _codec(signature: str, lines: list[str], fallback: str, name: str) -> list[s
     return [*code, "    except _FAULTS:", f"        return {fallback.format(name)}"]
 
 
-def _ros1_fields(spec: MessageSpec) -> list[str]:
-    lines: list[str] = []
-    for old, new in _ROS1_FIELDS.get(spec.name, {}).items():
+def _ros1_names(spec: MessageSpec) -> dict[str, str]:
+    """Return the fields that ROS 1 spells in another way, unless the text is ROS 1's."""
+    names = {field.name for field in spec.fields}
+    renamed = _ROS1_FIELDS.get(spec.name, {})
+    return renamed if names.issuperset(renamed.values()) and names.isdisjoint(renamed) else {}
+
+
+def _ros1_fields(renamed: dict[str, str]) -> list[str]:
+    lines = [f"_ros1_names = {json.dumps(renamed)}"] if renamed else []
+    for old, new in renamed.items():
         lines += ["", "@property", f"def {old}(self) -> _Any:", f"    return self.{new}"]
         lines += [
             "",

@@ -33,6 +33,7 @@ _ALWAYS = {
     "_DurationValue": "from rosz.time import DurationValue as _DurationValue",
     "_FAULTS": "from rosz.message.runtime import FAULTS as _FAULTS",
     "_Message": "from rosz.message import Message as _Message",
+    "_Renamed": "from rosz.message import Renamed as _Renamed",
     "_Sequenced": "from rosz.message import Sequenced as _Sequenced",
     "_Service": "from rosz.message import Service as _Service",
     "_Struct": "from struct import Struct as _Struct",

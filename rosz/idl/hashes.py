@@ -3,7 +3,8 @@
 ROS 1's is genmsg's: constants first, then fields, each on a line without comments and blanks; a
 field that is a message stands as the hash of that message. ROS 2's spellings of what is built into
 ROS 1 count as ROS 1's: ``builtin_interfaces/Time`` as ``time``, and any ``std_msgs/Header`` as the
-one with ``seq``. So a text that means the same in both has the hash that ROS 1 gives it.
+one with ``seq``. So a text that means the same in both has the hash that ROS 1 gives it. The few
+types that ROS 2 has changed have the hash of ROS 1's text.
 
 ROS 2's (REP 2016) is SHA-256 over a JSON text that describes the fields of the type and of all
 types in it; constants, defaults and comments are not part of it.
@@ -33,12 +34,26 @@ _BUILTIN = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Durat
 _HEADER = "std_msgs/msg/Header"
 _HEADER_MD5 = "2176decaecbce78abc3b96ef049fabed"
 
+_MD5_IN_ROS1 = {
+    "79e1dc841cdbf5f4ff851848b368746b": "4ddae7f048e32fda22cac764685e3974",  # BatteryState
+    "b5aff04250fbf270b71bef9d82c2132e": "c9a58c1b0b154e0e6da7578cb991d214",  # CameraInfo
+    "deed3b3500c4ca50f95eb656591164f6": "04a177815f75271039fa21f16acad8c9",  # DisparityImage
+    "08c30e99c06dacc3ca640bd46225091f": "1de93c67ec8858b831025a08fbf1b35c",  # ImageMarker
+    "b27df9b4124da18020f72c5b5eb24ae2": "4048c9de2a16f4ae8e0538085ebf1b97",  # Marker
+    "23ac1cfdf2364e1754b785804f19f800": "331cdbddfa4bc96ffc3b9ad98900a54c",  # NavSatStatus
+    "470cee326c156c680917c830889c04a6": "c005c34273dc426c67a020a87bc24148",  # Range
+    "8c7314fcbb621a6a7a6af3200d726861": "d8f8cbc74c5ff283fca29569ccefb45d",  # SolidPrimitive
+}
+"""The hash of ROS 1's text by the hash of ROS 2's, of types that ROS 2 has changed: what a ROS 1
+peer calls the type."""
+
 
 def message_md5(spec: MessageSpec, catalog: Catalog) -> str:
     """Return the md5 of a message, 32 hexadecimal digits."""
     if spec.name == _HEADER:
         return _HEADER_MD5
-    return hashlib.md5(_md5_text(spec, catalog).encode(), usedforsecurity=False).hexdigest()
+    md5 = hashlib.md5(_md5_text(spec, catalog).encode(), usedforsecurity=False).hexdigest()
+    return _MD5_IN_ROS1.get(md5, md5)
 
 
 def service_md5(spec: ServiceSpec, catalog: Catalog) -> str:

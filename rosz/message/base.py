@@ -34,6 +34,7 @@ __all__ = (
     "Array",
     "Bytes",
     "Message",
+    "Renamed",
     "Schema",
     "Sequenced",
     "Service",
@@ -341,6 +342,28 @@ class Sequenced(Message):
         if type(other) is not type(self):
             return NotImplemented
         return all(getattr(self, n) == getattr(other, n) for n, _, _ in self._schema)
+
+
+class _TakesRos1Names(msgspec.StructMeta):
+    def __call__(cls, *args: Any, **members: Any) -> Any:  # noqa: N805  # a class is the instance
+        """Make a message; members may have their names in ROS 1."""
+        renamed: dict[str, str] = cls._ros1_names  # type: ignore[attr-defined]
+        if not renamed.keys().isdisjoint(members):
+            for old in renamed.keys() & members.keys():
+                if renamed[old] in members:
+                    raise TypeError(f"'{old}' and '{renamed[old]}' are the same field: give one")
+            members = {renamed.get(name, name): value for name, value in members.items()}
+        return super().__call__(*args, **members)
+
+
+class Renamed(Message, metaclass=_TakesRos1Names):
+    """A message with fields that ROS 1 spells in another way, such as ``CameraInfo(K=…)``.
+
+    Attributes:
+        _ros1_names: Names of these fields by their names in ROS 1.
+    """
+
+    _ros1_names: ClassVar[dict[str, str]] = {}
 
 
 class Service:

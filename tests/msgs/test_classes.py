@@ -22,6 +22,7 @@ from rosz.msgs.rospy_tutorials.srv import AddTwoInts, AddTwoIntsRequest, AddTwoI
 from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, JointState
 from rosz.msgs.std_msgs.msg import Float64, Header, String
 from rosz.msgs.std_srvs.srv import SetBool, Trigger
+from rosz.msgs.stereo_msgs.msg import DisparityImage
 from rosz.typestore import TypeStore
 
 from .invented import Written
@@ -193,6 +194,25 @@ def test_ros_1_names_of_fields() -> None:
     assert info.P is info.p
     assert info.R is info.r
     assert array("d", [0.5]) == CameraInfo.from_cdr(info.to_cdr()).D
+
+
+def test_ros_1_names_of_members() -> None:
+    info_type: Any = CameraInfo
+    info = info_type(K=[1.0] * 9, D=[0.5], height=3)
+    assert info == CameraInfo(k=[1.0] * 9, d=[0.5], height=3)
+    assert pickle.loads(pickle.dumps(info)) == copy.deepcopy(info) == info
+    assert DisparityImage(T=0.1).t == 0.1  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="'K' and 'k' are the same field: give one"):
+        info_type(K=[1.0] * 9, k=[1.0] * 9)
+    with pytest.raises(TypeError, match="Unexpected keyword argument 'X'"):
+        info_type(X=1)
+
+
+def test_a_type_of_ros_1s_text_keeps_its_own_names() -> None:
+    text = "Header header\nfloat64[] D\nfloat64[9] K\n"
+    info_type: Any = TypeStore().message_from_text("sensor_msgs/CameraInfo", text)
+    info = info_type(D=[1.0])
+    assert array("d", [1.0]) == info_type.from_cdr(info.to_cdr()).D
 
 
 def test_words_of_python_as_names() -> None:

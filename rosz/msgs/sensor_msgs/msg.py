@@ -9,6 +9,7 @@ from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Bytes as _Bytes
 from rosz.message import Message as _Message
+from rosz.message import Renamed as _Renamed
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
@@ -119,7 +120,7 @@ class BatteryState(_Message):
     _type = "sensor_msgs/BatteryState"
     _type_name = "sensor_msgs/msg/BatteryState"
     _type_hash = "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741"
-    _md5sum = "79e1dc841cdbf5f4ff851848b368746b"
+    _md5sum = "4ddae7f048e32fda22cac764685e3974"
     _text = (
         "# State of one battery. What the hardware does not measure is NaN.\n"
         "\n"
@@ -299,7 +300,7 @@ _u5 = _Struct("<3I").unpack_from
 _u6 = _Struct("<6I?").unpack_from
 
 
-class CameraInfo(_Message):
+class CameraInfo(_Renamed):
     """How a camera maps space to pixels: calibration and the part of the sensor in use."""
 
     header: Header = _field(default_factory=Header)
@@ -313,6 +314,7 @@ class CameraInfo(_Message):
     binning_x: int = 0
     binning_y: int = 0
     roi: RegionOfInterest = _field(default_factory=RegionOfInterest)
+    _ros1_names = {"D": "d", "K": "k", "R": "r", "P": "p"}
 
     @property
     def D(self) -> _Any:
@@ -349,7 +351,7 @@ class CameraInfo(_Message):
     _type = "sensor_msgs/CameraInfo"
     _type_name = "sensor_msgs/msg/CameraInfo"
     _type_hash = "RIHS01_b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275"
-    _md5sum = "b5aff04250fbf270b71bef9d82c2132e"
+    _md5sum = "c9a58c1b0b154e0e6da7578cb991d214"
     _text = (
         "# How a camera maps space to pixels: calibration and the part of the sensor in use.\n"
         "#\n"
@@ -1506,7 +1508,7 @@ class NavSatStatus(_Message):
     _type = "sensor_msgs/NavSatStatus"
     _type_name = "sensor_msgs/msg/NavSatStatus"
     _type_hash = "RIHS01_d1ed3befa628e09571bd273b888ba1c1fd187c9a5e0006b385d7e5e9095a3204"
-    _md5sum = "23ac1cfdf2364e1754b785804f19f800"
+    _md5sum = "331cdbddfa4bc96ffc3b9ad98900a54c"
     _text = (
         "# How good a satellite fix is and where it comes from.\n"
         "\n"
@@ -1568,7 +1570,7 @@ class NavSatFix(_Message):
     _type = "sensor_msgs/NavSatFix"
     _type_name = "sensor_msgs/msg/NavSatFix"
     _type_hash = "RIHS01_62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"
-    _md5sum = "ad84cbbfe42855c46e65331f0023d113"
+    _md5sum = "2d3a8cd499b9b4a0249fb98fd05cfa48"
     _text = (
         "# A position from satellites, on the WGS 84 ellipsoid.\n"
         "\n"
@@ -1896,7 +1898,7 @@ class Range(_Message):
     _type = "sensor_msgs/Range"
     _type_name = "sensor_msgs/msg/Range"
     _type_hash = "RIHS01_b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a"
-    _md5sum = "470cee326c156c680917c830889c04a6"
+    _md5sum = "c005c34273dc426c67a020a87bc24148"
     _text = (
         "# A distance that one beam of sound or light measured, along the x axis of the frame.\n"
         "#\n"

@@ -46,7 +46,7 @@ class SetCameraInfoRequest(_Message):
     _type = "sensor_msgs/SetCameraInfoRequest"
     _type_name = "sensor_msgs/srv/SetCameraInfo_Request"
     _type_hash = "RIHS01_27dc5497730fdb6930e66cb879c210e31a83022acc5bbc999f24f55286029f87"
-    _md5sum = "2c08ecedd3cf516e9c5c132b104a7aac"
+    _md5sum = "ee34be01fdeee563d0d99cd594d5581d"
     _text = (
         "# Give a camera its calibration to keep.\n"
         "\n"
@@ -169,7 +169,7 @@ class SetCameraInfo(_Service):
     _type = "sensor_msgs/SetCameraInfo"
     _type_name = "sensor_msgs/srv/SetCameraInfo"
     _type_hash = "RIHS01_a10cca5d33dc637c8d49db50ab288701a3592bb9cd854f2f16a0659613b68984"
-    _md5sum = "506f703908f96e8e60a3e6107d8fd8c0"
+    _md5sum = "bef1df590ed75ed1f393692395e15482"
     _text = (
         "# Give a camera its calibration to keep.\n"
         "\n"

@@ -219,7 +219,7 @@ class SolidPrimitive(_Message):
     _type = "shape_msgs/SolidPrimitive"
     _type_name = "shape_msgs/msg/SolidPrimitive"
     _type_hash = "RIHS01_2802a15190aadc3f496584df4b0b4c5824d8a0b31aaef839faa75bc34dda38ac"
-    _md5sum = "8c7314fcbb621a6a7a6af3200d726861"
+    _md5sum = "d8f8cbc74c5ff283fca29569ccefb45d"
     _text = (
         "# A simple solid about the origin of its frame.\n"
         "\n"

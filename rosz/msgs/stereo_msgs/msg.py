@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from msgspec import field as _field
-from rosz.message import Message as _Message
+from rosz.message import Renamed as _Renamed
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
@@ -33,7 +33,7 @@ _u4 = _Struct("<2I").unpack_from
 _u5 = _Struct("<2f4I?3x3f").unpack_from
 
 
-class DisparityImage(_Message):
+class DisparityImage(_Renamed):
     """The disparity of each pixel of a rectified stereo pair: how far a point moves from one image to
     the other. Depth is f * t / disparity."""
 
@@ -45,6 +45,7 @@ class DisparityImage(_Message):
     min_disparity: float = 0.0
     max_disparity: float = 0.0
     delta_d: float = 0.0
+    _ros1_names = {"T": "t"}
 
     @property
     def T(self) -> _Any:
@@ -57,7 +58,7 @@ class DisparityImage(_Message):
     _type = "stereo_msgs/DisparityImage"
     _type_name = "stereo_msgs/msg/DisparityImage"
     _type_hash = "RIHS01_1ec1ff6b5bace919e4544a37f2d96ead9f81783701b7b7a4d97a09325ecf2711"
-    _md5sum = "deed3b3500c4ca50f95eb656591164f6"
+    _md5sum = "04a177815f75271039fa21f16acad8c9"
     _text = (
         "# The disparity of each pixel of a rectified stereo pair: how far a point moves from one image to\n"
         "# the other. Depth is f * t / disparity.\n"

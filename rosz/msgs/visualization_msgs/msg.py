@@ -82,7 +82,7 @@ class ImageMarker(_Message):
     _type = "visualization_msgs/ImageMarker"
     _type_name = "visualization_msgs/msg/ImageMarker"
     _type_hash = "RIHS01_603152491ef2331c200a5305230d31f6e8704875944b388da0f547c415d11836"
-    _md5sum = "08c30e99c06dacc3ca640bd46225091f"
+    _md5sum = "1de93c67ec8858b831025a08fbf1b35c"
     _text = (
         "# A drawing on top of an image. Coordinates are pixels.\n"
         "\n"
@@ -393,7 +393,7 @@ class Marker(_Message):
     _type = "visualization_msgs/Marker"
     _type_name = "visualization_msgs/msg/Marker"
     _type_hash = "RIHS01_45b13ccf791f225962bf74e746f9644518855d783a6f42ba0cc14fde2b4f3ce0"
-    _md5sum = "b27df9b4124da18020f72c5b5eb24ae2"
+    _md5sum = "4048c9de2a16f4ae8e0538085ebf1b97"
     _text = (
         "# Something to draw in a 3D view.\n"
         "\n"
@@ -633,7 +633,7 @@ class InteractiveMarkerControl(_Message):
     _type = "visualization_msgs/InteractiveMarkerControl"
     _type_name = "visualization_msgs/msg/InteractiveMarkerControl"
     _type_hash = "RIHS01_60e2fa36344f5f4791b24a809542a18bffd555f563550d4b22b3bbfc31ec0ed5"
-    _md5sum = "427401a78b59b96f2d070e2025db5f0b"
+    _md5sum = "b3c81e785788195d1840b86c28da1aac"
     _text = (
         "# A handle of an interactive marker: what it looks like and what can be done with it.\n"
         "\n"
@@ -877,7 +877,7 @@ class InteractiveMarker(_Message):
     _type = "visualization_msgs/InteractiveMarker"
     _type_name = "visualization_msgs/msg/InteractiveMarker"
     _type_hash = "RIHS01_3d5b51448b51d73b0f395b94d259edd3a5d269ae9f7d9fd5cceb9ae4b72be346"
-    _md5sum = "94a95435a5b04a24d796231c873e60a0"
+    _md5sum = "dd86d22909d5a3364b384492e35c10af"
     _text = (
         "# A thing in a 3D view that a person can drag, turn, click or call a menu on.\n"
         "\n"
@@ -1287,7 +1287,7 @@ class InteractiveMarkerInit(_Message):
     _type = "visualization_msgs/InteractiveMarkerInit"
     _type_name = "visualization_msgs/msg/InteractiveMarkerInit"
     _type_hash = "RIHS01_23fda1b3373b154d9d6408dd7b9f8129b2a2b76b905ee421e8c4109d8bf71f78"
-    _md5sum = "2e5c9f425ad5add2f854052273293d77"
+    _md5sum = "d5f2c5045a72456d228676ab91048734"
     _text = (
         "# All interactive markers of a server, for views that come later.\n"
         "\n"
@@ -1656,7 +1656,7 @@ class InteractiveMarkerUpdate(_Message):
     _type = "visualization_msgs/InteractiveMarkerUpdate"
     _type_name = "visualization_msgs/msg/InteractiveMarkerUpdate"
     _type_hash = "RIHS01_0a8b000c4fd4d50876ac716a7de018911599a2f015795388e956a2ca8b0c54f0"
-    _md5sum = "341971ff2eba8b00c1b6c28496e0cd83"
+    _md5sum = "710d308d0a9276d65945e92dd30b3946"
     _text = (
         "# What changed among the interactive markers of a server.\n"
         "\n"
@@ -2020,7 +2020,7 @@ class MarkerArray(_Message):
     _type = "visualization_msgs/MarkerArray"
     _type_name = "visualization_msgs/msg/MarkerArray"
     _type_hash = "RIHS01_86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf"
-    _md5sum = "db89b041d4126bd7259de54897db24b6"
+    _md5sum = "d155b9ce5188fbaf89745847fd5882d7"
     _text = (
         "# Several markers at once.\n"
         "\n"

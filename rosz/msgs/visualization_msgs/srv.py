@@ -108,7 +108,7 @@ class GetInteractiveMarkersResponse(_Message):
     _type = "visualization_msgs/GetInteractiveMarkersResponse"
     _type_name = "visualization_msgs/srv/GetInteractiveMarkers_Response"
     _type_hash = "RIHS01_414620cf7471b5469b159989af34edd1ed9276be592e43d1b7544204f4177302"
-    _md5sum = "4d9387cc2b87f9055ba8f367b05db3f8"
+    _md5sum = "59cafd486c959fd1dd99bd971c3cbbd2"
     _text = (
         "uint64 sequence_number       # of the last update that is contained\n"
         "InteractiveMarker[] markers\n"
@@ -400,7 +400,7 @@ class GetInteractiveMarkers(_Service):
     _type = "visualization_msgs/GetInteractiveMarkers"
     _type_name = "visualization_msgs/srv/GetInteractiveMarkers"
     _type_hash = "RIHS01_bfdfaa861f4a8422b4ec3bd02c6681e4a45a83bdc2913d8facdf923d8ad1376a"
-    _md5sum = "4d9387cc2b87f9055ba8f367b05db3f8"
+    _md5sum = "59cafd486c959fd1dd99bd971c3cbbd2"
     _text = (
         "# Ask a server for all its interactive markers.\n"
         "---\n"
