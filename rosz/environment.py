@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 import os
+import stat
 from collections.abc import Mapping
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import Literal
@@ -25,6 +27,9 @@ DEFAULT_RENDEZVOUS = "tcp/localhost:7447"
 """The endpoint where the sessions of one machine meet, with the port of rmw_zenoh's router."""
 
 _MAX_DOMAIN = 232
+_PRIVATE = "private"
+_USER_FOLDERS = Path("/run/user")
+"""Where systemd makes a folder for each user who is logged in."""
 
 
 class Environment(msgspec.Struct, frozen=True, kw_only=True):
@@ -32,7 +37,8 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         domain: ``ROS_DOMAIN_ID``, 0 when unset; domains do not see each other.
-        rendezvous: ``ROSZ_RENDEZVOUS``, the endpoint where local sessions meet.
+        rendezvous: ``ROSZ_RENDEZVOUS``, the endpoint where local sessions meet; ``private`` is a
+            unix socket in a folder that only this user can enter.
         connect: ``ROSZ_CONNECT``, endpoints of other machines, separated by commas.
         listen: ``ROSZ_LISTEN``, endpoints to accept other machines on, separated by commas.
         mode: ``ROSZ_MODE``: ``peer`` (mesh) or ``client`` (of the core at the rendezvous, or of
@@ -92,7 +98,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         listen = _endpoints("ROSZ_LISTEN", env)
         return cls(
             domain=_number("ROS_DOMAIN_ID", env, f"a number from 0 to {_MAX_DOMAIN}", _MAX_DOMAIN),
-            rendezvous=_endpoint("ROSZ_RENDEZVOUS", env.get("ROSZ_RENDEZVOUS", "")),
+            rendezvous=_rendezvous(env.get("ROSZ_RENDEZVOUS", "")),
             connect=connect,
             listen=listen,
             mode=_mode(env.get("ROSZ_MODE", ""), dials=bool(connect and not listen)),
@@ -178,9 +184,26 @@ def _endpoints(name: str, env: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(_endpoint(name, part) for part in parts if part)
 
 
+def _rendezvous(text: str) -> str:
+    if text != _PRIVATE:
+        return _endpoint("ROSZ_RENDEZVOUS", text) if text else DEFAULT_RENDEZVOUS
+    # Named by the user's number alone, so that all programs of the user agree on it.
+    user = os.geteuid()
+    own = _USER_FOLDERS / str(user)
+    folder = own / "rosz" if own.is_dir() else Path(f"/tmp/rosz-{user}")  # noqa: S108  # checked
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != user or found.st_mode & 0o077:
+        raise UsageError(
+            f"ROSZ_RENDEZVOUS is '{_PRIVATE}', but '{folder}' is not a folder that only you can"
+            f" enter; 'ls -ld {folder}' shows whose it is: remove it, or name another place,"
+            " 'unixsock-stream/FOLDER/z.sock' with a folder of your own (chmod 700)"
+        )
+    return f"unixsock-stream/{folder}/z.sock"
+
+
 def _endpoint(name: str, text: str) -> str:
-    if not text:
-        return DEFAULT_RENDEZVOUS
     from rosz.wire import Endpoint  # unset in most processes, which can do without the import
 
     return str(Endpoint.parse(text, name))

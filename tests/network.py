@@ -229,6 +229,7 @@ class Network:
 
     def __init__(self, domain: int = 42) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="rosz-"))
+        self.folder.chmod(0o755)  # not private: sessions listen at loopback ports, as usual
         self.rendezvous = f"unixsock-stream/{self.folder}/z.sock"
         self.domain = domain
         self._open: list[Any] = []

@@ -108,6 +108,9 @@ def env_command(
         Argument("SHELL", "bash, zsh or fish; $SHELL if omitted.", lambda _: list(SHELLS)),
     ] = "",
     *,
+    private: Annotated[
+        bool, Option("--private", "Also keep other users of this machine out.")
+    ] = False,
     json: Annotated[bool, Option("--json", "Print the settings of rosz as JSON.")] = False,
 ) -> None:
     """Print shell code that makes rostopic, roslaunch and the like run rosz.
@@ -126,6 +129,9 @@ def env_command(
             f"{near_miss(shell, SHELLS)}"
         )
     home = str(Path(__file__).parent.parent)
+    if private:
+        setting = "set -gx ROSZ_RENDEZVOUS" if name == "fish" else "export ROSZ_RENDEZVOUS="
+        sys.stdout.write(f"{setting}{' ' * (name == 'fish')}private\n")
     sys.stdout.write(_script(name if name in SHELLS else "bash", home, sys.executable))
 
 

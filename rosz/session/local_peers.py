@@ -6,6 +6,10 @@ so that it does not introduce peers. So each session registers itself with a soc
 abstract namespace, which disappears with the process. Nothing is ever sent to it. Its name contains
 the process id and the loopback port where the session can be reached directly.
 
+If the rendezvous is a unix socket in a folder that nobody else can enter, it is private: sessions
+can be reached directly at further unix sockets beside it, and at no port, which all users of the
+machine could connect to. The number of such a socket takes the place of the port.
+
 A process is stopped by Ctrl-Z or a debugger. The kernel still accepts connections for it, but
 nothing ever answers, so checking first avoids a long wait. A process that cannot be examined, for
 example in another container, counts as running.
@@ -16,6 +20,7 @@ from __future__ import annotations
 import errno
 import os
 import socket
+import stat
 import struct
 import sys
 from collections.abc import Container, Iterable, Iterator
@@ -34,14 +39,17 @@ __all__ = (
     "LocalPeers",
     "LocalRegistration",
     "describe_process",
+    "direct_endpoint",
     "find_listener",
     "how_to_resume",
+    "is_private",
     "is_stopped",
     "pid_of_peer",
     "tcp_ports",
 )
 
 _LOOPBACK = "127.0.0.1"
+_MAX_PORT = 65535
 _FIELDS = 4
 _PROC = Path("/proc")
 _STOPPED = frozenset("Tt")
@@ -57,7 +65,7 @@ class LocalPeer(msgspec.Struct, frozen=True):
     Attributes:
         namespace: The namespace of its process id.
         pid: The id of its process.
-        port: The loopback port that it listens at; 0 for none.
+        port: The loopback port that it listens at, or the number of its private socket; 0 for none.
         zid: The id of the session; empty while it is being opened.
     """
 
@@ -71,10 +79,35 @@ class LocalPeer(msgspec.Struct, frozen=True):
         """Whether its process is stopped; false if that is unknown."""
         return self.namespace == _pid_namespace() and is_stopped(self.pid)
 
-    @property
-    def endpoint(self) -> str:
-        """The endpoint where it can be reached directly; empty if there is none."""
-        return f"tcp/{_LOOPBACK}:{self.port}" if self.port else ""
+
+def is_private(rendezvous: str) -> bool:
+    """Tell whether a rendezvous is a unix socket in a folder that nobody else can enter."""
+    endpoint = Endpoint(rendezvous)
+    if not endpoint.is_unix:
+        return False
+    try:
+        mode = Path(endpoint.address).parent.stat().st_mode
+    except OSError:  # there is no such folder, so there can be no socket
+        return False
+    return not mode & (stat.S_IRWXG | stat.S_IRWXO)
+
+
+def direct_endpoint(rendezvous: str, peer: LocalPeer | None) -> str:
+    """Return the endpoint where a session listens for direct links; empty if any will do.
+
+    Args:
+        rendezvous: The endpoint where sessions meet.
+        peer: How the session is registered, if it is.
+    """
+    port = peer.port if peer is not None else 0
+    if is_private(rendezvous):
+        return f"{rendezvous}.{port or _private_number():x}"
+    return f"tcp/{_LOOPBACK}:{port}" if port else ""
+
+
+def _private_number() -> int:
+    """Return a number for a private socket, which no port has."""
+    return _MAX_PORT + 1 + int.from_bytes(os.urandom(4))
 
 
 class LocalPeers:
@@ -127,7 +160,11 @@ class LocalPeers:
     @property
     def running(self) -> list[str]:
         """The endpoints of the sessions whose processes are not stopped."""
-        return [peer.endpoint for peer in self._peers if peer.port and not peer.is_stopped]
+        return [
+            direct_endpoint(self.rendezvous, peer)
+            for peer in self._peers
+            if peer.port and not peer.is_stopped
+        ]
 
     @cached_property
     def is_any_running(self) -> bool:
@@ -201,7 +238,9 @@ class LocalRegistration:
         self._reserved: socket.socket | None = None
         if sys.platform != "linux":
             return
-        if reachable:
+        if reachable and is_private(rendezvous):
+            self.peer = msgspec.structs.replace(self.peer, port=_private_number())
+        elif reachable:
             self._reserved = socket.socket()
             # Two sockets with this option may have one port, as long as only one of them listens.
             self._reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -7,6 +7,7 @@ import logging
 import os
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -23,7 +24,7 @@ from rosz.session.config import (
     zenoh_settings,
 )
 from rosz.session.declared import translate_errors
-from rosz.session.local_peers import LocalPeer, LocalPeers
+from rosz.session.local_peers import LocalPeer, LocalPeers, direct_endpoint, is_private
 from rosz.session.zenoh_workarounds import (
     SEGMENTS,
     connect_to_running,
@@ -31,6 +32,7 @@ from rosz.session.zenoh_workarounds import (
     prepare_process,
     reachable_config,
     remove_abandoned_segments,
+    remove_abandoned_sockets,
 )
 from rosz.wire import Endpoint
 
@@ -72,11 +74,8 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         _log.warning("no shared memory: %s cannot be written to; samples go over links", SEGMENTS)
         config = msgspec.structs.replace(config, shared_memory=0)
     settings = _settings(config)
+    _listen_directly(settings, config.rendezvous, own)
     if own is not None:
-        listen = json.loads(settings.get_json("listen/endpoints"))
-        if own.endpoint and EPHEMERAL in listen:
-            listen[listen.index(EPHEMERAL)] = own.endpoint
-            settings.insert_json5("listen/endpoints", json.dumps(listen))
         connect_to_running(settings, peers)
     remove_abandoned_segments()
     _log_refused_links(config)
@@ -89,6 +88,19 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         if _NOBODY not in str(error):
             raise
         raise _nobody(config) from error
+
+
+def _listen_directly(settings: zenoh.Config, rendezvous: str, own: LocalPeer | None) -> None:
+    """Listen for direct links where the session is registered, or at a private socket."""
+    endpoint = Endpoint(rendezvous)
+    if endpoint.is_unix and not (folder := Path(endpoint.address).parent).is_dir():
+        raise TransportError(f"nobody can meet at '{endpoint}': there is no folder '{folder}'")
+    if is_private(rendezvous):
+        remove_abandoned_sockets(rendezvous)
+    listen = json.loads(settings.get_json("listen/endpoints"))
+    if EPHEMERAL in listen and (direct := direct_endpoint(rendezvous, own)):
+        listen[listen.index(EPHEMERAL)] = direct
+        settings.insert_json5("listen/endpoints", json.dumps(listen))
 
 
 def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:

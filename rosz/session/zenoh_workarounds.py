@@ -71,6 +71,7 @@ __all__ = (
     "prepare_process",
     "reachable_config",
     "remove_abandoned_segments",
+    "remove_abandoned_sockets",
 )
 
 _RUNTIME = "ZENOH_RUNTIME"
@@ -96,6 +97,7 @@ _AGAIN_SECONDS: Final = 0.01
 SEGMENTS = Path("/dev/shm")  # noqa: S108  # the place on Linux
 """The folder of the segments."""
 _SUFFIX = ".zenoh"
+_LOCK = ".lock"
 _MIN_AGE = 2.0
 """Seconds that the maker of a segment has between creating and locking it."""
 
@@ -221,7 +223,9 @@ class _StoppedPeers:
         there = connection.getpeername()
         if connection.family == socket.AF_UNIX:
             ends = (there, connection.getsockname())
-            return bool(self._path) and self._path in ends and pid_of_peer(connection) in self._pids
+            # Private sockets are beside that of the rendezvous, and their names begin with its.
+            ours = bool(self._path) and any(str(end).startswith(self._path) for end in ends)
+            return ours and pid_of_peer(connection) in self._pids
         return (
             connection.family in {socket.AF_INET, socket.AF_INET6}
             and there[1] in self._ports
@@ -320,16 +324,31 @@ def remove_abandoned_segments(folder: Path = SEGMENTS, *, min_age: float = _MIN_
     Returns:
         The names of the files removed.
     """
-    before = time.time() - min_age
-    removed: list[str] = []
-    for path in folder.glob("*" + _SUFFIX):
-        # Another process may remove it first, use it, or own it.
-        with suppress(OSError):
-            found = path.stat()
-            if found.st_uid != os.getuid() or found.st_ctime >= before:
-                continue
-            with path.open("r+b") as file:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                path.unlink()
-                removed.append(path.name)
-    return removed
+    found = folder.glob("*" + _SUFFIX)
+    return [path.name for path in found if _remove_abandoned(path, min_age)]
+
+
+def remove_abandoned_sockets(rendezvous: str) -> None:
+    """Remove the private sockets of processes that were killed.
+
+    Zenoh holds a lock on a file beside each socket. Numbers are never used again, so nobody opens
+    such a file any more; the socket of the rendezvous itself has no number.
+    """
+    first = Path(Endpoint(rendezvous).address)
+    for lock in first.parent.glob(f"{first.name}.*{_LOCK}"):
+        if _remove_abandoned(lock, _MIN_AGE):
+            lock.with_name(lock.name.removesuffix(_LOCK)).unlink(missing_ok=True)
+
+
+def _remove_abandoned(path: Path, min_age: float) -> bool:
+    """Remove a file of this user that nobody has locked; return whether it was removed."""
+    # Another process may remove it first, use it, or own it.
+    with suppress(OSError):
+        found = path.stat()
+        if found.st_uid != os.getuid() or found.st_ctime >= time.time() - min_age:
+            return False
+        with path.open("r+b") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            path.unlink()
+            return True
+    return False

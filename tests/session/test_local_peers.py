@@ -13,7 +13,7 @@ from network import Network, Program, eventually
 
 from rosz.errors import TransportError
 from rosz.session import LocalPeers, Session, SessionConfig, describe_process, is_stopped
-from rosz.session.local_peers import LocalRegistration, find_listener
+from rosz.session.local_peers import LocalRegistration, direct_endpoint, find_listener
 from rosz.wire import Endpoint
 
 LISTEN = """
@@ -135,7 +135,8 @@ def test_a_registration_is_there_before_its_session(network: Network) -> None:
     one = LocalRegistration(network.rendezvous)
     other = LocalRegistration(network.rendezvous, reachable=False)
     assert set(peers(network)) == {one.peer, other.peer}
-    assert other.peer.endpoint == ""
+    assert direct_endpoint(network.rendezvous, one.peer) == f"tcp/127.0.0.1:{one.peer.port}"
+    assert direct_endpoint(network.rendezvous, other.peer) == ""
     one.opened("abc")
     assert {peer.zid for peer in peers(network)} == {"", "abc"}
     one.close()

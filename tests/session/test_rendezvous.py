@@ -13,7 +13,7 @@ from network import TIMEOUT, Network, Program, eventually, free_port
 from rosz.environment import Environment
 from rosz.errors import TransportError
 from rosz.node import Context, Node
-from rosz.session import Session, SessionConfig, config
+from rosz.session import Session, SessionConfig, config, zenoh_workarounds
 
 PEER = """
     import sys
@@ -36,9 +36,11 @@ PEER = """
 """
 
 
-@pytest.fixture(params=["unixsock", "tcp"])
+@pytest.fixture(params=["unixsock", "private", "tcp"])
 def place(request: pytest.FixtureRequest) -> Iterator[Network]:
     made = Network()
+    if request.param == "private":
+        made.folder.chmod(0o700)
     if request.param == "tcp":
         made.rendezvous = f"tcp/127.0.0.1:{free_port()}"
     yield made
@@ -180,3 +182,26 @@ def test_stop_and_go(network: Network) -> None:
         thread.join(TIMEOUT * 2)
     assert not errors
     assert not any(thread.is_alive() for thread in threads)
+
+
+def test_killed_processes_leave_no_private_sockets(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    network.folder.chmod(0o700)
+    killed, _ = peer(network, "killed"), peer(network, "lasting")
+    before = set(network.folder.glob("z.sock.*.lock"))
+    assert len(before) == 2
+    killed.kill()
+    monkeypatch.setattr(zenoh_workarounds, "_MIN_AGE", 0.0)
+    network.session()
+    (left,) = before & set(network.folder.glob("z.sock.*.lock"))
+    sockets = {path.name for path in network.folder.glob("z.sock.*[0-9a-f]")}
+    assert left.name.removesuffix(".lock") in sockets
+    assert len(sockets) == 2  # that one, and the new session's
+    network.node("other").context.graph.wait_for_node("/lasting", TIMEOUT)
+
+
+def test_a_unix_socket_in_no_folder(network: Network) -> None:
+    nowhere = SessionConfig(rendezvous=f"unixsock-stream/{network.folder}/nowhere/z.sock")
+    with pytest.raises(TransportError, match=r"there is no folder '.*/nowhere'"):
+        Session.open(nowhere)
