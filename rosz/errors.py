@@ -189,8 +189,15 @@ class PackageNotFound(NotFoundError):
         self, package: str, known: Iterable[str] = (), searched: Iterable[str] = ()
     ) -> None:
         self.package = package
+        from rosz.replacements import instead_of  # rarely needed
+
         where = ", ".join(searched) or "nowhere: the package path is empty"
-        hint = near_miss(package, known) or "; add its folder to ROSZ_PACKAGE_PATH"
+        instead = instead_of(package)
+        hint = f"; rosz does not have it: {instead}" if instead else near_miss(package, known)
+        hint = hint or (
+            "; a package is a folder with a package.xml, below ROSZ_PACKAGE_PATH, ROS_PACKAGE_PATH"
+            " or the 'src' of the workspace around the working folder"
+        )
         super().__init__(f"package '{package}' not found (searched {where}){hint}")
 
 

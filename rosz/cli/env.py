@@ -2,8 +2,10 @@
 
 A folder of small programs goes on the PATH, so that ``timeout 5 rostopic …``, ``nohup roscore`` and
 scripts find them as well. Only roscd, which changes the working folder of the shell, is a function.
-Another folder goes on the PYTHONPATH, so that scripts that are run directly can import rospy. In an
-interactive shell, the TAB key runs ``rosz complete``.
+A second folder goes to the end of the PATH. It has a program for each command that rosz has not,
+which says what to use instead, where the machine does not have that command. A third one goes on
+the PYTHONPATH, so that scripts that are run directly can import rospy. In an interactive shell, the
+TAB key runs ``rosz complete``.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ _HELPERS = ("roscd", "rosed", "rosls", "rospack")
 
 _POSIX = """\
 export ROSZ_PYTHON={python}
-case ":$PATH:" in *:{folder}:*) ;; *) export PATH={folder}:"$PATH" ;; esac
+case ":$PATH:" in *:{folder}:*) ;; *) export PATH={folder}:"$PATH":{absent} ;; esac
 case ":${{PYTHONPATH-}}:" in
   *:{modules}:*) ;;
   *) export PYTHONPATH="${{PYTHONPATH:+$PYTHONPATH:}}"{modules} ;;
@@ -84,7 +86,7 @@ fi
 
 _FISH = """\
 set -gx ROSZ_PYTHON {python}
-contains {folder} $PATH; or set -gx PATH {folder} $PATH
+contains {folder} $PATH; or set -gx PATH {folder} $PATH {absent}
 contains {modules} $PYTHONPATH; or set -gx --path PYTHONPATH $PYTHONPATH {modules}
 function roscd
     set -l parts (string split -m 1 / "$argv[1]")
@@ -141,6 +143,7 @@ def _script(shell: str, home: str, python: str) -> str:
     names = " ".join(("rosz", *ALIASES, *_HELPERS))
     return text.format(
         folder=shlex.quote(f"{home}/cli/bin"),
+        absent=shlex.quote(f"{home}/cli/absent"),
         modules=shlex.quote(f"{home}/ros1/shell"),
         python=shlex.quote(python),
         names=names,

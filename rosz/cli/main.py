@@ -143,8 +143,13 @@ def _dispatch(argv: list[str]) -> int:
 
         return complete(words)
     if name not in COMMANDS:
+        from rosz.replacements import instead_of
+
+        instead = instead_of(name)
         hint = near_miss(name, COMMANDS) or "; 'rosz --help' lists them"
-        raise UsageError(f"'{name}' is not a command{hint}")
+        raise UsageError(
+            f"rosz has no '{name}': {instead}" if instead else f"'{name}' is not a command{hint}"
+        )
     return _invoke(load(name), words, f"rosz {name}")
 
 

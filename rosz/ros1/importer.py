@@ -25,6 +25,7 @@ from types import ModuleType
 from rosz.environment import Environment, package_index
 from rosz.errors import PackageError, RoszError
 from rosz.packages import PackageIndex
+from rosz.replacements import instead_of
 from rosz.ros1.modules import (
     ELSEWHERE,
     MODULES,
@@ -257,11 +258,17 @@ class _EndFinder(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> ModuleSpec | None:
-        """Find a package on the package path."""
-        if path is not None or "." in fullname:
-            return None
-        folder = self._types.folder(fullname)
+        """Find a package on the package path.
+
+        Raises:
+            ModuleNotFoundError: ROS has such a module and rosz has not; the text says what to use.
+        """
+        folder = self._types.folder(fullname) if path is None and "." not in fullname else None
         if folder is None:
+            instead = instead_of(fullname)
+            if instead:
+                text = f"No module named '{fullname}': rosz does not have it: {instead}"
+                raise ModuleNotFoundError(text, name=fullname)
             return None
         # The folder of catkin_python_setup.
         code = folder / "src" / fullname

@@ -35,6 +35,7 @@ FLOORS = {
     "rosz.qos": 0,
     "rosz.packages": 0,
     "rosz.message": 0,
+    "rosz.replacements": 0,
     "rosz.idl": 1,
     "rosz.params": 1,
     "rosz.launch": 1,

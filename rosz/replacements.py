@@ -1,0 +1,140 @@
+"""What to use instead of the programs, packages and modules of ROS that rosz does not have.
+
+Shells, ``rosz run``, launch files and imports find here what they say of such a name.
+"""
+
+from __future__ import annotations
+
+__all__ = ("COMMANDS", "instead_of")
+
+_NOTHING_TO_BUILD = "nothing needs building; 'rosz pkg check' looks for mistakes"
+_NOTHING_TO_INSTALL = "pip installs what a package imports; messages and rospy come with rosz"
+_MASTER = "there is no master; nodes find each other, and 'rosz core' is a meeting point"
+
+
+def _of_ros2(what: str) -> str:
+    """Return that a program of ROS 2 works beside rosz."""
+    return (
+        f"{what} of ROS 2 works beside rosz with RMW_IMPLEMENTATION=rmw_zenoh_cpp: rosz help ros2"
+    )
+
+
+_GRAPHS = "use 'rosz node list', 'rosz node info' and 'rosz topic info', or " + _of_ros2(
+    "rqt_graph"
+)
+_PICTURES = _of_ros2("rqt_image_view")
+_IMAGES = (
+    "numpy.frombuffer(image.data, numpy.uint8).reshape(image.height, image.width, -1) is the array"
+    " that OpenCV takes: pip install 'rosz[numpy]' opencv-python"
+)
+_BAGS = (
+    "rosz has no bags yet; " + _of_ros2("'ros2 bag record'") + "; 'pip install rosbags' reads files"
+)
+_GAZEBO = "'rosz launch turtlebot3_sim turtlebot3_sim.launch' simulates a TurtleBot3; " + _of_ros2(
+    "ros_gz_bridge"
+)
+_TRANSFORMS = "in a node use tf2_ros: Buffer, TransformListener, StaticTransformBroadcaster"
+_LAUNCH = "launch files are XML: 'rosz launch PACKAGE FILE' runs them"
+_PLOT = "'rosz topic echo -p TOPIC' prints CSV to plot; " + _of_ros2("rqt_plot")
+
+COMMANDS = {
+    "catkin": _NOTHING_TO_BUILD,
+    "catkin_init_workspace": "a workspace is any folder with 'src' in it; nothing needs building",
+    "catkin_make_isolated": _NOTHING_TO_BUILD,
+    "colcon": _NOTHING_TO_BUILD,
+    "gazebo": _GAZEBO,
+    "gzclient": _GAZEBO,
+    "gzserver": _GAZEBO,
+    "ros2": "'rosz topic', 'rosz node', 'rosz param' and so on take its place: rosz --help",
+    "rosbag": _BAGS,
+    "rosclean": "the size of log files is bounded; remove old ones by hand",
+    "rosdep": _NOTHING_TO_INSTALL,
+    "rosinstall": "git gets sources; a package below 'src' of the workspace is found as it is",
+    "rosmake": _NOTHING_TO_BUILD,
+    "rosmaster": _MASTER,
+    "rostest": "start the nodes with 'rosz launch' and run the test, which may import rostest",
+    "rosversion": "'rosz --version' prints the version of rosz",
+    "rqt": "'rosz log', 'rosz reconfigure', 'rosz topic' and 'rosz node' show it; "
+    + _of_ros2("rqt"),
+    "rqt_bag": _BAGS,
+    "rqt_console": "use 'rosz log'; 'rosz log level NODE LOGGER LEVEL' sets levels",
+    "rqt_graph": _GRAPHS,
+    "rqt_image_view": _PICTURES,
+    "rqt_logger_level": "use 'rosz log level NODE LOGGER LEVEL'",
+    "rqt_plot": _PLOT,
+    "rqt_publisher": "use 'rosz topic pub'",
+    "rqt_tf_tree": _of_ros2("'ros2 run tf2_tools view_frames'"),
+    "rqt_topic": "use 'rosz topic list -v', 'rosz topic echo' and 'rosz topic hz'",
+    "rviz": _of_ros2("rviz2"),
+    "wstool": "git gets sources; a package below 'src' of the workspace is found as it is",
+    "xacro": "'pip install xacro' brings the command; in launch files: command=\"xacro FILE\"",
+}
+"""Commands that people type; each has a program of this name in ``rosz/cli/absent``."""
+
+_PACKAGES = {
+    "actionlib_tutorials": "actionlib itself is importable: rosz help rospy",
+    "amcl": _of_ros2("nav2_amcl"),
+    "beginner_tutorials": "it is the package that the tutorials create: rosz pkg create --bare",
+    "cv_bridge": _IMAGES,
+    "gazebo_ros": _GAZEBO,
+    "gmapping": _of_ros2("slam_toolbox"),
+    "image_geometry": _IMAGES,
+    "image_transport": "publish sensor_msgs/Image, or sensor_msgs/CompressedImage, itself",
+    "image_view": _PICTURES,
+    "joint_state_publisher": "publish sensor_msgs/JointState, as a node or with 'rosz topic pub'",
+    "joint_state_publisher_gui": "publish sensor_msgs/JointState, or use 'rosz topic pub'",
+    "map_server": _of_ros2("nav2_map_server"),
+    "move_base": _of_ros2("nav2_bringup"),
+    "nodelet": "write the nodes as nodes: those of one machine can share memory (ROSZ_SHM)",
+    "robot_state_publisher": _of_ros2("robot_state_publisher"),
+    "roscpp": "rosz has no C++ API; " + _of_ros2("rclcpp"),
+    "roscpp_tutorials": "'rosz run rosz_tutorials publisher.py' is a talker in Python",
+    "rospy_tutorials": "'rosz run rosz_tutorials publisher.py' and subscriber.py talk and listen",
+    "slam_gmapping": _of_ros2("slam_toolbox"),
+    "teleop_twist_keyboard": _of_ros2("teleop_twist_keyboard"),
+    "tf": _TRANSFORMS,
+    "tf2_ros": _TRANSFORMS,
+    "tf2_tools": _TRANSFORMS,
+    "topic_tools": "a node that subscribes and publishes relays a topic",
+    "turtle_tf": _TRANSFORMS,
+    "turtle_tf2": _TRANSFORMS,
+    "usb_cam": _of_ros2("usb_cam"),
+}
+
+_ALIAS = "after 'eval \"$(rosz env)\"' the shell has it"
+_ALIASES = {
+    "catkin_create_pkg": "use 'rosz pkg create --bare'",
+    "catkin_make": "use 'rosz pkg check'; nothing needs building",
+    **dict.fromkeys(("roscd", "rosed", "rosls", "rospack"), _ALIAS),
+    "roswtf": "use 'rosz doctor'",
+}
+
+_MODULES = {
+    "PyKDL": "use tf.transformations: pip install 'rosz[numpy]'",
+    "ament_index_python": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
+    "catkin": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
+    "launch": _LAUNCH,
+    "launch_ros": _LAUNCH,
+    "roslaunch": _LAUNCH,
+    "ros_numpy": "numpy.frombuffer reads the data of messages: pip install 'rosz[numpy]'",
+    "sensor_msgs.point_cloud2": (
+        "numpy.frombuffer(cloud.data, dtype) reads the points, with a dtype of cloud.fields:"
+        " pip install 'rosz[numpy]'"
+    ),
+    "tf2_py": _TRANSFORMS,
+}
+
+
+def instead_of(name: str) -> str:
+    """Return what to use instead of a program, package or module; empty if nothing is known.
+
+    Args:
+        name: Name of the program, package or module.
+    """
+    for table in COMMANDS, _ALIASES, _PACKAGES, _MODULES:
+        if name in table:
+            return table[name]
+    for prefix, other in (("rqt_", "rqt"), ("gazebo_", "gazebo")):
+        if name.startswith(prefix):
+            return COMMANDS[other]
+    return ""
