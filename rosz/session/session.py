@@ -11,6 +11,7 @@ import logging
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from typing import Any, Self, Unpack
 
 import zenoh
@@ -58,6 +59,15 @@ _HEARTBEAT_SECONDS = 0.5
 _log = logging.getLogger("rosz.session")
 
 
+@cache
+def _runtime() -> Lifecycle:
+    """Return the lifecycle of Zenoh's threads, which start with the first session of a process.
+
+    They never end, and a forked child does not have them: a session would never be open there.
+    """
+    return Lifecycle("the network")
+
+
 class Session:
     """One connection to the network.
 
@@ -99,7 +109,9 @@ class Session:
             TransportError: Nobody answers although the configuration requires a link, an endpoint
                 is occupied or malformed, or a configuration value is refused.
             UsageError: The override text is malformed.
+            ClosedError: This process was forked from one that had opened a session.
         """
+        _runtime().check_open("open a session")
         if config.mode == "client" or not config.hold_rendezvous:
             raw = open_raw(config, peers or LocalPeers.read(config.rendezvous))
             registration = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 
 import pytest
 from network import Network
@@ -151,3 +152,69 @@ def test_a_child_with_a_node_of_its_own(network: Network) -> None:
     )
     assert program.exit_code() == 0, program.output
     assert program.lines == ["heard hello"]
+
+
+REFUSED = "cannot open a session: .*forked from one that uses rosz.*'spawn'"
+PARENTS = {
+    "open": 'node = rosz.Node("parent")',
+    "closed": 'with rosz.Node("parent"): pass',
+}
+POOLS = {
+    "multiprocessing": "multiprocessing.get_context('fork').Pool(2)",
+    "concurrent.futures": (
+        "concurrent.futures.ProcessPoolExecutor(2, multiprocessing.get_context('fork'))"
+    ),
+}
+
+
+@pytest.mark.parametrize("parent", PARENTS.values(), ids=PARENTS)
+def test_a_node_in_a_child_of_a_process_with_a_session(network: Network, parent: str) -> None:
+    """Zenoh's threads are not in the child, so a session would never open there."""
+    program = network.program(
+        f"""
+        import os
+        import rosz
+        {parent}
+        if not os.fork():
+            try:
+                rosz.Node("child")
+            except rosz.RoszError as error:
+                print(error, flush=True)
+            raise SystemExit(0)
+        assert os.wait()[1] == 0
+        with rosz.Node("again"):
+            print("parent goes on", flush=True)
+        """
+    )
+    assert program.exit_code() == 0, program.output
+    refused, last = program.lines
+    assert re.match(REFUSED, refused)
+    assert last == "parent goes on"
+
+
+@pytest.mark.parametrize("pool", POOLS.values(), ids=POOLS)
+def test_a_node_in_a_worker_of_a_pool(network: Network, pool: str) -> None:
+    program = network.program(
+        f"""
+        import concurrent.futures
+        import multiprocessing
+        import rosz
+
+        def work(number):
+            with rosz.Node(f"child{{number}}") as node:
+                return node.name
+
+        with {pool} as workers:
+            print(*workers.map(work, [1, 2]), flush=True)
+        node = rosz.Node("parent")
+        with {pool} as workers:
+            try:
+                print(*workers.map(work, [3]), flush=True)
+            except rosz.RoszError as error:
+                print(error, flush=True)
+        """
+    )
+    assert program.exit_code() == 0, program.output
+    worked, refused = program.lines
+    assert worked == "/child1 /child2"
+    assert re.match(REFUSED, refused)
