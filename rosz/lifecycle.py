@@ -23,6 +23,7 @@ from __future__ import annotations
 import itertools
 import logging
 import os
+import signal
 import threading
 import weakref
 from collections.abc import Callable
@@ -268,6 +269,22 @@ _numbers = itertools.count()
 _lifecycles: weakref.WeakSet[Lifecycle] = weakref.WeakSet()
 
 
+_held = threading.local()
+
+
+def _hold_signal() -> None:
+    """Let SIGTERM wait until the child has its own handlers.
+
+    Pools terminate their processes at any time. A child that has just begun would call the handler
+    of its parent, which writes to the parent's pipe, and so shut down the parent and not itself.
+    """
+    _held.mask = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGTERM,))
+
+
+def _release_signal() -> None:
+    signal.pthread_sigmask(signal.SIG_SETMASK, _held.mask)
+
+
 def _close_all_in_child() -> None:
     inherited = sorted(_lifecycles, key=lambda lifecycle: -lifecycle._number)  # noqa: SLF001
     for lifecycle in inherited:
@@ -279,3 +296,6 @@ def _close_all_in_child() -> None:
 
 
 os.register_at_fork(after_in_child=_close_all_in_child)
+os.register_at_fork(  # in the child after the one above
+    before=_hold_signal, after_in_parent=_release_signal, after_in_child=_release_signal
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 
 import pytest
 from network import Network
@@ -218,3 +219,23 @@ def test_a_node_in_a_worker_of_a_pool(network: Network, pool: str) -> None:
     worked, refused = program.lines
     assert worked == "/child1 /child2"
     assert re.match(REFUSED, refused)
+
+
+def test_a_child_that_is_terminated_at_its_beginning(network: Network) -> None:
+    """As pools do it; it must not call the handler that it inherits, which ends the parent."""
+    program = network.program(
+        """
+        import os
+        import signal
+        os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGTERM))
+        import rosz
+        node = rosz.Node("parent")
+        child = os.fork()
+        if not child:
+            os._exit(0)
+        print("child:", os.waitpid(child, 0)[1], flush=True)
+        print("parent is shut down:", node.is_shutdown, flush=True)
+        """
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines == [f"child: {signal.SIGTERM:d}", "parent is shut down: False"]
