@@ -344,12 +344,19 @@ class Encoder:
         self._out.emit(f"    {local} = bytes({octets}({local}, {kind.size}))")
         self._out.scalar(f"{kind.size}s", local)
 
-    def _count(self, kind: FieldType, value: str) -> str:
-        """Add the number of elements to the run, and return an expression of it."""
+    def _count(self, kind: FieldType, value: str, found: str = "") -> str:
+        """Add the number of elements to the run, and return an expression of it.
+
+        Args:
+            kind: Type of the sequence.
+            value: Expression of the sequence.
+            found: Variable that has the number already; empty if there is none.
+        """
         if kind.shape == "fixed":
             return str(kind.size)
-        count = self._out.fresh("n")
-        self._out.emit(f"{count} = len({value})")
+        count = found or self._out.fresh("n")
+        if not found:
+            self._out.emit(f"{count} = len({value})")
         if kind.shape == "bounded":
             self._out.emit(f"if {count} > {kind.size}: raise ValueError")
         self._out.scalar("I", count)
@@ -358,6 +365,7 @@ class Encoder:
     def _block(self, kind: FieldType, value: str, local: str) -> None:
         """Encode a sequence of numbers, which is a piece of its own."""
         self._out.emit(f"{local} = {value}")
+        found = ""
         size = kind.size if kind.shape == "fixed" else 0
         wrong_size = f" or len({local}) != {size}" if size else ""
         more = f", {size}" if size else ""
@@ -368,11 +376,15 @@ class Encoder:
             self._out.emit(f"    {local} = {self._module.use('octets')}({local}{more})")
         else:
             code = ARRAY_CODES[kind.base]
+            found = self._out.fresh("n")
             wrong = f'type({local}) is not _array or {local}.typecode != "{code}"{wrong_size}'
             numbers = self._module.use("numbers")
             self._out.emit(f"if {wrong}:")
-            self._out.emit(f'    {local} = {numbers}({local}, "{code}"{more})')
-        count = self._count(kind, local)
+            self._out.emit(f'    {found}, {local} = {numbers}({local}, "{code}"{more})')
+            if not size:
+                self._out.emit("else:")
+                self._out.emit(f"    {found} = len({local})")
+        count = self._count(kind, local, found)
         self._pad_elements(count, size_of(SCALAR_CODES[kind.base]))
         self._out.piece(local)
         self._out.offset.plus_elements(count, size_of(SCALAR_CODES[kind.base]))

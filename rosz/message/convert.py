@@ -12,6 +12,7 @@ import binascii
 import json
 import keyword
 import math
+from array import array
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn, TypeAlias, TypeVar
 
@@ -149,8 +150,9 @@ class _Filler:
             if slot.kind in OCTETS:
                 return bytes(element & 0xFF for element in elements)
             if slot.kind in ARRAY_CODES:
+                code = ARRAY_CODES[slot.kind]
                 try:
-                    return numbers(elements, ARRAY_CODES[slot.kind])
+                    return array(code, bytes(numbers(elements, code)[1]))
                 except OverflowError:
                     self._refuse(path, f"elements in the range of {slot.kind}", value)
         return elements

@@ -166,18 +166,18 @@ class _Writer:
         """Write a sequence of numbers as one block."""
         kind = str(slot.kind)
         try:
-            if kind == "bool":
-                block: Any = flags(value)
-            elif kind in OCTETS:
-                block = octets(value)
+            if kind in ARRAY_CODES:
+                count, block = numbers(value, ARRAY_CODES[kind])
             else:
-                block = numbers(value, ARRAY_CODES[kind])
+                block = flags(value) if kind == "bool" else octets(value)
+                count = len(block)
         except FAULTS as error:
             block = self._by_number(kind, value, path, error)
-        self._count(slot, value, len(block), path)
-        if len(block):
+            count = len(block)
+        self._count(slot, value, count, path)
+        if count:
             self.data += bytes(-len(self.data) % SCALAR_SIZES[kind])
-            self.data += block if isinstance(block, bytes) else block.tobytes()
+            self.data += block
 
     def _by_number(self, kind: str, value: Any, path: str, error: Exception) -> bytes:
         """Convert the numbers of a sequence one by one; the error names the wrong one."""

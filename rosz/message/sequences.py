@@ -29,11 +29,11 @@ TRUTH = {False: False, True: True}
 _OCTET_FORMATS = frozenset({"B", "b", "c", "?"})
 
 
-def numbers(value: Any, code: str, size: int = -1) -> array[Any] | memoryview:
-    """Return the numbers as a flat buffer whose ``len`` is their count.
+def numbers(value: Any, code: str, size: int = -1) -> tuple[int, bytes | array[Any] | memoryview]:
+    """Return the count of numbers, and a buffer of them.
 
     Buffers of the right type (``array.array``, numpy arrays of any shape) are not copied; other
-    sequences are converted, number by number.
+    sequences are packed.
 
     Args:
         value: The sequence.
@@ -46,14 +46,15 @@ def numbers(value: Any, code: str, size: int = -1) -> array[Any] | memoryview:
         OverflowError: A number is too large for a float32.
         ValueError: The number of elements is wrong.
     """
-    if type(value) is list or type(value) is tuple:
-        found: array[Any] | memoryview = array(code, _packers[code, len(value)](*value))
-    else:
+    if type(value) is not list and type(value) is not tuple:
         view = _view(value, code)
-        found = _converted(value, code) if view is None else view
-    if len(found) != size >= 0:
-        raise ValueError(f"expected {size} elements, got {len(found)}")
-    return found
+        value = _plain(value) if view is None else view
+    count = len(value)
+    if count != size >= 0:
+        raise ValueError(f"expected {size} elements, got {count}")
+    if type(value) is list or type(value) is tuple:
+        return count, _packers[code, count](*value)
+    return count, value
 
 
 class _ListPackers(dict[tuple[str, int], Callable[..., bytes]]):
@@ -78,13 +79,12 @@ _MOST_LISTS = 1024
 _packers = _ListPackers()
 
 
-def _converted(value: Any, code: str) -> array[Any]:
-    """Return the numbers of any other sequence, converted one by one."""
+def _plain(value: Any) -> list[Any]:
+    """Return any other sequence of numbers as a list."""
     if isinstance(value, str | bytes | bytearray | dict | set):
         raise TypeError(f"'{type(value).__name__}' is not a sequence of numbers")
     _refuse_iterator(value)
-    plain = _flat(value.tolist()) if hasattr(value, "tolist") else list(value)
-    return array(code, _packers[code, len(plain)](*plain))
+    return _flat(value.tolist()) if hasattr(value, "tolist") else list(value)
 
 
 def _view(value: Any, code: str) -> array[Any] | memoryview | None:

@@ -380,7 +380,7 @@ class GeoPoseWithCovariance(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n1, covariance = _numbers(covariance, "d", 36)
             return b"".join((_p3(256, position.latitude, position.longitude, position.altitude,
                 orientation.x, orientation.y, orientation.z, orientation.w), covariance))
         except _FAULTS:
@@ -433,7 +433,7 @@ class GeoPoseWithCovarianceStamped(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n2, covariance = _numbers(covariance, "d", 36)
             return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.latitude,
                 position.longitude, position.altitude, orientation.x, orientation.y, orientation.z,
                 orientation.w), covariance))

@@ -222,7 +222,7 @@ class AccelWithCovariance(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n1, covariance = _numbers(covariance, "d", 36)
             return b"".join((_p2(256, linear.x, linear.y, linear.z, angular.x, angular.y,
                 angular.z), covariance))
         except _FAULTS:
@@ -274,7 +274,7 @@ class AccelWithCovarianceStamped(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n2, covariance = _numbers(covariance, "d", 36)
             return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y,
                 linear.z, angular.x, angular.y, angular.z), covariance))
         except _FAULTS:
@@ -987,7 +987,7 @@ class PoseWithCovariance(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n1, covariance = _numbers(covariance, "d", 36)
             return b"".join((_p8(256, position.x, position.y, position.z, orientation.x,
                 orientation.y, orientation.z, orientation.w), covariance))
         except _FAULTS:
@@ -1040,7 +1040,7 @@ class PoseWithCovarianceStamped(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n2, covariance = _numbers(covariance, "d", 36)
             return b"".join((_t7[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y,
                 position.z, orientation.x, orientation.y, orientation.z, orientation.w),
                 covariance))
@@ -1322,7 +1322,7 @@ class TwistWithCovariance(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n1, covariance = _numbers(covariance, "d", 36)
             return b"".join((_p2(256, linear.x, linear.y, linear.z, angular.x, angular.y,
                 angular.z), covariance))
         except _FAULTS:
@@ -1374,7 +1374,7 @@ class TwistWithCovarianceStamped(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n2, covariance = _numbers(covariance, "d", 36)
             return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, linear.x, linear.y,
                 linear.z, angular.x, angular.y, angular.z), covariance))
         except _FAULTS:

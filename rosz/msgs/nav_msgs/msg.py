@@ -231,8 +231,9 @@ class OccupancyGrid(_Message):
             orientation = origin.orientation
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n2 = len(data_2)
+                n2, data_2 = _numbers(data_2, "b")
+            else:
+                n2 = len(data_2)
             return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
                 map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
                 position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
@@ -291,8 +292,9 @@ class GetMapResult(_Message):
             orientation = origin.orientation
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n2 = len(data_2)
+                n2, data_2 = _numbers(data_2, "b")
+            else:
+                n2 = len(data_2)
             return b"".join((_t2[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
                 map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
                 position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
@@ -376,8 +378,9 @@ class GetMapActionResult(_Message):
             orientation = origin.orientation
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n9 = len(data_2)
+                n9, data_2 = _numbers(data_2, "b")
+            else:
+                n9 = len(data_2)
             return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, stamp_2.sec,
                 stamp_2.nanosec, n2, b2, status.status), f7(n3, b3, stamp_3.sec, stamp_3.nanosec),
                 _t5[p8, n6](n6, b6, map_load_time.sec, map_load_time.nanosec, info.resolution,
@@ -591,8 +594,9 @@ class GetMapAction(_Message):
             orientation = origin.orientation
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n13 = len(data_2)
+                n13, data_2 = _numbers(data_2, "b")
+            else:
+                n13 = len(data_2)
             action_feedback = m.action_feedback
             header_4 = action_feedback.header
             stamp_6 = header_4.stamp
@@ -800,7 +804,7 @@ class Odometry(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n3, covariance = _numbers(covariance, "d", 36)
             twist = m.twist
             twist_2 = twist.twist
             linear = twist_2.linear
@@ -811,7 +815,7 @@ class Odometry(_Message):
                 or covariance_2.typecode != "d"
                 or len(covariance_2) != 36
             ):
-                covariance_2 = _numbers(covariance_2, "d", 36)
+                n4, covariance_2 = _numbers(covariance_2, "d", 36)
             return b"".join((_t13[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2,
                 position.x, position.y, position.z, orientation.x, orientation.y, orientation.z,
                 orientation.w), covariance,

@@ -105,8 +105,9 @@ class GetMapResponse(_Message):
             orientation = origin.orientation
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n2 = len(data_2)
+                n2, data_2 = _numbers(data_2, "b")
+            else:
+                n2 = len(data_2)
             return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
                 map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
                 position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
@@ -396,8 +397,9 @@ class LoadMapResponse(_Message):
             orientation = origin.orientation
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n2 = len(data_2)
+                n2, data_2 = _numbers(data_2, "b")
+            else:
+                n2 = len(data_2)
             return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
                 map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
                 position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,
@@ -483,8 +485,9 @@ class SetMapRequest(_Message):
             orientation = origin.orientation
             data_2 = map_2.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n2 = len(data_2)
+                n2, data_2 = _numbers(data_2, "b")
+            else:
+                n2 = len(data_2)
             initial_pose = m.initial_pose
             header_2 = initial_pose.header
             stamp_2 = header_2.stamp
@@ -499,7 +502,7 @@ class SetMapRequest(_Message):
                 or covariance.typecode != "d"
                 or len(covariance) != 36
             ):
-                covariance = _numbers(covariance, "d", 36)
+                n4, covariance = _numbers(covariance, "d", 36)
             return b"".join((_t1[n1](256, stamp.sec, stamp.nanosec, n1, b1, map_load_time.sec,
                 map_load_time.nanosec, info.resolution, info.width, info.height, position.x,
                 position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w,

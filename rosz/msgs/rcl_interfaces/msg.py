@@ -399,14 +399,16 @@ class ParameterValue(_Message):
             f6, p7 = _t6[p4 + n2 & 7]
             integer_array_value = m.integer_array_value
             if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
-                integer_array_value = _numbers(integer_array_value, "q")
-            n8 = len(integer_array_value)
+                n8, integer_array_value = _numbers(integer_array_value, "q")
+            else:
+                n8 = len(integer_array_value)
             f9, p10 = _t6[p7 + n5 & 7]
             p11 = 0 if n8 else p10
             double_array_value = m.double_array_value
             if type(double_array_value) is not _array or double_array_value.typecode != "d":
-                double_array_value = _numbers(double_array_value, "d")
-            n12 = len(double_array_value)
+                n12, double_array_value = _numbers(double_array_value, "d")
+            else:
+                n12 = len(double_array_value)
             p13 = 0 if n12 else p11 + n8 * 8 + 4
             string_array_value, k = m.string_array_value, _s3.written
             b14 = k[1] if string_array_value == k[0] else _s3.put(string_array_value)
@@ -502,14 +504,16 @@ class Parameter(_Message):
             f7, p8 = _t6[p5 + n3 & 7]
             integer_array_value = value.integer_array_value
             if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
-                integer_array_value = _numbers(integer_array_value, "q")
-            n9 = len(integer_array_value)
+                n9, integer_array_value = _numbers(integer_array_value, "q")
+            else:
+                n9 = len(integer_array_value)
             f10, p11 = _t6[p8 + n6 & 7]
             p12 = 0 if n9 else p11
             double_array_value = value.double_array_value
             if type(double_array_value) is not _array or double_array_value.typecode != "d":
-                double_array_value = _numbers(double_array_value, "d")
-            n13 = len(double_array_value)
+                n13, double_array_value = _numbers(double_array_value, "d")
+            else:
+                n13 = len(double_array_value)
             p14 = 0 if n13 else p12 + n9 * 8 + 4
             string_array_value, k = value.string_array_value, _s4.written
             b15 = k[1] if string_array_value == k[0] else _s4.put(string_array_value)
@@ -740,14 +744,16 @@ class ParameterEvent(_Message):
                 f12, p13 = _t6[p10 + n8 & 7]
                 integer_array_value = value.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
-                    integer_array_value = _numbers(integer_array_value, "q")
-                n14 = len(integer_array_value)
+                    n14, integer_array_value = _numbers(integer_array_value, "q")
+                else:
+                    n14 = len(integer_array_value)
                 f15, p16 = _t6[p13 + n11 & 7]
                 p17 = 0 if n14 else p16
                 double_array_value = value.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
-                    double_array_value = _numbers(double_array_value, "d")
-                n18 = len(double_array_value)
+                    n18, double_array_value = _numbers(double_array_value, "d")
+                else:
+                    n18 = len(double_array_value)
                 p19 = 0 if n18 else p17 + n14 * 8 + 4
                 string_array_value, k = value.string_array_value, _s5.written
                 b20 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
@@ -783,14 +789,16 @@ class ParameterEvent(_Message):
                     type(integer_array_value_2) is not _array
                     or integer_array_value_2.typecode != "q"
                 ):
-                    integer_array_value_2 = _numbers(integer_array_value_2, "q")
-                n33 = len(integer_array_value_2)
+                    n33, integer_array_value_2 = _numbers(integer_array_value_2, "q")
+                else:
+                    n33 = len(integer_array_value_2)
                 f34, p35 = _t6[p32 + n30 & 7]
                 p36 = 0 if n33 else p35
                 double_array_value_2 = value_2.double_array_value
                 if type(double_array_value_2) is not _array or double_array_value_2.typecode != "d":
-                    double_array_value_2 = _numbers(double_array_value_2, "d")
-                n37 = len(double_array_value_2)
+                    n37, double_array_value_2 = _numbers(double_array_value_2, "d")
+                else:
+                    n37 = len(double_array_value_2)
                 p38 = 0 if n37 else p36 + n33 * 8 + 4
                 string_array_value_2, k = value_2.string_array_value, _s6.written
                 b39 = k[1] if string_array_value_2 == k[0] else _s6.put(string_array_value_2)
@@ -826,14 +834,16 @@ class ParameterEvent(_Message):
                     type(integer_array_value_3) is not _array
                     or integer_array_value_3.typecode != "q"
                 ):
-                    integer_array_value_3 = _numbers(integer_array_value_3, "q")
-                n52 = len(integer_array_value_3)
+                    n52, integer_array_value_3 = _numbers(integer_array_value_3, "q")
+                else:
+                    n52 = len(integer_array_value_3)
                 f53, p54 = _t6[p51 + n49 & 7]
                 p55 = 0 if n52 else p54
                 double_array_value_3 = value_3.double_array_value
                 if type(double_array_value_3) is not _array or double_array_value_3.typecode != "d":
-                    double_array_value_3 = _numbers(double_array_value_3, "d")
-                n56 = len(double_array_value_3)
+                    n56, double_array_value_3 = _numbers(double_array_value_3, "d")
+                else:
+                    n56 = len(double_array_value_3)
                 p57 = 0 if n56 else p55 + n52 * 8 + 4
                 string_array_value_3, k = value_3.string_array_value, _s7.written
                 b58 = k[1] if string_array_value_3 == k[0] else _s7.put(string_array_value_3)

@@ -514,14 +514,16 @@ class GetParametersResponse(_Message):
                 f8, p9 = _t5[p6 + n4 & 7]
                 integer_array_value = values_one.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
-                    integer_array_value = _numbers(integer_array_value, "q")
-                n10 = len(integer_array_value)
+                    n10, integer_array_value = _numbers(integer_array_value, "q")
+                else:
+                    n10 = len(integer_array_value)
                 f11, p12 = _t5[p9 + n7 & 7]
                 p13 = 0 if n10 else p12
                 double_array_value = values_one.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
-                    double_array_value = _numbers(double_array_value, "d")
-                n14 = len(double_array_value)
+                    n14, double_array_value = _numbers(double_array_value, "d")
+                else:
+                    n14 = len(double_array_value)
                 p15 = 0 if n14 else p13 + n10 * 8 + 4
                 string_array_value, k = values_one.string_array_value, _s5.written
                 b16 = k[1] if string_array_value == k[0] else _s5.put(string_array_value)
@@ -892,14 +894,16 @@ class SetParametersRequest(_Message):
                 f9, p10 = _t5[p7 + n5 & 7]
                 integer_array_value = value.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
-                    integer_array_value = _numbers(integer_array_value, "q")
-                n11 = len(integer_array_value)
+                    n11, integer_array_value = _numbers(integer_array_value, "q")
+                else:
+                    n11 = len(integer_array_value)
                 f12, p13 = _t5[p10 + n8 & 7]
                 p14 = 0 if n11 else p13
                 double_array_value = value.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
-                    double_array_value = _numbers(double_array_value, "d")
-                n15 = len(double_array_value)
+                    n15, double_array_value = _numbers(double_array_value, "d")
+                else:
+                    n15 = len(double_array_value)
                 p16 = 0 if n15 else p14 + n11 * 8 + 4
                 string_array_value, k = value.string_array_value, _s9.written
                 b17 = k[1] if string_array_value == k[0] else _s9.put(string_array_value)
@@ -1078,14 +1082,16 @@ class SetParametersAtomicallyRequest(_Message):
                 f9, p10 = _t5[p7 + n5 & 7]
                 integer_array_value = value.integer_array_value
                 if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
-                    integer_array_value = _numbers(integer_array_value, "q")
-                n11 = len(integer_array_value)
+                    n11, integer_array_value = _numbers(integer_array_value, "q")
+                else:
+                    n11 = len(integer_array_value)
                 f12, p13 = _t5[p10 + n8 & 7]
                 p14 = 0 if n11 else p13
                 double_array_value = value.double_array_value
                 if type(double_array_value) is not _array or double_array_value.typecode != "d":
-                    double_array_value = _numbers(double_array_value, "d")
-                n15 = len(double_array_value)
+                    n15, double_array_value = _numbers(double_array_value, "d")
+                else:
+                    n15 = len(double_array_value)
                 p16 = 0 if n15 else p14 + n11 * 8 + 4
                 string_array_value, k = value.string_array_value, _s10.written
                 b17 = k[1] if string_array_value == k[0] else _s10.put(string_array_value)

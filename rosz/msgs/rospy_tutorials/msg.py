@@ -50,8 +50,9 @@ class Floats(_Message):
         try:
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "f":
-                data_2 = _numbers(data_2, "f")
-            n1 = len(data_2)
+                n1, data_2 = _numbers(data_2, "f")
+            else:
+                n1 = len(data_2)
             return b"".join((_p1(256, n1), data_2))
         except _FAULTS:
             return _plain(m, Floats)

@@ -186,12 +186,14 @@ class BatteryState(_Message):
             n1, b1 = _texts[header.frame_id]
             cell_voltage = m.cell_voltage
             if type(cell_voltage) is not _array or cell_voltage.typecode != "f":
-                cell_voltage = _numbers(cell_voltage, "f")
-            n2 = len(cell_voltage)
+                n2, cell_voltage = _numbers(cell_voltage, "f")
+            else:
+                n2 = len(cell_voltage)
             cell_temperature = m.cell_temperature
             if type(cell_temperature) is not _array or cell_temperature.typecode != "f":
-                cell_temperature = _numbers(cell_temperature, "f")
-            n3 = len(cell_temperature)
+                n3, cell_temperature = _numbers(cell_temperature, "f")
+            else:
+                n3 = len(cell_temperature)
             b4 = m.location.encode()
             if 0 in b4: raise ValueError
             n4 = len(b4) + 1
@@ -396,19 +398,20 @@ class CameraInfo(_Renamed):
             n2, b2 = _texts[m.distortion_model]
             d = m.d
             if type(d) is not _array or d.typecode != "d":
-                d = _numbers(d, "d")
-            n3 = len(d)
+                n3, d = _numbers(d, "d")
+            else:
+                n3 = len(d)
             f4, p5 = _t4[n1, n2]
             p6 = 0 if n3 else p5
             k_2 = m.k
             if type(k_2) is not _array or k_2.typecode != "d" or len(k_2) != 9:
-                k_2 = _numbers(k_2, "d", 9)
+                n7, k_2 = _numbers(k_2, "d", 9)
             r = m.r
             if type(r) is not _array or r.typecode != "d" or len(r) != 9:
-                r = _numbers(r, "d", 9)
+                n8, r = _numbers(r, "d", 9)
             p_2 = m.p
             if type(p_2) is not _array or p_2.typecode != "d" or len(p_2) != 12:
-                p_2 = _numbers(p_2, "d", 12)
+                n9, p_2 = _numbers(p_2, "d", 12)
             roi = m.roi
             return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.height, m.width, n2, b2,
                 n3), (_PADDING[-(p5) & 7] if n3 else b""), d, _t5[p6 + n3 * 8 & 7](), k_2, r, p_2,
@@ -478,8 +481,9 @@ class ChannelFloat32(_Message):
             n1, b1 = _texts[m.name]
             values = m.values
             if type(values) is not _array or values.typecode != "f":
-                values = _numbers(values, "f")
-            n2 = len(values)
+                n2, values = _numbers(values, "f")
+            else:
+                n2 = len(values)
             return b"".join((_t6[n1](256, n1, b1, n2), values))
         except _FAULTS:
             return _plain(m, ChannelFloat32)
@@ -782,7 +786,7 @@ class Imu(_Message):
                 or orientation_covariance.typecode != "d"
                 or len(orientation_covariance) != 9
             ):
-                orientation_covariance = _numbers(orientation_covariance, "d", 9)
+                n2, orientation_covariance = _numbers(orientation_covariance, "d", 9)
             angular_velocity = m.angular_velocity
             angular_velocity_covariance = m.angular_velocity_covariance
             if (
@@ -790,7 +794,7 @@ class Imu(_Message):
                 or angular_velocity_covariance.typecode != "d"
                 or len(angular_velocity_covariance) != 9
             ):
-                angular_velocity_covariance = _numbers(angular_velocity_covariance, "d", 9)
+                n3, angular_velocity_covariance = _numbers(angular_velocity_covariance, "d", 9)
             linear_acceleration = m.linear_acceleration
             linear_acceleration_covariance = m.linear_acceleration_covariance
             if (
@@ -798,7 +802,8 @@ class Imu(_Message):
                 or linear_acceleration_covariance.typecode != "d"
                 or len(linear_acceleration_covariance) != 9
             ):
-                linear_acceleration_covariance = _numbers(linear_acceleration_covariance, "d", 9)
+                (n4, linear_acceleration_covariance) = _numbers(linear_acceleration_covariance,
+                    "d", 9)
             return b"".join((_t10[n1](256, stamp.sec, stamp.nanosec, n1, b1, orientation.x,
                 orientation.y, orientation.z, orientation.w), orientation_covariance,
                 _p4(angular_velocity.x, angular_velocity.y, angular_velocity.z),
@@ -879,19 +884,22 @@ class JointState(_Message):
             f3, p4 = _t11[n1]
             position = m.position
             if type(position) is not _array or position.typecode != "d":
-                position = _numbers(position, "d")
-            n5 = len(position)
+                n5, position = _numbers(position, "d")
+            else:
+                n5 = len(position)
             f6, p7 = _t12[p4 + n2 & 7]
             p8 = 0 if n5 else p7
             velocity = m.velocity
             if type(velocity) is not _array or velocity.typecode != "d":
-                velocity = _numbers(velocity, "d")
-            n9 = len(velocity)
+                n9, velocity = _numbers(velocity, "d")
+            else:
+                n9 = len(velocity)
             p10 = 0 if n9 else p8 + n5 * 8 + 4
             effort = m.effort
             if type(effort) is not _array or effort.typecode != "d":
-                effort = _numbers(effort, "d")
-            n11 = len(effort)
+                n11, effort = _numbers(effort, "d")
+            else:
+                n11 = len(effort)
             p12 = 0 if n11 else p10 + n9 * 8 + 4
             return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1), b2, f6(n5),
                 (_PADDING[-(p7) & 7] if n5 else b""), position, _p1(n9),
@@ -965,12 +973,14 @@ class Joy(_Message):
             n1, b1 = _texts[header.frame_id]
             axes = m.axes
             if type(axes) is not _array or axes.typecode != "f":
-                axes = _numbers(axes, "f")
-            n2 = len(axes)
+                n2, axes = _numbers(axes, "f")
+            else:
+                n2 = len(axes)
             buttons = m.buttons
             if type(buttons) is not _array or buttons.typecode != "i":
-                buttons = _numbers(buttons, "i")
-            n3 = len(buttons)
+                n3, buttons = _numbers(buttons, "i")
+            else:
+                n3 = len(buttons)
             return b"".join((_t13[n1](256, stamp.sec, stamp.nanosec, n1, b1, n2), axes, _p1(n3),
                 buttons))
         except _FAULTS:
@@ -1108,8 +1118,9 @@ class LaserEcho(_Message):
         try:
             echoes = m.echoes
             if type(echoes) is not _array or echoes.typecode != "f":
-                echoes = _numbers(echoes, "f")
-            n1 = len(echoes)
+                n1, echoes = _numbers(echoes, "f")
+            else:
+                n1 = len(echoes)
             return b"".join((_p7(256, n1), echoes))
         except _FAULTS:
             return _plain(m, LaserEcho)
@@ -1178,12 +1189,14 @@ class LaserScan(_Message):
             n1, b1 = _texts[header.frame_id]
             ranges = m.ranges
             if type(ranges) is not _array or ranges.typecode != "f":
-                ranges = _numbers(ranges, "f")
-            n2 = len(ranges)
+                n2, ranges = _numbers(ranges, "f")
+            else:
+                n2 = len(ranges)
             intensities = m.intensities
             if type(intensities) is not _array or intensities.typecode != "f":
-                intensities = _numbers(intensities, "f")
-            n3 = len(intensities)
+                n3, intensities = _numbers(intensities, "f")
+            else:
+                n3 = len(intensities)
             return b"".join((_t14[n1](256, stamp.sec, stamp.nanosec, n1, b1, m.angle_min,
                 m.angle_max, m.angle_increment, m.time_increment, m.scan_time, m.range_min,
                 m.range_max, n2), ranges, _p1(n3), intensities))
@@ -1251,7 +1264,7 @@ class MagneticField(_Message):
                 or magnetic_field_covariance.typecode != "d"
                 or len(magnetic_field_covariance) != 9
             ):
-                magnetic_field_covariance = _numbers(magnetic_field_covariance, "d", 9)
+                n2, magnetic_field_covariance = _numbers(magnetic_field_covariance, "d", 9)
             return b"".join((_t15[n1](256, stamp.sec, stamp.nanosec, n1, b1, magnetic_field.x,
                 magnetic_field.y, magnetic_field.z), magnetic_field_covariance))
         except _FAULTS:
@@ -1435,8 +1448,9 @@ class MultiEchoLaserScan(_Message):
             for ranges_one in ranges:
                 echoes = ranges_one.echoes
                 if type(echoes) is not _array or echoes.typecode != "f":
-                    echoes = _numbers(echoes, "f")
-                n3 = len(echoes)
+                    n3, echoes = _numbers(echoes, "f")
+                else:
+                    n3 = len(echoes)
                 out += (_p1(n3), echoes)
             intensities = m.intensities
             n4 = len(intensities)
@@ -1444,8 +1458,9 @@ class MultiEchoLaserScan(_Message):
             for intensities_one in intensities:
                 echoes_2 = intensities_one.echoes
                 if type(echoes_2) is not _array or echoes_2.typecode != "f":
-                    echoes_2 = _numbers(echoes_2, "f")
-                n5 = len(echoes_2)
+                    n5, echoes_2 = _numbers(echoes_2, "f")
+                else:
+                    n5 = len(echoes_2)
                 out += (_p1(n5), echoes_2)
             return b"".join(out)
         except _FAULTS:
@@ -1605,7 +1620,7 @@ class NavSatFix(_Message):
                 or position_covariance.typecode != "d"
                 or len(position_covariance) != 9
             ):
-                position_covariance = _numbers(position_covariance, "d", 9)
+                n2, position_covariance = _numbers(position_covariance, "d", 9)
             return b"".join((_t16[n1](256, stamp.sec, stamp.nanosec, n1, b1, status.status,
                 status.service, m.latitude, m.longitude, m.altitude), position_covariance,
                 _p11(m.position_covariance_type)))
@@ -1678,8 +1693,9 @@ class PointCloud(_Message):
                 n4, b4 = _texts[channels_one.name]
                 values = channels_one.values
                 if type(values) is not _array or values.typecode != "f":
-                    values = _numbers(values, "f")
-                n5 = len(values)
+                    n5, values = _numbers(values, "f")
+                else:
+                    n5 = len(values)
                 out += (_t17[n4](n4, b4, n5), values)
             return b"".join(out)
         except _FAULTS:

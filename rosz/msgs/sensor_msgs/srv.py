@@ -64,19 +64,20 @@ class SetCameraInfoRequest(_Message):
             n2, b2 = _texts[camera_info.distortion_model]
             d = camera_info.d
             if type(d) is not _array or d.typecode != "d":
-                d = _numbers(d, "d")
-            n3 = len(d)
+                n3, d = _numbers(d, "d")
+            else:
+                n3 = len(d)
             f4, p5 = _t1[n1, n2]
             p6 = 0 if n3 else p5
             k_2 = camera_info.k
             if type(k_2) is not _array or k_2.typecode != "d" or len(k_2) != 9:
-                k_2 = _numbers(k_2, "d", 9)
+                n7, k_2 = _numbers(k_2, "d", 9)
             r = camera_info.r
             if type(r) is not _array or r.typecode != "d" or len(r) != 9:
-                r = _numbers(r, "d", 9)
+                n8, r = _numbers(r, "d", 9)
             p_2 = camera_info.p
             if type(p_2) is not _array or p_2.typecode != "d" or len(p_2) != 12:
-                p_2 = _numbers(p_2, "d", 12)
+                n9, p_2 = _numbers(p_2, "d", 12)
             roi = camera_info.roi
             return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, camera_info.height,
                 camera_info.width, n2, b2, n3), (_PADDING[-(p5) & 7] if n3 else b""), d,

@@ -58,7 +58,7 @@ class MeshTriangle(_Message):
                 or vertex_indices.typecode != "I"
                 or len(vertex_indices) != 3
             ):
-                vertex_indices = _numbers(vertex_indices, "I", 3)
+                n1, vertex_indices = _numbers(vertex_indices, "I", 3)
             return b"".join((_p1(256), vertex_indices))
         except _FAULTS:
             return _plain(m, MeshTriangle)
@@ -113,13 +113,13 @@ class Mesh(_Message):
                     or vertex_indices.typecode != "I"
                     or len(vertex_indices) != 3
                 ):
-                    vertex_indices = _numbers(vertex_indices, "I", 3)
+                    n3, vertex_indices = _numbers(vertex_indices, "I", 3)
                 out.append(vertex_indices)
                 p2 = p2 + 4 & 7
             vertices = m.vertices
-            n3 = len(vertices)
-            p4 = 0 if n3 else p2 + 4
-            out += (_p1(n3), (_PADDING[-(p2 + 4) & 7] if n3 else b""),
+            n4 = len(vertices)
+            p5 = 0 if n4 else p2 + 4
+            out += (_p1(n4), (_PADDING[-(p2 + 4) & 7] if n4 else b""),
                 b"".join([_p3(e.x, e.y, e.z) for e in vertices]))
             return b"".join(out)
         except _FAULTS:
@@ -171,7 +171,7 @@ class Plane(_Message):
         try:
             coef = m.coef
             if type(coef) is not _array or coef.typecode != "d" or len(coef) != 4:
-                coef = _numbers(coef, "d", 4)
+                n1, coef = _numbers(coef, "d", 4)
             return b"".join((_p1(256), coef))
         except _FAULTS:
             return _plain(m, Plane)
@@ -264,8 +264,9 @@ class SolidPrimitive(_Message):
         try:
             dimensions = m.dimensions
             if type(dimensions) is not _array or dimensions.typecode != "d":
-                dimensions = _numbers(dimensions, "d")
-            n1 = len(dimensions)
+                n1, dimensions = _numbers(dimensions, "d")
+            else:
+                n1 = len(dimensions)
             if n1 > 3: raise ValueError
             polygon = m.polygon
             points = polygon.points

@@ -516,8 +516,9 @@ class Float32MultiArray(_Message):
                 out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "f":
-                data_2 = _numbers(data_2, "f")
-            n3 = len(data_2)
+                n3, data_2 = _numbers(data_2, "f")
+            else:
+                n3 = len(data_2)
             out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
@@ -621,8 +622,9 @@ class Float64MultiArray(_Message):
                 p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "d":
-                data_2 = _numbers(data_2, "d")
-            n6 = len(data_2)
+                n6, data_2 = _numbers(data_2, "d")
+            else:
+                n6 = len(data_2)
             p7 = 0 if n6 else p2
             out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
@@ -769,8 +771,9 @@ class Int16MultiArray(_Message):
                 out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "h":
-                data_2 = _numbers(data_2, "h")
-            n3 = len(data_2)
+                n3, data_2 = _numbers(data_2, "h")
+            else:
+                n3 = len(data_2)
             out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
@@ -870,8 +873,9 @@ class Int32MultiArray(_Message):
                 out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "i":
-                data_2 = _numbers(data_2, "i")
-            n3 = len(data_2)
+                n3, data_2 = _numbers(data_2, "i")
+            else:
+                n3 = len(data_2)
             out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
@@ -974,8 +978,9 @@ class Int64MultiArray(_Message):
                 p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "q":
-                data_2 = _numbers(data_2, "q")
-            n6 = len(data_2)
+                n6, data_2 = _numbers(data_2, "q")
+            else:
+                n6 = len(data_2)
             p7 = 0 if n6 else p2
             out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)
@@ -1076,8 +1081,9 @@ class Int8MultiArray(_Message):
                 out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "b":
-                data_2 = _numbers(data_2, "b")
-            n3 = len(data_2)
+                n3, data_2 = _numbers(data_2, "b")
+            else:
+                n3 = len(data_2)
             out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
@@ -1252,8 +1258,9 @@ class UInt16MultiArray(_Message):
                 out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "H":
-                data_2 = _numbers(data_2, "H")
-            n3 = len(data_2)
+                n3, data_2 = _numbers(data_2, "H")
+            else:
+                n3 = len(data_2)
             out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
@@ -1349,8 +1356,9 @@ class UInt32MultiArray(_Message):
                 out.append(_t2[n2](n2, b2, dim_one.size, dim_one.stride))
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "I":
-                data_2 = _numbers(data_2, "I")
-            n3 = len(data_2)
+                n3, data_2 = _numbers(data_2, "I")
+            else:
+                n3 = len(data_2)
             out += (_p3(layout.data_offset, n3), data_2)
             return b"".join(out)
         except _FAULTS:
@@ -1453,8 +1461,9 @@ class UInt64MultiArray(_Message):
                 p2 = p5
             data_2 = m.data
             if type(data_2) is not _array or data_2.typecode != "Q":
-                data_2 = _numbers(data_2, "Q")
-            n6 = len(data_2)
+                n6, data_2 = _numbers(data_2, "Q")
+            else:
+                n6 = len(data_2)
             p7 = 0 if n6 else p2
             out += (_p3(layout.data_offset, n6), (_PADDING[-(p2) & 7] if n6 else b""), data_2)
             return b"".join(out)

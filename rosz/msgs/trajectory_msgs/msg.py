@@ -76,23 +76,27 @@ class JointTrajectoryPoint(_Message):
         try:
             positions = m.positions
             if type(positions) is not _array or positions.typecode != "d":
-                positions = _numbers(positions, "d")
-            n1 = len(positions)
+                n1, positions = _numbers(positions, "d")
+            else:
+                n1 = len(positions)
             p2 = 0 if n1 else 4
             velocities = m.velocities
             if type(velocities) is not _array or velocities.typecode != "d":
-                velocities = _numbers(velocities, "d")
-            n3 = len(velocities)
+                n3, velocities = _numbers(velocities, "d")
+            else:
+                n3 = len(velocities)
             p4 = 0 if n3 else p2 + n1 * 8 + 4
             accelerations = m.accelerations
             if type(accelerations) is not _array or accelerations.typecode != "d":
-                accelerations = _numbers(accelerations, "d")
-            n5 = len(accelerations)
+                n5, accelerations = _numbers(accelerations, "d")
+            else:
+                n5 = len(accelerations)
             p6 = 0 if n5 else p4 + n3 * 8 + 4
             effort = m.effort
             if type(effort) is not _array or effort.typecode != "d":
-                effort = _numbers(effort, "d")
-            n7 = len(effort)
+                n7, effort = _numbers(effort, "d")
+            else:
+                n7 = len(effort)
             p8 = 0 if n7 else p6 + n5 * 8 + 4
             time_from_start = m.time_from_start
             return b"".join((_p1(256, n1), (_PADDING[4] if n1 else b""), positions, _p2(n3),
@@ -174,23 +178,27 @@ class JointTrajectory(_Message):
             for points_one in points:
                 positions = points_one.positions
                 if type(positions) is not _array or positions.typecode != "d":
-                    positions = _numbers(positions, "d")
-                n9 = len(positions)
+                    n9, positions = _numbers(positions, "d")
+                else:
+                    n9 = len(positions)
                 p10 = 0 if n9 else p8 + 4
                 velocities = points_one.velocities
                 if type(velocities) is not _array or velocities.typecode != "d":
-                    velocities = _numbers(velocities, "d")
-                n11 = len(velocities)
+                    n11, velocities = _numbers(velocities, "d")
+                else:
+                    n11 = len(velocities)
                 p12 = 0 if n11 else p10 + n9 * 8 + 4
                 accelerations = points_one.accelerations
                 if type(accelerations) is not _array or accelerations.typecode != "d":
-                    accelerations = _numbers(accelerations, "d")
-                n13 = len(accelerations)
+                    n13, accelerations = _numbers(accelerations, "d")
+                else:
+                    n13 = len(accelerations)
                 p14 = 0 if n13 else p12 + n11 * 8 + 4
                 effort = points_one.effort
                 if type(effort) is not _array or effort.typecode != "d":
-                    effort = _numbers(effort, "d")
-                n15 = len(effort)
+                    n15, effort = _numbers(effort, "d")
+                else:
+                    n15 = len(effort)
                 p16 = 0 if n15 else p14 + n13 * 8 + 4
                 time_from_start = points_one.time_from_start
                 out += (_p2(n9), (_PADDING[-(p8 + 4) & 7] if n9 else b""), positions, _p2(n11),
