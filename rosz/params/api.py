@@ -101,7 +101,8 @@ class Params:
                 are logged.
 
         Raises:
-            ParamError: A parameter cannot hold the value.
+            ParamError: A parameter cannot hold the value, or a replica refuses it or cannot
+                store it; nothing is set then.
             ClosedError: The node is shut down.
         """
         self._replica.set(self._path(name), value, origin=self._origin, timeout=timeout)
@@ -118,7 +119,8 @@ class Params:
                 are logged.
 
         Raises:
-            ParamError: A parameter cannot hold one of the values; nothing is set then.
+            ParamError: A parameter cannot hold one of the values, or a replica refuses them or
+                cannot store them; nothing is set then.
             ClosedError: The node is shut down.
         """
         changes: list[Change] = []
@@ -132,7 +134,8 @@ class Params:
 
         Raises:
             ParamNotFound: The parameter is not set; also a ``KeyError``.
-            ParamError: The parameter is the root.
+            ParamError: The parameter is the root, or a replica refuses the deletion or cannot
+                store it.
             ClosedError: The node is shut down.
         """
         self._replica.delete(self._path(name), origin=self._origin, timeout=timeout)

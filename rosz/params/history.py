@@ -35,7 +35,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
 from rosz.errors import DecodeError
-from rosz.params.paths import Path
+from rosz.params.paths import ROOT, Path
 from rosz.params.tree import MISSING, Draft, Missing, Tree, lookup
 from rosz.params.values import Value
 from rosz.params.writes import DELETED, Deleted, Order, Write, check_write, put
@@ -149,7 +149,13 @@ class History:
 
     def writes(self) -> Iterator[Write]:
         """Yield all writes of the set; a write comes before those below its path."""
+        return self.below(ROOT)
+
+    def below(self, path: Path) -> Iterator[Write]:
+        """Yield the writes at a path and below, in the order of `writes`."""
         stack = [self._top]
+        for part in path:
+            stack = [node.below[part] for node in stack if part in node.below]
         while stack:
             node = stack.pop()
             if node.write is not None:
@@ -286,15 +292,8 @@ class History:
 
     def _holds_older(self, path: Path, order: Order) -> bool:
         """Tell whether an older write is held at a path or below, or one above holds a part."""
-        node: _Node | None = self._top
-        for part in path:
-            node = node.below.get(part) if node is not None else None
-        stack = [node] if node is not None else []
-        while stack:
-            node = stack.pop()
-            if node.write is not None and node.write.order < order:
-                return True
-            stack.extend(node.below.values())
+        if any(write.order < order for write in self.below(path)):
+            return True
         cover = self.source(path)
         if cover is None or cover.order >= order or cover.value is DELETED:
             return False

@@ -82,7 +82,8 @@ class ParamClient:
         """Set a global name; a dict replaces everything below it.
 
         Raises:
-            ParamError: A parameter cannot hold the value, or the root would not be a dict.
+            ParamError: A parameter cannot hold the value, the root would not be a dict, or a
+                replica refuses the write or cannot store it.
         """
         return self.write([(split(name), normalise(value, name))])
 
@@ -105,7 +106,8 @@ class ParamClient:
             changes: Paths with normalised values or `DELETED`, as `condense` returns them.
 
         Raises:
-            ParamError: The tree cannot hold a change; nothing is changed then.
+            ParamError: The tree cannot hold a change, or a replica refuses the batch or cannot
+                store it; nothing is changed then.
         """
         from rosz.params.replica import ACK_TIMEOUT, Outcome, process_label
 

@@ -6,7 +6,8 @@ The protocol between replicas, and between a replica and its clients:
   with its session and a number. Every replica that has applied it (and stored it, if it has
   storage) publishes an **acknowledgement**, that number and its own session, on ``ack`` of the
   writer. A replica that does not acknowledge in time is sent the batch once more as a query on its
-  ``write`` key (the barrier query), whose reply is the acknowledgement.
+  ``write`` key (the barrier query), whose reply is the acknowledgement. A replica that refuses the
+  batch, or cannot store it, adds the reason; the writer then undoes the batch.
 - **Exchange of differences.** A replica sends another its **digest** on the ``sync`` key of the
   other. If the digests differ, it sends the index (path and stamp) of its writes in the buckets
   that differ. The reply holds the writes that it lacks, and the paths of the writes that the other
@@ -75,6 +76,7 @@ __all__ = (
     "join_path",
     "pack_value",
     "read_header",
+    "read_time",
     "split_path",
 )
 
@@ -244,6 +246,12 @@ class Batch(msgspec.Struct, array_like=True):
         stamp, origin = (self.time, self.clock), self.origin
         puts = [_read_write(path, stamp, value, origin) for path, value in self.puts]
         return puts + [_read_write(path, stamp, DELETED, origin) for path in self.deletions]
+
+
+class _BatchStart(msgspec.Struct, array_like=True):
+    """The first field of a `Batch`."""
+
+    time: int
 
 
 class Record(msgspec.Struct, array_like=True):
@@ -423,6 +431,15 @@ def read_header(data: bytes) -> tuple[str, int, int]:
     return sender.decode(), number, start
 
 
+def read_time(message: memoryview) -> int:
+    """Return the time of an encoded `Batch`, without reading all of it.
+
+    Raises:
+        DecodeError: The bytes are no batch.
+    """
+    return decode(message, _BatchStart).time
+
+
 def encode_value(value: Value) -> bytes:
     """Return the payload of a parameter's own key."""
     return _ENCODER.encode(pack_value(value))
@@ -496,5 +513,5 @@ _ENCODER: Final = msgspec.msgpack.Encoder()
 _ANY: Final = msgspec.msgpack.Decoder(ext_hook=_read_extension)
 _DECODERS: Final[dict[type, Any]] = {
     kind: msgspec.msgpack.Decoder(kind, ext_hook=_read_extension)
-    for kind in (Batch, SyncRequest, SyncReply, ClientRequest, ClientReply)
+    for kind in (Batch, _BatchStart, SyncRequest, SyncReply, ClientRequest, ClientReply)
 }

@@ -29,6 +29,7 @@ __all__ = (
     "check_time",
     "check_write",
     "condense",
+    "latest_time",
     "put",
     "spread",
 )
@@ -101,6 +102,15 @@ def put(path: Path, stamp: tuple[int, str], value: Value | Deleted, origin: str 
     return Write(path, stamp[0], stamp[1], value, origin)
 
 
+def latest_time(now: int) -> int:
+    """Return the latest time of a stamp that is not refused.
+
+    Args:
+        now: Time of the local clock, in nanoseconds since the epoch.
+    """
+    return max(now, _PAST) + _MAX_YEARS_AHEAD * _YEAR
+
+
 def check_time(write: Write, now: int) -> None:
     """Refuse a write whose stamp lies years ahead.
 
@@ -111,8 +121,8 @@ def check_time(write: Write, now: int) -> None:
     Raises:
         DecodeError: The stamp lies years ahead.
     """
-    ahead = write.time - max(now, _PAST)
-    if ahead > _MAX_YEARS_AHEAD * _YEAR:
+    if write.time > latest_time(now):
+        ahead = write.time - max(now, _PAST)
         raise DecodeError(
             "parameter stamp",
             -1,

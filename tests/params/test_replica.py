@@ -11,7 +11,7 @@ from network import eventually
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
 from rosz.params.replica import Replica
-from rosz.params.replica.broadcast import PendingWrite
+from rosz.params.replica.broadcast import Delivery, PendingWrite
 from rosz.params.wire import (
     Batch,
     ClientRequest,
@@ -134,7 +134,7 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
     eventually(lambda: sessions[1].live_tokens(Keys(0).tokens, TIMEOUT) != [])
     other = network.join(sessions[1])
     eventually(lambda: len(one.members()) == 1)
-    monkeypatch.setattr(one._broadcaster, "send", lambda *_: ())
+    monkeypatch.setattr(one._broadcaster, "send", lambda *_: Delivery((), {}))
     other._declared[1].close()  # where it is told: rules leave such questions without an answer
     merge(one, "/", {"a": {"b": 1, "c": 2}, "d": 3})
     with caplog.at_level(logging.WARNING, "rosz.params"):
@@ -334,8 +334,24 @@ def test_a_replica_that_does_not_answer_is_named_once_and_then_not_waited_for(
     )
     assert other.get("/a/b") == 1
     begun = time.monotonic()
-    assert one.set("/a/b", 2, timeout=5).slow == ()
+    assert one.set("/a/b", 2, timeout=5).slow == outcome.slow
     assert time.monotonic() - begun < 1
+    assert caplog.text.count("not yet known") == 1
+
+
+def test_a_write_that_a_replica_refuses_is_undone(network: Network) -> None:
+    right = network.replica(label="right")
+    session = network.session()
+    session.clock = SkewedClock(session.zid, 11 * 365.25 * 86_400)
+    wrong = network.join(session)
+    eventually(lambda: len(right.members()) == 1)
+    right.set("/a", 1)
+    for name in ("/a", "/new/deep"):
+        with pytest.raises(ParamError) as caught:
+            wrong.set(name, 2, timeout=TIMEOUT)
+        assert f"'{name}' is not written, since right refuses it: " in str(caught.value)
+        assert "stamped 11 years ahead, expected at most 10" in str(caught.value)
+    assert wrong.root == right.root == {"a": 1}
 
 
 def test_a_replica_that_goes_is_not_waited_for(network: Network) -> None:

@@ -134,11 +134,55 @@ def test_taking_does_not_wait_for_others() -> None:
     other = threading.Thread(target=work)
     other.start()
     assert entered.wait(10)
-    assert not shared.try_receive(message("a", 1, 1))
+    assert shared.try_receive(message("a", 1, 1)) is None
     release.set()
     other.join()
-    assert shared.try_receive(message("a", 1, 1))
+    assert shared.try_receive(message("a", 1, 1)) == ""
     assert shared.root == {"a": 1}
+
+
+def test_what_may_have_been_deleted_is_refused() -> None:
+    shared = state()
+    shared.write([(("a",), 1)], "me")
+    stamp, _ = shared.write([(("a",), DELETED)], "me")
+    assert shared.forget(0) == 1
+    early = message("a", 1, stamp.time - 1)
+    assert not shared.defer(early)
+    assert "older than deletions that are forgotten" in shared.receive(early)
+    with pytest.raises(DecodeError, match="older than deletions that are forgotten"):
+        shared.write([(("a",), 1)], "me", Stamp(stamp.time - 1, "bb"))
+    assert shared.root == {}
+    assert shared.defer(message("a", 1, stamp.time + 1))
+    assert shared.root == {"a": 1}
+
+
+@pytest.mark.parametrize("seen", [{}, {"a": {"b": 1}}, {"a": 1}, {"a": {"b": {"c": 1}, "x": 1}}])
+@pytest.mark.parametrize(
+    "batch",
+    [
+        [(("a", "b", "c"), 2)],
+        [(("a",), 2)],
+        [((), {"a": 5, "z": 1})],
+        [(("a", "b"), 2), (("a", "d", "e"), 3), (("a", "d", "f"), 3), (("q",), 4)],
+        [(("a", "b"), DELETED)],
+    ],
+)
+def test_undoing_restores_the_tree(seen: dict[str, Any], batch: list[Any]) -> None:
+    shared = state()
+    shared.write([((), seen)], "me")
+    stamp, change = shared.write(batch, "me")
+    shared.undo(change, stamp, "me")
+    # In ROS 1 only what is set can be deleted, so the parents of a deletion are there already.
+    assert shared.root == seen or batch[0][1] is DELETED
+
+
+def test_undoing_leaves_what_came_later() -> None:
+    shared = state()
+    stamp, change = shared.write([(("a", "b"), 1), (("c",), 1)], "me")
+    shared.write([(("a", "d"), 2), (("c",), 2)], "other")
+    changes, _, _ = shared.undo(change, stamp, "me")
+    assert changes == [(("a", "b"), DELETED)]
+    assert shared.root == {"a": {"d": 2}, "c": 2}
 
 
 def test_own_stamps_are_later_than_all_that_was_noted() -> None:
@@ -203,7 +247,7 @@ def test_damaged_messages_change_nothing(caplog: pytest.LogCaptureFixture) -> No
             add_header("bb", 1, b"\xc1"),
             message("a//b", 1, 1),
         ):
-            shared.defer(data)
+            assert shared.defer(data) or shared.receive(data)
         assert shared.root == {}
     assert caplog.text.count("wrote something that is not a parameter") == 3  # kinds of damage
 

@@ -15,13 +15,14 @@ import pytest
 from hypothesis import given
 from network import eventually
 
-from rosz.errors import StoreError
+from rosz.errors import ParamError, StoreError
 from rosz.params.history import History
 from rosz.params.replica.storage import Storage, StoreFile
-from rosz.params.writes import DELETED, Write, put
+from rosz.params.writes import DELETED, Change, Write, put
 
-from .network import Network
+from .network import TIMEOUT, Network
 from .strategies import writes
+from .test_replica import Mute
 
 WRITER = """
 import sys
@@ -347,7 +348,7 @@ def test_tidying_up_makes_nobody_wait() -> None:
     disk = Disk()
     storage = Storage(disk)
     go_on, safe = held(storage), threading.Event()
-    storage.when_stored(safe.set)
+    storage.when_stored(lambda _: safe.set())
     storage.compact(lambda: ([], 0))
     go_on.set()
     assert safe.wait(10)
@@ -369,6 +370,59 @@ def test_a_disk_that_is_full_for_long_costs_no_memory() -> None:
         (("m",), 100),
         (("late",), 101),
     ]
+
+
+def test_a_full_disk_refuses_every_set(network: Network, caplog: pytest.LogCaptureFixture) -> None:
+    disk = Disk()
+    keeper = network.replica(storage=Storage(disk), label="keeper")
+    other = network.replica(label="other")
+    eventually(lambda: len(keeper.members()) == 1)
+    other.set("/a", 1)
+    disk.full = True
+    changes: list[Change] = [(("a",), 2), (("new", "deep"), 2), (("a",), DELETED)]
+    for replica in (keeper, other, keeper, other):
+        for change in changes:
+            with pytest.raises(
+                ParamError, match="' is not written, since keeper refuses it: no space left"
+            ):
+                replica.write([change], timeout=TIMEOUT)
+            assert keeper.root == other.root == {"a": 1}
+    assert caplog.text.count("parameters cannot be saved") == 1
+    disk.full = False
+    eventually(lambda: "parameters are saved again" in caplog.text)
+    other.set("/b", 2)
+    history = History()
+    history.apply(disk.kept)
+    assert history.root == keeper.root == other.root == {"a": 1, "b": 2}
+
+
+def test_a_file_that_cannot_grow_keeps_what_it_has(network: Network, tmp_path: Path) -> None:
+    path = tmp_path / "params"
+    store = StoreFile(path)
+    replica = network.replica(storage=Storage(store))
+    replica.set("/a", 1)
+    store._base.execute("PRAGMA max_page_count = 1")
+    with pytest.raises(ParamError, match=f"cannot write '{path}': database or disk is full"):
+        replica.set("/large", "x" * 100_000, timeout=TIMEOUT)
+    assert replica.root == {"a": 1}
+    store._base.execute("PRAGMA max_page_count = 10000")
+    replica.set("/b", 2)
+    replica.close()
+    assert loaded(path).root == {"a": 1, "b": 2}
+
+
+def test_a_set_waits_for_replicas_and_the_disk_within_one_time(network: Network) -> None:
+    storage = Storage(Disk())
+    replica = network.replica(storage=storage, label="me")
+    Mute(network)
+    eventually(lambda: len(replica.members()) == 1)
+    go_on = held(storage)
+    begun = time.monotonic()
+    outcome = replica.set("/a", 1, timeout=3)
+    taken = time.monotonic() - begun
+    go_on.set()
+    assert outcome.slow == ("mute program (pid 7 on elsewhere)", "the file of me")
+    assert taken < 5
 
 
 def loaded_while_open(path: Path) -> dict[str, object]:

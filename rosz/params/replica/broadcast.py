@@ -3,7 +3,8 @@
 A write is acknowledged, and `WriteBroadcaster.send` returns, when every live replica has applied
 it. A replica that has not acknowledged it after a moment is sent it once more, as a query to it
 alone. One that still does not answer in time is lagging: no write waits for it until it answers
-again.
+again, but each names it. One that refuses the write, or cannot store it, acknowledges it with the
+reason.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Collection
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from rosz.errors import DecodeError, RoszError
 from rosz.lifecycle import Closable
@@ -29,7 +30,7 @@ from rosz.session import Query, RawPublisher, Reply, Sample, Stamp
 if TYPE_CHECKING:
     from rosz.params.replica.storage import Storage
 
-__all__ = ("PendingWrite", "PendingWrites", "WriteBroadcaster")
+__all__ = ("Delivery", "PendingWrite", "PendingWrites", "WriteBroadcaster")
 
 _log = logging.getLogger("rosz.params")
 
@@ -37,11 +38,27 @@ _LARGE: Final = 16_384
 """Bytes of a message above which it is not applied on Zenoh's thread."""
 
 _ACK: Final = struct.Struct("<Q")
+_SEPARATOR: Final = b" "
 _MAX_PEERS: Final = 1000
 """Writers with a publisher of their own for the acknowledgements to them."""
 
 _RESEND_AFTER: Final = 0.25
 """Seconds after which a write is sent once more to those that have not acknowledged it."""
+
+
+_NOBODY: Final[frozenset[str]] = frozenset()
+
+
+class Delivery(NamedTuple):
+    """How a write arrived.
+
+    Attributes:
+        slow: Replicas that have not acknowledged it, as shown to users.
+        refusals: Replicas that refused it, as shown to users, and their reasons.
+    """
+
+    slow: tuple[str, ...]
+    refusals: dict[str, str]
 
 
 class PendingWrite:
@@ -50,13 +67,17 @@ class PendingWrite:
     Attributes:
         number: Number of the write of this replica.
         waiting: Sessions that have not acknowledged it.
+        skipped: Sessions that lag, which it does not wait for.
+        refusals: Reason of each session that has refused it.
     """
 
-    __slots__ = ("_done", "number", "waiting")
+    __slots__ = ("_done", "number", "refusals", "skipped", "waiting")
 
-    def __init__(self, number: int, waiting: set[str]) -> None:
+    def __init__(self, number: int, waiting: set[str], skipped: frozenset[str]) -> None:
         self.number: int = number
         self.waiting: set[str] = waiting
+        self.skipped: frozenset[str] = skipped
+        self.refusals: dict[str, str] = {}
         # A bare lock is the fastest thing to wait on: it is acquired here and released at the end.
         self._done = threading.Lock()
         if waiting:
@@ -89,8 +110,9 @@ class PendingWrites:
     def open(self, zids: Collection[str]) -> PendingWrite:
         """Start waiting for sessions, except for lagging ones."""
         with self._lock:
-            waiting = {zid for zid in zids if zid not in self._lagging}
-            pending = PendingWrite(next(self._numbers), waiting)
+            skipped = self._lagging.intersection(zids) if self._lagging else _NOBODY
+            waiting = set(zids).difference(skipped)
+            pending = PendingWrite(next(self._numbers), waiting, frozenset(skipped))
             if waiting:
                 self._pending[pending.number] = pending
             return pending
@@ -103,12 +125,24 @@ class PendingWrites:
             self._lagging |= late
             return late
 
-    def acknowledge(self, zid: str, number: int) -> None:
-        """Handle an acknowledgement."""
+    def lagging(self, pending: PendingWrite) -> frozenset[str]:
+        """Return the sessions that a write did not wait for, and that lag still."""
+        return pending.skipped & self._lagging if pending.skipped else _NOBODY
+
+    def acknowledge(self, zid: str, number: int, refusal: str = "") -> None:
+        """Handle an acknowledgement.
+
+        Args:
+            zid: Session that has acknowledged a write.
+            number: Number of the write.
+            refusal: Reason why the session refused it; empty if it has taken it.
+        """
         with self._lock:
             self._lagging.discard(zid)
             pending = self._pending.get(number)
             if pending is not None:
+                if refusal:
+                    pending.refusals[zid] = refusal
                 pending.remove(zid)
 
     def drop_peer(self, zid: str) -> None:
@@ -156,9 +190,7 @@ class WriteBroadcaster:
             session.queryable(f"{resent_key}/**", self._on_resent, complete=True),
         ]
 
-    def send(
-        self, changes: list[Change], stamp: Stamp, origin: str, timeout: float
-    ) -> tuple[str, ...]:
+    def send(self, changes: list[Change], stamp: Stamp, origin: str, timeout: float) -> Delivery:
         """Send a batch to all replicas, and wait until they have acknowledged it.
 
         Args:
@@ -166,9 +198,6 @@ class WriteBroadcaster:
             stamp: Stamp of the batch.
             origin: Writer, as shown to users.
             timeout: Time limit in seconds; 0 does not wait.
-
-        Returns:
-            The replicas that did not acknowledge it in time, as shown to users.
 
         Raises:
             ClosedError: The session is closed.
@@ -190,7 +219,9 @@ class WriteBroadcaster:
             late = self._labels(self.pending.close(pending))
         if late:
             _warn(changes, late, time.monotonic() - began)
-        return tuple(late)
+        late += self._labels(self.pending.lagging(pending) & self._members.zids)
+        refusals = {self._members.label(zid): why for zid, why in pending.refusals.items()}
+        return Delivery(tuple(late), refusals)
 
     def drop_peer(self, zid: str) -> None:
         """Stop waiting for a replica that is gone, and stop acknowledging its writes."""
@@ -237,7 +268,7 @@ class WriteBroadcaster:
 
     def _on_resend_reply(self, zid: str, number: int, reply: Reply) -> None:
         if reply.ok:
-            self.pending.acknowledge(zid, number)
+            self.pending.acknowledge(zid, number, reply.payload.decode(errors="replace"))
 
     def _on_change(self, sample: Sample) -> None:
         """Apply a message on Zenoh's thread if that is quick, else on the worker."""
@@ -253,25 +284,32 @@ class WriteBroadcaster:
             if self._state.defer(message, reach):
                 acknowledge()
                 return
-            if self._state.try_receive(message, reach):
-                self._when_stored(acknowledge)
+            refusal = self._state.try_receive(message, reach)
+            if refusal is not None:
+                self._when_stored(refusal, acknowledge)
                 return
         # If the worker is busy, the write is not acknowledged, and so sent once more.
         self._worker.offer(lambda: self._apply(message, reach, acknowledge))
 
-    def _apply(self, message: bytes, reach: Path, then: Callable[[], None]) -> None:
-        self._state.receive(message, reach)
-        self._when_stored(then)
+    def _apply(self, message: bytes, reach: Path, then: Callable[[str], object]) -> None:
+        self._when_stored(self._state.receive(message, reach), then)
 
-    def _when_stored(self, then: Callable[[], None]) -> None:
-        """Call a function when everything applied so far is stored."""
-        if self._storage is None:
-            then()
+    def _when_stored(self, refusal: str, then: Callable[[str], object]) -> None:
+        """Call a function when everything applied so far is stored, or is not.
+
+        Args:
+            refusal: Reason why the message was not applied; empty if it was.
+            then: Function called with the reason, or with the reason why it is not stored.
+        """
+        if refusal or self._storage is None:
+            then(refusal)
         else:
             self._storage.when_stored(then)
 
-    def _acknowledge(self, sender: str, number: int) -> None:
+    def _acknowledge(self, sender: str, number: int, refusal: str = "") -> None:
         ack = _ACK.pack(number) + self._own
+        if refusal:
+            ack += _SEPARATOR + refusal.encode()
         publisher = self._ack_publishers.get(sender)
         try:
             # On Zenoh's thread: an acknowledgement that waits for a full link would delay the
@@ -296,9 +334,10 @@ class WriteBroadcaster:
 
     def _on_ack(self, sample: Sample) -> None:
         payload = sample.payload
-        zid = payload[_ACK.size :]
+        zid, _, refusal = payload[_ACK.size :].partition(_SEPARATOR)
         if zid.isalnum():
-            self.pending.acknowledge(zid.decode(), _ACK.unpack_from(payload)[0])
+            number = _ACK.unpack_from(payload)[0]
+            self.pending.acknowledge(zid.decode(), number, refusal.decode(errors="replace"))
 
     def _on_resent(self, query: Query) -> None:
         message = query.payload or b""
@@ -313,9 +352,9 @@ class WriteBroadcaster:
             query.close()
 
 
-def _confirm(query: Query) -> None:
+def _confirm(query: Query, refusal: str) -> None:
     with query:
-        query.reply(query.key, b"")
+        query.reply(query.key, refusal.encode())
 
 
 def _warn(changes: list[Change], late: list[str], seconds: float) -> None:

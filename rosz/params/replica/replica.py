@@ -12,7 +12,8 @@ import os
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import PurePath
 from queue import Empty, SimpleQueue
@@ -28,6 +29,7 @@ from rosz.params.replica.members import Core
 from rosz.params.replica.serve import ClientServer, ParameterKeys
 from rosz.params.replica.state import NOT_A_PARAMETER, TreeReader, not_found
 from rosz.params.replica.sync import AntiEntropy, Synchroniser
+from rosz.params.replica.watch import TreeChange
 from rosz.params.tree import MISSING
 from rosz.params.values import normalise
 from rosz.params.wire import Member, Record, SyncReply, decode, encode
@@ -58,7 +60,7 @@ _MAX_WAITING: Final = 2000
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """The result of a write, which stands in any case.
+    """The result of a write.
 
     Attributes:
         time: Time of the write, in nanoseconds since the epoch.
@@ -188,7 +190,8 @@ class Replica(_Copy):
             timeout: Time limit in seconds of the wait for the other replicas.
 
         Raises:
-            ParamError: A parameter cannot hold the value, or the root would not be a dict.
+            ParamError: A parameter cannot hold the value, the root would not be a dict, or a
+                replica refuses the write or cannot store it.
             InvalidName: The name is not a global name.
             ClosedError: The replica or the session is closed.
         """
@@ -202,7 +205,8 @@ class Replica(_Copy):
 
         Raises:
             ParamNotFound: The parameter is not set.
-            ParamError: The parameter is the root.
+            ParamError: The parameter is the root, or a replica refuses the write or cannot
+                store it.
             InvalidName: The name is not a global name.
             ClosedError: The replica or the session is closed.
         """
@@ -231,12 +235,14 @@ class Replica(_Copy):
             timeout: Time limit in seconds of the wait for the other replicas.
 
         Raises:
-            ParamError: The tree cannot hold a change; nothing is changed then.
+            ParamError: The tree cannot hold a change, or a replica refuses the batch or cannot
+                store it; nothing is changed then.
             DecodeError: The given stamp lies years ahead; nothing is changed then.
             ClosedError: The replica or the session is closed.
             UsageError: The timeout is not a number; nothing is changed then.
         """
         timeout = clamp_timeout(timeout)
+        deadline = time.monotonic() + timeout
         if self._lifecycle.closing:
             self._lifecycle.check_open("write parameters")
         batch = list(changes)
@@ -244,9 +250,16 @@ class Replica(_Copy):
             return Outcome(0)
         origin = origin or self.label
         stamp, change = self._state.write(batch, origin, stamp)
-        slow = self._broadcaster.send(batch, stamp, origin, timeout)
+        slow, refusals = self._broadcaster.send(batch, stamp, origin, timeout)
+        unstored = self._wait_until_stored(deadline) if timeout > 0 else ""
+        if unstored is None:
+            slow = (*slow, f"the file of {self.label}")
+        elif unstored:
+            refusals[self.label] = unstored
+        if refusals:
+            self._undo(change, stamp, origin, deadline)
+            raise _refused(batch, refusals)
         self._parameter_keys.publish(change)
-        self._wait_until_stored(timeout)
         return Outcome(stamp.time, slow)
 
     def members(self) -> list[Member]:
@@ -346,11 +359,31 @@ class Replica(_Copy):
         if self._storage is not None:
             self._storage.compact(self._snapshot)
 
-    def _wait_until_stored(self, timeout: float) -> None:
-        if self._storage is not None and timeout > 0:
-            stored = threading.Event()
-            self._storage.when_stored(stored.set)
-            stored.wait(timeout)
+    def _wait_until_stored(self, deadline: float) -> str | None:
+        """Return the reason why what was written cannot be stored; ``None`` if that takes long."""
+        if self._storage is None:
+            return ""
+        reasons: SimpleQueue[str] = SimpleQueue()
+        self._storage.when_stored(reasons.put)
+        try:
+            return reasons.get(timeout=max(0.0, deadline - time.monotonic()))
+        except Empty:
+            return None
+
+    def _undo(self, change: TreeChange, stamp: Stamp, origin: str, deadline: float) -> None:
+        """Undo a batch that a replica has refused, on all replicas that have taken it."""
+        changes, now, undone = self._state.undo(change, stamp, origin)
+        if changes:
+            timeout = max(0.0, deadline - time.monotonic())
+            self._broadcaster.send(changes, now, origin, timeout)
+            self._parameter_keys.publish(undone)
+
+
+def _refused(batch: list[Change], refusals: Mapping[str, str]) -> ParamError:
+    name = joined(batch[0][0])
+    more = f" and {len(batch) - 1} more" if len(batch) > 1 else ""
+    reasons = "; ".join(f"{label} refuses it: {why}" for label, why in sorted(refusals.items()))
+    return ParamError(f"'{name}'{more} is not written, since {reasons}")
 
 
 class Follower(_Copy):

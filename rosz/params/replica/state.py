@@ -18,8 +18,8 @@ from rosz.params.paths import ROOT, Path, climb, joined, to_path
 from rosz.params.replica.watch import Callback, TreeChange, Watch, Watchers
 from rosz.params.tree import MISSING, Missing, Tree, leaves, lookup
 from rosz.params.values import Value, copy
-from rosz.params.wire import Batch, check_reach, decode, read_header
-from rosz.params.writes import Change, Write, check_time, put
+from rosz.params.wire import Batch, check_reach, decode, read_header, read_time
+from rosz.params.writes import DELETED, Change, Write, check_time, condense, latest_time, put
 from rosz.session import HybridClock, Stamp
 
 __all__ = ("NOT_A_PARAMETER", "DamageLog", "State", "TreeReader", "names_beside", "not_found")
@@ -144,32 +144,38 @@ class State:
 
         Returns:
             Whether that is enough; if not, the message must be applied now, because somebody is to
-            be notified of it or too many messages are deferred.
+            be notified of it, too many messages are deferred, or it may have to be refused.
         """
         if self._is_followed() or len(self._deferred) >= _MAX_DEFERRED:
+            return False
+        if not self._is_plausible(message):
             return False
         self._deferred.append((message, reach))
         # Somebody may have begun to follow after the first check, and seen the queue without this.
         return not self._is_followed()
 
-    def receive(self, message: bytes, reach: Path = ROOT) -> None:
-        """Apply a message of another replica; the arguments are those of `defer`."""
-        with self:
-            self._receive(message, reach)
+    def receive(self, message: bytes, reach: Path = ROOT) -> str:
+        """Apply a message of another replica; the arguments are those of `defer`.
 
-    def try_receive(self, message: bytes, reach: Path = ROOT) -> bool:
+        Returns:
+            The reason why it is refused; empty if it is not.
+        """
+        with self:
+            return self._receive(message, reach)
+
+    def try_receive(self, message: bytes, reach: Path = ROOT) -> str | None:
         """Apply a message of another replica, unless another thread holds the history.
 
         Returns:
-            Whether it was applied; if not, call `receive` on a thread that may wait.
+            What `receive` returns, or ``None`` if the message was not applied; then call `receive`
+            on a thread that may wait.
         """
         if not self.acquire(_LOCK_TIMEOUT):
-            return False
+            return None
         try:
-            self._receive(message, reach)
+            return self._receive(message, reach)
         finally:
             self.release()
-        return True
 
     def write(
         self, changes: Iterable[Change], origin: str, stamp: Stamp | None = None
@@ -178,7 +184,8 @@ class State:
 
         Raises:
             ParamError: The tree cannot hold a change; nothing is changed then.
-            DecodeError: The given stamp lies years ahead; nothing is changed then.
+            DecodeError: The given stamp lies years ahead, or before deletions that are forgotten;
+                nothing is changed then.
         """
         with self:
             given, stamp = stamp, stamp or self._now()
@@ -188,7 +195,31 @@ class State:
                 now = time.time_ns()
                 for write in writes:
                     check_time(write, now)
+                    self._check_horizon(write)
             return stamp, self._apply(writes)
+
+    def undo(
+        self, change: TreeChange, stamp: Stamp, origin: str
+    ) -> tuple[list[Change], Stamp, TreeChange]:
+        """Write what a batch replaced, unless it is overwritten already.
+
+        Args:
+            change: What the batch changed.
+            stamp: Stamp of the batch.
+            origin: Writer, as shown to users.
+
+        Returns:
+            The changes that undo the batch, their stamp, and what they changed.
+        """
+        at = (stamp.time, stamp.id)
+        with self as history:
+            mine = [write.path for write in change.writes if history.find(write.path) == write]
+            changes = condense(_before(change.old, path, history, at) for path in mine)
+            now = self._now()
+            again = self._apply(
+                [put(path, (now.time, now.id), old, origin) for path, old in changes]
+            )
+            return changes, now, again
 
     def apply(self, writes: Iterable[Write]) -> None:
         """Add writes of other replicas, except for those stamped years ahead.
@@ -310,14 +341,41 @@ class State:
     def _is_followed(self) -> bool:
         return self._on_new is not None or self.watchers.active
 
-    def _receive(self, message: bytes, reach: Path) -> None:
+    def _is_plausible(self, message: bytes) -> bool:
+        """Tell whether no write in a message is to be refused for its time."""
+        try:
+            time_ = read_time(memoryview(message)[read_header(message)[2] :])
+        except DecodeError:
+            return False
+        return self._history.horizon < time_ <= latest_time(time.time_ns())
+
+    def _receive(self, message: bytes, reach: Path) -> str:
         try:
             start = read_header(message)[2]
             writes = decode(memoryview(message)[start:], Batch).writes()
             check_reach((write.path for write in writes), reach)
-            self._apply(self._check_times(writes, _REFUSED)[0])
         except DecodeError as error:
             self.damage.report(NOT_A_PARAMETER, error)
+            return str(error)
+        try:
+            for write in writes:
+                check_time(write, time.time_ns())
+                self._check_horizon(write)
+        except DecodeError as error:
+            self.damage.report(_REFUSED, error)
+            return error.reason
+        self._apply(writes)
+        return ""
+
+    def _check_horizon(self, write: Write) -> None:
+        """Raise `DecodeError` if the history neither holds nor takes a write."""
+        history = self._history
+        if write.time <= history.horizon and not (history.hides(write) or history.provable(write)):
+            raise DecodeError(
+                "parameter stamp",
+                -1,
+                f"'{joined(write.path)}' is older than deletions that are forgotten: set it again",
+            )
 
     def _check_times(self, writes: Iterable[Write], what: str) -> tuple[list[Write], list[Write]]:
         """Return the writes with a plausible stamp, and those stamped years ahead.
@@ -360,6 +418,21 @@ class State:
 
 
 def _ignore(_writes: list[Write]) -> None: ...
+
+
+def _before(old: Tree, path: Path, history: History, at: tuple[int, str]) -> Change:
+    """Return the change that makes a path what it was, without the writes of one stamp."""
+    for depth in range(len(path)):
+        start = path[:depth]
+        value = lookup(old, start)
+        if value is MISSING and all(
+            write.deleted or (write.time, write.clock) == at for write in history.below(start)
+        ):
+            return start, DELETED
+        if value is not MISSING and type(value) is not dict:
+            return start, value
+    value = lookup(old, path)
+    return path, DELETED if value is MISSING else value
 
 
 class TreeReader:

@@ -45,6 +45,9 @@ CREATE TABLE writes (
 ) WITHOUT ROWID
 """
 _HORIZON_SCHEMA: Final = "CREATE TABLE horizon (time INTEGER NOT NULL)"
+_RETRY_AFTER: Final = 1.0
+"""Seconds after which what could not be saved is tried again."""
+
 _HEADER: Final = b"SQLite format 3\0"
 _LOAD: Final = "SELECT path, time, clock, origin, value, sum FROM writes"
 _DELETE_HIDDEN: Final = """
@@ -247,7 +250,9 @@ class Storage:
         self._file = file
         self._worker: Worker[Callable[[], object]] = Worker("rosz-params-save")
         self._unsaved: list[Write] = []
-        self._waiting: list[Callable[[], None]] = []
+        self._waiting: list[Callable[[str], object]] = []
+        self._failing = False
+        self._retrying = False
 
     def load(self) -> tuple[list[Write], int]:
         """Return the stored writes, and the time up to which deletions may be forgotten.
@@ -261,8 +266,12 @@ class Storage:
         """Save writes soon."""
         self._worker.submit(lambda: self._add(writes, None))
 
-    def when_stored(self, then: Callable[[], None]) -> None:
-        """Call a function, on the thread of the storage, when all writes so far are stored."""
+    def when_stored(self, then: Callable[[str], object]) -> None:
+        """Call a function, on the thread of the storage, when all writes so far are stored.
+
+        Args:
+            then: Function called with the reason why they cannot be stored; empty if they are.
+        """
         self._worker.submit(lambda: self._add([], then))
 
     def compact(self, snapshot: Callable[[], tuple[list[Write], int]]) -> None:
@@ -275,7 +284,7 @@ class Storage:
         self._worker.close()
         self._file.close()
 
-    def _add(self, writes: list[Write], then: Callable[[], None] | None) -> None:
+    def _add(self, writes: list[Write], then: Callable[[str], object] | None) -> None:
         self._unsaved += writes
         if then is not None:
             self._waiting.append(then)
@@ -284,22 +293,41 @@ class Storage:
 
     def _replace(self, snapshot: Callable[[], tuple[list[Write], int]]) -> None:
         # Writes applied meanwhile are in the snapshot, or are saved after it.
+        writes, horizon = snapshot()
         try:
-            self._file.replace(*snapshot())
+            self._file.replace(writes, horizon)
         except RoszError as error:
-            _log.error("parameters are not saved: %s", error)  # a traceback would add nothing
+            _log.debug("old parameters stay in the file: %s", error)
+            self._unsaved += writes
         self._flush()
 
     def _flush(self) -> None:
         writes, self._unsaved = self._unsaved, []
         waiting, self._waiting = self._waiting, []
+        reason = ""
         try:
             if writes:
                 self._file.save(writes)
         except RoszError as error:
-            _log.error("parameters are not saved: %s", error)  # a traceback would add nothing
+            reason = str(error)
             # The disk may stay full for long, so only the newest write of each path is kept.
             self._unsaved = list({write.path: write for write in writes}.values())
-            return
+        self._report(reason)
         for then in waiting:
-            then()
+            then(reason)
+
+    def _report(self, reason: str) -> None:
+        """Log when saving begins to fail and when it works again; try again while it fails."""
+        if reason and not self._failing:
+            _log.error("parameters cannot be saved, so none are set: %s", reason)
+        elif self._failing and not reason:
+            _log.warning("parameters are saved again")
+        self._failing = bool(reason)
+        if reason and not self._retrying:
+            self._retrying = True
+            self._worker.later(_RETRY_AFTER, self._retry)
+
+    def _retry(self) -> None:
+        self._retrying = False
+        if self._failing:
+            self._flush()
