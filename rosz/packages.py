@@ -1,5 +1,8 @@
 """ROS packages on disk: folders with a package.xml (REP 127, REP 149).
 
+Programs of a package are its executable files. A package in Python of ROS 2 (ament_python) has them
+as entry points in setup.py, from which colcon would make files; they are found there.
+
 The index searches its folders in order, and the first package of a name wins, as in ``rospack``.
 Nothing is read before it is needed.
 """
@@ -47,8 +50,9 @@ class Package(msgspec.Struct, frozen=True):
                     yield Path(folder, file)
 
     def executables(self) -> list[str]:
-        """Return the names of all executable files of the package, sorted."""
-        return sorted({file.name for file in self._files() if _is_executable(file)})
+        """Return the names of all executable files and entry points of the package, sorted."""
+        files = {file.name for file in self._files() if _is_executable(file)}
+        return sorted(files | self._entry_points().keys())
 
     def files(self, name: str) -> list[Path]:
         """Return all files of a name in the package."""
@@ -57,6 +61,8 @@ class Package(msgspec.Struct, frozen=True):
     def executable(self, name: str) -> Path:
         """Return an executable file by its name, from anywhere in the package, as rosrun does.
 
+        An entry point is the path of its module and the name of its function, with a colon between.
+
         Raises:
             ExecutableNotFound: There is none, or the file is not executable.
         """
@@ -64,6 +70,9 @@ class Package(msgspec.Struct, frozen=True):
         for file in found:
             if _is_executable(file):
                 return file
+        entry = self._entry_points().get(name)
+        if entry is not None:
+            return self._module_of(name, entry)
         if found:
             raise ExecutableNotFound(
                 f"'{found[0]}' of package '{self.name}' is not executable; run: chmod +x {found[0]}"
@@ -74,6 +83,43 @@ class Package(msgspec.Struct, frozen=True):
         hint = near_miss(name, known) or near_miss(name, scripts) or listing
         raise ExecutableNotFound(
             f"package '{self.name}' ({self.path}) has no executable '{name}'{hint}"
+        )
+
+    def _entry_points(self) -> dict[str, str]:
+        """Return the entry points in setup.py, such as ``talker`` for ``demo.talker:main``."""
+        try:
+            source = (self.path / "setup.py").read_bytes()
+        except OSError:
+            return {}
+        import ast  # slow to load, and rarely needed
+
+        try:
+            tree = ast.parse(source)
+        except (SyntaxError, ValueError):  # 'rosz pkg check' reports it
+            return {}
+        listed = [
+            item.value
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Dict)
+            for key, value in zip(node.keys, node.values, strict=True)
+            if isinstance(key, ast.Constant) and key.value == "console_scripts"
+            if isinstance(value, ast.List | ast.Tuple)
+            for item in value.elts
+            if isinstance(item, ast.Constant) and isinstance(item.value, str)
+        ]
+        pairs = (text.partition("=") for text in listed)
+        return {name.strip(): entry.strip() for name, _, entry in pairs}
+
+    def _module_of(self, name: str, entry: str) -> Path:
+        """Return the path of an entry point, with its function."""
+        module, _, function = entry.partition(":")
+        relative = f"{module.strip().replace('.', '/')}.py"
+        for folder in (self.path, self.path / "src"):
+            if (folder / relative).is_file():
+                return folder / f"{relative}:{function.strip() or 'main'}"
+        raise ExecutableNotFound(
+            f"setup.py of package '{self.name}' says that '{name}' is '{entry}', but there is no"
+            f" {self.path / relative}"
         )
 
     def within(self, name: str) -> Path:

@@ -27,7 +27,7 @@ class Script:
     """A compiled script.
 
     Args:
-        path: Path of the script.
+        path: Path of the script, or of a module with a function to call: ``demo/talker.py:main``.
 
     Raises:
         NotFoundError: The file cannot be read.
@@ -38,6 +38,10 @@ class Script:
     def __init__(self, path: str) -> None:
         self._path = path
         self._file = Path(path).absolute()
+        self._folder = self._file.resolve().parent
+        entry = None if self._file.exists() else _entry(self._file)
+        if entry is not None:
+            self._folder, source = entry
         self._main = ModuleType("__main__")
         self._main.__dict__.update(
             __file__=str(self._file),
@@ -48,12 +52,15 @@ class Script:
         if "__annotations__" in vars(sys.modules["__main__"]):  # up to Python 3.13
             self._main.__annotations__ = {}
         with _trimmed_tracebacks(self._main):
-            self._code = _compile(self._file)
+            if entry is None:
+                self._code = _compile(self._file)
+            else:
+                self._code = compile(source, str(self._file), "exec", dont_inherit=True)
 
     def run(self, arguments: Sequence[str]) -> None:
         """Run the script as the main module of this process; whatever it raises is passed on."""
         sys.argv[:] = [self._path, *arguments]
-        folder = str(self._file.resolve().parent)
+        folder = str(self._folder)
         if sys.flags.safe_path:
             sys.path.insert(0, folder)
         else:
@@ -61,6 +68,20 @@ class Script:
         sys.modules["__main__"] = self._main
         with _trimmed_tracebacks(self._main):
             exec(self._code, self._main.__dict__)  # noqa: S102  # the user's own program
+
+
+def _entry(path: Path) -> tuple[Path, str] | None:
+    """Return the folder to import from and the source that calls an entry point, if it is one."""
+    name, _, function = path.name.partition(":")
+    module = path.resolve().with_name(name)
+    if not function or not module.is_file():
+        return None
+    folder, names = module.parent, [module.stem]
+    while (folder / "__init__.py").is_file():
+        folder, names = folder.parent, [folder.name, *names]
+    first = function.partition(".")[0]
+    dotted = ".".join(names)
+    return folder, f"import sys\nfrom {dotted} import {first}\nsys.exit({function}())\n"
 
 
 def _compile(file: Path) -> CodeType:

@@ -31,6 +31,7 @@ __all__ = (
 )
 
 _SHEBANG_BYTES = 256
+_LAUNCH_SUFFIXES = (".launch", ".launch.xml")
 _PYTHON = re.compile(r"python[0-9.]*")
 _SCRIPT = ("-m", "rosz.script")
 
@@ -170,6 +171,11 @@ def locate(package: Package, name: str) -> Path:
     Raises:
         ExecutableNotFound: If it does not exist, or is not executable.
     """
+    if name.endswith(_LAUNCH_SUFFIXES) and package.files(name.rpartition("/")[2]):
+        raise ExecutableNotFound(
+            f"'{name}' is a launch file, not a program; use roslaunch, or: rosz launch"
+            f" {package.name} {name}"
+        )
     if "/" not in name:
         return package.executable(name)
     path = package.within(name)
@@ -185,7 +191,7 @@ def locate(package: Package, name: str) -> Path:
 
 def is_python(program: Path) -> bool:
     """Return whether a program is a Python script, by its suffix or its first line."""
-    if program.suffix == ".py":
+    if program.suffix == ".py" or ".py:" in program.name:  # an entry point has its function there
         return True
     try:
         with program.open("rb") as file:
