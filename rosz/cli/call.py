@@ -89,10 +89,12 @@ class Call:
         with self.session() as session:
             yield session, take_survey(session, self.domain, processes=processes)
 
-    def survey(self, *, processes: bool = False) -> Survey:
-        """Return the nodes, topics and services of the domain, with processes if wanted."""
-        with self.session_and_survey(processes=processes) as (_, survey):
-            pass
+    def survey(self, *, processes: bool = False, dropped: bool = False) -> Survey:
+        """Return the domain, with processes and counts of dropped samples if wanted."""
+        from rosz.introspect.survey import take_survey
+
+        with self.session() as session:
+            survey = take_survey(session, self.domain, processes=processes, dropped=dropped)
         for damage in survey.damaged:
             warn(f"ignoring an invalid name of a node or topic: {damage}")
         return survey

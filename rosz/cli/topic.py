@@ -112,7 +112,7 @@ def info_command(call: Call, topic: _TopicName, *, json: Json = False) -> None:
     from rosz.introspect import topics as library
 
     name = call.resolve(topic, _TOOL)
-    survey = call.survey(processes=True)
+    survey = call.survey(processes=True, dropped=True)
     if not json:
         print_lines([library.format_topic(survey, name)])
         return

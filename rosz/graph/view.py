@@ -42,7 +42,11 @@ class View:
 
     def is_rosz(self, zid: str) -> bool:
         """Tell whether a session belongs to rosz nodes."""
-        return zid in self._own_sessions
+        return zid in self._hosts
+
+    def host(self, zid: str) -> str | None:
+        """Return the host of a session of rosz nodes; ``None`` if it has none."""
+        return self._hosts.get(zid)
 
     def entities(self, *kinds: Kind, name: str | None = None) -> list[Token]:
         """Return the entities of some kinds, sorted by name, node and number.
@@ -89,8 +93,8 @@ class View:
         return dict(found)
 
     @cached_property
-    def _own_sessions(self) -> frozenset[str]:
-        return frozenset(process.zid for process in self._processes)
+    def _hosts(self) -> dict[str, str]:
+        return {process.zid: process.host for process in self._processes}
 
     def _types(self, *kinds: Kind) -> dict[str, list[str]]:
         found: defaultdict[str, set[str]] = defaultdict(set)

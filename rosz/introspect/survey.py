@@ -10,12 +10,21 @@ import msgspec
 from rosz.errors import DecodeError
 from rosz.graph import View
 from rosz.session import Session
-from rosz.wire import ProcessToken, Token, parse_process, parse_token, processes_key, tokens_key
+from rosz.wire import (
+    ProcessToken,
+    Token,
+    dropped_key,
+    parse_process,
+    parse_token,
+    processes_key,
+    tokens_key,
+)
 
 __all__ = ("Survey", "process_address", "take_survey")
 
 T = TypeVar("T")
 _REPLY_TIMEOUT = 2.0
+_DROPPED_TIMEOUT = 1.0
 
 
 class Survey(msgspec.Struct, frozen=True):
@@ -26,12 +35,14 @@ class Survey(msgspec.Struct, frozen=True):
         view: Nodes and their publishers, subscriptions, services and clients.
         processes: Processes of rosz nodes by session and node id; ROS 2 nodes declare none.
         damaged: Reasons why tokens could not be read.
+        dropped: Samples that publishers and subscriptions have dropped, by session and entity id.
     """
 
     domain: int
     view: View
     processes: dict[tuple[str, int], ProcessToken]
     damaged: tuple[str, ...] = ()
+    dropped: dict[tuple[str, int], int] = {}
 
     def process(self, token: Token) -> ProcessToken | None:
         """Return the process of the node that a token belongs to."""
@@ -58,13 +69,16 @@ def process_address(process: ProcessToken) -> str:
     return f"{process.host}, pid {process.pid}"
 
 
-def take_survey(session: Session, domain: int, *, processes: bool = False) -> Survey:
+def take_survey(
+    session: Session, domain: int, *, processes: bool = False, dropped: bool = False
+) -> Survey:
     """Query the network for the nodes of a domain.
 
     Args:
         session: The session to query with.
         domain: The ROS domain.
         processes: Whether to query processes as well.
+        dropped: Whether to query the counts of dropped samples as well.
 
     Raises:
         ClosedError: The session is closed.
@@ -77,7 +91,24 @@ def take_survey(session: Session, domain: int, *, processes: bool = False) -> Su
     if processes:
         keys = session.live_tokens(processes_key(domain), _REPLY_TIMEOUT)
         found = {(one.zid, one.node_id): one for one in _read(keys, parse_process, damaged)}
-    return Survey(domain, View(tokens), found, tuple(damaged))
+    counts = dict(_read_dropped(session, domain, damaged)) if dropped else {}
+    return Survey(domain, View(tokens), found, tuple(damaged), counts)
+
+
+def _read_dropped(
+    session: Session, domain: int, damaged: list[str]
+) -> Iterator[tuple[tuple[str, int], int]]:
+    for reply in session.get(dropped_key(domain), timeout=_DROPPED_TIMEOUT):
+        if not reply.ok:  # somebody is stopped
+            continue
+        zid = reply.key.rpartition("/")[2]
+        try:
+            counts = msgspec.msgpack.decode(reply.payload, type=dict[int, int])
+        except msgspec.DecodeError as error:
+            damaged.append(f"what '{zid}' has dropped: {error}")
+            continue
+        for entity_id, count in counts.items():
+            yield (zid, entity_id), count
 
 
 def _read(keys: Iterable[str], parse: Callable[[str], T], damaged: list[str]) -> Iterator[T]:

@@ -136,7 +136,9 @@ def format_topic(survey: Survey, name: str) -> str:
         lines.append(f"{title}: " if tokens else f"{title}: None")
         for token in tokens:
             type_text = f" [{short_type(token.type_name)}]" if mixed else ""
-            lines.append(f" * {token.node_name} ({survey.address(token)}){type_text}")
+            count = survey.dropped.get((token.zid, token.entity_id), 0)
+            dropped = f", {count} dropped" if count else ""
+            lines.append(f" * {token.node_name} ({survey.address(token)}){type_text}{dropped}")
         lines.append("")
     return "\n".join([*lines, ""])
 
@@ -147,4 +149,5 @@ def entity_row(survey: Survey, token: Token) -> dict[str, str | int]:
     process = survey.process(token)
     if process is not None:
         row |= {"host": process.host, "pid": process.pid}
-    return row | {"session": token.zid, "hash": token.type_hash}
+    dropped = survey.dropped.get((token.zid, token.entity_id), 0)
+    return row | {"session": token.zid, "hash": token.type_hash, "dropped": dropped}

@@ -7,6 +7,7 @@ from rosz.node.client import Client
 from rosz.node.clock import Clock
 from rosz.node.context import Context
 from rosz.node.control import NodeInfo, Request, control_key
+from rosz.node.decoder import MessageInfo
 from rosz.node.entity import Entity
 from rosz.node.log import NodeLog, NodeLogger
 from rosz.node.log_handlers import (
@@ -22,7 +23,7 @@ from rosz.node.publisher import Publisher, SubscriberLink
 from rosz.node.service import Service
 from rosz.node.signals import of_program
 from rosz.node.standard import serve_loggers, simulate
-from rosz.node.subscription import GenericSubscription, MessageInfo, Subscription
+from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Rate, Timer, TimerEvent
 
 PUBLIC_MODULES = ("type_description",)

@@ -18,6 +18,7 @@ from rosz.interrupts import InterruptDeferral
 from rosz.lifecycle import Lifecycle
 from rosz.node.clock import Clock
 from rosz.node.direct_delivery import DirectDelivery
+from rosz.node.dropped import DroppedSamples
 from rosz.node.incompatible import IncompatibleEntities
 from rosz.session import (
     LocalPeers,
@@ -52,6 +53,7 @@ class Context:
         clock: ROS time.
         mesh: Readiness of the session: whether it is linked to all its neighbours.
         direct_delivery: Samples for single subscriptions of this process.
+        dropped: Counts of dropped samples.
         incompatible: Warnings about entities that cannot reach each other.
         passing: Whether this is a command, which holds no parameters, rather than a node.
         permissions: Permissions of this machine on others; None without rules.
@@ -102,6 +104,7 @@ class Context:
         self.graph: Graph = Graph(self.session, self.domain)
         self.incompatible: IncompatibleEntities = IncompatibleEntities(self.graph, self.session.zid)
         self.direct_delivery: DirectDelivery = DirectDelivery(self.session, self.domain)
+        self.dropped: DroppedSamples = DroppedSamples(self.session, self.domain)
         self.mesh: MeshReadiness = MeshReadiness(
             self.session,
             0 if alone or self.passing else self.MESH_TIMEOUT,

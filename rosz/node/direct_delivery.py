@@ -13,22 +13,37 @@ from rosz.wire import Token, own_key
 if TYPE_CHECKING:
     from rosz.graph import View
 
-__all__ = ("DirectDelivery", "direct_key")
+__all__ = ("DirectDelivery", "announcement_key", "direct_key", "own_direct_key")
 
 _SPACE = "inbox"
+_LARGE = "large"
 
 
 def direct_key(subscription: Token, view: View) -> str | None:
     """Return the key that only one subscription receives; ``None`` if its process is not rosz."""
     if not view.is_rosz(subscription.zid):
         return None
+    return own_direct_key(subscription)
+
+
+def own_direct_key(subscription: Token) -> str:
+    """Return the key that only one subscription of rosz receives."""
     return own_key(subscription.domain, _SPACE, subscription.zid, str(subscription.entity_id))
+
+
+def announcement_key(direct: str) -> str:
+    """Return the key for announcements of large samples to a subscription.
+
+    Args:
+        direct: The key that only this subscription receives.
+    """
+    return f"{direct}/{_LARGE}"
 
 
 class DirectDelivery:
     """Receive what is sent to single subscriptions of a session.
 
-    The Zenoh subscriber is declared when the first subscription registers.
+    Zenoh's subscribers are declared when the first subscription registers.
 
     Args:
         session: The session.
@@ -39,27 +54,43 @@ class DirectDelivery:
         self._session = session
         self._key = own_key(domain, _SPACE, session.zid)
         self._lock = threading.RLock()  # a signal handler may subscribe in between
-        self._subscriber: Closable | None = None
+        self._subscribers: list[Closable] = []
         self._receivers: dict[str, Callable[[Sample], None]] = {}
 
-    def register(self, entity_id: int, receive: Callable[[Sample], None]) -> Registration:
+    def register(
+        self,
+        entity_id: int,
+        receive: Callable[[Sample], None],
+        announced: Callable[[Sample], None],
+    ) -> Registration:
         """Pass on what is sent to one subscription.
 
         Args:
             entity_id: Number of the subscription.
             receive: Function that gets each sample, on a thread of the session.
+            announced: Function that gets each announcement of large samples, likewise.
 
         Raises:
             ClosedError: The session is closed.
         """
-        number = str(entity_id)
-        self._receivers[number] = receive
+        direct = f"{self._key}/{entity_id}"
+        receivers = {direct: receive, announcement_key(direct): announced}
+        self._receivers.update(receivers)
         with self._lock:
-            if self._subscriber is None:
-                self._subscriber = self._session.subscriber(f"{self._key}/*", self._dispatch)
-        return Registration(lambda: self._receivers.pop(number, None))
+            if not self._subscribers:
+                # Two, because access rules restrict samples more than announcements.
+                self._subscribers = [
+                    self._session.subscriber(key, self._dispatch)
+                    for key in (f"{self._key}/*", announcement_key(f"{self._key}/*"))
+                ]
+
+        def unregister() -> None:
+            for key in receivers:
+                self._receivers.pop(key, None)
+
+        return Registration(unregister)
 
     def _dispatch(self, sample: Sample) -> None:
-        receive = self._receivers.get(sample.key.rpartition("/")[2])
+        receive = self._receivers.get(sample.key)
         if receive is not None:
             receive(sample)

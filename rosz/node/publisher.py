@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
 from rosz.node.direct_delivery import direct_key
 from rosz.node.entity import Entity
+from rosz.node.fetch import LARGE, FetchableSamples
 from rosz.qos import QoS
 from rosz.wire import Kind, Token, pack_attachment
 from rosz.worker import Worker
@@ -59,6 +61,15 @@ class Publisher(Entity, Generic[M]):
 
     Samples published before the process is linked to all its neighbours are held, at most 1000 of
     them for at most two seconds, and sent then.
+
+    Of large samples, those of more than 32 kB, subscriptions on other machines fetch the newest
+    ``queue_size`` in pieces, each at its own pace, unless a node of ROS 2 is among them. When it
+    closes, the publisher waits until they have, at most 10 seconds.
+
+    Attributes:
+        message_type: The class of the messages.
+        dropped: The number of samples that newer ones replaced before a subscription on another
+            machine had fetched them.
     """
 
     def __init__(self, node: NodeCore, topic: str, message_type: type[M], qos: QoS) -> None:
@@ -69,6 +80,7 @@ class Publisher(Entity, Generic[M]):
         self.message_type = message_type
         self._encode: Callable[[Any], bytes] = message_type._encode
         self._sequence = 0
+        self.dropped: int = 0
         # A signal handler that publishes may interrupt this thread while it publishes.
         self._ordered = threading.RLock()
         self._blocks = qos.reliable and qos.history == "keep_all"
@@ -79,9 +91,13 @@ class Publisher(Entity, Generic[M]):
             cache=qos.depth if qos.latched else 0,
         )
         self._put = self._raw.put
-        self._held: list[tuple[bytes, bytes]] | None = (
+        self._fetchable: FetchableSamples | None = None
+        if qos.reliable and not qos.latched and not self._blocks:
+            self._fetchable = FetchableSamples(self, qos.depth, self._report_dropped)
+        self._held: list[tuple[int, bytes, bytes]] | None = (
             None if node.context.mesh.ready.is_set() else []
         )
+        self._small = self._largest_small()
         self.announce()
         if self._held is not None:
             node.context.mesh.when_ready(self._release)
@@ -124,12 +140,43 @@ class Publisher(Entity, Generic[M]):
         with self._ordered:
             self._sequence = sequence = self._sequence + 1
             attachment = pack_attachment(sequence, time.time_ns(), self.gid)
-            if self._held is None:
+            if len(payload) <= self._small:
                 self._put(payload, attachment)
-                return
+            else:
+                self._send_with_care(sequence, payload, attachment)
+
+    def _largest_small(self) -> int:
+        """Return the size in bytes up to which samples need nothing but to be published."""
+        if self._held is not None:
+            return -1
+        return sys.maxsize if self._fetchable is None else LARGE
+
+    def _send_with_care(self, sequence: int, payload: bytes, attachment: bytes) -> None:
+        """Send a sample that is large, or comes after a large one, or before the links are up."""
+        fetchable = self._fetchable
+        if self._held is not None:
             self.check_open("publish")
-            self._held.append((payload, attachment))
+            self._held.append((sequence, payload, attachment))
             del self._held[:-_HELD_SAMPLES]
+        elif fetchable is not None and fetchable.needed:
+            self._small = -1  # small ones must not overtake it
+            self.check_open("publish")
+            fetchable.send(sequence, payload, attachment)
+        else:
+            self._small = self._largest_small()
+            self._put(payload, attachment)
+
+    def _report_dropped(self, node: str) -> None:
+        if not self.dropped:
+            self.node.log.warning(
+                "dropping messages on '%s' for node '%s', which takes them more slowly than they"
+                " are published: queue_size=%d (told once)",
+                self.name,
+                node,
+                self.qos.depth,
+            )
+        self.dropped += 1
+        self.node.context.dropped.add(self.token.entity_id, 1)
 
     def publish_to(self, subscription: Token, message: M) -> None:
         """Send a message to one subscription alone; see `SubscriberLink.publish`.
@@ -164,8 +211,9 @@ class Publisher(Entity, Generic[M]):
         """Send the held samples, in order, and hold no more."""
         with self._ordered:
             held, self._held = self._held, None
-            for payload, attachment in held or ():
-                self._put(payload, attachment)
+            self._small = self._largest_small()
+            for sample in held or ():
+                self._send_with_care(*sample)
 
     def _finish(self) -> None:
         context = self.node.context
@@ -173,6 +221,15 @@ class Publisher(Entity, Generic[M]):
             context.mesh.ready.wait(context.MESH_TIMEOUT)
         if self._held is not None:
             self._release()
+        if self._fetchable is not None:
+            for node, count in self._fetchable.flush().items():
+                self.node.log.warning(
+                    "closed '%s' before node '%s' had received the last %d messages, which its link"
+                    " or the node was too slow for",
+                    self.name,
+                    node,
+                    count,
+                )
         # Zenoh's handle refuses to be undeclared while another thread is inside its put.
         with self._ordered:
             self._raw.close()
@@ -242,4 +299,5 @@ class Publisher(Entity, Generic[M]):
 
     def _forked(self) -> None:
         self._ordered = threading.RLock()
+        self._small = -1
         self._held = []  # so that `publish` checks whether the publisher is open

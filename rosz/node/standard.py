@@ -7,9 +7,10 @@ from typing import Any
 
 from rosz.errors import ClosedError, NotFoundError, UsageError, YamlError
 from rosz.node.core import NodeCore
+from rosz.node.decoder import MessageInfo
 from rosz.node.publisher import Publisher
 from rosz.node.service import Service
-from rosz.node.subscription import MessageInfo, Subscription
+from rosz.node.subscription import Subscription
 from rosz.qos import CLOCK, ROSOUT, SERVICES
 from rosz.worker import start_thread
 

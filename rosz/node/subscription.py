@@ -11,7 +11,6 @@ which a second thread reads; it starts with the first of them. Callbacks run one
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
 from collections import deque
@@ -20,21 +19,21 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-import msgspec
-
 from rosz.errors import ClosedError, DecodeError, RoszError, WaitTimeout
 from rosz.node.core import NodeCore
+from rosz.node.decoder import AnySample, Decoder, Received
 from rosz.node.entity import ANY, Entity
+from rosz.node.fetch import Fetcher
 from rosz.qos import QoS
 from rosz.session import LONGEST_WAIT, clamp_timeout
-from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, read_attachment, ros_type
+from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, ros_type
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.session import PullSubscriber, Reply, Sample
 
-__all__ = ("GenericSubscription", "MessageInfo", "Subscription")
+__all__ = ("GenericSubscription", "Subscription")
 
 M = TypeVar("M")
 
@@ -45,140 +44,9 @@ _MOST = 1 << 20
 """Largest queue: Zenoh allocates 256 bytes for each sample at once, and aborts if it cannot."""
 
 _HISTORY_TIMEOUT = 10.0
-_KINDS_OF_DAMAGE = 10
-_PUBLISHERS = 1000
-"""Publishers to remember; the oldest is forgotten, because nothing tells when that is safe."""
 
 
-class MessageInfo(msgspec.Struct, frozen=True):
-    """The origin of a message.
-
-    Attributes:
-        source_time: Time of publication by the sender's clock, in nanoseconds since the Unix epoch;
-            0 if unknown.
-        reception_time: Time of dispatch here, in nanoseconds since the Unix epoch.
-        sequence: Number within its publisher, from 1; 0 if unknown, or if the message was sent to
-            this subscription alone.
-        gid: 16 bytes that identify the publisher; empty if unknown.
-        lost: Samples of that publisher missing right before this one: lost, or pushed out of the
-            queue by newer ones.
-        type_name: ``pkg/msg/Name``.
-        type_hash: ``RIHS01_…``, the hash of the type's definition.
-    """
-
-    source_time: int
-    reception_time: int
-    sequence: int
-    gid: bytes
-    lost: int
-    type_name: str
-    type_hash: str = ""
-
-
-Received = tuple[Any, MessageInfo | None]
-"""A message with its info, if that is wanted."""
-
-
-class _Publisher:
-    """The last sequence number of a publisher, and whether its samples may be replayed."""
-
-    __slots__ = ("last", "replays")
-
-    def __init__(self) -> None:
-        self.last = 0
-        self.replays = False
-
-
-class _Decoder:
-    """Decode samples, count lost ones, and drop damaged and repeated ones.
-
-    Args:
-        topic: Name of the topic, for the log.
-        type_name: ``pkg/msg/Name``.
-        type_hash: ``RIHS01_…``.
-        message_type: Class of the messages; when not given, the encoded bytes are the messages.
-        log: Logger for damage, which is logged once per kind.
-        with_info: Whether to make a `MessageInfo` for each message.
-    """
-
-    def __init__(
-        self,
-        topic: str,
-        type_name: str,
-        type_hash: str,
-        message_type: type[Message] | None,
-        log: logging.Logger,
-        *,
-        with_info: bool,
-    ) -> None:
-        self._topic = topic
-        self._type_name = type_name
-        self._type_hash = type_hash
-        self._decode: Callable[[bytes], Any] | None = None
-        self._has_header = False
-        if message_type is not None:
-            self._decode = message_type._decode
-            self._has_header = message_type._has_header
-        self._log = log
-        self._with_info = with_info
-        self._publishers: dict[bytes, _Publisher] = {}
-        self._reported: set[str] = set()
-
-    def expect_replay(self, gid: bytes) -> None:
-        """Expect the samples of a publisher twice: live, and from its cache.
-
-        That holds beyond the publisher's end, because replies of its cache may still be on the way.
-        """
-        self._publisher(gid).replays = True
-
-    def decode(self, sample: Sample | Reply) -> Received | None:
-        """Decode one sample; ``None`` if it is damaged or a repetition."""
-        sequence, source_time, gid, lost = 0, 0, b"", 0
-        try:
-            attachment = sample.attachment
-            if attachment is not None:
-                sequence, source_time, gid = read_attachment(attachment)
-                if sequence > 0:
-                    publisher = self._publishers.get(gid) or self._publisher(gid)
-                    last = publisher.last
-                    if sequence <= last and publisher.replays:
-                        return None
-                    publisher.last = sequence
-                    if last and sequence > last:
-                        lost = sequence - last - 1
-            payload = sample.payload
-            message: Any = payload if self._decode is None else self._decode(payload)
-        except DecodeError as error:
-            self._report(error)
-            return None
-        if self._has_header:
-            # ROS 1 code reads the sequence number from there.
-            message.header.seq = sequence
-        if not self._with_info:
-            return message, None
-        return message, MessageInfo(
-            source_time, time.time_ns(), sequence, gid, lost, self._type_name, self._type_hash
-        )
-
-    def _publisher(self, gid: bytes) -> _Publisher:
-        publisher = self._publishers.get(gid)
-        if publisher is None:
-            if len(self._publishers) >= _PUBLISHERS:
-                self._publishers.pop(next(iter(self._publishers)), None)
-            publisher = self._publishers[gid] = _Publisher()
-        return publisher
-
-    def _report(self, error: DecodeError) -> None:
-        """Log damage once per kind, so that a broken sender does not fill the disk."""
-        kind = f"{error.type_name}: {error.reason}"
-        if kind not in self._reported and len(self._reported) < _KINDS_OF_DAMAGE:
-            self._reported.add(kind)
-            self._log.warning(
-                "dropping damaged samples on '%s' (told once): %.300s", self._topic, error
-            )
-
-
-_Item = tuple["Sample | Reply", _Decoder | None]
+_Item = tuple[AnySample, Decoder | None]
 """A sample, with its decoder if its key does not tell its type."""
 
 
@@ -200,6 +68,8 @@ class Subscription(Entity, Generic[M]):
 
     Attributes:
         message_type: As given.
+        dropped: The number of samples that were lost, or pushed out of the queue by newer ones. The
+            first is logged, unless the queue holds only one sample or best effort will do.
     """
 
     def __init__(
@@ -219,6 +89,7 @@ class Subscription(Entity, Generic[M]):
         super().__init__(node, Kind.SUBSCRIPTION, topic, name, type_hash, qos)
         qos = self.qos
         self.message_type = message_type
+        self.dropped: int = 0
         self._callback = callback
         self._raw = raw
         self._with_info = with_info
@@ -228,8 +99,8 @@ class Subscription(Entity, Generic[M]):
         self._turn = threading.RLock()
         self._learning = threading.RLock()  # a signal handler may come in between
         self._decoder = None
-        self._decoders: dict[tuple[str, str], _Decoder | None] = {}
-        self._announced: set[tuple[str, str]] = set()
+        self._decoders: dict[tuple[str, str], Decoder | None] = {}
+        self._announced: dict[tuple[str, str], Entity] = {}
         if message_type is not None:
             self._decoder = self._make_decoder(name, type_hash, None if raw else message_type)
         self._open()
@@ -242,8 +113,7 @@ class Subscription(Entity, Generic[M]):
             recover=typed and latched and self.qos.reliable,
         )
         if typed:
-            direct = self.node.context.direct_delivery
-            self.keep(direct.register(self.token.entity_id, self._receive))
+            self._receive_directly(self, self._receive)
             self.announce()
         if not (typed and latched):
             self.keep(self.node.listen(self._follow))
@@ -277,7 +147,7 @@ class Subscription(Entity, Generic[M]):
 
     # Receiving.
 
-    def _receive(self, sample: Sample | Reply, decoder: _Decoder | None = None) -> None:
+    def _receive(self, sample: AnySample, decoder: Decoder | None = None) -> None:
         """Put a sample into the queue; called on threads of the session.
 
         Args:
@@ -294,11 +164,11 @@ class Subscription(Entity, Generic[M]):
                         receive=self._queue.receive,
                     )
 
-    def _decode(self, sample: Sample | Reply, decoder: _Decoder | None) -> Received | None:
+    def _decode(self, sample: AnySample, decoder: Decoder | None) -> Received | None:
         decoder = decoder or self._decoder or self._decoder_of(sample)
         return None if decoder is None else decoder.decode(sample)
 
-    def _dispatch(self, sample: Sample | Reply, decoder: _Decoder | None = None) -> None:
+    def _dispatch(self, sample: AnySample, decoder: Decoder | None = None) -> None:
         """Decode a sample, and call the callback with the message."""
         callback = self._callback
         if callback is None or self._queue.closed:
@@ -413,16 +283,21 @@ class Subscription(Entity, Generic[M]):
             decoder.expect_replay(gid(format_token(publisher)))
             self._request_history(publisher, publisher.qos.depth, receive)
 
-    def _announce(self, kind: tuple[str, str], receive: Callable[[Sample], None]) -> None:
+    def _announce(self, kind: tuple[str, str], receive: Callable[[AnySample], None]) -> None:
         """Announce a subscription of one type, with a key for direct delivery."""
         if kind in self._announced:
             return
-        self._announced.add(kind)
         with suppress(ClosedError):  # the subscription or its context ends
             entity = self.keep(Entity(self.node, Kind.SUBSCRIPTION, self.name, *kind, self.qos))
-            direct = self.node.context.direct_delivery
-            entity.keep(direct.register(entity.token.entity_id, receive))
+            self._announced[kind] = entity
+            self._receive_directly(entity, receive)
             entity.announce(watch=False)
+
+    def _receive_directly(self, entity: Entity, receive: Callable[[AnySample], None]) -> None:
+        """Receive what is sent to one subscription alone, and large samples in pieces."""
+        fetcher = entity.keep(Fetcher(entity, self._depth, receive))
+        direct = self.node.context.direct_delivery
+        entity.keep(direct.register(entity.token.entity_id, receive, fetcher.announced))
 
     def _request_history(
         self, publisher: Token, depth: int, receive: Callable[[Reply], None]
@@ -445,7 +320,7 @@ class Subscription(Entity, Generic[M]):
                     "no history of '%s' from node '%s': %s", self.name, publisher.node_name, error
                 )
 
-    def _decoder_of(self, sample: Sample | Reply) -> _Decoder | None:
+    def _decoder_of(self, sample: AnySample) -> Decoder | None:
         """Return the decoder for a sample whose key tells its type."""
         *_, dds_name, type_hash = sample.key.split("/")
         try:
@@ -453,7 +328,7 @@ class Subscription(Entity, Generic[M]):
         except DecodeError:
             return None  # a key of Zenoh itself below the name of the topic
 
-    def _decoder_for(self, type_name: str, type_hash: str) -> _Decoder | None:
+    def _decoder_for(self, type_name: str, type_hash: str) -> Decoder | None:
         """Return the decoder for a type; ``None``, after one warning, if it cannot be decoded."""
         kind = (type_name, type_hash)
         with self._learning:
@@ -461,7 +336,7 @@ class Subscription(Entity, Generic[M]):
                 self._decoders[kind] = self._learn(*kind)
             return self._decoders[kind]
 
-    def _learn(self, type_name: str, type_hash: str) -> _Decoder | None:
+    def _learn(self, type_name: str, type_hash: str) -> Decoder | None:
         log = self.node.log
         if self._raw:
             return self._make_decoder(type_name, type_hash, None)
@@ -484,9 +359,29 @@ class Subscription(Entity, Generic[M]):
 
     def _make_decoder(
         self, type_name: str, type_hash: str, message_type: type[Message] | None
-    ) -> _Decoder:
-        log, with_info = self.node.log, self._with_info
-        return _Decoder(self.name, type_name, type_hash, message_type, log, with_info=with_info)
+    ) -> Decoder:
+        return Decoder(
+            self.name,
+            type_name,
+            type_hash,
+            message_type,
+            self.node.log,
+            partial(self._report_lost, (type_name, type_hash)),
+            with_info=self._with_info,
+        )
+
+    def _report_lost(self, kind: tuple[str, str], count: int) -> None:
+        """Count samples that are missing, and warn of the first."""
+        if not self.dropped and self.qos.reliable and self._depth > 1:
+            self.node.log.warning(
+                "dropping messages on '%s', which come faster than they are taken or than a link"
+                " carries them: the newest queue_size=%d wait (told once; rosz topic info counts)",
+                self.name,
+                self._depth,
+            )
+        self.dropped += count
+        entity = self._announced.get(kind, self)
+        self.node.context.dropped.add(entity.token.entity_id, count)
 
     # The end.
 

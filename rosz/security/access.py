@@ -107,7 +107,7 @@ def _grants(permit: Permit) -> Iterator[_Grant]:
 
 
 def _presence() -> Iterator[_Grant]:
-    """Yield what everybody needs: to watch tokens, to be present as a node, and to find peers.
+    """Yield what everybody needs: to watch tokens, to be present as a node, to find peers.
 
     Watching is unrestricted, because each token that could be seen is restricted itself.
     """
@@ -115,7 +115,9 @@ def _presence() -> Iterator[_Grant]:
     for flow in _BOTH:
         yield flow, _LOOK, _ANY_KEY
         yield flow, _TOKEN, [f"{SPACE}/*/*/*/*/{Kind.NODE.value}/**"]
-        yield flow, (*_ASK, *_ANSWER), [f"{OWN_SPACE}/links/**"]
+        yield flow, (*_ASK, *_ANSWER), [f"{OWN_SPACE}/links/**", f"{_OWN}/dropped/*"]
+        # Announcements say no more than the size of samples, which topics restrict.
+        yield flow, (*_DATA, *_LISTEN), [f"{_OWN}/inbox/*/*/large"]
 
 
 def _topics(names: Sequence[str], out: Flow, back: Flow) -> Iterator[_Grant]:

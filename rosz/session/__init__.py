@@ -14,6 +14,7 @@ from rosz.session.queries import (
     LONGEST_WAIT,
     Cancellation,
     Query,
+    Replies,
     Reply,
     clamp_timeout,
 )
@@ -34,6 +35,7 @@ __all__ = (
     "PullSubscriber",
     "Query",
     "RawPublisher",
+    "Replies",
     "Reply",
     "Sample",
     "Session",

@@ -66,6 +66,7 @@ class QueryOptions(TypedDict, total=False):
     any_key: bool
     urgent: bool
     cancel: Cancellation | None
+    background: bool
 
 
 class Cancellation:

@@ -335,6 +335,7 @@ class Session:
         any_key: bool = False,
         urgent: bool = False,
         cancel: Cancellation | None = None,
+        background: bool = False,
     ) -> Replies:
         """Send a query, and return the replies as they come; one that is not ``ok`` is an error.
 
@@ -350,6 +351,7 @@ class Session:
             urgent: Whether it and its replies overtake samples that wait for a slow link.
             cancel: The cancellation that can end the query early; one that was cancelled before
                 makes the query raise `ClosedError`.
+            background: Whether everything else on a link goes before the replies.
         """
         with translate_errors(f"query '{key}'"):
             handler = self._raw.get(
@@ -363,6 +365,7 @@ class Session:
                 payload=payload,
                 attachment=attachment,
                 cancellation_token=None if cancel is None else cancel.token,
+                priority=zenoh.Priority.DATA_LOW if background else None,
             )
         return Replies(handler)
 

@@ -31,6 +31,7 @@ __all__ = (
     "ProcessToken",
     "Token",
     "dds_type",
+    "dropped_key",
     "entity_key",
     "format_process",
     "format_qos",
@@ -243,6 +244,11 @@ class ProcessToken(msgspec.Struct, frozen=True):
     def newer_than(self, other: ProcessToken) -> bool:
         """Tell whether this node started after another; the answer is the same on every machine."""
         return (self.started, self.zid, self.node_id) > (other.started, other.zid, other.node_id)
+
+
+def dropped_key(domain: int, zid: str = "*") -> str:
+    """Return the key of what the entities of one session have dropped, or of all sessions."""
+    return own_key(domain, "dropped", zid)
 
 
 def processes_key(domain: int) -> str:

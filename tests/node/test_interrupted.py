@@ -29,12 +29,12 @@ def test_subscribing(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*args: Any) -> Any:
         if not opened:
             opened.append(1)
-            direct.register(1, lambda _: None)
+            direct.register(1, lambda _: None, lambda _: None)
         return subscriber(*args)
 
     monkeypatch.setattr(session, "subscriber", interrupted)
-    in_time(lambda: direct.register(2, lambda _: None))
-    assert set(direct._receivers) == {"1", "2"}
+    in_time(lambda: direct.register(2, lambda _: None, lambda _: None))
+    assert {key.removesuffix("/large")[-1] for key in direct._receivers} == {"1", "2"}
 
 
 def test_learning_a_type(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,160 @@
+"""Decoding: from Zenoh's samples to messages, with where they come from and what is missing."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rosz.errors import DecodeError
+from rosz.node.fetch import FetchedSample
+from rosz.session import Reply, Sample
+from rosz.wire import read_attachment
+
+if TYPE_CHECKING:
+    from rosz.message import Message
+
+__all__ = ("AnySample", "Decoder", "MessageInfo", "Received")
+
+AnySample = Sample | Reply | FetchedSample
+"""A sample, however it came."""
+
+_KINDS_OF_DAMAGE = 10
+_PUBLISHERS = 1000
+"""Publishers to remember; the oldest is forgotten, because nothing tells when that is safe."""
+
+
+class MessageInfo(msgspec.Struct, frozen=True):
+    """The origin of a message.
+
+    Attributes:
+        source_time: Time of publication by the sender's clock, in nanoseconds since the Unix epoch;
+            0 if unknown.
+        reception_time: Time of dispatch here, in nanoseconds since the Unix epoch.
+        sequence: Number within its publisher, from 1; 0 if unknown, or if the message was sent to
+            this subscription alone.
+        gid: 16 bytes that identify the publisher; empty if unknown.
+        lost: Samples of that publisher missing right before this one: lost, or pushed out of the
+            queue by newer ones.
+        type_name: ``pkg/msg/Name``.
+        type_hash: ``RIHS01_…``, the hash of the type's definition.
+    """
+
+    source_time: int
+    reception_time: int
+    sequence: int
+    gid: bytes
+    lost: int
+    type_name: str
+    type_hash: str = ""
+
+
+Received = tuple[Any, MessageInfo | None]
+"""A message with its info, if that is wanted."""
+
+
+class _Publisher:
+    """The last sequence number of a publisher, and whether its samples may be replayed."""
+
+    __slots__ = ("last", "replays")
+
+    def __init__(self) -> None:
+        self.last = 0
+        self.replays = False
+
+
+class Decoder:
+    """Decode samples, count lost ones, and drop damaged and repeated ones.
+
+    Args:
+        topic: Name of the topic, for the log.
+        type_name: ``pkg/msg/Name``.
+        type_hash: ``RIHS01_…``.
+        message_type: Class of the messages; when not given, the encoded bytes are the messages.
+        log: Logger for damage, which is logged once per kind.
+        report_lost: Function called with the number of samples that are missing before one.
+        with_info: Whether to make a `MessageInfo` for each message.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        type_name: str,
+        type_hash: str,
+        message_type: type[Message] | None,
+        log: logging.Logger,
+        report_lost: Callable[[int], object],
+        *,
+        with_info: bool,
+    ) -> None:
+        self._topic = topic
+        self._type_name = type_name
+        self._type_hash = type_hash
+        self._decode: Callable[[bytes], Any] | None = None
+        self._has_header = False
+        if message_type is not None:
+            self._decode = message_type._decode
+            self._has_header = message_type._has_header
+        self._log = log
+        self._report_lost = report_lost
+        self._with_info = with_info
+        self._publishers: dict[bytes, _Publisher] = {}
+        self._reported: set[str] = set()
+
+    def expect_replay(self, gid: bytes) -> None:
+        """Expect the samples of a publisher twice: live, and from its cache.
+
+        That holds beyond the publisher's end, because replies of its cache may still be on the way.
+        """
+        self._publisher(gid).replays = True
+
+    def decode(self, sample: AnySample) -> Received | None:
+        """Decode one sample; ``None`` if it is damaged or a repetition."""
+        sequence, source_time, gid, lost = 0, 0, b"", 0
+        try:
+            attachment = sample.attachment
+            if attachment is not None:
+                sequence, source_time, gid = read_attachment(attachment)
+                if sequence > 0:
+                    publisher = self._publishers.get(gid) or self._publisher(gid)
+                    last = publisher.last
+                    if sequence <= last and publisher.replays:
+                        return None
+                    publisher.last = sequence
+                    if last and sequence > last:
+                        lost = sequence - last - 1
+                        if lost:
+                            self._report_lost(lost)
+            payload = sample.payload
+            message: Any = payload if self._decode is None else self._decode(payload)
+        except DecodeError as error:
+            self._report(error)
+            return None
+        if self._has_header:
+            # ROS 1 code reads the sequence number from there.
+            message.header.seq = sequence
+        if not self._with_info:
+            return message, None
+        return message, MessageInfo(
+            source_time, time.time_ns(), sequence, gid, lost, self._type_name, self._type_hash
+        )
+
+    def _publisher(self, gid: bytes) -> _Publisher:
+        publisher = self._publishers.get(gid)
+        if publisher is None:
+            if len(self._publishers) >= _PUBLISHERS:
+                self._publishers.pop(next(iter(self._publishers)), None)
+            publisher = self._publishers[gid] = _Publisher()
+        return publisher
+
+    def _report(self, error: DecodeError) -> None:
+        """Log damage once per kind, so that a broken sender does not fill the disk."""
+        kind = f"{error.type_name}: {error.reason}"
+        if kind not in self._reported and len(self._reported) < _KINDS_OF_DAMAGE:
+            self._reported.add(kind)
+            self._log.warning(
+                "dropping damaged samples on '%s' (told once): %.300s", self._topic, error
+            )

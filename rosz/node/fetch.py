@@ -1,0 +1,397 @@
+"""Large samples for other machines, which fetch them in pieces, each at its own pace.
+
+Zenoh drops a sample of many pieces when a link takes longer for it than 50 ms, and to wait for a
+slow link would hold up all other links. So a publisher keeps its newest samples and announces them,
+and a subscription on another machine asks for one piece after the other. No piece waits for a link,
+so small samples pass between them, and a subscription that is slow or stopped delays nobody.
+
+The publisher announces again from time to time what a subscription has not fetched yet. So neither
+a lost announcement nor a link that was cut loses a sample that is still kept.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import msgspec
+
+from rosz.errors import ClosedError, TransportError
+from rosz.lifecycle import Registration
+from rosz.node.direct_delivery import announcement_key, direct_key, own_direct_key
+from rosz.session import Cancellation
+from rosz.worker import Worker
+
+if TYPE_CHECKING:
+    from rosz.graph import View
+    from rosz.node.entity import Entity
+    from rosz.session import Query, Replies, Sample
+    from rosz.wire import Token
+
+__all__ = ("LARGE", "FetchableSamples", "FetchedSample", "Fetcher")
+
+LARGE = 1 << 15
+"""Bytes beyond which a sample is large; ten smaller ones fit into what a link buffers."""
+_PIECE = 60_000
+"""Bytes of one reply, which Zenoh sends in one batch of up to 65535 bytes."""
+_AT_ONCE = 2 * _PIECE
+"""Bytes of one request: as much as the queue of a link holds, so that no thread waits for room."""
+_MOST_BYTES = 1 << 28
+"""Bytes that a publisher keeps at most, whatever the depth of its queue; one sample in any case."""
+_THREADS = 16
+_AGAIN_SECONDS = 1.0
+_TIMEOUT = 5.0
+_SILENT_SECONDS = 2.0
+_CLOSE_SECONDS = 10.0
+_SUBSCRIPTIONS = 1000
+"""Subscriptions to remember; the oldest is forgotten."""
+
+
+class _Announcement(msgspec.Struct, frozen=True, array_like=True):
+    """What a publisher keeps for a subscription.
+
+    Attributes:
+        zid: The session of the publisher.
+        entity_id: The number of the publisher.
+        samples: The sequence number and the size in bytes of each sample, oldest first.
+    """
+
+    zid: str
+    entity_id: int
+    samples: list[tuple[int, int]]
+
+
+class _Request(msgspec.Struct, frozen=True, array_like=True):
+    """What a subscription asks for.
+
+    Attributes:
+        sequence: The sequence number of the sample.
+        offset: The bytes of it that have come already; all of them when it needs nothing more.
+        subscription: The key of the subscription for direct delivery.
+    """
+
+    sequence: int
+    offset: int
+    subscription: str
+
+
+_encode = msgspec.msgpack.Encoder().encode
+_read_announcement = msgspec.msgpack.Decoder(_Announcement).decode
+_read_request = msgspec.msgpack.Decoder(_Request).decode
+
+
+class FetchedSample(NamedTuple):
+    """A sample that was put together from pieces.
+
+    Attributes:
+        key: The key expression of the publisher.
+        payload: The encoded message.
+        attachment: The bytes beside it.
+    """
+
+    key: str
+    payload: bytes
+    attachment: bytes | None
+
+
+def _source_key(key: str, zid: str, entity_id: int) -> str:
+    """Return the key of what a publisher keeps; who may receive a topic may query below its key."""
+    return f"{key}/@adv/rosz/{zid}/{entity_id}"
+
+
+class FetchableSamples:
+    """The newest samples of a publisher, for subscriptions on other machines.
+
+    Args:
+        publisher: The publisher.
+        depth: The number of samples to keep.
+        report_dropped: Function called with the node of a subscription for each sample that it has
+            not fetched before newer ones took its place.
+    """
+
+    def __init__(
+        self, publisher: Entity, depth: int, report_dropped: Callable[[str], object]
+    ) -> None:
+        token = publisher.token
+        self._publisher = publisher
+        self._context = publisher.node.context
+        self._depth = depth
+        self._report_dropped = report_dropped
+        self._key = _source_key(publisher.key, token.zid, token.entity_id)
+        self._lock = threading.RLock()  # a signal handler may publish meanwhile
+        self._view: View | None = None
+        self._near: list[str] = []
+        self._far: dict[str, Token] = {}
+        self._last = 0
+        self._kept: dict[int, tuple[bytes, bytes]] = {}
+        self._bytes = 0
+        # The number up to which a subscription needs nothing more, also while its link is cut.
+        self._done: dict[str, int] = {}
+        self._progress = threading.Event()
+        self._announcer: Worker[Callable[[], object]] | None = None
+        self._announcing = False
+
+    @property
+    def needed(self) -> bool:
+        """Whether subscriptions on other machines have to fetch the samples."""
+        view = self._context.graph.view()
+        if view is not self._view:
+            with self._lock:
+                self._sort(view)
+        return bool(self._far)
+
+    def _sort(self, view: View) -> None:
+        """Sort the subscriptions into those of this machine and those of others."""
+        publisher = self._publisher
+        here = view.host(publisher.token.zid)
+        near: list[str] = []
+        far: dict[str, Token] = {}
+        for token in filter(publisher.matches, view.subscriptions(publisher.name)):
+            key = direct_key(token, view)
+            if key is None:  # a node of ROS 2 cannot fetch: everybody gets what is published
+                near, far = [], {}
+                break
+            if view.host(token.zid) == here:
+                near.append(key)
+            else:
+                far[key] = token
+        for key in far:
+            self._done.setdefault(key, self._last)
+        while len(self._done) > max(_SUBSCRIPTIONS, len(far)):
+            del self._done[next(key for key in self._done if key not in far)]
+        if not far:
+            self._kept.clear()
+            self._bytes = 0
+        self._near, self._far, self._view = near, far, view
+
+    def send(self, sequence: int, payload: bytes, attachment: bytes) -> None:
+        """Send a sample to the subscriptions of this machine, and announce it to the others.
+
+        Raises:
+            ClosedError: The publisher is closed.
+        """
+        with self._lock:
+            if self._announcer is None:
+                self._announcer = self._serve()
+            self._last = sequence
+            self._kept[sequence] = (payload, attachment)
+            self._bytes += len(payload)
+            while len(self._kept) > self._depth or (
+                self._bytes > _MOST_BYTES and len(self._kept) > 1
+            ):
+                self._drop_oldest()
+            near, far = self._near, list(self._far)
+            first, self._announcing = not self._announcing, True
+        session = self._context.session
+        for key in near:
+            session.put(key, payload, attachment=attachment, block=False)
+        for key in far:
+            self._announce(key)
+        if first:
+            self._announcer.later(_AGAIN_SECONDS, self._announce_again)
+
+    def _serve(self) -> Worker[Callable[[], object]]:
+        publisher = self._publisher
+        queryable = publisher.keep(self._context.session.pull_queryable(self._key))
+        name, receive = f"rosz-samples{publisher.name}", queryable.receive
+        Worker(name, self._reply, receive=receive, threads=_THREADS)
+        announcer: Worker[Callable[[], object]] = Worker(f"rosz-announce{publisher.name}")
+        publisher.keep(Registration(lambda: announcer.close(0)))
+        return announcer
+
+    def _drop_oldest(self) -> None:
+        sequence = next(iter(self._kept))
+        self._bytes -= len(self._kept.pop(sequence)[0])
+        for key, token in self._far.items():
+            if self._done[key] < sequence:
+                self._done[key] = sequence
+                self._report_dropped(token.node_name)
+
+    def _announce(self, key: str) -> None:
+        with self._lock:
+            done = self._done.get(key, self._last)
+            samples = [(n, len(payload)) for n, (payload, _) in self._kept.items() if n > done]
+        if samples:
+            token = self._publisher.token
+            announcement = _encode(_Announcement(token.zid, token.entity_id, samples))
+            self._context.session.put(announcement_key(key), announcement, block=False)
+
+    def _announce_again(self) -> None:
+        """Announce what has not been fetched, until all has been."""
+        if self._announcer is None or self._publisher.closed:
+            return
+        if not self.needed:
+            self._announcing = False
+            return
+        with self._lock:
+            behind = self._behind()
+            self._announcing = bool(behind)
+        for key in behind:
+            self._announce(key)
+        if behind:
+            self._announcer.later(_AGAIN_SECONDS, self._announce_again)
+
+    def _behind(self) -> list[str]:
+        return [key for key in self._far if self._done[key] < self._last]
+
+    def _reply(self, query: Query) -> None:
+        """Send the next pieces of a sample, or an empty one if it is not kept any more."""
+        with query:
+            try:
+                request = _read_request(query.payload or b"")
+            except msgspec.DecodeError as error:
+                query.reply_error(f"cannot read the request: {error}")
+                return
+            self._progress.set()
+            payload, attachment = self._kept.get(request.sequence, (b"", b""))
+            if payload and request.offset >= len(payload):
+                with self._lock:
+                    done = self._done.get(request.subscription, 0)
+                    self._done[request.subscription] = max(request.sequence, done)
+                return
+            end = min(request.offset + _AT_ONCE, len(payload))
+            for begin in range(request.offset, end, _PIECE) if payload else (0,):
+                piece = payload[begin : min(begin + _PIECE, end)]
+                query.reply(self._key, piece, attachment=attachment)
+
+    def flush(self) -> dict[str, int]:
+        """Wait until all samples have been fetched, or nobody fetches any more.
+
+        Returns:
+            The number of samples that were not fetched, by the node of the subscription.
+        """
+        deadline = time.monotonic() + _CLOSE_SECONDS
+        while self.needed and (left := deadline - time.monotonic()) > 0:
+            self._progress.clear()
+            if not self._behind() or not self._progress.wait(min(left, _SILENT_SECONDS)):
+                break
+        with self._lock:
+            return {
+                self._far[key].node_name: sum(n > self._done[key] for n in self._kept)
+                for key in self._behind()
+            }
+
+
+class Fetcher:
+    """Fetches large samples for one subscription.
+
+    Args:
+        subscription: The subscription, with the type of the publishers.
+        depth: The number of newest samples that wait to be fetched; older ones are left out.
+        receive: Function that gets each sample.
+    """
+
+    def __init__(
+        self, subscription: Entity, depth: int, receive: Callable[[FetchedSample], object]
+    ) -> None:
+        self._subscription = subscription
+        self._depth = depth
+        self._receive = receive
+        self._cancel = Cancellation()
+        self._sources: dict[tuple[str, int], _Source] = {}
+
+    def announced(self, sample: Sample) -> None:
+        """Fetch what a publisher announces, on a thread for each publisher.
+
+        Called on a thread of the session.
+        """
+        try:
+            announcement = _read_announcement(sample.payload)
+        except msgspec.DecodeError as error:
+            raise TransportError(f"cannot read the announcement of a sample: {error}") from error
+        place = announcement.zid, announcement.entity_id
+        source = self._sources.get(place)
+        if source is None:
+            self._forget_ended()
+            key = _source_key(self._subscription.key, *place)
+            source = _Source(self._subscription, key, self._depth, self._receive, self._cancel)
+            self._sources[place] = source
+        source.announced(announcement.samples)
+
+    def _forget_ended(self) -> None:
+        view = self._subscription.node.context.graph.view()
+        alive = {(t.zid, t.entity_id) for t in view.publishers(self._subscription.name)}
+        for place in self._sources.keys() - alive:
+            self._sources.pop(place).close()
+
+    def close(self) -> None:
+        """Fetch nothing more; a second call has no effect."""
+        self._cancel.cancel()
+        for source in self._sources.values():
+            source.close()
+
+
+class _Source:
+    """One publisher, whose samples are fetched in their order."""
+
+    def __init__(
+        self,
+        subscription: Entity,
+        key: str,
+        depth: int,
+        receive: Callable[[FetchedSample], object],
+        cancel: Cancellation,
+    ) -> None:
+        self._session = subscription.node.context.session
+        self._topic_key = subscription.key
+        self._own = own_direct_key(subscription.token)
+        self._key = key
+        self._depth = depth
+        self._receive = receive
+        self._cancel = cancel
+        self._wanted: list[tuple[int, int]] = []
+        self._done = 0
+        self._partly = 0, bytearray()
+        self._worker: Worker[Callable[[], object]] = Worker(f"rosz-fetch{subscription.name}")
+
+    def announced(self, samples: list[tuple[int, int]]) -> None:
+        """Fetch some samples, rather than those announced before."""
+        self._wanted = samples
+        self._worker.submit(self._fetch_all)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._worker.close(0)
+
+    def _fetch_all(self) -> None:
+        """Fetch what is wanted and kept, until nobody replies; an announcement begins it again."""
+        try:
+            while not self._worker.closed and (wanted := self._next()) is not None:
+                if not self._fetch(*wanted):
+                    return
+        except ClosedError:
+            return  # the subscription or the session is closed
+
+    def _next(self) -> tuple[int, int] | None:
+        return next((one for one in self._wanted[-self._depth :] if one[0] > self._done), None)
+
+    def _fetch(self, sequence: int, size: int) -> bool:
+        """Fetch a sample; return false if nobody replies."""
+        if self._partly[0] != sequence:
+            self._partly = sequence, bytearray()
+        data, attachment = self._partly[1], None
+        while len(data) < size:
+            before = len(data)
+            for reply in self._query(sequence, before):
+                if not reply.ok:
+                    return False
+                if not reply.size:
+                    self._done = sequence  # it is not kept any more
+                    return True
+                data += reply.payload
+                attachment = reply.attachment
+            if len(data) == before:
+                return False
+        self._done = sequence
+        self._partly = 0, bytearray()
+        self._receive(FetchedSample(self._topic_key, bytes(data), attachment))
+        self._query(sequence, size)
+        return True
+
+    def _query(self, sequence: int, offset: int) -> Replies:
+        request = _encode(_Request(sequence, offset, self._own))
+        return self._session.query(
+            self._key, timeout=_TIMEOUT, payload=request, cancel=self._cancel, background=True
+        )
