@@ -67,6 +67,9 @@ class Context:
     MESH_TIMEOUT = 2.0
     """Seconds after which a new session counts as linked to all its neighbours in any case."""
 
+    HOLD_TIMEOUT = 10.0
+    """Seconds without a new link after which publishers hold samples no longer."""
+
     def __init__(
         self,
         environment: Environment | None = None,
@@ -94,13 +97,14 @@ class Context:
         with InterruptDeferral(self.close):
             self.session: Session = Session.open(config, peers)
             try:
-                self._join_network(config, alone=alone)
+                expected = peers.is_any_running
+                self._join_network(config, alone=alone, expected=expected)
             except BaseException:
                 self.session.close()
                 raise
             atexit.register(self.close)
 
-    def _join_network(self, config: SessionConfig, *, alone: bool) -> None:
+    def _join_network(self, config: SessionConfig, *, alone: bool, expected: bool) -> None:
         self.graph: Graph = Graph(self.session, self.domain)
         self.incompatible: IncompatibleEntities = IncompatibleEntities(self.graph, self.session.zid)
         self.direct_delivery: DirectDelivery = DirectDelivery(self.session, self.domain)
@@ -109,6 +113,7 @@ class Context:
             self.session,
             0 if alone or self.passing else self.MESH_TIMEOUT,
             self._flushed,
+            link_timeout=self.HOLD_TIMEOUT if expected else 0,
             mesh=config.mode == "peer",
             everywhere=config.multicast,
         )

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 
 from rosz.errors import ClosedError, TransportError
-from rosz.lifecycle import Registration
 from rosz.node.direct_delivery import announcement_key, direct_key, own_direct_key
 from rosz.session import Cancellation
 from rosz.worker import Worker
@@ -27,7 +26,7 @@ from rosz.worker import Worker
 if TYPE_CHECKING:
     from rosz.graph import View
     from rosz.node.entity import Entity
-    from rosz.session import Query, Replies, Sample
+    from rosz.session import Query, Queryable, Replies, Sample
     from rosz.wire import Token
 
 __all__ = ("LARGE", "FetchableSamples", "FetchedSample", "Fetcher")
@@ -42,6 +41,11 @@ _MOST_BYTES = 1 << 28
 """Bytes that a publisher keeps at most, whatever the depth of its queue; one sample in any case."""
 _THREADS = 16
 _AGAIN_SECONDS = 1.0
+_RETURN_SECONDS = 60.0
+"""Seconds in which a subscription that is gone may return, because only its link was cut."""
+_POLL_SECONDS = 0.02
+_TOKEN_SECONDS = 2.0
+"""Seconds in which the token of a process comes that has others already."""
 _TIMEOUT = 5.0
 _SILENT_SECONDS = 2.0
 _CLOSE_SECONDS = 10.0
@@ -124,23 +128,60 @@ class FetchableSamples:
         self._view: View | None = None
         self._near: list[str] = []
         self._far: dict[str, Token] = {}
+        self._gone: dict[str, float] = {}
+        self._unknown: dict[str, float] = {}
         self._last = 0
         self._kept: dict[int, tuple[bytes, bytes]] = {}
         self._bytes = 0
+        # What is being fetched, so that newer ones do not take its place.
+        self._current: dict[str, tuple[int, bytes, bytes]] = {}
         # The number up to which a subscription needs nothing more, also while its link is cut.
         self._done: dict[str, int] = {}
         self._progress = threading.Event()
-        self._announcer: Worker[Callable[[], object]] | None = None
+        self._worker: Worker[Callable[[], object]] = Worker(f"rosz-announce{publisher.name}")
+        self._queryable: Queryable | None = None
         self._announcing = False
 
     @property
     def needed(self) -> bool:
         """Whether subscriptions on other machines have to fetch the samples."""
+        self._look()
+        if self._far:
+            return True
+        with self._lock:
+            now = time.monotonic()
+            self._gone = {k: t for k, t in self._gone.items() if now - t < _RETURN_SECONDS}
+            if not self._gone:
+                self._kept.clear()
+                self._bytes = 0
+            return bool(self._gone)
+
+    @property
+    def undecided(self) -> bool:
+        """Whether it is not known yet if some subscription is one of rosz or of ROS 2.
+
+        The token of a process may come after those of its subscriptions.
+        """
+        self._look()
+        now = time.monotonic()
+        return any(now - seen < _TOKEN_SECONDS for seen in self._unknown.values())
+
+    def when_decided(self, callback: Callable[[], object]) -> None:
+        """Call a function, on another thread, once that is known."""
+
+        def check() -> None:
+            if self.undecided:
+                self._worker.later(_POLL_SECONDS, check)
+            else:
+                callback()
+
+        self._worker.submit(check)
+
+    def _look(self) -> None:
         view = self._context.graph.view()
         if view is not self._view:
             with self._lock:
                 self._sort(view)
-        return bool(self._far)
 
     def _sort(self, view: View) -> None:
         """Sort the subscriptions into those of this machine and those of others."""
@@ -148,22 +189,26 @@ class FetchableSamples:
         here = view.host(publisher.token.zid)
         near: list[str] = []
         far: dict[str, Token] = {}
+        unknown: dict[str, float] = {}
         for token in filter(publisher.matches, view.subscriptions(publisher.name)):
             key = direct_key(token, view)
-            if key is None:  # a node of ROS 2 cannot fetch: everybody gets what is published
-                near, far = [], {}
-                break
-            if view.host(token.zid) == here:
+            if key is None:
+                unknown[token.zid] = self._unknown.get(token.zid, time.monotonic())
+            elif view.host(token.zid) == here:
                 near.append(key)
             else:
                 far[key] = token
+        if unknown:  # a node of ROS 2 cannot fetch: everybody gets what is published
+            near, far = [], {}
+        self._unknown = unknown
+        gone = dict.fromkeys(self._far.keys() - far.keys(), time.monotonic())
+        self._gone = {key: t for key, t in (self._gone | gone).items() if key not in far}
+        for key in gone:
+            self._current.pop(key, None)
         for key in far:
             self._done.setdefault(key, self._last)
         while len(self._done) > max(_SUBSCRIPTIONS, len(far)):
             del self._done[next(key for key in self._done if key not in far)]
-        if not far:
-            self._kept.clear()
-            self._bytes = 0
         self._near, self._far, self._view = near, far, view
 
     def send(self, sequence: int, payload: bytes, attachment: bytes) -> None:
@@ -173,8 +218,8 @@ class FetchableSamples:
             ClosedError: The publisher is closed.
         """
         with self._lock:
-            if self._announcer is None:
-                self._announcer = self._serve()
+            if self._queryable is None:
+                self._serve()
             self._last = sequence
             self._kept[sequence] = (payload, attachment)
             self._bytes += len(payload)
@@ -190,22 +235,19 @@ class FetchableSamples:
         for key in far:
             self._announce(key)
         if first:
-            self._announcer.later(_AGAIN_SECONDS, self._announce_again)
+            self._worker.later(_AGAIN_SECONDS, self._announce_again)
 
-    def _serve(self) -> Worker[Callable[[], object]]:
-        publisher = self._publisher
-        queryable = publisher.keep(self._context.session.pull_queryable(self._key))
-        name, receive = f"rosz-samples{publisher.name}", queryable.receive
-        Worker(name, self._reply, receive=receive, threads=_THREADS)
-        announcer: Worker[Callable[[], object]] = Worker(f"rosz-announce{publisher.name}")
-        publisher.keep(Registration(lambda: announcer.close(0)))
-        return announcer
+    def _serve(self) -> None:
+        self._queryable = queryable = self._context.session.pull_queryable(self._key)
+        name = f"rosz-samples{self._publisher.name}"
+        Worker(name, self._reply, receive=queryable.receive, threads=_THREADS)
 
     def _drop_oldest(self) -> None:
         sequence = next(iter(self._kept))
         self._bytes -= len(self._kept.pop(sequence)[0])
         for key, token in self._far.items():
-            if self._done[key] < sequence:
+            current = self._current.get(key)
+            if self._done[key] < sequence and (current is None or current[0] != sequence):
                 self._done[key] = sequence
                 self._report_dropped(token.node_name)
 
@@ -220,18 +262,16 @@ class FetchableSamples:
 
     def _announce_again(self) -> None:
         """Announce what has not been fetched, until all has been."""
-        if self._announcer is None or self._publisher.closed:
-            return
         if not self.needed:
             self._announcing = False
             return
         with self._lock:
             behind = self._behind()
-            self._announcing = bool(behind)
+            self._announcing = bool(behind or self._gone)
         for key in behind:
             self._announce(key)
-        if behind:
-            self._announcer.later(_AGAIN_SECONDS, self._announce_again)
+        if self._announcing:
+            self._worker.later(_AGAIN_SECONDS, self._announce_again)
 
     def _behind(self) -> list[str]:
         return [key for key in self._far if self._done[key] < self._last]
@@ -244,17 +284,30 @@ class FetchableSamples:
             except msgspec.DecodeError as error:
                 query.reply_error(f"cannot read the request: {error}")
                 return
+            payload, attachment = self._find(request)
             self._progress.set()
-            payload, attachment = self._kept.get(request.sequence, (b"", b""))
             if payload and request.offset >= len(payload):
-                with self._lock:
-                    done = self._done.get(request.subscription, 0)
-                    self._done[request.subscription] = max(request.sequence, done)
                 return
             end = min(request.offset + _AT_ONCE, len(payload))
             for begin in range(request.offset, end, _PIECE) if payload else (0,):
                 piece = payload[begin : min(begin + _PIECE, end)]
                 query.reply(self._key, piece, attachment=attachment)
+
+    def _find(self, request: _Request) -> tuple[bytes, bytes]:
+        """Return the sample that is asked for, and note what the subscription has of it."""
+        sequence, key = request.sequence, request.subscription
+        with self._lock:
+            current = self._current.get(key)
+            if current is not None and current[0] == sequence:
+                payload, attachment = current[1:]
+            else:
+                payload, attachment = self._kept.get(sequence, (b"", b""))
+            if request.offset < len(payload):
+                self._current[key] = sequence, payload, attachment
+            elif payload:
+                self._current.pop(key, None)
+                self._done[key] = max(sequence, self._done.get(key, 0))
+            return payload, attachment
 
     def flush(self) -> dict[str, int]:
         """Wait until all samples have been fetched, or nobody fetches any more.
@@ -272,6 +325,12 @@ class FetchableSamples:
                 self._far[key].node_name: sum(n > self._done[key] for n in self._kept)
                 for key in self._behind()
             }
+
+    def close(self) -> None:
+        """End its threads; a second call has no effect."""
+        self._worker.close(0)
+        if self._queryable is not None:
+            self._queryable.close()
 
 
 class Fetcher:
@@ -393,5 +452,5 @@ class _Source:
     def _query(self, sequence: int, offset: int) -> Replies:
         request = _encode(_Request(sequence, offset, self._own))
         return self._session.query(
-            self._key, timeout=_TIMEOUT, payload=request, cancel=self._cancel, background=True
+            self._key, timeout=_TIMEOUT, payload=request, cancel=self._cancel, priority="background"
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -24,7 +25,11 @@ if TYPE_CHECKING:
 __all__ = ("Publisher", "SubscriberLink")
 
 M = TypeVar("M", bound="Message")
+_Held = tuple[int, bytes, bytes]
+"""The sequence number, payload and attachment of a sample."""
+
 _HELD_SAMPLES = 1000
+_HELD_BYTES = 64 << 20
 _HEADER = 4
 """Bytes of the header of CDR; a receiver of fewer may abort."""
 
@@ -59,8 +64,8 @@ class SubscriberLink(Generic[M]):
 class Publisher(Entity, Generic[M]):
     """Publish messages on a topic; see `rosz.Node.publisher`.
 
-    Samples published before the process is linked to all its neighbours are held, at most 1000 of
-    them for at most two seconds, and sent then.
+    Samples published before the process is linked to all its neighbours are held, the newest 1000
+    or 64 MB of them, and sent then; see `rosz.session.MeshReadiness`.
 
     Of large samples, those of more than 32 kB, subscriptions on other machines fetch the newest
     ``queue_size`` in pieces, each at its own pace, unless a node of ROS 2 is among them. When it
@@ -93,14 +98,15 @@ class Publisher(Entity, Generic[M]):
         self._put = self._raw.put
         self._fetchable: FetchableSamples | None = None
         if qos.reliable and not qos.latched and not self._blocks:
-            self._fetchable = FetchableSamples(self, qos.depth, self._report_dropped)
-        self._held: list[tuple[int, bytes, bytes]] | None = (
-            None if node.context.mesh.ready.is_set() else []
-        )
+            self._fetchable = self.keep(FetchableSamples(self, qos.depth, self._report_dropped))
+        linked = node.context.mesh.linked.is_set()
+        self._held: deque[_Held] | None = None if linked else deque()
+        self._held_bytes = 0
+        self._fetching = False
         self._small = self._largest_small()
         self.announce()
         if self._held is not None:
-            node.context.mesh.when_ready(self._release)
+            node.context.mesh.when_linked(self._release)
 
     def publish(self, *args: Any, **fields: Any) -> None:
         """Send a message: one of the topic's type, or the values of its fields.
@@ -143,30 +149,57 @@ class Publisher(Entity, Generic[M]):
             if len(payload) <= self._small:
                 self._put(payload, attachment)
             else:
+                self.check_open("publish")
                 self._send_with_care(sequence, payload, attachment)
 
     def _largest_small(self) -> int:
         """Return the size in bytes up to which samples need nothing but to be published."""
-        if self._held is not None:
-            return -1
+        if self._held is not None or self._fetching:
+            return -1  # small ones must not overtake large ones
         return sys.maxsize if self._fetchable is None else LARGE
 
     def _send_with_care(self, sequence: int, payload: bytes, attachment: bytes) -> None:
         """Send a sample that is large, or comes after a large one, or before the links are up."""
         fetchable = self._fetchable
         if self._held is not None:
-            self.check_open("publish")
-            self._held.append((sequence, payload, attachment))
-            del self._held[:-_HELD_SAMPLES]
-        elif fetchable is not None and fetchable.needed:
-            self._small = -1  # small ones must not overtake it
-            self.check_open("publish")
-            fetchable.send(sequence, payload, attachment)
-        else:
-            self._small = self._largest_small()
+            self._hold(self._held, (sequence, payload, attachment))
+        elif fetchable is None or not (self._fetching or len(payload) > LARGE):
             self._put(payload, attachment)
+        elif fetchable.undecided:
+            self._held = deque()
+            self._small = -1
+            self._hold(self._held, (sequence, payload, attachment))
+            fetchable.when_decided(self._release)
+        else:
+            self._fetching = fetchable.needed
+            self._small = self._largest_small()
+            if self._fetching:
+                fetchable.send(sequence, payload, attachment)
+            else:
+                self._put(payload, attachment)
+
+    def _hold(self, held: deque[_Held], sample: _Held) -> None:
+        """Hold a sample; the newest are kept where there are too many."""
+        held.append(sample)
+        self._held_bytes += len(sample[1])
+        while len(held) > _HELD_SAMPLES or (self._held_bytes > _HELD_BYTES and len(held) > 1):
+            self._held_bytes -= len(held.popleft()[1])
+            if not self.dropped:
+                self.node.log.warning(
+                    "dropping messages on '%s': until this process is linked to all others, only"
+                    " the newest %d wait, or %d MB (told once)",
+                    self.name,
+                    _HELD_SAMPLES,
+                    _HELD_BYTES >> 20,
+                )
+            self._count_dropped()
+
+    def _count_dropped(self) -> None:
+        self.dropped += 1
+        self.node.context.dropped.add(self.token.entity_id, 1)
 
     def _report_dropped(self, node: str) -> None:
+        """Count a sample that newer ones replaced before a node had fetched it."""
         if not self.dropped:
             self.node.log.warning(
                 "dropping messages on '%s' for node '%s', which takes them more slowly than they"
@@ -175,8 +208,7 @@ class Publisher(Entity, Generic[M]):
                 node,
                 self.qos.depth,
             )
-        self.dropped += 1
-        self.node.context.dropped.add(self.token.entity_id, 1)
+        self._count_dropped()
 
     def publish_to(self, subscription: Token, message: M) -> None:
         """Send a message to one subscription alone; see `SubscriberLink.publish`.
@@ -210,7 +242,7 @@ class Publisher(Entity, Generic[M]):
     def _release(self) -> None:
         """Send the held samples, in order, and hold no more."""
         with self._ordered:
-            held, self._held = self._held, None
+            held, self._held, self._held_bytes = self._held, None, 0
             self._small = self._largest_small()
             for sample in held or ():
                 self._send_with_care(*sample)
@@ -218,8 +250,12 @@ class Publisher(Entity, Generic[M]):
     def _finish(self) -> None:
         context = self.node.context
         if self._held:
-            context.mesh.ready.wait(context.MESH_TIMEOUT)
-        if self._held is not None:
+            context.mesh.linked.wait(context.HOLD_TIMEOUT)
+            self._release()
+        if self._held and self._fetchable is not None:  # a subscription has just appeared
+            decided = threading.Event()
+            self._fetchable.when_decided(decided.set)
+            decided.wait(context.HOLD_TIMEOUT)
             self._release()
         if self._fetchable is not None:
             for node, count in self._fetchable.flush().items():
@@ -300,4 +336,4 @@ class Publisher(Entity, Generic[M]):
     def _forked(self) -> None:
         self._ordered = threading.RLock()
         self._small = -1
-        self._held = []  # so that `publish` checks whether the publisher is open
+        self._held = deque()  # so that `publish` checks whether the publisher is open

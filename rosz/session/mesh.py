@@ -31,6 +31,7 @@ __all__ = ("MeshReadiness", "machine_id", "serve_links")
 
 _SPACE = "@rosz/links"
 _POLL_SECONDS = 0.002
+_LATER_POLL_SECONDS = 0.05
 _QUERY_TIMEOUT = 0.5
 
 _log = logging.getLogger("rosz.session")
@@ -43,12 +44,15 @@ class MeshReadiness:
         session: The session.
         timeout: Time in seconds after which the session counts as ready in any case; 0 if it is
             ready now.
+        link_timeout: Time in seconds without a new link after which no more is expected: by then
+            Zenoh has given up each attempt.
         stop: Event that ends the waiting.
         mesh: Whether the session links to all its neighbours, rather than to one as a client does.
         everywhere: Whether it also links to peers of other machines, as with multicast.
 
     Attributes:
-        ready: Set when the session is ready.
+        ready: Set when the session is ready, or the timeout is over.
+        linked: Set when the session is ready, or no more links are expected.
     """
 
     def __init__(
@@ -57,26 +61,30 @@ class MeshReadiness:
         timeout: float,
         stop: threading.Event,
         *,
+        link_timeout: float = 0.0,
         mesh: bool = True,
         everywhere: bool = False,
     ) -> None:
         self.ready: threading.Event = threading.Event()
+        self.linked: threading.Event = threading.Event()
         self._session = session
         self._timeout = timeout
+        self._link_timeout = max(timeout, link_timeout)
         self._stop = stop
         self._mesh = mesh
         self._key = f"{_SPACE}/{'*' if everywhere else machine_id()}/*"
-        self._lock = threading.RLock()  # a signal handler may call `when_ready` meanwhile
+        self._lock = threading.RLock()  # a signal handler may call `when_linked` meanwhile
         self._callbacks: list[Callable[[], None]] = []
         if timeout:
             threading.Thread(target=self._run, name="rosz-mesh", daemon=True).start()
         else:
             self.ready.set()
+            self.linked.set()
 
-    def when_ready(self, callback: Callable[[], None]) -> None:
-        """Call a function when the session is ready, or now if it is."""
+    def when_linked(self, callback: Callable[[], None]) -> None:
+        """Call a function when `linked` is set, or now if it is."""
         with self._lock:
-            if not self.ready.is_set():
+            if not self.linked.is_set():
                 self._callbacks.append(callback)
                 return
         callback()
@@ -90,6 +98,7 @@ class MeshReadiness:
         finally:
             with self._lock:
                 self.ready.set()
+                self.linked.set()
                 callbacks, self._callbacks = self._callbacks, []
             for callback in callbacks:
                 try:
@@ -98,10 +107,30 @@ class MeshReadiness:
                     _log.warning("cannot send the held samples: %s", error)
 
     def _wait(self) -> None:
-        deadline = time.monotonic() + self._timeout
-        while (left := deadline - time.monotonic()) > 0 and not self._stop.wait(_POLL_SECONDS):
-            if self._session.peers() and (not self._mesh or not self._missing(left)):
+        began = latest = time.monotonic()
+        peers: list[str] = []
+        missing: set[str] = set()
+        pause = _POLL_SECONDS
+        while not self._stop.wait(pause):
+            found = self._session.peers()
+            now = time.monotonic()
+            if found != peers:
+                peers, latest = found, now
+            missing = self._missing(_QUERY_TIMEOUT) if found and self._mesh else set()
+            if found and not missing:
                 return
+            if now - began >= self._timeout:
+                self.ready.set()
+                pause = _LATER_POLL_SECONDS
+            if now - latest >= self._link_timeout:
+                break
+        if missing and not self._stop.is_set():
+            _log.warning(
+                "not linked to %d other session(s) of this machine within %g s: what is published"
+                " does not reach them; use a core for so many nodes (rosz core)",
+                len(missing),
+                self._link_timeout,
+            )
 
     def _missing(self, timeout: float) -> set[str]:
         """Return the sessions that neighbours are linked to, and that this one is not yet."""

@@ -16,8 +16,10 @@ from rosz.session.samples import Sample, Stamp, to_timestamp
 
 __all__ = (
     "LONGEST_WAIT",
+    "PRIORITIES",
     "TARGETS",
     "Cancellation",
+    "Priority",
     "Querier",
     "Query",
     "QueryOptions",
@@ -35,6 +37,14 @@ TARGETS: Final = {
     "all": zenoh.QueryTarget.ALL,
     "all_complete": zenoh.QueryTarget.ALL_COMPLETE,
     "best": zenoh.QueryTarget.BEST_MATCHING,
+}
+Priority = Literal["urgent", "normal", "background"]
+"""Which of the samples, queries and replies that wait for a link goes first."""
+
+PRIORITIES: Final = {
+    "urgent": zenoh.Priority.INTERACTIVE_HIGH,
+    "normal": zenoh.Priority.DATA,
+    "background": zenoh.Priority.DATA_LOW,
 }
 LONGEST_WAIT = threading.TIMEOUT_MAX / 2
 """Seconds that stand for "forever": more than a century, and the longest wait of the system."""
@@ -64,9 +74,8 @@ class QueryOptions(TypedDict, total=False):
     parameters: str
     target: Target
     any_key: bool
-    urgent: bool
     cancel: Cancellation | None
-    background: bool
+    priority: Priority
 
 
 class Cancellation:

@@ -31,8 +31,10 @@ from rosz.session.declared import (
 from rosz.session.local_peers import LocalPeers, LocalRegistration
 from rosz.session.opening import open_raw
 from rosz.session.queries import (
+    PRIORITIES,
     TARGETS,
     Cancellation,
+    Priority,
     Querier,
     Query,
     Queryable,
@@ -333,9 +335,8 @@ class Session:
         parameters: str = "",
         target: Target = "all",
         any_key: bool = False,
-        urgent: bool = False,
+        priority: Priority = "normal",
         cancel: Cancellation | None = None,
-        background: bool = False,
     ) -> Replies:
         """Send a query, and return the replies as they come; one that is not ``ok`` is an error.
 
@@ -348,10 +349,10 @@ class Session:
             parameters: The part of the selector after the ``?``.
             target: Queryables that get the query.
             any_key: Whether replies may be for keys that ``key`` does not match.
-            urgent: Whether it and its replies overtake samples that wait for a slow link.
+            priority: Whether it and its replies overtake samples that wait for a slow link
+                (``urgent``), or let them pass (``background``).
             cancel: The cancellation that can end the query early; one that was cancelled before
                 makes the query raise `ClosedError`.
-            background: Whether everything else on a link goes before the replies.
         """
         with translate_errors(f"query '{key}'"):
             handler = self._raw.get(
@@ -360,12 +361,11 @@ class Session:
                 target=TARGETS[target],
                 consolidation=zenoh.ConsolidationMode.NONE,
                 accept_replies=zenoh.ReplyKeyExpr.ANY if any_key else None,
-                priority=zenoh.Priority.INTERACTIVE_HIGH if urgent else None,
+                priority=PRIORITIES[priority],
                 timeout=clamp_timeout(timeout),
                 payload=payload,
                 attachment=attachment,
                 cancellation_token=None if cancel is None else cancel.token,
-                priority=zenoh.Priority.DATA_LOW if background else None,
             )
         return Replies(handler)
 

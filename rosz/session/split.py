@@ -142,7 +142,7 @@ class SplitWatch:
     def _replies(self) -> dict[str, View]:
         found: dict[str, View] = {}
         try:
-            for reply in self._session.get(f"{self._space}/*", timeout=_TIMEOUT, urgent=True):
+            for reply in self._session.get(f"{self._space}/*", timeout=_TIMEOUT, priority="urgent"):
                 zid = reply.key.rpartition("/")[2]
                 if reply.ok and zid != self._session.zid:
                     found[zid] = msgspec.msgpack.decode(reply.payload, type=View)

@@ -92,25 +92,68 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(
         MeshReadiness, "_missing", lambda *_: set() if linked.is_set() else strangers
     )
-    monkeypatch.setattr(Context, "MESH_TIMEOUT", TIMEOUT)
     publisher = network.node("talker").publisher("chatter", String)
     for number in range(1500):
         publisher.publish(str(number))
     linked.set()
     assert subscription.get().data == "500"
+    assert publisher.dropped == 500
 
 
-def test_time_of_holding_is_bounded(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Held samples are sent in the end, even if a peer does not respond."""
+def test_bytes_that_are_held_are_bounded(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rosz.node.publisher._HELD_BYTES", 100_000)
+    network.context()
+    subscription = network.node("listener").subscription("chatter", String, queue_size=2000)
+    monkeypatch.setattr(standard, "follow_clock", lambda _: None)
+    linked = threading.Event()
+    strangers = {"somebody who is linked late"}
+    monkeypatch.setattr(
+        MeshReadiness, "_missing", lambda *_: set() if linked.is_set() else strangers
+    )
+    publisher = network.node("talker").publisher("chatter", String)
+    for number in range(20):
+        publisher.publish(str(number) + " " * 10_000)
+    linked.set()
+    assert int(subscription.get().data) == publisher.dropped == 11
+
+
+def test_held_for_as_long_as_links_come(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may take longer than others wait for the mesh."""
+    network.context()
+    subscription = network.node("listener").subscription("chatter", String)
+    monkeypatch.setattr(standard, "follow_clock", lambda _: None)
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", 0.1)
+    monkeypatch.setattr(Context, "HOLD_TIMEOUT", TIMEOUT)
+    linked = threading.Event()
+    strangers = {"somebody who is linked late"}
+    monkeypatch.setattr(
+        MeshReadiness, "_missing", lambda *_: set() if linked.is_set() else strangers
+    )
+    talker = network.node("talker")
+    publisher = talker.publisher("chatter", String)
+    publisher.publish("first")
+    assert talker.context.mesh.ready.wait(TIMEOUT)
+    publisher.publish("second")
+    assert not subscription._queue.items
+    linked.set()
+    assert [subscription.get().data for _ in range(2)] == ["first", "second"]
+
+
+def test_time_of_holding_is_bounded(
+    network: Network, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Held samples are sent in the end, even if a peer is never linked, which is told."""
     network.context()
     subscription = network.node("listener").subscription("chatter", String)
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)
     monkeypatch.setattr(MeshReadiness, "_missing", lambda *_: {"somebody who is never linked"})
-    monkeypatch.setattr(Context, "MESH_TIMEOUT", 1.0)
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", 0.5)
+    monkeypatch.setattr(Context, "HOLD_TIMEOUT", 1.0)
     began = time.monotonic()
     network.node("talker").publisher("chatter", String).publish("hello")
     assert subscription.get().data == "hello"
     assert 1.0 <= time.monotonic() - began < 1.0 + TIMEOUT
+    assert "not linked to 1 other session(s)" in caplog.text
 
 
 def test_nobody_else_no_wait(network: Network) -> None:

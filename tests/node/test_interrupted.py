@@ -61,10 +61,10 @@ def test_waiting_for_neighbours(network: Network) -> None:
         def is_set(self) -> bool:
             if not asked:
                 asked.append(1)
-                mesh.when_ready(lambda: asked.append(2))
+                mesh.when_linked(lambda: asked.append(2))
             return super().is_set()
 
-    mesh.ready = Interrupted()
-    in_time(lambda: mesh.when_ready(lambda: asked.append(3)))
+    mesh.linked = Interrupted()
+    in_time(lambda: mesh.when_linked(lambda: asked.append(3)))
     assert asked == [1]
     assert len(mesh._callbacks) == 2

@@ -46,8 +46,8 @@ def test_a_callback_of_mesh_readiness_is_freed(network: Network) -> None:
     network.session()
     session = network.session()
     mesh = MeshReadiness(session, 0.1, threading.Event())
-    mesh.when_ready(waiting.call)
+    mesh.when_linked(waiting.call)
     del waiting
-    assert mesh.ready.wait(TIMEOUT)
+    assert mesh.linked.wait(TIMEOUT)
     eventually(lambda: kept() is None, "the callback is freed")
     assert Waiting.called
