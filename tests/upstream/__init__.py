@@ -1,0 +1,1 @@
+"""Reports for other projects: programs that show a fault with that project alone."""
