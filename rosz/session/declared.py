@@ -79,6 +79,11 @@ class Declared:
         self._calls: list[None] = []
         self._closed = False
 
+    @property
+    def closed(self) -> bool:
+        """Whether it is undeclared, or about to be."""
+        return self._closed
+
     def close(self) -> None:
         """Undeclare it; a second call, or one after the end of the session, has no effect.
 
