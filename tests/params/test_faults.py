@@ -185,6 +185,17 @@ def test_a_replica_that_was_stopped_catches_up(fleet: Fleet) -> None:
     assert stopped.do("set", name="/mine", value=3)["slow"] == []
 
 
+def test_a_full_link_to_a_stopped_replica_delays_no_set(fleet: Fleet) -> None:
+    one, other, stopped = fleet.start_many(3)
+    stopped.stop()
+    for number in range(12):
+        taken = one.do("set", name=f"/p{number}", value="x" * 2_000_000, timeout=1.0)
+        assert f"member {stopped.pid} (stopped)" in taken["slow"]
+        assert taken["seconds"] < 4, "Zenoh blocks a put for 5 s while a link is full"
+    stopped.resume()
+    until_same([one, other, stopped], "a replica with a full link")
+
+
 def test_joining_during_a_storm_misses_nothing(fleet: Fleet) -> None:
     writers = fleet.start_many(2)
     logs = [fleet.folder / "one", fleet.folder / "two"]

@@ -26,6 +26,7 @@ from rosz.params.replica.state import NOT_A_PARAMETER
 from rosz.params.wire import Batch, add_header, encode, read_header
 from rosz.params.writes import Change
 from rosz.session import Query, RawPublisher, Reply, Sample, Stamp
+from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.params.replica.storage import Storage
@@ -41,6 +42,10 @@ _ACK: Final = struct.Struct("<Q")
 _SEPARATOR: Final = b" "
 _MAX_PEERS: Final = 1000
 """Writers with a publisher of their own for the acknowledgements to them."""
+
+_SENDERS: Final = 4
+_MAX_UNSENT: Final = 100
+"""Messages that wait for full links; the sizes of messages are not bounded."""
 
 _RESEND_AFTER: Final = 0.25
 """Seconds after which a write is sent once more to those that have not acknowledged it."""
@@ -125,6 +130,11 @@ class PendingWrites:
             self._lagging |= late
             return late
 
+    @property
+    def any_lagging(self) -> bool:
+        """Whether any session lags."""
+        return bool(self._lagging)
+
     def lagging(self, pending: PendingWrite) -> frozenset[str]:
         """Return the sessions that a write did not wait for, and that lag still."""
         return pending.skipped & self._lagging if pending.skipped else _NOBODY
@@ -180,6 +190,10 @@ class WriteBroadcaster:
         self._worker = core.worker
         self._storage = storage
         self._own = session.zid.encode()
+        # A put blocks for seconds while the link to a replica that is stopped is full.
+        self._senders: Worker[Callable[[], object]] = Worker(
+            "rosz-params-send", _send, threads=_SENDERS, capacity=_MAX_UNSENT, logger=_log
+        )
         self._ack_publishers: dict[str, RawPublisher] = {}
         self._publisher = session.publisher(keys.change, block=True)
         resent_key = keys.of(session.zid, "write")
@@ -233,11 +247,19 @@ class WriteBroadcaster:
         for declared in self._declared:
             declared.close()
         self.pending.abandon()
+        self._senders.close()
         for zid in tuple(self._ack_publishers):
             self._close_ack_publisher(zid)
         self._publisher.close()
 
     def _publish(self, changes: list[Change], message: bytes) -> None:
+        if len(message) <= _LARGE and not self.pending.any_lagging:
+            self._put(changes, message)
+        else:
+            # If the workers are busy, the replicas get the write when they compare.
+            self._senders.offer(lambda: self._put(changes, message))
+
+    def _put(self, changes: list[Change], message: bytes) -> None:
         if self._keys.scoped:
             key = self._keys.scope(self._keys.change, (path for path, _ in changes))
             self._session.put(key, message)
@@ -258,13 +280,10 @@ class WriteBroadcaster:
         if timeout <= 0:
             return
         for zid in sorted(pending.waiting.copy()):
-            self._session.get_async(
-                self._keys.scope(self._keys.of(zid, "write"), (path for path, _ in changes)),
-                partial(self._on_resend_reply, zid, pending.number),
-                lambda: None,
-                payload=message,
-                timeout=timeout,
-            )
+            key = self._keys.scope(self._keys.of(zid, "write"), (path for path, _ in changes))
+            handle = partial(self._on_resend_reply, zid, pending.number)
+            query = partial(self._session.get_async, key, handle, _ignore)
+            self._senders.offer(partial(query, payload=message, timeout=timeout))
 
     def _on_resend_reply(self, zid: str, number: int, reply: Reply) -> None:
         if reply.ok:
@@ -350,6 +369,16 @@ class WriteBroadcaster:
         confirm = partial(_confirm, query)
         if not self._worker.offer(lambda: self._apply(message, reach, confirm)):
             query.close()
+
+
+def _send(task: Callable[[], object]) -> None:
+    try:
+        task()
+    except RoszError as error:
+        _log.debug("a write is not sent: %s", error)  # whoever lacks it is named as slow
+
+
+def _ignore() -> None: ...
 
 
 def _confirm(query: Query, refusal: str) -> None:
