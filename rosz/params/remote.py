@@ -26,6 +26,9 @@ _TOKENS_TIMEOUT: Final = 2.0
 _REPLY_TIMEOUT: Final = 1.0
 """Seconds after which the next replica is asked."""
 
+_LEAST_TIMEOUT: Final = 0.5
+"""Least time in seconds that a write waits for all replicas, whatever it took to find one."""
+
 _JOINING_PAUSE: Final = 0.02
 
 
@@ -54,6 +57,7 @@ class ParamClient:
         self._timeout = clamp_timeout(timeout)
         self._members: list[Member] = []
         self._silent: dict[str, Member] = {}
+        self._answered = ""
 
     def get(self, name: str) -> Value:
         """Return the value of a global name.
@@ -115,14 +119,17 @@ class ParamClient:
         if not batch:
             self._find_members()
             return Outcome(0)
-        seen = self._request(ClientRequest("stamp"), batch).value
+        began = time.monotonic()
+        deadline = began + self._timeout
+        seen = self._request(ClientRequest("stamp"), batch, deadline).value
         if type(seen) is not int:
             raise DecodeError("answer about parameters", -1, f"{seen!r}, expected a stamp")
         self._session.clock.observe(Stamp(seen, ""))
         stamp = self._session.stamp()
         message = Batch.of((stamp.time, stamp.id), self._origin or process_label(), batch)
-        timeout = min(ACK_TIMEOUT, self._timeout)
-        reply = self._request(ClientRequest("write", batch=message, timeout=timeout), batch)
+        timeout = min(ACK_TIMEOUT, self._timeout) - (time.monotonic() - began)
+        request = ClientRequest("write", batch=message, timeout=max(_LEAST_TIMEOUT, timeout))
+        reply = self._request(request, batch, deadline)
         return Outcome(stamp.time, tuple(reply.slow))
 
     def follow(self) -> Follower:
@@ -154,26 +161,35 @@ class ParamClient:
             raise NoReplica(NO_REPLICA)
         return self._members
 
-    def _request(self, request: ClientRequest, batch: Sequence[Change] = ()) -> ClientReply:
+    def _request(
+        self, request: ClientRequest, batch: Sequence[Change] = (), deadline: float | None = None
+    ) -> ClientReply:
         """Ask the replicas one after the other, last those that did not answer before.
 
         Args:
             request: Request to send.
             batch: Batch that the request is for, if it is about a write.
+            deadline: Monotonic time when to give up, if not after the timeout of the client.
         """
-        deadline = time.monotonic() + self._timeout
+        if deadline is None:
+            deadline = time.monotonic() + self._timeout
         payload = encode(request)
         timeout = request.timeout + _REPLY_TIMEOUT
         while True:
             stopped = self._session.out_of_reach()
             for member in sorted(
                 self._members or self._find_members(),
-                key=lambda one: (one.zid in stopped, one.zid in self._silent),
+                key=lambda one: (
+                    one.zid in stopped,
+                    one.zid in self._silent,
+                    one.zid != self._answered,
+                ),
             ):
                 key = self._keys.of(member.zid, "set" if batch else "ask")
                 key = self._keys.scope(key, (path for path, _ in batch))
                 reply = self._request_from(member, key, payload, timeout)
                 if reply is not None and reply.status != "joining":
+                    self._answered = member.zid
                     if reply.status == "missing":
                         beside = reply.value if isinstance(reply.value, list) else ()
                         raise ParamNotFound(request.name, beside)

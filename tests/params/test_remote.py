@@ -3,16 +3,19 @@ from __future__ import annotations
 import datetime as dt
 import threading
 import time
+from collections.abc import Iterable
 from queue import SimpleQueue
+from typing import Any
 
 import pytest
 from network import eventually
 
 from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
 from rosz.params.remote import ParamClient
-from rosz.params.replica import Changed
-from rosz.params.writes import DELETED, condense
-from rosz.session import HybridClock
+from rosz.params.replica import ACK_TIMEOUT, Changed, Outcome
+from rosz.params.wire import Keys
+from rosz.params.writes import DELETED, Change, condense
+from rosz.session import HybridClock, Query
 
 from .network import Network, merge
 from .test_replica import Mute
@@ -88,6 +91,30 @@ def test_a_replica_that_does_not_answer_is_passed_over(network: Network) -> None
     replica.set("/a", 1, timeout=0.1)
     assert client.get("/a") == 1
     assert time.monotonic() - begun < 3
+
+
+def test_a_write_waits_once_for_one_that_does_not_answer(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mute = Mute(network)
+    kept: list[Query] = []
+    key = f"{Keys(0).of(mute.member.zid, 'set')}/**"
+    network.keep(mute.session.queryable(key, kept.append, complete=True))
+    replica = network.replica()
+    waits: list[float] = []
+    write = replica.write
+
+    def note(changes: Iterable[Change], *, timeout: float, **how: Any) -> Outcome:
+        waits.append(timeout)
+        return write(changes, timeout=timeout, **how)
+
+    monkeypatch.setattr(replica._declared[2], "_write_batch", note)
+    outcome = ParamClient(network.command()).set("/a", 1)
+    (wait,) = waits
+    assert wait <= ACK_TIMEOUT - 1  # the silent one is given up after 1 s
+    assert len(kept) == 1
+    assert outcome.slow == ("mute program (pid 7 on elsewhere)",)
+    assert replica.get("/a") == 1
 
 
 def test_only_replicas_that_do_not_answer_end_in_a_timeout(network: Network) -> None:

@@ -309,7 +309,7 @@ class Mute:
     """Something that looks like a replica and never answers."""
 
     def __init__(self, network: Network) -> None:
-        session = network.session()
+        self.session = session = network.session()
         self.member = Member(1, session.zid, "mute program (pid 7 on elsewhere)")
         self.token = session.token(Keys(0).token(self.member))
         network.keep(self.token)
