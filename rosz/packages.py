@@ -113,13 +113,14 @@ class Package(msgspec.Struct, frozen=True):
     def _module_of(self, name: str, entry: str) -> Path:
         """Return the path of an entry point, with its function."""
         module, _, function = entry.partition(":")
-        relative = f"{module.strip().replace('.', '/')}.py"
+        relative = module.strip().replace(".", "/")
         for folder in (self.path, self.path / "src"):
-            if (folder / relative).is_file():
-                return folder / f"{relative}:{function.strip() or 'main'}"
+            for file in (f"{relative}.py", f"{relative}/__init__.py"):
+                if (folder / file).is_file():
+                    return folder / f"{file}:{function.strip() or 'main'}"
         raise ExecutableNotFound(
             f"setup.py of package '{self.name}' says that '{name}' is '{entry}', but there is no"
-            f" {self.path / relative}"
+            f" {self.path / relative}.py"
         )
 
     def within(self, name: str) -> Path:

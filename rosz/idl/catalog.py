@@ -80,6 +80,10 @@ class Catalog:
         self._services: dict[str, ServiceSpec] = {}
         self._checked: set[str] = set()
 
+    def with_definition(self, name: str, definition: Definition) -> Catalog:
+        """Return a catalog that has another definition of one type."""
+        return Catalog(lambda wanted: definition if wanted == name else self._find(wanted))
+
     def message(self, name: str) -> MessageSpec:
         """Return the spec of a message, checked to refer to existing types only.
 

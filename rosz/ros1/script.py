@@ -76,7 +76,7 @@ def _entry(path: Path) -> tuple[Path, str] | None:
     module = path.resolve().with_name(name)
     if not function or not module.is_file():
         return None
-    folder, names = module.parent, [module.stem]
+    folder, names = module.parent, [module.stem] if module.stem != "__init__" else []
     while (folder / "__init__.py").is_file():
         folder, names = folder.parent, [folder.name, *names]
     first = function.partition(".")[0]

@@ -10,12 +10,18 @@ import msgspec
 
 from rosz.environment import Environment, package_index
 from rosz.errors import DefinitionError, NotFoundError, RoszError, TypeNotFound
-from rosz.idl import Catalog, parse_action, read_definition
+from rosz.idl import Catalog, Definition, parse_action, read_definition
 from rosz.packages import MANIFEST, Package, PackageIndex, crawl
 from rosz.typestore import TypeStore
 from rosz.workspace.manifest import check_manifest
 from rosz.workspace.problem import REMEDY, Problem, error, from_error
-from rosz.workspace.programs import check_cmake, check_configs, check_launches, check_scripts
+from rosz.workspace.programs import (
+    check_cmake,
+    check_configs,
+    check_entry_points,
+    check_launches,
+    check_scripts,
+)
 
 __all__ = ("Checked", "check", "find_packages")
 
@@ -58,10 +64,11 @@ def check(
         problems += check_scripts(folder)
         problems += check_cmake(folder)
         if package is not None:
+            problems += check_entry_points(package)
             problems += _check_definitions(folder, package.name, catalog)
             problems += check_launches(folder, index, variables)
-            if not problems or all(one.level == "warning" for one in problems):
-                problems += check_configs(folder, variables)
+            wrong = {one.path for one in problems if one.level == "error"}
+            problems += check_configs(folder, variables, wrong)
         name = folder.name if package is None else package.name
         yield Checked(name, str(folder), sorted(set(_each_remedy_once(problems))))
 
@@ -104,18 +111,40 @@ def _check_definitions(folder: Path, package: str, catalog: Catalog) -> Iterator
         for file in sorted((folder / kind).glob(f"*.{kind}")):
             name = f"{package}/{kind}/{file.stem}"
             try:
-                if kind == "msg":
-                    catalog.message(name)
-                elif kind == "srv":
-                    catalog.service(name)
-                else:
-                    _check_action(name, file, catalog)
+                definition = read_definition(file)
             except RoszError as fault:
                 yield from_error(fault, file)
+            else:
+                yield from _check_definition(name, definition, catalog)
 
 
-def _check_action(name: str, file: Path, catalog: Catalog) -> None:
-    definition = read_definition(file)
+def _check_definition(name: str, definition: Definition, catalog: Catalog) -> Iterator[Problem]:
+    """Yield the problems of a definition: after each one, it is read without the wrong line."""
+    lines = definition.text.split("\n")
+    while True:
+        try:
+            _read_definition(name, definition, catalog)
+        except RoszError as fault:
+            yield from_error(fault, Path(definition.path))
+            if not isinstance(fault, DefinitionError) or fault.path != definition.path:
+                return
+            if not fault.line or not lines[fault.line - 1]:
+                return
+            lines[fault.line - 1] = ""
+            definition = Definition("\n".join(lines), definition.path)
+            catalog = catalog.with_definition(name, definition)
+        else:
+            return
+
+
+def _read_definition(name: str, definition: Definition, catalog: Catalog) -> None:
+    kind = name.split("/")[1]
+    if kind == "msg":
+        catalog.message(name)
+        return
+    if kind == "srv":
+        catalog.service(name)
+        return
     action = parse_action(name, definition.text, definition.path)
     for part in (action.goal, action.result, action.feedback):
         for field in part.fields:
@@ -125,7 +154,7 @@ def _check_action(name: str, file: Path, catalog: Catalog) -> None:
                 catalog.message(field.type.base)
             except TypeNotFound as fault:
                 reason = f"type '{field.type.written}' of field '{field.name}': {fault}"
-                raise DefinitionError(reason, str(file), field.line, field.column) from fault
+                raise DefinitionError(reason, definition.path, field.line, field.column) from fault
 
 
 def find_packages(words: Sequence[str], cwd: Path, index: PackageIndex) -> list[Path]:

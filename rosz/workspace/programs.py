@@ -14,18 +14,24 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from rosz.errors import NotFoundError, RoszError
+from rosz.errors import LaunchFileError, NotFoundError, RoszError
 from rosz.launch.plan import NodePlan, SystemContext, describe_args, plan
 from rosz.launch.run.command import is_python, locate
-from rosz.packages import PackageIndex
+from rosz.packages import Package, PackageIndex
 from rosz.ros1.python2 import explain
 from rosz.workspace.problem import Problem, error, from_error, warning
 
-__all__ = ("check_cmake", "check_configs", "check_launches", "check_scripts")
+__all__ = (
+    "check_cmake",
+    "check_configs",
+    "check_entry_points",
+    "check_launches",
+    "check_scripts",
+)
 
 _SCRIPT_FOLDERS = frozenset({"scripts", "script", "nodes", "node", "bin", "test", "tests"})
 _SKIPPED_FOLDERS = frozenset({"__pycache__", "node_modules", "build", "devel", "install"})
@@ -119,6 +125,15 @@ def _check_python(file: Path) -> Iterator[Problem]:
         yield error(file, f"not valid Python: {fault}")
 
 
+def check_entry_points(package: Package) -> Iterator[Problem]:
+    """Yield the entry points in setup.py that lead to no module."""
+    for name in package.executables():
+        try:
+            package.executable(name)
+        except NotFoundError as fault:
+            yield error(package.path / "setup.py", str(fault))
+
+
 def check_cmake(folder: Path) -> Iterator[Problem]:
     """Yield the C++ programs of a package, which rosz does not build."""
     file = folder / "CMakeLists.txt"
@@ -132,19 +147,23 @@ def check_cmake(folder: Path) -> Iterator[Problem]:
         yield warning(file, f"'{name}' is C++: rosz does not build it, and has no C++ API", line)
 
 
-def check_configs(folder: Path, environ: Mapping[str, str]) -> Iterator[Problem]:
+def check_configs(
+    folder: Path, environ: Mapping[str, str], wrong: Container[str]
+) -> Iterator[Problem]:
     """Yield the problems of the .cfg files of a package.
 
     Args:
         folder: Folder of the package.
         environ: Environment variables to run them with.
+        wrong: Paths of files that have an error already; they are not run.
     """
     for file in sorted(folder.rglob("*.cfg")):
         if not file.is_file() or _GENERATOR not in file.read_bytes():
             continue  # another kind of configuration
         if not os.access(file, os.X_OK):
             yield warning(file, f"not executable, which catkin requires; run: chmod +x {file}")
-        if find_spec("rosz.ros1.dynamic_reconfigure") is not None:
+        known = find_spec("rosz.ros1.dynamic_reconfigure") is not None
+        if known and str(file) not in wrong:
             yield from _run_config(file, environ)
 
 
@@ -197,13 +216,15 @@ def check_launches(
     """
     context = _DryContext(index, environ, folder, lambda base: f"{base}_1")
     for file in sorted({file for pattern in _LAUNCH_PATTERNS for file in folder.rglob(pattern)}):
+        faults: list[LaunchFileError] = []
+        found = None
         try:
-            missing = [a.name for a in describe_args([file], {}, context) if a.default is None]
             # A file with required args is meant to be included by another one.
-            found = None if missing else plan([file], {}, context)
+            if all(arg.default is not None for arg in describe_args([file], {}, context)):
+                found = plan([file], {}, context, faults=faults)
         except RoszError as fault:
             yield from_error(fault, file)
-            continue
+        yield from (from_error(fault, file) for fault in faults)
         if found is not None:
             for notice in found.warnings:
                 place = notice.place

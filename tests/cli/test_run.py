@@ -28,7 +28,9 @@ setup(
     name=package_name,
     packages=[package_name],
     entry_points={
-        'console_scripts': ['talker = py_demo.sub.talker:main', 'gone=py_demo.gone:main'],
+        'console_scripts': [
+            'talker = py_demo.sub.talker:main', 'gone=py_demo.gone:main', 'top=py_demo:main'
+        ],
     },
 )
 """
@@ -50,7 +52,8 @@ def ament(tmp_path: Path) -> Path:
     (folder / "py_demo" / "sub").mkdir(parents=True)
     (folder / "package.xml").write_text("<package><name>py_demo</name></package>")
     (folder / "setup.py").write_text(SETUP)
-    for name, text in (("__init__", ""), ("words", "WORD = 'hi'\n"), ("sub/__init__", "")):
+    top = "def main():\n    print('top', __name__)\n"
+    for name, text in (("__init__", top), ("words", "WORD = 'hi'\n"), ("sub/__init__", "")):
         (folder / "py_demo" / f"{name}.py").write_text(text)
     (folder / "py_demo" / "sub" / "talker.py").write_text(TALKER)
     return tmp_path
@@ -61,6 +64,7 @@ def test_an_entry_point_is_a_program(ament: Path) -> None:
     done = rosz(ament, "run", "py_demo", "talker", "a")
     assert done.stdout == f"hi ['a'] py_demo.sub.talker {file}:main\n"
     assert (done.returncode, done.stderr) == (3, "")
+    assert rosz(ament, "run", "py_demo", "top").stdout == "top py_demo\n"
     done = rosz(ament, "run", "py_demo", "talker", "fail")
     assert done.returncode == 1
     assert done.stderr.startswith("Traceback (most recent call last):\n")
@@ -73,7 +77,7 @@ def test_an_entry_point_is_a_program(ament: Path) -> None:
     [
         (["gone"], "says that 'gone' is 'py_demo.gone:main', but there is no "),
         (["tolker"], "did you mean 'talker'?"),
-        ([], "no executable of package 'py_demo' is given: gone, talker\n"),
+        ([], "no executable of package 'py_demo' is given: gone, talker, top\n"),
     ],
 )
 def test_errors_name_entry_points(ament: Path, words: list[str], text: str) -> None:

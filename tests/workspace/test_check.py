@@ -242,11 +242,77 @@ def test_a_command_that_mends_is_told_once(workspace: Path) -> None:
 def test_a_misspelt_type_gets_one_hint(workspace: Path) -> None:
     put(workspace, "msg/Strings.msg", "string[] data\n")
     put(workspace, "msg/A.msg", "Strng x\nflot64 y\n")
+    first, second = problems(workspace)
+    assert first.endswith("has no 'Strng.msg'; did you mean 'Strings'?")
+    assert second.endswith("has no 'flot64.msg'; did you mean 'float64'?")
+
+
+def places(found: list[str]) -> list[str]:
+    return [one.partition(": error: ")[0] for one in found]
+
+
+def test_all_errors_of_definitions_are_named(workspace: Path) -> None:
+    put(workspace, "msg/A.msg", "int8 9a\nfloat64 x\nint8 x\nint8 B=900\nNope c\n")
+    put(workspace, "srv/A.srv", "int8 9a\n---\nbool ok\nNope c\n---\n")
+    put(workspace, "action/A.action", "Nope a\n---\nNope b\n---\n")
+    assert places(problems(workspace)) == [
+        "demo/action/A.action:1:1",
+        "demo/action/A.action:3:1",
+        "demo/msg/A.msg:1:6",
+        "demo/msg/A.msg:3:6",
+        "demo/msg/A.msg:4:8",
+        "demo/msg/A.msg:5:1",
+        "demo/srv/A.srv:1:6",
+        "demo/srv/A.srv:4:1",
+        "demo/srv/A.srv:5:1",
+    ]
+
+
+def test_all_errors_of_launch_files_are_named(workspace: Path) -> None:
+    put(
+        workspace,
+        "launch/a.launch",
+        """<launch>
+  <param name="a"/>
+  <group if="maybe"/>
+  <node pkg="demo" name="n" type="talker.py">
+    <remap from="a"/>
+    <param name="b" value="$(arg nope)"/>
+    <rosparam>[</rosparam>
+  </node>
+  <include file="$(find demo)/nothing.launch"/>
+  <include file="$(find demo)/package.xml"/>
+  <rosparam command="lod"/>
+</launch>
+""",
+    )
+    found = [one for one in problems(workspace) if "error" in one]
+    lines = [one.removeprefix("demo/launch/a.launch:").partition(":")[0] for one in found]
+    assert lines[:8] == ["2", "3", "5", "6", "7", "9", "11", "demo/package.xml"]
+
+
+def test_an_arg_that_is_wrong_ends_the_reading(workspace: Path) -> None:
+    text = '<arg name="a" value="1" default="2"/><param name="p" value="$(arg a)"/>'
+    put(workspace, "launch/a.launch", f"<launch>{text}</launch>")
     (found,) = problems(workspace)
-    assert found.endswith("has no 'Strng.msg'; did you mean 'Strings'?")
-    put(workspace, "msg/A.msg", "flot64 y\n")
-    (found,) = problems(workspace)
-    assert found.endswith("has no 'flot64.msg'; did you mean 'float64'?")
+    assert "<arg> has both 'value' and 'default'" in found
+
+
+def test_errors_elsewhere_do_not_hide_those_of_configs(workspace: Path) -> None:
+    put(workspace, "msg/A.msg", "Nope a\n")
+    text = (
+        "from dynamic_reconfigure.parameter_generator_catkin import *\nParameterGenerator().ad()\n"
+    )
+    put(workspace, "cfg/A.cfg", "#!/usr/bin/env python3\n" + text, executable=True)
+    assert places(problems(workspace)) == ["demo/cfg/A.cfg:3", "demo/msg/A.msg:1:1"]
+
+
+def test_an_entry_point_without_its_module(workspace: Path) -> None:
+    listed = "['a = demo.gone:main', 'b = demo:main']"
+    put(workspace, "demo/__init__.py", "")
+    put(workspace, "setup.py", f"setup(entry_points={{'console_scripts': {listed}}})\n")
+    (found,) = [one for one in problems(workspace) if "setup.py" in one]
+    assert "error: setup.py of package 'demo' says that 'a' is 'demo.gone:main'" in found
 
 
 def test_a_file_is_no_package(workspace: Path) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 import msgspec
 
@@ -44,6 +43,7 @@ def plan(
     context: LaunchContext,
     *,
     ns: str = "",
+    faults: list[LaunchFileError] | None = None,
 ) -> Plan:
     """Read launch files into a plan.
 
@@ -52,11 +52,14 @@ def plan(
         args: Values for ``<arg>`` by name, for all files.
         context: The system around the launch.
         ns: Namespace to begin in: ``__ns``, otherwise ``ROS_NAMESPACE``.
+        faults: List for the error of each tag that is refused, and then left out; the first one is
+            raised when not given. What follows a refused ``<arg>`` may depend on it, so its error
+            is always raised.
 
     Raises:
         LaunchFileError: If a file is refused, or cannot be read.
     """
-    loader = _Loader(context, args, ns)
+    loader = _Loader(context, args, ns, faults=faults)
     for file in files:
         loader.load(file)
     return loader.finish()
@@ -94,7 +97,13 @@ class _Loader:
     """Reads files into one plan."""
 
     def __init__(
-        self, context: LaunchContext, args: Mapping[str, str], ns: str, *, args_only: bool = False
+        self,
+        context: LaunchContext,
+        args: Mapping[str, str],
+        ns: str,
+        *,
+        args_only: bool = False,
+        faults: list[LaunchFileError] | None = None,
     ) -> None:
         self.docs: dict[str, ArgDoc] = {}
         self.builder = PlanBuilder(context)
@@ -102,6 +111,7 @@ class _Loader:
         self._given = dict(args)
         self._ns = ns
         self._args_only = args_only
+        self._faults = faults
         self._substitution = Substitution(context)
         self._documents: dict[str, Document] = {}
         self._declared: set[str] = set()
@@ -163,6 +173,10 @@ class _Loader:
                 self._read(element, frame)
             except TagError as error:
                 self._refuse(error)
+            except LaunchFileError as error:  # of an included file that is not XML
+                if self._faults is None:
+                    raise
+                self._faults.append(error)
 
     def _read(self, element: Element, frame: _Frame) -> None:
         if self._args_only and element.tag != "arg":
@@ -179,7 +193,7 @@ class _Loader:
 
     def _tag(self, element: Element, scope: Scope) -> Tag:
         places = tuple(place for place, _ in self._chain)
-        return Tag(element, scope, self._substitution, self._warn, places)
+        return Tag(element, scope, self._substitution, self._warn, self._refuse, places)
 
     def _launch(self, element: Element, scope: Scope) -> None:
         """Read the attributes of a ``<launch>``; conditions on it do nothing, as in roslaunch."""
@@ -310,7 +324,8 @@ class _Loader:
         places = tuple(place for place, _ in self._chain)
         self.builder.warnings.append(Notice(text, Place(element.file, line, column, places)))
 
-    def _refuse(self, error: TagError) -> NoReturn:
+    def _refuse(self, error: TagError) -> None:
+        """Keep the error of a tag, or raise it."""
         places = tuple(place for place, _ in self._chain)
         element = error.element
         path, line, column = element.file, *element.locate(error.attribute, error.index)
@@ -319,7 +334,10 @@ class _Loader:
                 places = (*places, f"{path}:{line}:{column}")
             path, line, column = error.place
         cause = error.__cause__ if isinstance(error.__cause__, RoszError) else None
-        raise LaunchFileError(error.reason, path, line, column, _shorten(places)) from cause
+        fault = LaunchFileError(error.reason, path, line, column, _shorten(places))
+        if self._faults is None or element.tag == "arg":
+            raise fault from cause
+        self._faults.append(fault)
 
 
 def _shorten(places: tuple[str, ...]) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from rosz import names
 from rosz.errors import InvalidName, near_miss
-from rosz.launch.plan.document import TextError, misplaced
+from rosz.launch.plan.document import TagError, TextError, misplaced
 from rosz.launch.plan.model import Condition, MachinePlan, NodePlan, PlanBuilder, TestPlan, Wait
 from rosz.launch.plan.param import read_param, read_rosparam
 from rosz.launch.plan.scope import Scope, join
@@ -211,23 +211,32 @@ def _read_children(
     tag: Tag, builder: PlanBuilder, params: Scope, remaps: Scope, env: Scope
 ) -> None:
     for element in tag.element.children:
-        outer, inner = tag.inside(element, tag.scope), tag.inside(element, params)
-        match outer.name:
-            case "remap":
-                if outer.wanted():
-                    outer.remap(remaps)
-            case "param":
-                if inner.wanted():
-                    read_param(inner, builder, in_node=True)
-            case "rosparam":
-                if inner.wanted():
-                    read_rosparam(inner, builder)
-            case "env":
-                inner = tag.inside(element, env)
-                if inner.wanted():
-                    inner.env(env)
-            case _:
-                outer.warn(misplaced(element.tag, tag.name))
+        try:
+            match element.tag.lower():
+                case "remap":
+                    inner = tag.inside(element, tag.scope)
+                    if inner.wanted():
+                        inner.remap(remaps)
+                case "param" | "rosparam":
+                    _read_parameters(tag.inside(element, params), builder)
+                case "env":
+                    inner = tag.inside(element, env)
+                    if inner.wanted():
+                        inner.env(env)
+                case _:
+                    outer = tag.inside(element, tag.scope)
+                    outer.warn(misplaced(element.tag, tag.name))
+        except TagError as error:
+            tag.refuse(error)
+
+
+def _read_parameters(tag: Tag, builder: PlanBuilder) -> None:
+    if not tag.wanted():
+        return
+    if tag.name == "param":
+        read_param(tag, builder, in_node=True)
+    else:
+        read_rosparam(tag, builder)
 
 
 def _add_private(tag: Tag, builder: PlanBuilder, params: Scope) -> None:

@@ -26,6 +26,7 @@ class Tag:
         scope: The scope that substitutions look names up in.
         substitution: Applies the substitutions.
         warn: Function that takes warnings.
+        refuse: Function that takes the error of a tag, and raises it unless all are wanted.
         includes: Places of the ``<include>`` tags that led here, outermost first.
 
     Attributes:
@@ -40,6 +41,7 @@ class Tag:
         scope: Scope,
         substitution: Substitution,
         warn: Warn,
+        refuse: Callable[[TagError], None],
         includes: tuple[str, ...],
     ) -> None:
         self.element = element
@@ -47,11 +49,12 @@ class Tag:
         self.name: str = element.tag.lower()
         self._substitution = substitution
         self._warn = warn
+        self.refuse = refuse
         self._includes = includes
 
     def inside(self, element: Element, scope: Scope) -> Tag:
         """Return the tag for a child element."""
-        return Tag(element, scope, self._substitution, self._warn, self._includes)
+        return Tag(element, scope, self._substitution, self._warn, self.refuse, self._includes)
 
     @property
     def place(self) -> Place:
