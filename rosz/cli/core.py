@@ -19,8 +19,11 @@ from rosz.cli.declare import App, Option
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
+    from rosz.environment import Environment
     from rosz.params.replica import Replica
     from rosz.params.replica.storage import Storage
+    from rosz.security import KeyFolder
+    from rosz.security.watch import KeyWatch
     from rosz.session.router import Router
 
 __all__ = ("LogSummary", "app")
@@ -28,6 +31,8 @@ __all__ = ("LogSummary", "app")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _LINE = re.compile(r"\S+ +(?:WARN|ERROR) .*?zenoh_link_tls\S*: (?P<reason>.*)")
 _MISLEADING = re.compile(r"\.? Hint: .*")
+_REVOKED = "NameConstraintViolation"
+"""What TLS says of a certificate with a name that the authority excludes."""
 _PROBE = "tls handshake eof"
 """A peer has only probed the port, as a peer with keys does first."""
 _NUMBER = re.compile(r"\d+")
@@ -76,13 +81,15 @@ def core_command(
     logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
     with logging, until_stopped() as ready, ExitStack() as stack:
         before = Handover.take()
+        key_watch = None if environment.keys is None else _watch_keys(environment)
         storage = None if file is None else _open_storage(file, stack)
         router = stack.enter_context(Router(environment, listen or (), connect or ()))
         domain = environment.domain
         replica = Replica(router.session, domain, storage=storage, handover=before.parameters)
         stack.enter_context(closing(replica))
         _set_core_params(replica)
-        watch = stack.enter_context(closing(CoreWatch(router, replica, domain, before)))
+        watch = CoreWatch(router, replica, domain, before, key_watch=key_watch)
+        stack.enter_context(closing(watch))
         ready()
         if before.why:
             kept = count(len(replica.names()), "parameter")
@@ -96,6 +103,18 @@ def core_command(
 def _endpoint_lines(router: Router) -> list[str]:
     listening = [f"listening on {endpoint}" for endpoint in router.endpoints]
     return listening + [f"connecting to {endpoint}" for endpoint in router.connect]
+
+
+def _watch_keys(environment: Environment) -> KeyWatch:
+    from rosz.security.watch import KeyWatch
+    from rosz.session import keys_of
+
+    def find() -> KeyFolder:
+        keys = keys_of(environment)
+        assert keys is not None  # noqa: S101  # the environment names them
+        return keys
+
+    return KeyWatch(find)
 
 
 def _open_storage(file: Path, stack: ExitStack) -> Storage:
@@ -135,6 +154,8 @@ class LogSummary:
         line = _COLOUR.sub("", line).strip()
         match = _LINE.fullmatch(line)
         reason = _MISLEADING.sub("", match["reason"]) if match else line
+        if _REVOKED in reason:
+            reason = "its keys were revoked"
         if reason == _PROBE:
             return
         kind = _NUMBER.sub("0", reason)

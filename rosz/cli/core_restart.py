@@ -1,4 +1,4 @@
-"""How ``rosz core`` starts itself afresh when its links no longer carry everything."""
+"""How ``rosz core`` starts itself afresh when its links are of no more use, or its keys change."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from rosz.wire import processes_key, tokens_key
 
 if TYPE_CHECKING:
     from rosz.params.replica import Replica
+    from rosz.security.watch import KeyWatch
     from rosz.session.router import Router
 
 __all__ = ("CoreWatch", "Handover")
@@ -53,10 +54,20 @@ class CoreWatch:
         replica: Replica of the core.
         domain: ROS domain of the replica.
         before: What was handed over to this process.
+        key_watch: Watch of the keys that the router uses; None without keys.
     """
 
-    def __init__(self, router: Router, replica: Replica, domain: int, before: Handover) -> None:
+    def __init__(
+        self,
+        router: Router,
+        replica: Replica,
+        domain: int,
+        before: Handover,
+        *,
+        key_watch: KeyWatch | None = None,
+    ) -> None:
         self._replica = replica
+        self._key_watch = key_watch
         self._splits = before.splits
         self._standstill = Standstill(router.outlasted_silence)
         self._began = time.monotonic()
@@ -71,7 +82,7 @@ class CoreWatch:
             )
 
     def restart_when_needed(self) -> NoReturn:
-        """Start the program afresh as soon as the links of the core are of no more use.
+        """Start the program afresh as soon as its links are of no more use, or its keys change.
 
         Raises:
             OSError: The program cannot be executed any more.
@@ -79,6 +90,9 @@ class CoreWatch:
         while not self._found.wait(_LOOK_SECONDS):
             if seconds := self._standstill.seconds():
                 self._why = f"stood still for {seconds:.0f} s, longer than others keep its links"
+                break
+            if self._key_watch is not None and (change := self._key_watch.change()):
+                self._why = change
                 break
         with self._replica.frozen() as parameters:
             handover = Handover(self._why, parameters, self._splits)

@@ -62,6 +62,28 @@ def add_keys(
         sys.stdout.write(f"made {made}; copy it to {name}, and set ROSZ_KEYS to the copy there\n")
 
 
+@app.command("revoke")
+def revoke_keys(
+    names: Annotated[list[str], Argument("HOST|USER")],
+    *,
+    folder: _Folder = "",
+) -> None:
+    """Revoke the keys of machines or people, such as of a robot that was stolen.
+
+    Every machine has to get the new certificate of the authority. Running cores notice it.
+    """
+    from rosz.security.authority import Authority
+
+    authority = Authority(_folder(folder, f"revoke {' '.join(names)} --dir"))
+    for name in names:
+        gone = authority.revoke(name)
+        sys.stdout.write(f"revoked the keys of {name}, which are in {gone} now\n")
+    sys.stdout.write(
+        f"next: copy {authority.folder}/authority/certificate.pem to all other machines, as the"
+        " file authority.pem of their keys; each refuses the revoked keys from then on\n"
+    )
+
+
 @app.command("list")
 def list_keys(
     *,

@@ -1,7 +1,12 @@
 """A small certificate authority: one key that signs those of machines and people.
 
 Certificates are X.509 version 3 (RFC 5280) on the curve P-256. A certificate serves either end of
-a link. It contains the name of its holder and, for machines, the addresses that reach it.
+a link. It contains the name of its holder, for machines the addresses that reach it, and a name of
+its own that no other certificate has.
+
+Zenoh reads no revocation lists. But every end of a link checks certificates by that of the
+authority, which may exclude names (RFC 5280, section 4.2.1.10). So a certificate is revoked by a
+new certificate of the same authority that excludes its own name.
 """
 
 from __future__ import annotations
@@ -10,20 +15,24 @@ import datetime as dt
 import ipaddress
 import os
 import re
+import secrets
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosz.errors import UsageError
+from rosz.errors import UsageError, near_miss
 from rosz.security.folder import AUTHORITY, CERTIFICATE, KEY, check_private
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
     from cryptography.x509 import Certificate, GeneralName, Name
 
-__all__ = ("Authority", "read_certificate")
+__all__ = ("Authority", "excluded_names", "own_name", "read_certificate")
 
 _HOME = "authority"
+_REVOKED = "revoked"
+_OWN_DOMAIN = ".key.invalid"
+"""End of the own names of certificates, which are no names of hosts (RFC 2606)."""
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?")
 _LONGEST_NAME = 64
 """The longest common name of a certificate, in characters (RFC 5280, appendix A.1)."""
@@ -92,7 +101,8 @@ class Authority:
         Raises:
             UsageError: The name is not valid, or has keys already, which are left as they are.
         """
-        if not _NAME.fullmatch(name) or name == _HOME or len(name) > _LONGEST_NAME:
+        reserved = name in {_HOME, _REVOKED}
+        if not _NAME.fullmatch(name) or reserved or len(name) > _LONGEST_NAME:
             raise UsageError(
                 f"'{name}' is no name for a holder of keys; expected at most {_LONGEST_NAME}"
                 " letters, digits, '.', '_', '-'"
@@ -102,14 +112,88 @@ class Authority:
             raise UsageError(
                 f"'{name}' has keys already: '{folder}'. To replace them, delete that folder first"
             )
+        refused = {name, *addresses}.intersection(excluded_names(self.certificate))
+        if refused:
+            raise UsageError(
+                f"'{refused.pop()}' was revoked as a name, with keys of an older rosz: keys for it"
+                " are refused everywhere; choose another name"
+            )
         key = _new_key()
         issuer = self.certificate.subject
-        certificate = _sign(
-            _subject(name), key.public_key(), days, issuer, self._key, [name, *addresses]
-        )
+        places = [name, *addresses, f"{secrets.token_hex(8)}{_OWN_DOMAIN}"]
+        certificate = _sign(_subject(name), key.public_key(), days, issuer, self._key, places)
         _write(folder, key, certificate)
         _create(folder / AUTHORITY, (self.folder / _HOME / CERTIFICATE).read_bytes())
         return folder
+
+    def revoke(self, name: str) -> Path:
+        """Revoke the keys of a holder, who can get new ones afterwards.
+
+        Every machine refuses the keys once it has the new certificate of the authority.
+
+        Args:
+            name: The name of the holder.
+
+        Returns:
+            The folder that the revoked keys are in now.
+
+        Raises:
+            UsageError: The holder has no keys here.
+        """
+        home = self.folder / name
+        if name == _HOME or not _NAME.fullmatch(name) or not (home / CERTIFICATE).is_file():
+            known = sorted(file.parent.name for file in self.folder.glob(f"*/{AUTHORITY}"))
+            hint = near_miss(name, known) or f"; there are keys of {', '.join(known) or 'nobody'}"
+            raise UsageError(f"'{name}' has no keys in '{self.folder}'{hint}")
+        own = own_name(read_certificate(home / CERTIFICATE)) or name
+        self.certificate = self._excluding([*excluded_names(self.certificate), own])
+        data = _pem(self.certificate)
+        _replace(self.folder / _HOME / CERTIFICATE, data)
+        for copy in self.folder.glob(f"*/{AUTHORITY}"):
+            _replace(copy, data)
+        gone = self.folder / _REVOKED / f"{name}-{own.partition('.')[0]}"
+        gone.parent.mkdir(mode=0o700, exist_ok=True)
+        return home.rename(gone)
+
+    def _excluding(self, names: Sequence[str]) -> Certificate:
+        """Return a certificate like that of the authority which excludes names."""
+        from cryptography import x509
+        from cryptography.hazmat.primitives import hashes
+
+        old = self.certificate
+        builder = x509.CertificateBuilder(
+            old.issuer,
+            old.subject,
+            self._key.public_key(),
+            x509.random_serial_number(),
+            old.not_valid_before_utc,
+            old.not_valid_after_utc,
+        )
+        for extension in old.extensions:
+            if not isinstance(extension.value, x509.NameConstraints):
+                builder = builder.add_extension(extension.value, extension.critical)
+        constraints = x509.NameConstraints(None, [x509.DNSName(name) for name in names])
+        return builder.add_extension(constraints, True).sign(self._key, hashes.SHA256())
+
+
+def own_name(certificate: Certificate) -> str:
+    """Return the name that only this certificate has; empty if an older rosz made it."""
+    from cryptography.x509 import DNSName, SubjectAlternativeName
+
+    names = certificate.extensions.get_extension_for_class(SubjectAlternativeName).value
+    found = (one for one in names.get_values_for_type(DNSName) if one.endswith(_OWN_DOMAIN))
+    return next(found, "")
+
+
+def excluded_names(certificate: Certificate) -> list[str]:
+    """Return the names that the certificate of an authority excludes."""
+    from cryptography import x509
+
+    try:
+        found = certificate.extensions.get_extension_for_class(x509.NameConstraints).value
+    except x509.ExtensionNotFound:
+        return []
+    return [str(one.value) for one in found.excluded_subtrees or ()]
 
 
 def _sign(
@@ -214,7 +298,21 @@ def _write(folder: Path, key: EllipticCurvePrivateKey, certificate: Certificate)
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     secret = key.private_bytes(form.Encoding.PEM, form.PrivateFormat.PKCS8, form.NoEncryption())
     _create(folder / KEY, secret)
-    _create(folder / CERTIFICATE, certificate.public_bytes(form.Encoding.PEM))
+    _create(folder / CERTIFICATE, _pem(certificate))
+
+
+def _pem(certificate: Certificate) -> bytes:
+    from cryptography.hazmat.primitives import serialization as form
+
+    return certificate.public_bytes(form.Encoding.PEM)
+
+
+def _replace(file: Path, data: bytes) -> None:
+    """Replace a file as a whole, so that nobody reads a part of it."""
+    fresh = file.with_name(f".{file.name}-{os.getpid()}")
+    fresh.unlink(missing_ok=True)
+    _create(fresh, data)
+    fresh.replace(file)
 
 
 def _create(file: Path, data: bytes) -> None:

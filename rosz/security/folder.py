@@ -62,11 +62,13 @@ class KeyFolder(msgspec.Struct, frozen=True):
         path: The folder.
         rules: What others may do; everything when ``None``.
         rules_file: The file of the rules.
+        places_of_rules: Where the rules may be; the first file that exists counts.
     """
 
     path: Path
     rules: Rules | None
     rules_file: Path | None = None
+    places_of_rules: tuple[Path, ...] = ()
 
     @classmethod
     def find(cls, folder: Path, host: str) -> KeyFolder:
@@ -92,8 +94,9 @@ class KeyFolder(msgspec.Struct, frozen=True):
                 raise UsageError(f"'{own}' has a key but no '{name}'; copy the whole folder")
         check_private(own / KEY)
         check_trusted(own / AUTHORITY)
-        file = next((one / RULES for one in (own, folder) if os.path.lexists(one / RULES)), None)
-        return cls(own, None if file is None else load_rules(file), file)
+        places = tuple(dict.fromkeys((own / RULES, folder / RULES)))
+        file = next(filter(os.path.lexists, places), None)
+        return cls(own, None if file is None else load_rules(file), file, places)
 
     @property
     def authority(self) -> Path:

@@ -15,6 +15,8 @@ __all__ = ("refusal", "wants_keys")
 
 _OTHER_NAME = {62, 64}
 """The codes of OpenSSL for a certificate of another host name or address."""
+_EXCLUDED = 48
+"""The code of OpenSSL for a certificate with a name that its authority excludes."""
 _ALERT_BY = 0.5
 """Seconds within which the other end refuses a finished handshake."""
 
@@ -49,9 +51,13 @@ def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
         reason = f"its certificate is refused here: {error.verify_message}"
         if error.verify_code in _OTHER_NAME:
             reason += f" ('rosz keys add' takes --address {host} for it)"
+        if error.verify_code == _EXCLUDED:
+            reason += " (its keys were revoked)"
         return reason
     except ssl.SSLError as error:
         reason = (error.reason or str(error)).lower().replace("_", " ")
+        if "certificate unknown" in reason:
+            reason += " (the keys of this machine may have been revoked)"
         return f"it refuses: {reason}"
     except (OSError, ValueError) as error:
         return str(error)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from rosz.errors import RoszError, UsageError
-from rosz.security.authority import read_certificate
+from rosz.security.authority import own_name, read_certificate
 from rosz.security.folder import (
     AUTHORITY,
     CERTIFICATE,
@@ -168,4 +168,5 @@ def _places(certificate: Certificate, name: str) -> tuple[str, ...]:
     from cryptography.x509 import SubjectAlternativeName
 
     names = certificate.extensions.get_extension_for_class(SubjectAlternativeName).value
-    return tuple(str(one.value) for one in names if str(one.value) != name)
+    hidden = {name, own_name(certificate)}
+    return tuple(str(one.value) for one in names if str(one.value) not in hidden)

@@ -24,6 +24,21 @@ def test_keys_are_made_and_checked(tmp_path: Path) -> None:
     assert [holder["name"] for holder in as_json["holders"]] == ["anna", "laptop", "robot"]
 
 
+def test_keys_are_revoked(tmp_path: Path) -> None:
+    keys = str(tmp_path / "keys")
+    rosz(tmp_path, "keys", "init", keys)
+    rosz(tmp_path, "keys", "add", "robot", "laptop", "--dir", keys)
+    revoked = rosz(tmp_path, "keys", "revoke", "robot", "--dir", keys).stdout.splitlines()
+    assert revoked[0].startswith(f"revoked the keys of robot, which are in {keys}/revoked/robot-")
+    assert revoked[1].startswith(f"next: copy {keys}/authority/certificate.pem to all other ")
+    assert rosz(tmp_path, "keys", "list", "--dir", keys).stdout.startswith("laptop: until ")
+    assert rosz(tmp_path, "keys", "check", keys).returncode == 0
+    unknown = rosz(tmp_path, "keys", "revoke", "laptp", "--dir", keys)
+    assert unknown.returncode == 2
+    assert f"'laptp' has no keys in '{keys}'; did you mean 'laptop'?" in unknown.stderr
+    assert rosz(tmp_path, "keys", "add", "robot", "--dir", keys).returncode == 0
+
+
 def test_check_reports_what_is_wrong(tmp_path: Path) -> None:
     keys = tmp_path / "keys"
     rosz(tmp_path, "keys", "init", str(keys))
