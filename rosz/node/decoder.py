@@ -111,6 +111,11 @@ class Decoder:
         """
         self._publisher(gid).replays = True
 
+    def last(self, gid: bytes) -> int:
+        """Return the sequence number of the latest sample of a publisher; 0 if there is none."""
+        publisher = self._publishers.get(gid)
+        return 0 if publisher is None else publisher.last
+
     def decode(self, sample: AnySample) -> Received | None:
         """Decode one sample; ``None`` if it is damaged or a repetition."""
         sequence, source_time, gid, lost = 0, 0, b"", 0

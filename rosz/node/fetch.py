@@ -43,6 +43,8 @@ _THREADS = 16
 _AGAIN_SECONDS = 1.0
 _RETURN_SECONDS = 60.0
 """Seconds in which a subscription that is gone may return, because only its link was cut."""
+_ARRIVAL_SECONDS = 0.1
+"""Seconds in which a sample that was published arrives over a link that is fast enough."""
 _POLL_SECONDS = 0.02
 _TOKEN_SECONDS = 2.0
 """Seconds in which the token of a process comes that has others already."""
@@ -59,11 +61,15 @@ class _Announcement(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         zid: The session of the publisher.
         entity_id: The number of the publisher.
+        gid: The 16 bytes that identify the publisher.
+        published: Whether the samples were published as well, and may have arrived already.
         samples: The sequence number and the size in bytes of each sample, oldest first.
     """
 
     zid: str
     entity_id: int
+    gid: bytes
+    published: bool
     samples: list[tuple[int, int]]
 
 
@@ -131,6 +137,7 @@ class FetchableSamples:
         self._gone: dict[str, float] = {}
         self._unknown: dict[str, float] = {}
         self._last = 0
+        self._published = False
         self._kept: dict[int, tuple[bytes, bytes]] = {}
         self._bytes = 0
         # What is being fetched, so that newer ones do not take its place.
@@ -177,6 +184,11 @@ class FetchableSamples:
 
         self._worker.submit(check)
 
+    @property
+    def to_publish(self) -> bool:
+        """Whether there are subscriptions of ROS 2, which receive only what is published."""
+        return bool(self._unknown)
+
     def _look(self) -> None:
         view = self._context.graph.view()
         if view is not self._view:
@@ -198,8 +210,6 @@ class FetchableSamples:
                 near.append(key)
             else:
                 far[key] = token
-        if unknown:  # a node of ROS 2 cannot fetch: everybody gets what is published
-            near, far = [], {}
         self._unknown = unknown
         gone = dict.fromkeys(self._far.keys() - far.keys(), time.monotonic())
         self._gone = {key: t for key, t in (self._gone | gone).items() if key not in far}
@@ -211,8 +221,14 @@ class FetchableSamples:
             del self._done[next(key for key in self._done if key not in far)]
         self._near, self._far, self._view = near, far, view
 
-    def send(self, sequence: int, payload: bytes, attachment: bytes) -> None:
-        """Send a sample to the subscriptions of this machine, and announce it to the others.
+    def send(self, sequence: int, payload: bytes, attachment: bytes, *, published: bool) -> None:
+        """Announce a sample to the subscriptions of other machines.
+
+        Args:
+            sequence: The sequence number.
+            payload: The encoded message.
+            attachment: The bytes beside it.
+            published: Whether it is published; the subscriptions of this machine get it if not.
 
         Raises:
             ClosedError: The publisher is closed.
@@ -221,13 +237,14 @@ class FetchableSamples:
             if self._queryable is None:
                 self._serve()
             self._last = sequence
+            self._published = published
             self._kept[sequence] = (payload, attachment)
             self._bytes += len(payload)
             while len(self._kept) > self._depth or (
                 self._bytes > _MOST_BYTES and len(self._kept) > 1
             ):
                 self._drop_oldest()
-            near, far = self._near, list(self._far)
+            near, far = [] if published else self._near, list(self._far)
             first, self._announcing = not self._announcing, True
         session = self._context.session
         for key in near:
@@ -256,9 +273,11 @@ class FetchableSamples:
             done = self._done.get(key, self._last)
             samples = [(n, len(payload)) for n, (payload, _) in self._kept.items() if n > done]
         if samples:
-            token = self._publisher.token
-            announcement = _encode(_Announcement(token.zid, token.entity_id, samples))
-            self._context.session.put(announcement_key(key), announcement, block=False)
+            publisher, token = self._publisher, self._publisher.token
+            announcement = _Announcement(
+                token.zid, token.entity_id, publisher.gid, self._published, samples
+            )
+            self._context.session.put(announcement_key(key), _encode(announcement), block=False)
 
     def _announce_again(self) -> None:
         """Announce what has not been fetched, until all has been."""
@@ -339,15 +358,22 @@ class Fetcher:
     Args:
         subscription: The subscription, with the type of the publishers.
         depth: The number of newest samples that wait to be fetched; older ones are left out.
-        receive: Function that gets each sample.
+        receive: Function that gets each sample, and the GID of its publisher.
+        last: Function that gets the GID of a publisher, and returns the sequence number of what has
+            been received of it.
     """
 
     def __init__(
-        self, subscription: Entity, depth: int, receive: Callable[[FetchedSample], object]
+        self,
+        subscription: Entity,
+        depth: int,
+        receive: Callable[[FetchedSample, bytes], object],
+        last: Callable[[bytes], int],
     ) -> None:
         self._subscription = subscription
         self._depth = depth
         self._receive = receive
+        self._last = last
         self._cancel = Cancellation()
         self._sources: dict[tuple[str, int], _Source] = {}
 
@@ -365,9 +391,17 @@ class Fetcher:
         if source is None:
             self._forget_ended()
             key = _source_key(self._subscription.key, *place)
-            source = _Source(self._subscription, key, self._depth, self._receive, self._cancel)
+            gid = announcement.gid
+            source = _Source(
+                self._subscription,
+                key,
+                self._depth,
+                lambda fetched: self._receive(fetched, gid),
+                lambda: self._last(gid),
+                self._cancel,
+            )
             self._sources[place] = source
-        source.announced(announcement.samples)
+        source.announced(announcement)
 
     def _forget_ended(self) -> None:
         view = self._subscription.node.context.graph.view()
@@ -391,6 +425,7 @@ class _Source:
         key: str,
         depth: int,
         receive: Callable[[FetchedSample], object],
+        last: Callable[[], int],
         cancel: Cancellation,
     ) -> None:
         self._session = subscription.node.context.session
@@ -399,16 +434,21 @@ class _Source:
         self._key = key
         self._depth = depth
         self._receive = receive
+        self._last = last
         self._cancel = cancel
+        self._published = False
         self._wanted: list[tuple[int, int]] = []
         self._done = 0
         self._partly = 0, bytearray()
         self._worker: Worker[Callable[[], object]] = Worker(f"rosz-fetch{subscription.name}")
 
-    def announced(self, samples: list[tuple[int, int]]) -> None:
+    def announced(self, announcement: _Announcement) -> None:
         """Fetch some samples, rather than those announced before."""
-        self._wanted = samples
-        self._worker.submit(self._fetch_all)
+        self._wanted, self._published = announcement.samples, announcement.published
+        if self._published:
+            self._worker.later(_ARRIVAL_SECONDS, self._fetch_all)
+        else:
+            self._worker.submit(self._fetch_all)
 
     def close(self) -> None:
         """End the thread."""
@@ -428,6 +468,10 @@ class _Source:
 
     def _fetch(self, sequence: int, size: int) -> bool:
         """Fetch a sample; return false if nobody replies."""
+        if self._published and sequence <= self._last():
+            self._done = sequence
+            self._query(sequence, size)
+            return True
         if self._partly[0] != sequence:
             self._partly = sequence, bytearray()
         data, attachment = self._partly[1], None

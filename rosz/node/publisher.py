@@ -68,8 +68,8 @@ class Publisher(Entity, Generic[M]):
     or 64 MB of them, and sent then; see `rosz.session.MeshReadiness`.
 
     Of large samples, those of more than 32 kB, subscriptions on other machines fetch the newest
-    ``queue_size`` in pieces, each at its own pace, unless a node of ROS 2 is among them. When it
-    closes, the publisher waits until they have, at most 10 seconds.
+    ``queue_size`` in pieces, each at its own pace. When it closes, the publisher waits until they
+    have, at most 10 seconds.
 
     Attributes:
         message_type: The class of the messages.
@@ -97,7 +97,7 @@ class Publisher(Entity, Generic[M]):
         )
         self._put = self._raw.put
         self._fetchable: FetchableSamples | None = None
-        if qos.reliable and not qos.latched and not self._blocks:
+        if qos.reliable and not self._blocks:
             self._fetchable = self.keep(FetchableSamples(self, qos.depth, self._report_dropped))
         linked = node.context.mesh.linked.is_set()
         self._held: deque[_Held] | None = None if linked else deque()
@@ -173,10 +173,11 @@ class Publisher(Entity, Generic[M]):
         else:
             self._fetching = fetchable.needed
             self._small = self._largest_small()
-            if self._fetching:
-                fetchable.send(sequence, payload, attachment)
-            else:
+            published = not self._fetching or self.qos.latched or fetchable.to_publish
+            if published:
                 self._put(payload, attachment)
+            if self._fetching:
+                fetchable.send(sequence, payload, attachment, published=published)
 
     def _hold(self, held: deque[_Held], sample: _Held) -> None:
         """Hold a sample; the newest are kept where there are too many."""

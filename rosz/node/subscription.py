@@ -23,7 +23,7 @@ from rosz.errors import ClosedError, DecodeError, RoszError, WaitTimeout
 from rosz.node.core import NodeCore
 from rosz.node.decoder import AnySample, Decoder, Received
 from rosz.node.entity import ANY, Entity
-from rosz.node.fetch import Fetcher
+from rosz.node.fetch import FetchedSample, Fetcher
 from rosz.qos import QoS
 from rosz.session import LONGEST_WAIT, clamp_timeout
 from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, ros_type
@@ -112,8 +112,8 @@ class Subscription(Entity, Generic[M]):
             history=self.qos.depth if typed and latched else 0,
             recover=typed and latched and self.qos.reliable,
         )
-        if typed:
-            self._receive_directly(self, self._receive)
+        if self._decoder is not None:
+            self._receive_directly(self, self._decoder)
             self.announce()
         if not (typed and latched):
             self.keep(self.node.listen(self._follow))
@@ -276,26 +276,32 @@ class Subscription(Entity, Generic[M]):
         decoder = self._decoder or self._decoder_for(*kind)
         if decoder is None:
             return
-        receive = partial(self._receive, decoder=decoder)
         if self.message_type is None:
-            self._announce(kind, receive)
+            self._announce(kind, decoder)
         if publisher.qos.latched:
             decoder.expect_replay(gid(format_token(publisher)))
+            receive = partial(self._receive, decoder=decoder)
             self._request_history(publisher, publisher.qos.depth, receive)
 
-    def _announce(self, kind: tuple[str, str], receive: Callable[[AnySample], None]) -> None:
+    def _announce(self, kind: tuple[str, str], decoder: Decoder) -> None:
         """Announce a subscription of one type, with a key for direct delivery."""
         if kind in self._announced:
             return
         with suppress(ClosedError):  # the subscription or its context ends
             entity = self.keep(Entity(self.node, Kind.SUBSCRIPTION, self.name, *kind, self.qos))
             self._announced[kind] = entity
-            self._receive_directly(entity, receive)
+            self._receive_directly(entity, decoder)
             entity.announce(watch=False)
 
-    def _receive_directly(self, entity: Entity, receive: Callable[[AnySample], None]) -> None:
+    def _receive_directly(self, entity: Entity, decoder: Decoder) -> None:
         """Receive what is sent to one subscription alone, and large samples in pieces."""
-        fetcher = entity.keep(Fetcher(entity, self._depth, receive))
+        receive = partial(self._receive, decoder=decoder)
+
+        def received(sample: FetchedSample, publisher: bytes) -> None:
+            decoder.expect_replay(publisher)
+            receive(sample)
+
+        fetcher = entity.keep(Fetcher(entity, self._depth, received, decoder.last))
         direct = self.node.context.direct_delivery
         entity.keep(direct.register(entity.token.entity_id, receive, fetcher.announced))
 

@@ -19,7 +19,7 @@ from rosz.msgs.std_msgs.msg import Float64, UInt8MultiArray
 
 size = int(sys.argv[1])
 with rosz.Node("talker") as node:
-    large = node.publisher("large", UInt8MultiArray, queue_size=10)
+    large = node.publisher("large", UInt8MultiArray, latch=sys.argv[2:] == ["latch"])
     small = node.publisher("small", Float64)
     node.timer(0.02, lambda event: small.publish(time.time()))
     print("talking", flush=True)
@@ -110,6 +110,25 @@ def test_all_arrive_over_a_slow_link(world: World, linked: str) -> None:
     delays = sorted(map(float, listener.wait_for("delays").split()[1:]))
     print(f"small messages beside large ones, {linked}: p95 {p95(delays):.3f} s")
     assert p95(delays) < 0.25 * slack()
+
+
+@pytest.mark.timeout(180)
+def test_a_latched_one_arrives_over_a_slow_link(world: World) -> None:
+    """It is published as well, so that the cache for late subscriptions has it."""
+    robot, laptop = world.hosts("robot", "laptop")
+    link(robot, laptop, linked="core")
+    listener = listen(laptop, "listener")
+    talker = robot.program(TALKER, "2000000", "latch")
+    talker.wait_for("talking")
+    laptop.link.degrade(rate=_BYTES_PER_SECOND)
+    for number in range(2):
+        talker.say(f"1 {number} {number + 1} 0")
+        listener.wait_for(f"large {number}", 60)
+    laptop.link.heal()
+    late = listen(laptop, "late")
+    late.wait_for("large 1", 60)
+    assert heard(listener) == [0, 1]
+    assert heard(late) == [1]
 
 
 @pytest.mark.timeout(180)

@@ -46,6 +46,32 @@ def test_permission_to_serve(pair: tuple[Host, Host]) -> None:
     assert refused.exit_code(30) == 1
 
 
+LARGE = """
+    import sys
+    import rosz
+    from rosz.msgs.std_msgs.msg import UInt8MultiArray
+    with rosz.Node(sys.argv[1]) as node:
+        if sys.argv[1] == "listener":
+            node.subscription("large", UInt8MultiArray, lambda m: print(len(m.data), flush=True))
+            print("up", flush=True)
+        else:
+            large = node.publisher("large", UInt8MultiArray)
+            large.wait_for_subscribers(timeout=60)
+            large.publish(data=bytes(1_000_000))
+        node.spin()
+"""
+
+
+def test_permission_to_receive_large_messages(pair: tuple[Host, Host]) -> None:
+    """They are fetched in pieces, by queries below the key of the topic."""
+    robot, laptop = pair
+    start(pair, "laptop: {subscribe: [/large]}\n")
+    listener = laptop.program(LARGE, "listener")
+    listener.wait_for("up")
+    robot.program(LARGE, "talker")
+    listener.wait_for("1000000", 60)
+
+
 @pytest.mark.parametrize("control", [True, False])
 def test_permission_to_end_nodes(pair: tuple[Host, Host], control: bool) -> None:
     robot, laptop = pair
