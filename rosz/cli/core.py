@@ -73,17 +73,20 @@ def core_command(
     from rosz.environment import Environment
     from rosz.params.replica import Replica
     from rosz.session.router import Router
+    from rosz.wire import Endpoint
 
     environment = Environment.read()
     if keys:
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
+    listen_at = [str(Endpoint.parse(text, "--listen")) for text in listen or ()]
+    connect_to = [str(Endpoint.parse(text, "--connect")) for text in connect or ()]
     file = Path(store).absolute() if store else None
     logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
     with logging, until_stopped() as ready, ExitStack() as stack:
         before = Handover.take()
         key_watch = None if environment.keys is None else _watch_keys(environment)
         storage = None if file is None else _open_storage(file, stack)
-        router = stack.enter_context(Router(environment, listen or (), connect or ()))
+        router = stack.enter_context(Router(environment, listen_at, connect_to))
         domain = environment.domain
         replica = Replica(router.session, domain, storage=storage, handover=before.parameters)
         stack.enter_context(closing(replica))
@@ -96,13 +99,21 @@ def core_command(
             print_error(f"{before.why}: started afresh, with {kept}")
         else:
             kept = f"parameters of domain {domain} are kept in {file or 'memory'}"
-            print_lines([*_endpoint_lines(router), kept, "started core; press Ctrl-C to end it"])
+            lines = _describe(router, environment.rendezvous)
+            print_lines([*lines, kept, "started core; press Ctrl-C to end it"])
         watch.restart_when_needed()
 
 
-def _endpoint_lines(router: Router) -> list[str]:
-    listening = [f"listening on {endpoint}" for endpoint in router.endpoints]
-    return listening + [f"connecting to {endpoint}" for endpoint in router.connect]
+def _describe(router: Router, rendezvous: str) -> list[str]:
+    """Return what a router listens at, and what it is linked to."""
+    lines = [f"listening on {endpoint}" for endpoint in router.endpoints]
+    if router.holder:
+        lines.append(f"{rendezvous} is held by {router.holder}: the core takes its place when free")
+    lines += [
+        f"{'connected to' if reached else 'waiting for'} {endpoint}"
+        for endpoint, reached in router.announce().items()
+    ]
+    return lines
 
 
 def _watch_keys(environment: Environment) -> KeyWatch:

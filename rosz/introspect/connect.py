@@ -1,17 +1,20 @@
 """The session of a command.
 
 A short command is a client of the process at the rendezvous: it has one link and sees everything at
-once. If no process listens there, since the one that did has ended, the command listens there
-itself and waits for the others, which keep trying to connect. A command that runs for long is a
-peer from the start, so that it does not depend on the process at the rendezvous.
+once. If no process listens there, since the one that did has ended, the command connects to another
+process of this machine. A command that runs for long is a peer, so that it does not depend on the
+process at the rendezvous. No command listens there, so that a core that starts meanwhile can.
 """
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
+
+import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
@@ -45,7 +48,7 @@ def open_session(environment: Environment) -> Session:
     client = _open_client(environment, Session.open)
     if client is not None:
         return client
-    session = Session.open(SessionConfig.node(environment))
+    session = Session.open(_peer_config(environment))
     try:
         _wait_for_peers(session, environment)
     except BaseException:
@@ -74,7 +77,7 @@ def open_context(
     )
     if client is not None:
         return client
-    context = Context(environment, argv)
+    context = Context(environment, argv, _peer_config(environment))
     try:
         _wait_for_peers(context.session, environment)
         context.mesh.ready.wait(_READY_TIMEOUT)
@@ -98,6 +101,12 @@ def command_config(environment: Environment, peers: LocalPeers | None = None) ->
     return SessionConfig.command(environment, _BUSY_TIMEOUT if awake else _REPLY_TIMEOUT)
 
 
+def _peer_config(environment: Environment) -> SessionConfig:
+    # Without the registrations that Linux has, others must find the command at the rendezvous.
+    hold = sys.platform != "linux"
+    return msgspec.structs.replace(SessionConfig.node(environment), hold_rendezvous=hold)
+
+
 def _reaches_beyond(environment: Environment) -> bool:
     return bool(environment.connect or environment.multicast or environment.zenoh_config)
 
@@ -117,10 +126,12 @@ def _open_client(
     beyond = _reaches_beyond(environment)
     if not beyond and not peers.has_peers and peers.why_unanswered:
         raise TransportError(peers.why_unanswered)
+    held = is_listening(environment.rendezvous)
     if allowed and (
         beyond
         or environment.mode == "client"
-        or (is_listening(environment.rendezvous) and not peers.is_router_stopped)
+        or (held and not peers.is_router_stopped)
+        or (not held and peers.is_any_running)
     ):
         try:
             return open_client(command_config(environment, peers), peers)

@@ -21,6 +21,7 @@ from rosz.node.direct_delivery import DirectDelivery
 from rosz.node.dropped import DroppedSamples
 from rosz.node.incompatible import IncompatibleEntities
 from rosz.session import (
+    Dialling,
     LocalPeers,
     MeshReadiness,
     Session,
@@ -119,6 +120,7 @@ class Context:
         )
         if config.mode == "peer":
             self._links = serve_links(self.session)
+        self._dialling = Dialling(self.session, config)
 
     def next_id(self) -> int:
         """Return a number for a node or entity, unique within the session.
@@ -225,6 +227,7 @@ class Context:
 
     def _disconnect(self) -> None:
         self._flushed.set()
+        self._dialling.close()
         try:
             with self.session.close_links():
                 if self._params is not None:

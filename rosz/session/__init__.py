@@ -6,6 +6,7 @@ Only ``rosz core`` needs the modules in `PUBLIC_MODULES`.
 from rosz.session import at_exit as at_exit  # registers what waits at the exit
 from rosz.session.config import SessionConfig, connect_endpoint, keys_of, listen_endpoints
 from rosz.session.declared import PullSubscriber, RawPublisher
+from rosz.session.dialling import Dialling, find_waiting, who_answers
 from rosz.session.local_peers import LocalPeers, describe_process, is_stopped
 from rosz.session.mesh import MeshReadiness, serve_links
 from rosz.session.opening import places_of
@@ -30,6 +31,7 @@ __all__ = (
     "LONGEST_WAIT",
     "SEGMENTS",
     "Cancellation",
+    "Dialling",
     "HybridClock",
     "LocalPeers",
     "MeshReadiness",
@@ -46,6 +48,7 @@ __all__ = (
     "clamp_timeout",
     "connect_endpoint",
     "describe_process",
+    "find_waiting",
     "first_listening",
     "is_listening",
     "is_stopped",
@@ -53,5 +56,6 @@ __all__ = (
     "listen_endpoints",
     "places_of",
     "serve_links",
+    "who_answers",
     "why_refused",
 )

@@ -8,8 +8,10 @@ to, and multicast is off unless asked for.
 
 from __future__ import annotations
 
+import fcntl
 import os
 import socket
+import struct
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +30,9 @@ if TYPE_CHECKING:
 __all__ = (
     "EPHEMERAL",
     "SessionConfig",
+    "addresses_of",
     "connect_endpoint",
+    "is_own",
     "keys_of",
     "listen_endpoints",
     "loopback_interfaces",
@@ -38,6 +42,9 @@ __all__ = (
 )
 
 _RETRY_MS = 200
+_LONGEST_RETRY_MS = 1000
+"""The longest pause between attempts to reach another machine, which may be off for days."""
+_FOREVER_MS = -1
 _LEASE_MS = 60_000
 """Milliseconds for which others keep a silent link, so that a stopped process keeps its links.
 """
@@ -69,6 +76,7 @@ _EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
 """Endpoint at which a peer listens that others find by multicast."""
 
 _INTERFACES = Path("/sys/class/net")
+_SIOCGIFADDR = 0x8915
 _LOOPBACK = "772"
 """The type of a loopback interface on Linux (ARPHRD_LOOPBACK)."""
 
@@ -82,6 +90,8 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
         connect: Further endpoints to connect to.
         listen: Further endpoints to listen at.
         hold_rendezvous: Whether a peer may listen at the rendezvous; short-lived ones should not.
+        rendezvous_is_held: Whether another process holds the rendezvous of a router, which then
+            connects to that process.
         must_connect: Whether opening fails, after ``open_timeout``, when nobody answers.
         open_timeout: Seconds that a client, or a session that must connect, waits for an answer.
         multicast: Whether to look for others on the local network.
@@ -96,6 +106,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
     connect: tuple[str, ...] = ()
     listen: tuple[str, ...] = ()
     hold_rendezvous: bool = True
+    rendezvous_is_held: bool = False
     must_connect: bool = False
     open_timeout: float = 2.0
     multicast: bool = False
@@ -187,12 +198,14 @@ def new_id(config: SessionConfig) -> str:
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     """Return the Zenoh configuration, as nested dictionaries."""
     connect = [*config.connect]
-    if config.mode != "router":
+    if config.mode != "router" or config.rendezvous_is_held:
         connect.insert(0, config.rendezvous)
     if config.keys is not None:
         connect = [connect_endpoint(endpoint) for endpoint in connect]
     listen = _listen(config)
     local = not config.reaches_beyond
+    # Zenoh tries just once with 0: enough for a rendezvous that the session may hold itself.
+    timeout_ms = _FOREVER_MS if config.connect or config.rendezvous_is_held else 0
     sharing = {"enabled": True, "message_size_threshold": config.shared_memory}
     must_listen = config.mode == "router"
     must_connect = config.must_connect or config.mode == "client"
@@ -201,11 +214,11 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
         "connect": {
             "endpoints": connect,
             "exit_on_failure": must_connect,
-            "timeout_ms": int(config.open_timeout * 1000) if must_connect else 0,
+            "timeout_ms": int(config.open_timeout * 1000) if must_connect else timeout_ms,
             "retry": {
                 "period_init_ms": _RETRY_MS,
-                "period_max_ms": _RETRY_MS,
-                "period_increase_factor": 1,
+                "period_max_ms": _RETRY_MS if local else _LONGEST_RETRY_MS,
+                "period_increase_factor": 1.5,
             },
         },
         "listen": {"endpoints": listen, "exit_on_failure": must_listen, "timeout_ms": 0},
@@ -228,7 +241,9 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
 def _listen(config: SessionConfig) -> list[str]:
     keys = config.keys is not None
     places = config.listen
-    if config.mode == "router" or (config.mode == "peer" and config.hold_rendezvous):
+    if config.rendezvous_is_held:
+        places = (EPHEMERAL, *_share_port(config))
+    elif config.mode == "router" or (config.mode == "peer" and config.hold_rendezvous):
         places = listen_endpoints(config.rendezvous, places, keys=keys)
     if config.mode == "peer":
         places = (*places, _EPHEMERAL_EVERYWHERE if config.multicast else EPHEMERAL)
@@ -263,7 +278,7 @@ def connect_endpoint(text: str) -> str:
         UsageError: The protocol cannot use keys.
     """
     endpoint = Endpoint(text).secured()
-    if endpoint.protocol == "tls" and endpoint.port is not None and _is_own(endpoint.host):
+    if endpoint.protocol == "tls" and endpoint.port is not None and is_own(endpoint.host):
         return str(Endpoint.of("tcp", "localhost", endpoint.port))
     return str(endpoint)
 
@@ -297,7 +312,7 @@ def listen_endpoints(
     ]
     held = []
     if wide and meeting.protocol == "tcp" and meeting.port is not None:
-        addresses = _addresses(meeting.host)
+        addresses = addresses_of(meeting.host)
         held = [Endpoint.of("tcp", address, meeting.port) for address in addresses]
     if not held:
         found = [meeting, *others]
@@ -315,6 +330,23 @@ def listen_endpoints(
     return tuple(dict.fromkeys(map(str, found)))
 
 
+def _share_port(config: SessionConfig) -> Iterator[str]:
+    """Yield the endpoints of a router while another process holds its rendezvous.
+
+    An endpoint of all addresses would include the rendezvous, so each address gets its own.
+    """
+    meeting = Endpoint(config.rendezvous)
+    for endpoint in map(Endpoint, config.listen):
+        port = endpoint.port
+        if port is None or not endpoint.is_any_address or port != meeting.port:
+            yield str(endpoint)
+            continue
+        for _, name in socket.if_nameindex():
+            address = _address_of(name) if _is_beyond(name) else ""
+            if address:
+                yield str(Endpoint.of(endpoint.protocol, address, port).on_interface(name))
+
+
 def loopback_interfaces() -> list[str]:
     """Return the names of the network interfaces whose traffic stays on this machine."""
     names = [name for _, name in socket.if_nameindex()]
@@ -326,9 +358,23 @@ def loopback_interfaces() -> list[str]:
 def _on_each_interface(endpoint: Endpoint) -> Iterator[Endpoint]:
     """Yield an endpoint of all addresses once for each interface to other machines."""
     for _, name in socket.if_nameindex():
-        # An interface that is part of a bridge has no addresses of its own.
-        if _interface_type(name) != _LOOPBACK and not (_INTERFACES / name / "master").exists():
+        if _is_beyond(name):
             yield endpoint.on_interface(name)
+
+
+def _is_beyond(name: str) -> bool:
+    # An interface that is part of a bridge has no addresses of its own.
+    return _interface_type(name) != _LOOPBACK and not (_INTERFACES / name / "master").exists()
+
+
+def _address_of(name: str) -> str:
+    """Return the IPv4 address of a network interface (netdevice(7)); empty if it has none."""
+    request = struct.pack("256s", name.encode()[:15])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            return socket.inet_ntoa(fcntl.ioctl(probe, _SIOCGIFADDR, request)[20:24])
+        except OSError:
+            return ""
 
 
 def _interface_type(name: str) -> str:
@@ -338,7 +384,8 @@ def _interface_type(name: str) -> str:
         return ""
 
 
-def _addresses(host: str) -> list[str]:
+def addresses_of(host: str) -> list[str]:
+    """Return the addresses of a host name or address; none if it is not known."""
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, ValueError):  # Zenoh's own error says what is wrong with the host
@@ -346,9 +393,9 @@ def _addresses(host: str) -> list[str]:
     return list(dict.fromkeys(str(entry[4][0]) for entry in found))
 
 
-def _is_own(host: str) -> bool:
+def is_own(host: str) -> bool:
     """Tell whether all addresses of a host name belong to this machine."""
-    addresses = _addresses(host)
+    addresses = addresses_of(host)
     for address in addresses:
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
         try:

@@ -35,11 +35,13 @@ from rosz.session.probe import is_listening
 from rosz.wire import Endpoint
 
 __all__ = (
+    "CoreLock",
     "LocalPeer",
     "LocalPeers",
     "LocalRegistration",
     "describe_process",
     "direct_endpoint",
+    "find_holder",
     "find_listener",
     "how_to_resume",
     "is_private",
@@ -279,6 +281,46 @@ class LocalRegistration:
         self._sockets.append(made)
 
 
+class CoreLock:
+    """The right to be the core of a domain at a rendezvous, until closed; Linux only.
+
+    Args:
+        rendezvous: The endpoint where the sessions of this machine meet.
+        domain: The ROS domain.
+
+    Raises:
+        TransportError: Another core has it.
+    """
+
+    def __init__(self, rendezvous: str, domain: int) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        if sys.platform != "linux":
+            return
+        name = f"\0{_prefix(rendezvous)}core/{domain}"
+        try:
+            self._socket.bind(name)
+            self._socket.listen()
+        except OSError as error:
+            self._socket.close()
+            if error.errno != errno.EADDRINUSE:
+                raise
+            raise TransportError(
+                f"a core of domain {domain} runs already at {rendezvous}: {_listener_of(name)};"
+                " nodes use it, or end it and start the core again"
+            ) from error
+
+    def close(self) -> None:
+        """Give it up; a second call has no effect."""
+        self._socket.close()
+
+
+def _listener_of(name: str) -> str:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.setblocking(False)
+        refused = probe.connect_ex(name)
+        return "it has just ended" if refused else describe_process(pid_of_peer(probe))
+
+
 def _prefix(rendezvous: str) -> str:
     return f"rosz/{crc32(rendezvous.encode()):08x}/"
 
@@ -342,6 +384,12 @@ def find_listener(endpoint: Endpoint, candidates: Iterable[int]) -> int | None:
         name for name, port, state in _tcp_sockets() if state == _LISTENS and port == endpoint.port
     }
     return next((pid for pid in candidates if not wanted.isdisjoint(_open_files(pid))), None)
+
+
+def find_holder(endpoint: str) -> int | None:
+    """Return the process that listens at an endpoint of this machine; ``None`` if unknown."""
+    pids = [int(entry.name) for entry in _PROC.iterdir() if entry.name.isdecimal()]
+    return find_listener(Endpoint(endpoint), pids)
 
 
 def pid_of_peer(connection: socket.socket) -> int:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rosz.session.queries import Query
     from rosz.session.session import Session
 
-__all__ = ("MeshReadiness", "machine_id", "serve_links")
+__all__ = ("MeshReadiness", "links_key", "machine_id", "serve_links")
 
 _SPACE = "@rosz/links"
 _POLL_SECONDS = 0.002
@@ -72,7 +72,7 @@ class MeshReadiness:
         self._link_timeout = max(timeout, link_timeout)
         self._stop = stop
         self._mesh = mesh
-        self._key = f"{_SPACE}/{'*' if everywhere else machine_id()}/*"
+        self._key = links_key("*", machine="*" if everywhere else "")
         self._lock = threading.RLock()  # a signal handler may call `when_linked` meanwhile
         self._callbacks: list[Callable[[], None]] = []
         if timeout:
@@ -145,9 +145,20 @@ class MeshReadiness:
         return missing - self._session.out_of_reach() if missing else missing
 
 
+def links_key(zid: str, *chunks: str, machine: str = "") -> str:
+    """Return the key at which a session replies to queries about its links.
+
+    Args:
+        zid: The id of the session; ``*`` for all.
+        chunks: What the query is about; all links when not given.
+        machine: The id of its machine; this one when not given, ``*`` for all.
+    """
+    return "/".join((_SPACE, machine or machine_id(), zid, *chunks))
+
+
 def serve_links(session: Session) -> Closable:
     """Reply to queries for the links of a session, until closed."""
-    key = f"{_SPACE}/{machine_id()}/{session.zid}"
+    key = links_key(session.zid)
 
     def reply(query: Query) -> None:
         with query:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 import os
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,11 +38,13 @@ from rosz.wire import Endpoint
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
 
-__all__ = ("open_raw", "outlasted_silence", "places_of")
+__all__ = ("open_raw", "outlasted_silence", "places_of", "why_refused_by_keys")
 
 _NOBODY = "Unable to connect to any of"
 _BUSY_TIMEOUT = 60.0
 """Seconds that a node waits for a busy router."""
+_QUIET_SECONDS = 2.0
+"""Seconds after which a node logs that it waits for another machine."""
 
 _log = logging.getLogger("rosz.session")
 
@@ -66,19 +67,18 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         # When many nodes start at once, some of them are answered late.
         longer = max(config.open_timeout, _BUSY_TIMEOUT)
         config = msgspec.structs.replace(config, open_timeout=longer)
-    reachable = reachable_config(config, peers)
-    if reachable is None:
-        raise _nobody(config)
-    config = reachable
+    config = _reachable(config, peers)
     if config.shared_memory and SEGMENTS.exists() and not os.access(SEGMENTS, os.W_OK):
         _log.warning("no shared memory: %s cannot be written to; samples go over links", SEGMENTS)
         config = msgspec.structs.replace(config, shared_memory=0)
     settings = _settings(config)
     _listen_directly(settings, config.rendezvous, own)
     if own is not None:
-        connect_to_running(settings, peers)
+        connect_to_running(settings, peers, config)
     remove_abandoned_segments()
-    _log_refused_links(config)
+    if config.keys is not None and config.listen:
+        # Zenoh decides which links this machine accepts, and its log says which it refuses.
+        zenoh.init_log_from_env_or("zenoh_link_tls=warn")
     try:
         with translate_errors(f"open a session ({_quoted(config)})"), prepare_process(config.mode):
             if config.mode == "peer" and config.hold_rendezvous:
@@ -132,6 +132,27 @@ def outlasted_silence(config: SessionConfig) -> float:
     return float(sending["lease"] * (1 - 1 / sending["keep_alive"]) / 1000)
 
 
+def _reachable(config: SessionConfig, peers: LocalPeers) -> SessionConfig:
+    """Return the configuration of a client, reduced to an endpoint that answers.
+
+    A node that was told to connect to other machines waits until one of them is up.
+
+    Raises:
+        TransportError: Nobody answers.
+    """
+    waits = bool(config.connect) and not config.must_connect
+    found = reachable_config(config, peers, _QUIET_SECONDS if waits else config.open_timeout)
+    if found is None and waits:
+        _log.warning("waiting for %s: nobody answers", " or ".join(config.connect))
+        while found is None:
+            peers = LocalPeers.read(config.rendezvous)
+            found = reachable_config(config, peers, config.open_timeout)
+        _log.warning("connected to %s", found.rendezvous)
+    if found is None:
+        raise _nobody(config)
+    return found
+
+
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
     if "id" not in overrides(config.override) and (zid := new_id(config)):
         settings.insert_json5("id", json.dumps(zid))
@@ -181,39 +202,29 @@ def _quoted(config: SessionConfig) -> str:
     return ", ".join(f"'{endpoint}'" for endpoint in config.endpoints)
 
 
-def _refused_links(config: SessionConfig) -> Iterator[str]:
-    """Yield the endpoints that refuse links because of missing or wrong keys, with the reason.
+def why_refused_by_keys(endpoint: Endpoint, keys: KeyFolder | None) -> str:
+    """Return why an endpoint refuses links because of missing or wrong keys; empty if it does not.
 
-    This connects to each endpoint, which takes seconds where nobody answers.
+    This connects to the endpoint, which takes seconds where nobody answers.
+
+    Args:
+        endpoint: The endpoint as it is dialled.
+        keys: The keys of this machine, if it has any.
     """
+    if endpoint.is_local or not endpoint.is_tcp:
+        return ""
+    from rosz.security.handshake import refusal, wants_keys
+
+    if keys is not None:
+        return refusal(endpoint, keys)
+    if wants_keys(endpoint):
+        return "it requires keys, and this machine has none: set ROSZ_KEYS"
+    return ""
+
+
+def _refused_links(config: SessionConfig) -> Iterator[str]:
+    """Yield the endpoints that refuse links because of missing or wrong keys, with the reason."""
     for text in dict.fromkeys((config.rendezvous, *config.connect)):
         endpoint = Endpoint(text if config.keys is None else connect_endpoint(text))
-        if endpoint.is_local or not endpoint.is_tcp:
-            continue
-        from rosz.security.handshake import refusal, wants_keys
-
-        if config.keys is not None:
-            reason = refusal(endpoint, config.keys)
-        elif wants_keys(endpoint):
-            reason = "it requires keys, and this machine has none: set ROSZ_KEYS"
-        else:
-            reason = ""
-        if reason:
+        if reason := why_refused_by_keys(endpoint, config.keys):
             yield f"'{endpoint}': {reason}"
-
-
-def _log_refused_links(config: SessionConfig) -> None:
-    """Log which links are refused, by this machine or by the other end, from now on.
-
-    Zenoh decides which links this machine accepts, and its own log says which it refuses.
-    """
-
-    def log_refusals_of_others() -> None:
-        for reason in _refused_links(config):
-            _log.warning("no link to %s", reason)
-
-    if config.keys is not None and config.listen:
-        zenoh.init_log_from_env_or("zenoh_link_tls=warn")
-    if config.connect and not config.must_connect and config.mode != "client":
-        name = "rosz-refusals"
-        threading.Thread(target=log_refusals_of_others, name=name, daemon=True).start()

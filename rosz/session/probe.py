@@ -13,6 +13,7 @@ __all__ = ("first_listening", "is_listening", "why_refused")
 
 _TIMEOUT = 0.5
 _AGAIN_SECONDS = 0.1
+_LONGEST_PAUSE = 1.0
 _GRACE_SECONDS = 0.3
 """Seconds that a less preferred endpoint waits for the result of a more preferred one."""
 
@@ -31,6 +32,7 @@ def first_listening(endpoints: Sequence[str], timeout: float) -> str:
     over = threading.Event()
 
     def try_endpoint(endpoint: str) -> None:
+        pause = _AGAIN_SECONDS
         while not over.is_set():
             answer = is_listening(endpoint, timeout)
             with changed:
@@ -38,7 +40,8 @@ def first_listening(endpoints: Sequence[str], timeout: float) -> str:
                 changed.notify()
             if answer:
                 return
-            over.wait(_AGAIN_SECONDS)
+            over.wait(pause)
+            pause = min(1.2 * pause, _LONGEST_PAUSE)
 
     def preferred() -> bool:
         """Tell whether an endpoint answered, and all that are preferred to it have been tried."""

@@ -18,8 +18,11 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import RoszError, TransportError
 from rosz.lifecycle import Lifecycle
-from rosz.session.config import SessionConfig
+from rosz.session.config import EPHEMERAL, SessionConfig
+from rosz.session.dialling import Dialling, who_answers
+from rosz.session.local_peers import CoreLock, LocalPeers, describe_process, find_holder
 from rosz.session.opening import outlasted_silence, places_of
+from rosz.session.probe import is_listening
 from rosz.session.session import Session
 from rosz.wire import Endpoint
 
@@ -32,11 +35,16 @@ _OCCUPIED: Final = re.compile(
 """Errors of Zenoh for a TCP endpoint, and for a unix socket, that another process holds."""
 _POLL_SECONDS: Final = 2.0
 _ON_INTERFACE: Final = "#iface="
+_SUCCESSION_SECONDS: Final = 0.5
+_GREETING_TIMEOUT: Final = 3.0
 _log = logging.getLogger("rosz.core")
 
 
 class Router:
     """A router, until closed.
+
+    While another process holds the rendezvous, the router is linked to that process, and it takes
+    the place when it is free.
 
     Args:
         environment: The settings of the process.
@@ -45,13 +53,14 @@ class Router:
 
     Attributes:
         endpoints: The endpoints that it listens at.
-        connect: The endpoints that it connects to.
         has_rules: Whether rules say what other machines may do.
         outlasted_silence: Seconds of silence after which others give up its links.
+        holder: The process that held the rendezvous at the start; empty if none did.
         session: Its session.
 
     Raises:
-        TransportError: An endpoint is occupied or malformed.
+        TransportError: An endpoint is occupied or malformed, another core of this domain runs on
+            this machine, or what holds the rendezvous is not Zenoh.
     """
 
     def __init__(
@@ -66,25 +75,43 @@ class Router:
         both = (*environment.connect, *connect)
         config = SessionConfig.of(environment, mode="router", listen=listen, connect=both)
         self.endpoints: tuple[str, ...]
-        self.connect: tuple[str, ...]
-        self.endpoints, self.connect = places_of(config)
         self.has_rules: bool = config.keys is not None and config.keys.rules is not None
         self.outlasted_silence: float = outlasted_silence(config)
+        self.holder: str = ""
         self._lifecycle = Lifecycle("the router", log=_log)
+        lock = self._lifecycle.keep(CoreLock(environment.rendezvous, environment.domain))
+        self.session: Session
         try:
-            self.session: Session = self._lifecycle.keep(Session.open(config))
+            if _is_shareable(config) and is_listening(config.rendezvous):
+                config = self._share(config)
+            try:
+                self.session = Session.open(config)
+            except TransportError as error:
+                # Another process may have been faster.
+                if not (_OCCUPIED.search(str(error)) and _is_shareable(config)):
+                    raise
+                config = self._share(config)
+                self.session = Session.open(config)
         except TransportError as error:
-            match = _OCCUPIED.search(str(error))
-            if match is None:
-                raise
-            place = match[1] or match[2]
-            endpoint = next((one for one in self.endpoints if one.endswith(place)), place)
-            raise TransportError(
-                f"'{endpoint}' is occupied: another core, or a node that the others meet at, holds"
-                " it; nodes keep working with it, or end it and start the core again"
-            ) from error
-        if any(_ON_INTERFACE in place for place in self.endpoints):
+            lock.close()
+            raise _name_occupied(error, config) from error
+        self._lifecycle.keep(self.session)
+        listen, _ = places_of(config)
+        self.endpoints = tuple(place for place in listen if place != EPHEMERAL)
+        self._dialling = self._lifecycle.keep(Dialling(self.session, config))
+        if any(_ON_INTERFACE in place for place in listen):
             self._lifecycle.keep(_NewInterfaces(config))
+        if self.holder:
+            self._lifecycle.keep(_Successor(self.session, config))
+
+    def _share(self, config: SessionConfig) -> SessionConfig:
+        """Return the configuration of a router whose rendezvous another process holds."""
+        self.holder = _check_holder(config)
+        return msgspec.structs.replace(config, rendezvous_is_held=True)
+
+    def announce(self) -> dict[str, bool]:
+        """Return the endpoints that it dials, each with whether it is reached, to be printed."""
+        return self._dialling.announce()
 
     def close(self) -> None:
         """Close the router; a second call has no effect."""
@@ -152,3 +179,96 @@ class _NewInterfaces:
         self._thread.join()
         while self._sessions:
             self._sessions.popitem()[1].close()
+
+
+class _Successor:
+    """Listens at the rendezvous once the process that holds it has ended.
+
+    Seen with eclipse-zenoh 1.10.2: a session that listens as soon as an endpoint is free (with
+    ``listen/timeout_ms`` -1) takes ten seconds to close while the endpoint is occupied. So a
+    further router, linked to the first one, takes the place. Not reported upstream yet.
+    """
+
+    def __init__(self, session: Session, config: SessionConfig) -> None:
+        self._session = session
+        self._config = config
+        self._taken: Session | None = None
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="rosz-successor", daemon=True)
+        self._thread.start()
+
+    def _watch(self) -> None:
+        while self._taken is None and not self._closing.wait(_SUCCESSION_SECONDS):
+            try:
+                if not self._is_held():
+                    self._take()
+            except RoszError as error:
+                # Another process was faster.
+                _log.debug("cannot listen at the rendezvous: %s", error)
+
+    def _is_held(self) -> bool:
+        place = Endpoint(self._config.rendezvous)
+        ends = [Endpoint(end) for each in self._session.links().values() for end in each]
+        if any(end.address == place.address or end.port == place.port for end in ends):
+            return True
+        return is_listening(self._config.rendezvous)
+
+    def _take(self) -> None:
+        further = SessionConfig(
+            mode="router",
+            rendezvous=self._config.rendezvous,
+            connect=(self._session.local_endpoint,),
+            keys=self._config.keys,
+        )
+        self._taken = Session.open(further)
+        _log.warning("listening on %s, which has become free", self._config.rendezvous)
+
+    def close(self) -> None:
+        """Stop listening there; a second call has no effect."""
+        self._closing.set()
+        self._thread.join()
+        taken, self._taken = self._taken, None
+        if taken is not None:
+            taken.close()
+
+
+def _is_shareable(config: SessionConfig) -> bool:
+    """Tell whether a router may leave its rendezvous to another process for now."""
+    place = Endpoint(config.rendezvous)
+    return (place.is_unix or place.is_tcp) and not (
+        config.rendezvous_is_held or config.config_file or "listen" in config.override
+    )
+
+
+def _check_holder(config: SessionConfig) -> str:
+    """Return who listens at the rendezvous.
+
+    Raises:
+        TransportError: It is not Zenoh.
+    """
+    peers = LocalPeers.read(config.rendezvous)
+    pid = find_holder(config.rendezvous)
+    who = "another process" if pid is None else describe_process(pid)
+    is_ours = any(peer.pid == pid for peer in peers)
+    answers = is_ours or who_answers(config.rendezvous, config, _GREETING_TIMEOUT)
+    if not answers and is_listening(config.rendezvous):
+        raise TransportError(
+            f"'{config.rendezvous}' is held by {who}, which does not speak Zenoh: end it, or set"
+            " ROSZ_RENDEZVOUS to another endpoint for all processes"
+        )
+    return f"{who}, which is stopped" if pid == peers.stopped_holder is not None else who
+
+
+def _name_occupied(error: TransportError, config: SessionConfig) -> TransportError:
+    """Return the error to raise for an endpoint that another process may hold."""
+    match = _OCCUPIED.search(str(error))
+    if match is None:
+        return error
+    place = match[1] or match[2]
+    listen, _ = places_of(config)
+    endpoint = next((one for one in listen if one.partition("#")[0].endswith(place)), place)
+    pid = find_holder(endpoint)
+    who = "another process" if pid is None else describe_process(pid)
+    return TransportError(
+        f"'{endpoint}' is occupied by {who}: end it and start the core again, or name another port"
+    )

@@ -18,6 +18,7 @@ from weakref import WeakValueDictionary
 import zenoh
 import zenoh.ext
 
+from rosz.errors import ClosedError
 from rosz.lifecycle import Closable, Lifecycle
 from rosz.session.at_exit import ENDING, ClosedSession
 from rosz.session.config import SessionConfig
@@ -29,7 +30,7 @@ from rosz.session.declared import (
     open_channel,
     translate_errors,
 )
-from rosz.session.local_peers import LocalPeers, LocalRegistration
+from rosz.session.local_peers import LocalPeers, LocalRegistration, direct_endpoint
 from rosz.session.opening import open_raw
 from rosz.session.queries import (
     PRIORITIES,
@@ -116,11 +117,11 @@ class Session:
             ClosedError: This process was forked from one that had opened a session.
         """
         _runtime().check_open("open a session")
-        if config.mode == "client" or not config.hold_rendezvous:
+        if config.mode == "client" or (config.mode == "router" and not config.hold_rendezvous):
             raw = open_raw(config, peers or LocalPeers.read(config.rendezvous))
             registration = None
         else:
-            reachable = config.mode == "peer"
+            reachable = config.mode == "peer" or config.rendezvous_is_held
             registration = LocalRegistration(config.rendezvous, reachable=reachable)
             try:
                 others = LocalPeers.read(config.rendezvous, registration.peer)
@@ -435,6 +436,28 @@ class Session:
         """Return the ids of the sessions and routers that this one is linked to."""
         info = self._raw.info
         return sorted(str(zid) for zid in (*info.peers_zid(), *info.routers_zid()))
+
+    @property
+    def local_endpoint(self) -> str:
+        """The endpoint where sessions of this machine can reach this one; empty if there is none.
+
+        It is known on Linux only.
+        """
+        return (
+            ""
+            if self._registration is None
+            else direct_endpoint(self._rendezvous, self._registration.peer)
+        )
+
+    def links(self) -> dict[str, list[str]]:
+        """Return the other ends of the links of this session, by the ids of their sessions."""
+        if ENDING.is_set():
+            raise ClosedError("cannot look for links: the program ends")
+        found: dict[str, list[str]] = {}
+        with translate_errors("look for links"):
+            for link in self._raw.info.links():
+                found.setdefault(str(link.zid), []).append(str(link.dst))
+        return found
 
     def out_of_reach(self) -> set[str]:
         """Return the ids of the sessions of this machine whose processes are stopped."""

@@ -10,7 +10,8 @@ What happens without them:
 - `reachable_config`: A client connects to the first of its endpoints only, whether anybody answers
   there or not, and fails although another one answers.
 - `connect_to_running`: Peers hear of each other from the one at the rendezvous, so a newcomer finds
-  nobody while that process is stopped.
+  nobody while that process is stopped or has ended. Routers do not hear of each other there at all,
+  and a peer between two routers does not forward the tokens of one of them.
 - `open_and_listen`: Of two processes that begin to listen at one port at the same moment, Linux may
   refuse both, because each finds the other one about to. Zenoh does not try again, so they would
   never meet.
@@ -125,11 +126,18 @@ def prepare_process(mode: str) -> Iterator[None]:
         os.environ.pop(_RUNTIME, None)
 
 
-def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig | None:
+def reachable_config(
+    config: SessionConfig, peers: LocalPeers, timeout: float
+) -> SessionConfig | None:
     """Return the configuration of a client, reduced to the first endpoint that answers.
 
     A command prefers the endpoints that it was given to this machine. A node is a client of the
     router of this machine first.
+
+    Args:
+        config: The configuration.
+        peers: The other sessions of this machine.
+        timeout: Time limit in seconds.
 
     Returns:
         The configuration, unchanged if it is not of a client; ``None`` if nobody answers anywhere.
@@ -144,23 +152,33 @@ def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig 
         local = peers.running
         if not local and not config.connect:
             raise TransportError(peers.why_unanswered)
+    elif config.must_connect and not is_listening(config.rendezvous):
+        local += peers.running
     wanted = [*config.connect, *local] if config.must_connect else [*local, *config.connect]
     if wanted == [config.rendezvous]:
         return config
-    endpoint = first_listening(wanted, config.open_timeout)
+    endpoint = first_listening(wanted, timeout)
     return msgspec.structs.replace(config, rendezvous=endpoint, connect=()) if endpoint else None
 
 
-def connect_to_running(settings: zenoh.Config, peers: LocalPeers) -> None:
-    """Connect a peer to all running sessions directly if the rendezvous is held by a stopped one.
+def connect_to_running(settings: zenoh.Config, peers: LocalPeers, config: SessionConfig) -> None:
+    """Connect to all running sessions directly where nobody at the rendezvous introduces them.
 
     They are tried ever more rarely, because nobody knows who will listen there in an hour.
+
+    Args:
+        settings: The settings of the session.
+        peers: The other sessions of this machine.
+        config: The configuration that the settings were made from.
     """
     pid = peers.stopped_holder
-    if pid is None:
+    if pid is not None:
+        what = f"{describe_process(pid)} holds the meeting point {peers.rendezvous} and is stopped"
+        _log.warning("%s: it is not reached until it resumes (%s)", what, how_to_resume(pid))
+    elif not config.rendezvous_is_held and (
+        config.hold_rendezvous or is_listening(peers.rendezvous)
+    ):
         return
-    what = f"{describe_process(pid)} holds the meeting point {peers.rendezvous} and is stopped"
-    _log.warning("%s: it is not reached until it resumes (%s)", what, how_to_resume(pid))
     running = [f"{endpoint}#{_RARE_RETRIES}" for endpoint in peers.running]
     connect = [*running, *json.loads(settings.get_json("connect/endpoints"))]
     settings.insert_json5("connect/endpoints", json.dumps(connect))

@@ -81,7 +81,7 @@ def test_a_core_on_each_machine(world: World) -> None:
     robot, laptop = world.hosts("robot", "laptop")
     core(robot, "--listen", LISTEN)
     linked = core(laptop, "--connect", "tcp/robot:7447")
-    assert "connecting to tcp/robot:7447" in linked.output
+    linked.wait_for("connected to tcp/robot:7447")
     talker(robot)
     assert_soon("a core on each machine", laptop)
     assert laptop.listening() == []

@@ -125,7 +125,7 @@ def test_an_intruder_that_is_connected_to(
     robot, laptop = hosts
     kind(authority, tmp_path, laptop)
     core(laptop, "--listen", "tcp/0.0.0.0:7447")
-    core(robot, "--connect", "tcp/laptop:7447").wait_for("no link to 'tls/laptop:7447': ")
+    core(robot, "--connect", "tcp/laptop:7447").wait_for("no link to tls/laptop:7447: ")
     assert_apart(robot, laptop)
 
 

@@ -256,7 +256,7 @@ def test_cores_log_why_a_link_is_refused(pair: Pair) -> None:
     _, robot = pair.start()
     del pair.laptop.variables["ROSZ_KEYS"]
     without = pair.laptop.rosz("core", "--connect", "tcp/robot:7447")
-    without.wait_for("no link to 'tcp/robot:7447': it requires keys")
+    without.wait_for("no link to tcp/robot:7447: it requires keys")
     robot.kill()
 
 

@@ -124,7 +124,7 @@ def test_a_core_on_each_machine(world: World, authority: Authority) -> None:
     robot, laptop = pair(world, authority)
     started(robot, "--listen", "tcp/0.0.0.0:7447")
     linked = started(laptop, "--connect", "tcp/robot:7447")
-    assert "connecting to tls/robot:7447" in linked.output
+    linked.wait_for("connected to tls/robot:7447")
     robot.program(TALKER, ROSZ_KEYS="").wait_for("talking")
     laptop.program(LISTENER, ROSZ_KEYS="").wait_for("heard")
     eventually(lambda: "/listener" in robot.ask("node", "list"), "the graph on the other side")
