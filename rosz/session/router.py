@@ -79,9 +79,10 @@ class Router:
         self.outlasted_silence: float = outlasted_silence(config)
         self.holder: str = ""
         self._lifecycle = Lifecycle("the router", log=_log)
-        lock = self._lifecycle.keep(CoreLock(environment.rendezvous, environment.domain))
         self.session: Session
         try:
+            if _is_shareable(config):
+                self._lifecycle.keep(CoreLock(environment.rendezvous, environment.domain))
             if _is_shareable(config) and is_listening(config.rendezvous):
                 config = self._share(config)
             try:
@@ -93,7 +94,7 @@ class Router:
                 config = self._share(config)
                 self.session = Session.open(config)
         except TransportError as error:
-            lock.close()
+            self._lifecycle.close()
             raise _name_occupied(error, config) from error
         self._lifecycle.keep(self.session)
         listen, _ = places_of(config)
