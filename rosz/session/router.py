@@ -210,7 +210,8 @@ class _Successor:
     def _is_held(self) -> bool:
         place = Endpoint(self._config.rendezvous)
         ends = [Endpoint(end) for each in self._session.links().values() for end in each]
-        if any(end.address == place.address or end.port == place.port for end in ends):
+        ports = {place.port} - {None}
+        if any(end.address == place.address or end.port in ports for end in ends):
             return True
         return is_listening(self._config.rendezvous)
 
