@@ -60,6 +60,7 @@ class StampValue:
 
     if not TYPE_CHECKING:  # the fields are those of the message classes below
         __slots__ = ()
+    _ros1_names: ClassVar[dict[str, str]] = {"secs": "sec", "nsecs": "nanosec"}
     _duration_class: ClassVar[Any] = None
 
     sec: int

@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
-from rosz.message import Message, Slot, slot_type, slots
+from rosz.message import Message, Slot, ros1_slots, slot_type, slots
 from rosz.names import short_type
 
 __all__ = ("FieldPath", "Filter", "Target", "find_target")
@@ -133,10 +133,9 @@ def _slot(cls: type[Any], name: str) -> Slot:
     for slot in slots(cls):
         if slot.name == name:
             return slot
-    if name == "seq" and "seq" in cls.__slots__:
-        return Slot("seq", "uint32", 0, "one", 0)
-    if name in {"secs", "nsecs"} and hasattr(cls, name):  # ROS 1's spelling of the fields of times
-        return slots(cls)[name == "nsecs"]
+    other = ros1_slots(cls).get(name)
+    if other is not None:
+        return other
     known = cls.__slots__
     listing = f"; it has {', '.join(known)}" if known else "; it has no fields"
     raise NotFoundError(f"'{cls._type}' has no field '{name}'{near_miss(name, known) or listing}")

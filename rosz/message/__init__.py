@@ -21,6 +21,7 @@ from rosz.message.base import (
     Service,
     Slot,
     Writable,
+    ros1_slots,
     slot_type,
     slots,
 )
@@ -40,6 +41,7 @@ __all__ = (
     "Service",
     "Slot",
     "Writable",
+    "ros1_slots",
     "slot_type",
     "slots",
 )

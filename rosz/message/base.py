@@ -41,6 +41,7 @@ __all__ = (
     "Slot",
     "Writable",
     "rclpy_type",
+    "ros1_slots",
     "slot_type",
     "slots",
 )
@@ -246,6 +247,7 @@ class Message(msgspec.Struct, gc=False):
         _full_text: Text of the definition and of all types in it, as ROS 1 bags hold it.
         _slot_types: ROS 1 types of the fields, in the order of ``__slots__``.
         _has_header: Whether the first field is a ``std_msgs/Header`` named header.
+        _ros1_names: Names of fields by the other names that ROS 1 has for them.
     """
 
     _type: ClassVar[str] = ""
@@ -254,6 +256,7 @@ class Message(msgspec.Struct, gc=False):
     _md5sum: ClassVar[str] = ""
     _text: ClassVar[str] = ""
     _schema: ClassVar[Schema] = ()
+    _ros1_names: ClassVar[dict[str, str]] = {}
     _full_text = _Derived(_full_text)
     _slot_types = _Derived(_slot_types)
     _has_header = _Derived(_has_header)
@@ -344,6 +347,16 @@ class Sequenced(Message):
         return all(getattr(self, n) == getattr(other, n) for n, _, _ in self._schema)
 
 
+_SEQ = Slot("seq", "uint32", 0, "one", 0)
+
+
+def ros1_slots(cls: Any) -> dict[str, Slot]:
+    """Return the fields of a message class that have another name in ROS 1, or are only there."""
+    found = {slot.name: slot for slot in slots(cls)}
+    renamed = {old: found[new] for old, new in cls._ros1_names.items()}
+    return {**renamed, "seq": _SEQ} if issubclass(cls, Sequenced) else renamed
+
+
 class _TakesRos1Names(msgspec.StructMeta):
     def __call__(cls, *args: Any, **members: Any) -> Any:  # noqa: N805  # a class is the instance
         """Make a message; members may have their names in ROS 1."""
@@ -357,13 +370,7 @@ class _TakesRos1Names(msgspec.StructMeta):
 
 
 class Renamed(Message, metaclass=_TakesRos1Names):
-    """A message with fields that ROS 1 spells in another way, such as ``CameraInfo(K=…)``.
-
-    Attributes:
-        _ros1_names: Names of these fields by their names in ROS 1.
-    """
-
-    _ros1_names: ClassVar[dict[str, str]] = {}
+    """A message whose constructor takes ROS 1's names of fields, such as ``CameraInfo(K=…)``."""
 
 
 class Service:

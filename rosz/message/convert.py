@@ -19,7 +19,16 @@ from typing import Any, NoReturn, TypeAlias, TypeVar
 import yaml
 
 from rosz.errors import EncodeError, near_miss
-from rosz.message.base import ARRAY_CODES, INTEGER_RANGES, OCTETS, Message, Sequenced, Slot, slots
+from rosz.message.base import (
+    ARRAY_CODES,
+    INTEGER_RANGES,
+    OCTETS,
+    Message,
+    Sequenced,
+    Slot,
+    ros1_slots,
+    slots,
+)
 from rosz.message.schema_codec import shown
 from rosz.message.sequences import numbers
 from rosz.message.text import strify_message
@@ -41,7 +50,6 @@ __all__ = (
 _NOT_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 _FLOATS = frozenset({"float32", "float64"})
 _TEXTS = frozenset({"string", "wstring"})
-_SEQ = Slot("seq", "uint32", 0, "one", 0)
 
 
 def fill_message_args(msg: Message, msg_args: Any, keys: Mapping[str, Any] | None = None) -> None:
@@ -99,7 +107,7 @@ class _Filler:
     def _positional(self, cls: type[Message], count: int, path: str) -> list[Slot]:
         fields = list(slots(cls))
         if issubclass(cls, Sequenced) and count == len(fields) + 1:
-            return [_SEQ, *fields]  # as ROS 1 counts
+            return [ros1_slots(cls)["seq"], *fields]  # as ROS 1 counts
         if count != len(fields):
             names = ", ".join(shown_name(slot.name) for slot in fields)
             values = {0: "no values", 1: "1 value"}.get(len(fields), f"{len(fields)} values")
@@ -110,15 +118,9 @@ class _Filler:
 
     def _slot(self, cls: type[Message], name: Any, path: str) -> Slot:
         known = {shown_name(slot.name): slot for slot in slots(cls)}
-        if issubclass(cls, Sequenced):
-            known["seq"] = _SEQ
-        if issubclass(cls, TimeValue | DurationValue):
-            known |= {"secs": known["sec"], "nsecs": known["nanosec"]}
+        known |= ros1_slots(cls)
         if name in known:
             return known[name]
-        alias = getattr(cls, name, None) if isinstance(name, str) else None
-        if isinstance(alias, property) and name.lower() in known:  # CameraInfo.K
-            return known[name.lower()]
         fields = near_miss(str(name), known) or f"; it has {', '.join(known) or 'no fields'}"
         owner = cls._type if path else "it"
         raise EncodeError(self._type, path, f"{owner} has no field '{name}'{fields}")
