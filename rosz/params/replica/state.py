@@ -358,9 +358,11 @@ class State:
             self.damage.report(NOT_A_PARAMETER, error)
             return str(error)
         try:
-            for write in writes:
-                check_time(write, time.time_ns())
-                self._check_horizon(write)
+            if writes:  # all of them have the same time
+                check_time(writes[0], time.time_ns())
+            if writes and writes[0].time <= self._history.horizon:
+                for write in writes:
+                    self._check_horizon(write)
         except DecodeError as error:
             self.damage.report(_REFUSED, error)
             return error.reason
