@@ -126,7 +126,7 @@ def check_time(write: Write, now: int) -> None:
         raise DecodeError(
             "parameter stamp",
             -1,
-            f"'{joined(write.path)}' of {write.origin!r} is stamped {ahead // _YEAR} years"
+            f"'{joined(write.path)}' of {write.origin!r} is stamped {ahead / _YEAR:.1f} years"
             f" ahead, expected at most {_MAX_YEARS_AHEAD}: set the clock of the machine that wrote"
             " it",
         )

@@ -350,7 +350,7 @@ def test_a_write_that_a_replica_refuses_is_undone(network: Network) -> None:
         with pytest.raises(ParamError) as caught:
             wrong.set(name, 2, timeout=TIMEOUT)
         assert f"'{name}' is not written, since right refuses it: " in str(caught.value)
-        assert "stamped 11 years ahead, expected at most 10" in str(caught.value)
+        assert "stamped 11.0 years ahead, expected at most 10" in str(caught.value)
     assert wrong.root == right.root == {"a": 1}
 
 
