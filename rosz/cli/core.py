@@ -56,6 +56,7 @@ def core_command(
     ] = None,
     keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
     store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = "",
+    owner: Annotated[int, Option("--owner PID")] = 0,
     port: Annotated[str, Option("-p --port")] = "",
 ) -> None:
     """Run a meeting point with a copy of the parameters, until it is stopped.
@@ -101,7 +102,7 @@ def core_command(
             kept = f"parameters of domain {domain} are kept in {file or 'memory'}"
             lines = _describe(router, environment.rendezvous)
             print_lines([*lines, kept, "started core; press Ctrl-C to end it"])
-        watch.restart_when_needed()
+        watch.restart_when_needed(owner)
 
 
 def _describe(router: Router, rendezvous: str) -> list[str]:

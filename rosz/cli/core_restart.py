@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -81,13 +82,18 @@ class CoreWatch:
                 router.session, domain, tokens, self._on_split, self._splits
             )
 
-    def restart_when_needed(self) -> NoReturn:
+    def restart_when_needed(self, owner: int = 0) -> None:
         """Start the program afresh as soon as its links are of no more use, or its keys change.
+
+        Args:
+            owner: Process that started this one and ends with it; this returns when that has ended.
 
         Raises:
             OSError: The program cannot be executed any more.
         """
         while not self._found.wait(_LOOK_SECONDS):
+            if owner and os.getppid() != owner:
+                return
             if seconds := self._standstill.seconds():
                 self._why = f"stood still for {seconds:.0f} s, longer than others keep its links"
                 break

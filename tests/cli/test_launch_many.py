@@ -69,6 +69,14 @@ def test_a_killed_launch_takes_its_core_along(launch: Start, network: Network) -
     eventually(lambda: not any(map(runs, pids)), "the end of both")
 
 
+def test_a_launch_killed_as_its_core_comes_up_leaves_none(launch: Start, network: Network) -> None:
+    run = launch(fleet(network.folder, STUBBORN, 1), ROSZ_CONNECT="tcp/127.0.0.1:9")
+    eventually(lambda: is_listening(network.rendezvous), "the core", 30)
+    run.send(signal.SIGKILL)
+    eventually(lambda: not is_listening(network.rendezvous), "the end of the core")
+    eventually(lambda: not any(map(runs, started(run).values())), "the end of the node")
+
+
 def test_twenty_stubborn_nodes_end_in_time(launch: Start, network: Network) -> None:
     file = fleet(network.folder, STUBBORN, 20)
     run = launch("--sigint-timeout", "0.5", "--sigterm-timeout", "0.5", file)

@@ -157,7 +157,7 @@ class _Agent:
             self._environ["ROSZ_CONNECT"] = reaches
             environment = Environment.read(self._environ)
         self._output = Output(
-            self._loop, lambda text: self._writer.send(AgentWarning(text)), (setup.tag,)
+            self._loop, lambda text: self._writer.send(AgentWarning(text)), setup.tag
         )
         workplace = Workplace(
             package_index(environment), environment, self._environ, str(Path.cwd())

@@ -7,8 +7,8 @@ core`` as a router and makes its nodes clients of it.
 
 from __future__ import annotations
 
+import os
 import re
-import secrets
 import signal
 import socket
 import subprocess
@@ -264,7 +264,6 @@ class RouterProcess:
     Attributes:
         environment: Settings of its clients.
         environ: Environment variables of its clients.
-        tag: Tag by which its process is found.
 
     Raises:
         LaunchError: If it does not start.
@@ -273,9 +272,8 @@ class RouterProcess:
     def __init__(self, environment: Environment, environ: Mapping[str, str]) -> None:
         self.environment = msgspec.structs.replace(environment, mode="client")
         self.environ = {**environ, _MODE: "client"}
-        # Not below the tag of an outer launch, which would wait for it as for a part of its node.
-        self.tag = secrets.token_hex(8)
-        self._own_environ = {**environ, TAG: self.tag}
+        # An outer launch would wait for it as for a part of its node.
+        self._own_environ = {name: value for name, value in environ.items() if name != TAG}
         self._closing = False
         self._process = self._start()
         try:
@@ -291,7 +289,7 @@ class RouterProcess:
 
     def _start(self) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
-            [sys.executable, "-P", "-m", "rosz", "core"],
+            [sys.executable, "-P", "-m", "rosz", "core", "--owner", str(os.getpid())],
             env=self._own_environ,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

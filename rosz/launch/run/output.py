@@ -14,7 +14,7 @@ import socket
 import subprocess
 import sys
 import termios
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -118,14 +118,13 @@ class Output:
     Args:
         loop: Loop that waits for its replies.
         warn: Function that reports its death.
-        tags: Tags of all that the relay ends when this process is killed: that of the nodes, which
-            are asked to end first, and those of other processes.
+        tag: Tag of all nodes, which the relay ends when this process is killed.
     """
 
-    def __init__(self, loop: Loop, warn: Callable[[str], None], tags: Sequence[str]) -> None:
+    def __init__(self, loop: Loop, warn: Callable[[str], None], tag: str) -> None:
         self._loop = loop
         self._warn = warn
-        self._tags = tags
+        self._tag = tag
         self._waiting: dict[int, tuple[_OnDrained, Timer]] = {}
         self._unread = b""
         self._terminals = (os.isatty(1), os.isatty(2))
@@ -140,7 +139,7 @@ class Output:
         script = Path(__file__).with_name("relay.py")
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-S", str(script), str(theirs.fileno()), *self._tags],
+                [sys.executable, "-I", "-S", str(script), str(theirs.fileno()), self._tag],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,

@@ -13,7 +13,7 @@ import math
 import os
 import signal
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,14 +125,14 @@ class ProcessTree:
         return found, unclear
 
 
-def end_processes(tags: Sequence[str], groups: Collection[int]) -> None:
+def end_processes(tag: str, groups: Collection[int]) -> None:
     """End the processes of a launch that was killed: SIGINT, then SIGTERM, then SIGKILL.
 
     Args:
-        tags: Tag of the nodes, then those of processes that get only SIGKILL.
+        tag: Tag of the nodes.
         groups: Process groups of the nodes, for nodes that do not show their environment.
     """
-    tree = ProcessTree(tags[0])
+    tree = ProcessTree(tag)
     for number in (signal.SIGINT, signal.SIGTERM):
         deadline = time.monotonic() + _GRACE_SECONDS
         signalled: set[int] = set()
@@ -143,8 +143,7 @@ def end_processes(tags: Sequence[str], groups: Collection[int]) -> None:
                 _send(pid, number)
             signalled |= found
             time.sleep(_CACHE_SECONDS)
-    for tag in tags:
-        ProcessTree(tag).kill()
+    tree.kill()
     for pid in _members(groups):
         _send(pid, signal.SIGKILL)
 

@@ -1,6 +1,6 @@
 """A program that copies the output of nodes to the screen, and ends them if their launch is killed.
 
-It is a process of its own (``python -I -S relay.py SOCKET TAG…``), so that it outlives a launch
+It is a process of its own (``python -I -S relay.py SOCKET TAG``), so that it outlives a launch
 that is killed. It ends when the launch requests it, or when the launch and all nodes have ended.
 Lines stay whole: output of two nodes is never mixed within a line. The last lines of each node are
 kept for the summary.
@@ -31,7 +31,6 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -93,12 +92,12 @@ class Relay:
 
     Args:
         requests: Socket to the launch.
-        tags: Tags of what to end when the launch is killed, see `end_processes`.
+        tag: Tag of the nodes, which end when the launch is killed.
     """
 
-    def __init__(self, requests: socket.socket, tags: Sequence[str] = ()) -> None:
+    def __init__(self, requests: socket.socket, tag: str) -> None:
         self.requests = requests
-        self.tags = tags
+        self.tag = tag
         self.children: dict[int, tuple[int, int]] = {}
         self.selector = selectors.DefaultSelector()
         self.selector.register(requests, selectors.EVENT_READ, None)
@@ -155,7 +154,7 @@ class Relay:
         # Loaded when it is needed: rosz itself cannot be imported without site-packages.
         end = runpy.run_path(str(Path(__file__).with_name("process_tree.py")))["end_processes"]
         ended, _, _ = select.select([fd for _, fd in self.children.values()], [], [], 0)
-        end(self.tags, {pid for pid, fd in self.children.values() if fd not in ended})
+        end(self.tag, {pid for pid, fd in self.children.values() if fd not in ended})
 
     def _handle(self, request: dict[str, Any]) -> None:
         if request["op"] == "add":
@@ -240,7 +239,7 @@ class Relay:
 
 
 def main() -> None:
-    """Handle the requests from the socket whose descriptor is the first argument; tags follow."""
+    """Handle the requests from the socket whose descriptor is the first argument."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     # It holds two descriptors for each node.
@@ -249,7 +248,7 @@ def main() -> None:
     requests = socket.socket(fileno=int(sys.argv[1]))
     with contextlib.suppress(OSError):  # the launch has ended already
         requests.sendall(b"{}\n")
-    Relay(requests, sys.argv[2:]).run()
+    Relay(requests, sys.argv[2]).run()
 
 
 if __name__ == "__main__":

@@ -152,9 +152,7 @@ class Runner:
             LaunchError: If the launch cannot run.
             ParamError: If a value is not a parameter value.
         """
-        router = self._network.router
-        tags = (self._tag, *([router.tag] if router else []))
-        output = Output(self._loop, self._console.error, tags)
+        output = Output(self._loop, self._console.error, self._tag)
         try:
             supervisor = self._prepare(output)
             self._supervise(supervisor)
