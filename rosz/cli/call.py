@@ -10,7 +10,7 @@ from rosz import names, remap
 from rosz.cli.console import until_stopped, warn
 from rosz.cli.declare import App
 from rosz.environment import Environment
-from rosz.introspect.connect import open_context, open_session
+from rosz.introspect.connect import find_unreached, open_context, open_session
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
@@ -26,11 +26,17 @@ class Call:
 
     Args:
         argv: The remappings of the command line.
+
+    Attributes:
+        environment: The settings of this machine.
+        incomplete: Whether machines that should be reached are not, so that a list may lack what
+            is there.
     """
 
     def __init__(self, argv: Sequence[str] = ()) -> None:
         self.argv = tuple(argv)
         self.environment = Environment.read()
+        self.incomplete: bool = False
         self._remappings = remap.parse(argv)
 
     @property
@@ -60,12 +66,25 @@ class Call:
         return TypeStore(package_index(self.environment), self.environment.home / "rosz")
 
     def session(self) -> Session:
-        """Open a session for a short query."""
-        return open_session(self.environment)
+        """Open a session for a short query; warn of machines that it does not reach."""
+        session = open_session(self.environment)
+        self._check_reached(session)
+        return session
 
     def context(self, *, lasting: bool = False) -> Context:
         """Open the context of a node, which may belong to a command that runs until stopped."""
-        return open_context(self.environment, self.argv, lasting=lasting)
+        context = open_context(self.environment, self.argv, lasting=lasting)
+        if not lasting or self.environment.mode == "client":
+            self._check_reached(context.session)
+        return context
+
+    def _check_reached(self, session: Session) -> None:
+        for endpoint, dialler in find_unreached(session, self.environment).items():
+            self.incomplete = True
+            warn(
+                f"{endpoint} is not reached {dialler}: what is there is missing here; 'rosz doctor'"
+                " says why"
+            )
 
     @contextmanager
     def lasting_node(self, tool: str) -> Iterator[Node]:

@@ -34,7 +34,7 @@ def list_command(
     everything: Annotated[bool, Option("-a --all", "Print where each node runs as well.")] = False,
     places: Annotated[bool, Option("-u", "Print only where each node runs.")] = False,
     json: Json = False,
-) -> None:
+) -> int:
     """List nodes."""
     from rosz.introspect.nodes import list_nodes
     from rosz.introspect.topics import in_namespace
@@ -47,6 +47,7 @@ def list_command(
     else:
         lines = [node.address if places else node.name for node in nodes]
     print_result(lines, nodes, as_json=json)
+    return int(call.incomplete)
 
 
 @app.command("info")

@@ -36,7 +36,7 @@ def list_command(
     nodes: Annotated[bool, Option("-n --nodes", "Print the nodes as well.")] = False,
     types: Annotated[bool, Option("-t --types", "Print the types as well.")] = False,
     json: Json = False,
-) -> None:
+) -> int:
     """List services."""
     from rosz.introspect.services import list_services
     from rosz.introspect.topics import in_namespace
@@ -50,6 +50,7 @@ def list_command(
         for one in found
     )
     print_result(lines, found, as_json=json)
+    return int(call.incomplete)
 
 
 @app.command("info")

@@ -69,7 +69,7 @@ def list_command(
     types: Annotated[bool, Option("-t --types", "Print types.")] = False,
     host: Annotated[bool, Option("--host", "Group topics by host.")] = False,
     json: Json = False,
-) -> None:
+) -> int:
     """List topics."""
     if publishers and subscribers:
         raise UsageError("-p and -s exclude each other: without them both are listed")
@@ -90,7 +90,7 @@ def list_command(
     }
     if json:
         print_json(found if host else found[""])
-        return
+        return int(call.incomplete)
     for name, topics in found.items():
         indent = "  " if host else ""
         if host and topics:
@@ -104,6 +104,7 @@ def list_command(
             print_lines(f"{indent}{topic.name} [{topic.type_text}]" for topic in topics)
         else:
             print_lines(indent + topic.name for topic in topics)
+    return int(call.incomplete)
 
 
 @app.command("info")

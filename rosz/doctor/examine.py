@@ -24,6 +24,7 @@ from rosz.doctor.replies import (
     check_stamps,
     check_versions,
     check_visibility,
+    check_waiting,
     query_nodes,
 )
 from rosz.doctor.tokens import (
@@ -97,6 +98,7 @@ def _examine_network(session: Session, examination: Examination) -> Iterator[Fin
     environment = examination.environment
     survey = take_survey(session, environment.domain, processes=True)
     examination.nodes = len(survey.view.nodes())
+    yield from check_waiting(session)
     yield from check_domains(session, survey)
     yield from check_versions(session)
     yield from check_unreadable(survey)

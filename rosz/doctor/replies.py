@@ -23,7 +23,7 @@ from rosz.errors import DecodeError
 from rosz.introspect.survey import Survey, process_address, take_survey
 from rosz.node import NodeInfo, Request, control_key
 from rosz.params.wire import Keys, Member, SyncReply, SyncRequest, decode, encode
-from rosz.session import Sample, Session
+from rosz.session import Sample, Session, find_waiting, why_refused
 from rosz.wire import Kind, Token, entity_key, read_attachment
 
 __all__ = (
@@ -33,6 +33,7 @@ __all__ = (
     "check_stamps",
     "check_versions",
     "check_visibility",
+    "check_waiting",
     "query_nodes",
 )
 
@@ -163,6 +164,19 @@ def _blind(survey: Survey, replies: dict[_Node, _NodeReply], stopped: set[str]) 
         if zid in there and reply.info.sees  # older releases do not say whom they see
     }
     return {(zid, other) for zid, seen in sees.items() for other in there - seen}
+
+
+def check_waiting(session: Session) -> Iterator[Finding]:
+    """Find endpoints that cores and nodes connect to and do not reach."""
+    for one in find_waiting(session, _NODE_TIMEOUT, everywhere=True):
+        reason = why_refused(one.endpoint) if one.host == socket.gethostname() else ""
+        yield warning(
+            "waiting-for",
+            f"{one.host} is waiting for {one.endpoint}",
+            [reason or "there is no link yet"],
+            "start 'rosz core --listen tcp/0.0.0.0:7447' there, or check the name, the port and the"
+            " firewalls between; it is connected to as soon as it is up",
+        )
 
 
 def check_clocks(survey: Survey, replies: dict[_Node, _NodeReply]) -> Iterator[Finding]:

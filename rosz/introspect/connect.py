@@ -18,12 +18,22 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.session import LocalPeers, MeshReadiness, Session, SessionConfig, is_listening, places_of
+from rosz.session import (
+    LocalPeers,
+    MeshReadiness,
+    Session,
+    SessionConfig,
+    connect_endpoint,
+    find_waiting,
+    is_listening,
+    linked_session,
+    places_of,
+)
 
 if TYPE_CHECKING:
     from rosz.node import Context
 
-__all__ = ("command_config", "open_context", "open_session")
+__all__ = ("command_config", "find_unreached", "open_context", "open_session")
 
 T = TypeVar("T")
 
@@ -32,6 +42,7 @@ _PEER_TIMEOUT = 0.5
 _READY_TIMEOUT = 1.0
 _LOOK_SECONDS = 0.002
 _REPLY_TIMEOUT = 1.0
+_WAITING_TIMEOUT = 0.5
 _BUSY_TIMEOUT = 10.0
 """Time limit for a process that runs but is busy, as where many start at once."""
 
@@ -85,6 +96,28 @@ def open_context(
         context.close()
         raise
     return context
+
+
+def find_unreached(session: Session, environment: Environment) -> dict[str, str]:
+    """Return the endpoints beyond this machine that a command does not reach.
+
+    A command that was given several endpoints needs only one of them.
+
+    Args:
+        session: Session of the command, a client.
+        environment: Settings of this machine.
+
+    Returns:
+        Who was to connect to each endpoint, as "by laptop".
+    """
+    links = session.links()
+    found = {one.endpoint: f"by {one.host}" for one in find_waiting(session, _WAITING_TIMEOUT)}
+    dialled = environment.connect
+    if environment.keys is not None:
+        dialled = tuple(map(connect_endpoint, dialled))
+    if not any(linked_session(endpoint, links) for endpoint in dialled):
+        found |= dict.fromkeys(environment.connect, "as ROSZ_CONNECT says")
+    return found
 
 
 def command_config(environment: Environment, peers: LocalPeers | None = None) -> SessionConfig:

@@ -6,7 +6,7 @@ Only ``rosz core`` needs the modules in `PUBLIC_MODULES`.
 from rosz.session import at_exit as at_exit  # registers what waits at the exit
 from rosz.session.config import SessionConfig, connect_endpoint, keys_of, listen_endpoints
 from rosz.session.declared import PullSubscriber, RawPublisher
-from rosz.session.dialling import Dialling, find_waiting, who_answers
+from rosz.session.dialling import Dialling, Waiting, find_waiting, linked_session, who_answers
 from rosz.session.local_peers import LocalPeers, describe_process, is_stopped
 from rosz.session.mesh import MeshReadiness, serve_links
 from rosz.session.opening import places_of
@@ -45,6 +45,7 @@ __all__ = (
     "Session",
     "SessionConfig",
     "Stamp",
+    "Waiting",
     "clamp_timeout",
     "connect_endpoint",
     "describe_process",
@@ -53,6 +54,7 @@ __all__ = (
     "is_listening",
     "is_stopped",
     "keys_of",
+    "linked_session",
     "listen_endpoints",
     "places_of",
     "serve_links",

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rosz.lifecycle import Closable
     from rosz.session.queries import Query
 
-__all__ = ("Dialling", "Waiting", "find_waiting", "who_answers")
+__all__ = ("Dialling", "Waiting", "find_waiting", "linked_session", "who_answers")
 
 _PAUSE = 1.0
 """Seconds between two looks at the links."""
@@ -134,17 +134,11 @@ class Dialling:
         """
         if self._config.mode == "client":
             return bool(links)
-        place = Endpoint(endpoint)
         if self._answering.get(endpoint) in links:
             return True
-        names = {(name, place.port) for name in addresses_of(place.host)} if place.port else set()
-        for zid, ends in links.items():
-            if any(
-                end.address == place.address or (end.host, end.port) in names
-                for end in map(Endpoint, ends)
-            ):
-                self._answering[endpoint] = zid
-                return True
+        if zid := linked_session(endpoint, links):
+            self._answering[endpoint] = zid
+            return True
         if greet and not self._closing.is_set():
             self._answering[endpoint] = who_answers(endpoint, self._config, _GREETING)
         return self._answering.get(endpoint) in links
@@ -167,6 +161,22 @@ class Dialling:
 
     def _why_refused_by_keys(self, endpoint: str) -> str:
         return why_refused_by_keys(Endpoint(endpoint), self._config.keys)
+
+
+def linked_session(endpoint: str, links: dict[str, list[str]]) -> str:
+    """Return the id of the session that is linked at an endpoint; empty if none is.
+
+    Args:
+        endpoint: The endpoint.
+        links: The links of a session; see `Session.links`.
+    """
+    place = Endpoint(endpoint)
+    names = {(name, place.port) for name in addresses_of(place.host)} if place.port else set()
+    for zid, ends in links.items():
+        for end in map(Endpoint, ends):
+            if end.address == place.address or (end.host, end.port) in names:
+                return zid
+    return ""
 
 
 def find_waiting(session: Session, timeout: float, *, everywhere: bool = False) -> list[Waiting]:

@@ -135,12 +135,13 @@ def outlasted_silence(config: SessionConfig) -> float:
 def _reachable(config: SessionConfig, peers: LocalPeers) -> SessionConfig:
     """Return the configuration of a client, reduced to an endpoint that answers.
 
-    A node that was told to connect to other machines waits until one of them is up.
+    A node that was told to connect to other machines waits until one of them is up; a command,
+    which may not hold the rendezvous, does not.
 
     Raises:
         TransportError: Nobody answers.
     """
-    waits = bool(config.connect) and not config.must_connect
+    waits = bool(config.connect) and config.hold_rendezvous and not config.must_connect
     found = reachable_config(config, peers, _QUIET_SECONDS if waits else config.open_timeout)
     if found is None and waits:
         _log.warning("waiting for %s: nobody answers", " or ".join(config.connect))

@@ -1,0 +1,73 @@
+"""Commands that do not reach a machine that they, or a core, should be linked to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from network import Network, Program
+
+from .shell import Result, Shell
+
+
+@pytest.fixture
+def far(network: Network) -> str:
+    """An endpoint where nobody listens at first."""
+    return f"unixsock-stream/{network.folder}/far"
+
+
+@pytest.fixture
+def core(shell: Shell) -> Callable[..., Program]:
+    def start(*options: str, **variables: str) -> Program:
+        program = shell.start("core", *options, **variables)
+        program.wait_for("started core")
+        return program
+
+    return start
+
+
+def finished(program: Program) -> Result:
+    code = program.exit_code()
+    return Result(code, program.output, program.output)
+
+
+@pytest.mark.parametrize("command", ["topic", "node", "service"])
+def test_a_list_without_the_machine_of_rosz_connect(
+    shell: Shell, core: Callable[..., Program], far: str, command: str
+) -> None:
+    core()
+    result = finished(shell.start(command, "list", ROSZ_CONNECT=far))
+    assert result.code == 1
+    assert f"WARNING: {far} is not reached as ROSZ_CONNECT says" in result.out
+
+
+def test_what_needs_no_other_machine(shell: Shell, core: Callable[..., Program], far: str) -> None:
+    """The parameter store is the same wherever it answers."""
+    core()
+    result = finished(shell.start("param", "get", "/rosdistro", ROSZ_CONNECT=far))
+    assert result.code == 0
+    assert "noetic" in result.out
+    assert f"WARNING: {far} is not reached" in result.out
+
+
+def test_one_of_several_endpoints_is_enough(
+    shell: Shell, core: Callable[..., Program], network: Network, far: str
+) -> None:
+    core()
+    result = finished(shell.start("topic", "list", ROSZ_CONNECT=f"{far},{network.rendezvous}"))
+    assert (result.code, result.out) == (0, "")
+
+
+def test_a_machine_that_the_core_waits_for(
+    shell: Shell, core: Callable[..., Program], far: str
+) -> None:
+    here = core("--connect", far)
+    result = shell("topic", "list")
+    assert result.code == 1
+    assert f"WARNING: {far} is not reached by " in result.err
+    examined = shell("doctor", "--wait", "0.1")
+    assert f"is waiting for {far}" in examined.out
+    core(ROSZ_RENDEZVOUS=far)
+    here.wait_for(f"connected to {far}")
+    again = shell("topic", "list")
+    assert (again.code, again.err) == (0, "")
