@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import socket
 import ssl
+from contextlib import suppress
 
 from rosz.security.folder import KeyFolder
 from rosz.wire import Endpoint
 
-__all__ = ("refusal", "wants_keys")
+__all__ = ("certificate_names", "refusal", "wants_keys")
 
 _OTHER_NAME = {62, 64}
 """The codes of OpenSSL for a certificate of another host name or address."""
 _EXCLUDED = 48
 """The code of OpenSSL for a certificate with a name that its authority excludes."""
+_FLIGHTS = 2
+"""Number of times that each end has something to send in a handshake."""
 _ALERT_BY = 0.5
 """Seconds within which the other end refuses a finished handshake."""
 
@@ -83,3 +86,32 @@ def wants_keys(endpoint: Endpoint, timeout: float = 1.0) -> bool:
             return True
     except (OSError, ValueError):
         return False
+
+
+def certificate_names(keys: KeyFolder) -> tuple[str, ...]:
+    """Return the host names and addresses that the certificate of this machine is for.
+
+    ssl decodes no certificate but that of the other end of a link, so this makes a link in memory.
+
+    Args:
+        keys: The keys of this machine.
+
+    Returns:
+        The names; none if the certificate is not valid.
+    """
+    server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    client = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.check_hostname = False
+    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
+    try:
+        server.load_cert_chain(keys.certificate, keys.key)
+        client.load_verify_locations(keys.authority)
+        ends = [client.wrap_bio(back, there), server.wrap_bio(there, back, server_side=True)]
+        for _ in range(_FLIGHTS):
+            for end in ends:
+                with suppress(ssl.SSLWantReadError):
+                    end.do_handshake()
+        certificate = ends[0].getpeercert() or {}
+    except (OSError, ValueError):
+        return ()
+    return tuple(str(entry[1]) for entry in certificate.get("subjectAltName", ()))

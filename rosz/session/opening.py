@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 __all__ = ("open_raw", "outlasted_silence", "places_of", "why_refused_by_keys")
 
 _NOBODY = "Unable to connect to any of"
+_NO_SEGMENT = "Unable to create POSIX shm segment"
 _BUSY_TIMEOUT = 60.0
 """Seconds that a node waits for a busy router."""
 _QUIET_SECONDS = 2.0
@@ -85,6 +86,9 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
                 return open_and_listen(settings, config.rendezvous, lambda: _open(settings, config))
             return _open(settings, config)
     except TransportError as error:
+        if config.shared_memory and _NO_SEGMENT in str(error):
+            _log.warning("no shared memory: %s is full; samples go over links", SEGMENTS)
+            return open_raw(msgspec.structs.replace(config, shared_memory=0), peers, own)
         if _NOBODY not in str(error):
             raise
         raise _nobody(config) from error

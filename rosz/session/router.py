@@ -99,6 +99,7 @@ class Router:
         self._lifecycle.keep(self.session)
         listen, _ = places_of(config)
         self.endpoints = tuple(place for place in listen if place != EPHEMERAL)
+        _check_certificate(config)
         self._dialling = self._lifecycle.keep(Dialling(self.session, config))
         if any(_ON_INTERFACE in place for place in listen):
             self._lifecycle.keep(_NewInterfaces(config))
@@ -259,6 +260,25 @@ def _check_holder(config: SessionConfig) -> str:
             " ROSZ_RENDEZVOUS to another endpoint for all processes"
         )
     return f"{who}, which is stopped" if pid == peers.stopped_holder is not None else who
+
+
+def _check_certificate(config: SessionConfig) -> None:
+    """Log a warning if the certificate is of another machine, so that others refuse links."""
+    if config.keys is None or all(Endpoint(place).is_local for place in config.listen):
+        return
+    from rosz.security.handshake import certificate_names
+
+    names = certificate_names(config.keys)
+    host = socket.gethostname()
+    if names and not {host, host.partition(".")[0]} & {*names}:
+        _log.warning(
+            "the certificate in '%s' is for %s, and this machine is '%s': others refuse links to"
+            " it by that name ('rosz keys add %s' makes its own)",
+            config.keys.path,
+            ", ".join(f"'{name}'" for name in names if not name.endswith(".invalid")),
+            host,
+            host,
+        )
 
 
 def _name_occupied(error: TransportError, config: SessionConfig) -> TransportError:

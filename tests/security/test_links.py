@@ -276,3 +276,11 @@ def test_a_key_for_another_name(pair: Pair) -> None:
     listing = pair.laptop.rosz("topic", "list")
     assert listing.exit_code() == 1
     assert "Hostname mismatch" in listing.output
+
+
+def test_a_certificate_of_another_machine(pair: Pair) -> None:
+    """A core that others would refuse says so at its start."""
+    pair.robot.variables["ROSZ_KEYS"] = str(pair.authority.folder / "laptop")
+    core = pair.robot.rosz("core", "--listen", "tcp/0.0.0.0:7447")
+    core.wait_for(f"is for 'laptop', '{pair.laptop.address}', and this machine is 'robot'")
+    core.wait_for("started core")

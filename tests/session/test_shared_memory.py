@@ -74,3 +74,23 @@ def test_switch(network: Network, threshold: str, shared: bool) -> None:
 def test_no_room(network: Network, size: str) -> None:
     """Where /dev/shm is full or read-only, everything arrives by links."""
     assert exchanged(network, "100000", *SMALL, size)
+
+
+@pytest.mark.skipif(not can_unshare(), reason="needs Linux and the privilege to mount")
+def test_no_room_at_the_start(network: Network) -> None:
+    """A node starts without shared memory, and says so."""
+    fill = "cat /dev/zero >/dev/shm/full 2>/dev/null; exec "
+    full = (*SMALL[:-1], SMALL[-1].replace("exec ", fill), "64k")
+    node = """
+        import rosz
+        with rosz.Node("full"):
+            print("started", flush=True)
+    """
+    command = [*full, sys.executable, "-c", dedent(node)]
+    program = Program(command, network.variables(ROSZ_SHM="1000"))
+    try:
+        program.wait_for("no shared memory: /dev/shm is full; samples go over links")
+        program.wait_for("started")
+        assert program.exit_code() == 0
+    finally:
+        program.close()
