@@ -35,6 +35,8 @@ def main() -> None:
         took = "NEVER" if result.seconds is None else f"{result.seconds:.1f} s"
         print(f"{seed}: together after {took}, {result.written} writes, ", end="")
         print(f"{len(result.lost)} lost {result.lost[:5] or ''}; {history}", flush=True)
+        for restart in result.restarts:
+            print(f"  {restart}", flush=True)
         if result.views:
             print(json.dumps(result.views), flush=True)
     print(f"{count} histories, {late} not together within {WITHIN:g} s,", end=" ")

@@ -19,7 +19,7 @@ _PATIENCE = 60.0
 """Seconds after which what has not come together never does."""
 
 _NODE = """
-import json, sys, threading, time
+import json, sys, threading, time, zlib
 import rosz
 from rosz.msgs.std_msgs.msg import String
 
@@ -55,7 +55,7 @@ with rosz.Node(name) as node:
             "nodes": sorted(node.context.graph.view().nodes()),
             "replicas": len(replica.members()) + 1,
             "heard": sorted("/" + who for who, at in heard.items() if now - at < 2),
-            "digest": replica.digest().hex(),
+            "digest": zlib.crc32(replica.digest()),
         }
         if line.strip() == "root":
             found = replica.root.get("w", {})
@@ -71,12 +71,14 @@ class Result(NamedTuple):
         written: Number of acknowledged writes.
         lost: Those of them that somebody lacks in the end.
         views: What each node knows in the end, if they do not agree.
+        restarts: Reasons of cores that started afresh.
     """
 
     seconds: float | None
     written: int
     lost: list[str]
     views: dict[str, Any]
+    restarts: list[str]
 
     @property
     def good(self) -> bool:
@@ -182,7 +184,14 @@ def _result(machines: list[_Machine], healed: float) -> Result:
     acknowledged = [write for machine in machines for write in machine.acknowledged]
     roots = [machine.ask("root") for machine in machines]
     lost = [write for write in acknowledged if not all(_has(root, write) for root in roots)]
-    return Result(seconds if together else None, len(acknowledged), lost, {} if together else views)
+    restarts = [
+        f"{machine.host.name}: {line.partition(',')[0]}"
+        for machine in machines
+        for line in machine.core.lines
+        if "started afresh" in line
+    ]
+    took = seconds if together else None
+    return Result(took, len(acknowledged), lost, {} if together else views, restarts)
 
 
 def _has(root: dict[str, Any], write: str) -> bool:
