@@ -26,9 +26,9 @@ from rosz.worker import Worker
 __all__ = ("Differences", "SplitWatch")
 
 _SPACE = "core"
-_PERIOD = 3.0
+_PERIOD = 2.0
 _TIMEOUT = 3.0
-_PATIENCE = 15.0
+_PATIENCE = 12.0
 _MAX_PATIENCE = 1920.0
 _log = logging.getLogger("rosz.core")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 from pathlib import Path
@@ -62,3 +63,37 @@ def test_nodes_find_a_core_that_started_afresh(shell: Shell) -> None:
     eventually(lambda: shell("node", "list").lines == ["/robot"], "the node", TIMEOUT)
     assert shell("param", "set", "/x", "2").code == 0
     assert node.params.get("/x") == 2
+
+
+@pytest.mark.timeout(120)
+def test_a_core_that_is_linked_but_lacks_tokens_starts_afresh(shell: Shell) -> None:
+    """Rules of Zenoh that take no tokens stand for links that it confuses."""
+    deaf = {
+        "enabled": True,
+        "default_permission": "allow",
+        "rules": [
+            {
+                "id": "deaf",
+                "messages": ["liveliness_token"],
+                "flows": ["ingress"],
+                "permission": "deny",
+                "key_exprs": ["@rosz/**", "@ros2_lv/**"],
+            }
+        ],
+        "subjects": [{"id": "all"}],
+        "policies": [{"rules": ["deaf"], "subjects": ["all"]}],
+    }
+    far = f"unixsock-stream/{shell.network.folder}/far.sock"
+    core = shell.start("core")
+    core.wait_for("started core")
+    other = shell.start(
+        "core",
+        "--connect",
+        shell.network.rendezvous,
+        ROSZ_RENDEZVOUS=far,
+        ZENOH_CONFIG_OVERRIDE=f"access_control={json.dumps(deaf)}",
+    )
+    other.wait_for("started core")
+    line = other.wait_for(_AFRESH, 90)
+    assert "although there is a link to it" in line
+    assert _AFRESH not in core.output

@@ -34,7 +34,7 @@ def test_who_stood_still_is_back_soon(neighbours: dict[str, str], what: str) -> 
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("seed", range(1, 1 + repeats(1, 40)))
+@pytest.mark.parametrize("seed", range(207, 207 + repeats(1, 40)))
 def test_all_come_together_after_a_history(seed: int) -> None:
     history = History.of(seed)
     result = play(history)

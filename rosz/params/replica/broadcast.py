@@ -104,9 +104,14 @@ class PendingWrites:
     """All writes of this replica that are not yet acknowledged by all.
 
     Safe for threads, and for a signal handler that writes.
+
+    Args:
+        on_return: Function called with a session that lagged when it acknowledges a write again; it
+            may lack others.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, on_return: Callable[[str], object]) -> None:
+        self._on_return = on_return
         self._numbers = itertools.count(1)
         self._pending: dict[int, PendingWrite] = {}
         self._lagging: set[str] = set()
@@ -148,7 +153,9 @@ class PendingWrites:
             refusal: Reason why the session refused it; empty if it has taken it.
         """
         with self._lock:
-            self._lagging.discard(zid)
+            if zid in self._lagging:
+                self._lagging.discard(zid)
+                self._on_return(zid)
             pending = self._pending.get(number)
             if pending is not None:
                 if refusal:
@@ -176,13 +183,16 @@ class WriteBroadcaster:
     Args:
         core: Core of the replica.
         storage: Storage; with it, a write is acknowledged when it is stored.
+        on_return: Function called with a session that lagged and acknowledges writes again.
 
     Attributes:
         pending: Writes that are not yet acknowledged by all.
     """
 
-    def __init__(self, core: Core, storage: Storage | None) -> None:
-        self.pending: PendingWrites = PendingWrites()
+    def __init__(
+        self, core: Core, storage: Storage | None, on_return: Callable[[str], object]
+    ) -> None:
+        self.pending: PendingWrites = PendingWrites(on_return)
         self._session = session = core.session
         self._keys = keys = core.keys
         self._state = core.state

@@ -162,7 +162,7 @@ class Replica(_Copy):
         if storage is not None:
             self._state.on_new(storage.save)
         keys, sync = self._keys, self._sync
-        self._broadcaster = WriteBroadcaster(self._core, storage)
+        self._broadcaster = WriteBroadcaster(self._core, storage, sync.compare_soon)
         self._parameter_keys = ParameterKeys(self._core)
         sync.merge = self._merge
         tell_key = keys.of(session.zid, "tell")
@@ -337,7 +337,7 @@ class Replica(_Copy):
             self._broadcaster.drop_peer(member.zid)
             self._sync.drop_peer(member.zid)
         elif self._sync.ready and member < self._own:
-            self._sync.compare_soon(member)
+            self._sync.compare_soon(member.zid)
 
     def _restore(self, handover: bytes) -> bool:
         """Restore what is handed over or stored; return whether the storage differs from it."""

@@ -143,13 +143,13 @@ class Synchroniser:
             with query:
                 query.reply_error("this replica has too many queries; send the writes again later")
 
-    def compare_soon(self, member: Member) -> None:
-        """Compare with a replica that has appeared, after a random delay.
+    def compare_soon(self, zid: str) -> None:
+        """Compare with a replica that has appeared or lagged, after a random delay.
 
         Of many that appear together, such as those behind a restored link, a few are enough:
         they have told each other what they know. Anti-entropy finds what is missing even so.
         """
-        self.worker.submit(lambda: self._add_appeared(member.zid))
+        self.worker.submit(lambda: self._add_appeared(zid))
 
     def drop_peer(self, zid: str) -> None:
         """Forget what a replica refused: it may return, and was perhaps only out of reach."""
