@@ -139,11 +139,14 @@ class Package(msgspec.Struct, frozen=True):
     def file(self, name: str) -> Path:
         """Return a file by its name, from anywhere in the package, as ``roslaunch`` does.
 
+        A program of that name counts only where no other file has it.
+
         Raises:
             NotFoundError: There is none or several, or the path leads out of the package.
         """
         direct = self.within(name)
-        found = dict.fromkeys([*([direct] if direct.is_file() else []), *self.files(name)])
+        known = dict.fromkeys([*([direct] if direct.is_file() else []), *self.files(name)])
+        found = [file for file in known if not _is_executable(file)] or list(known)
         if len(found) > 1:
             listing = ", ".join(map(str, found))
             raise NotFoundError(
@@ -151,7 +154,7 @@ class Package(msgspec.Struct, frozen=True):
                 " path of one"
             )
         if found:
-            return next(iter(found))
+            return found[0]
         kin = [file.name for file in self._files() if file.suffix == Path(name).suffix]
         raise NotFoundError(
             f"package '{self.name}' ({self.path}) has no file '{name}'{near_miss(name, kin)}"

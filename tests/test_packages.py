@@ -101,6 +101,8 @@ def test_files_of_one_name_are_listed(tmp_path: Path, folders: tuple[str, str]) 
         f"package 'p' has 2 files named 'a.launch': {files[0]}, {files[1]}; give the path of one"
     )
     assert package.file("old/a.launch") == files[1]
+    files[0].chmod(0o755)
+    assert package.file("a.launch") == files[1]
 
 
 def test_a_slip_in_the_name_of_what_is_not_executable_yet(tmp_path: Path) -> None:

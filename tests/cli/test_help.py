@@ -71,7 +71,7 @@ Arguments:
 
 Options:
   -p          Print for reading; it may not be valid YAML.
-  -v          Print each step to standard error.
+  -v          Print each step.
   --json      Print JSON.
   -h, --help  Show this message and exit.
 """
