@@ -19,7 +19,6 @@ from rosz.params import DELETED, condense, normalise, split, spread
 from rosz.params.api import Params
 from rosz.params.replica import Changed, Replica
 from rosz.params.replica.storage import Storage, StoreFile
-from rosz.params.replica.sync import KEPT_TOMBSTONES
 from rosz.session import (
     HybridClock,
     MeshReadiness,
@@ -97,11 +96,14 @@ class Member:
         return self.replica.delete(name).slow
 
     def do_clear(self, namespace: str) -> Any:
-        """Delete every parameter in a namespace, each by itself, and forget what is too much."""
+        """Delete every parameter in a namespace, each by itself."""
         names = [name for name in self.replica.names() if name.startswith(f"{namespace}/")]
         self.replica.write([(split(name), DELETED) for name in names], timeout=0.3)
-        self.replica._state.forget(KEPT_TOMBSTONES)
         return len(names)
+
+    def do_forget(self, keep: int) -> Any:
+        """Forget old deletions, as a replica does from time to time."""
+        return self.replica._state.forget(keep)
 
     def do_get(self, name: str) -> Any:
         return self.replica.get(name)

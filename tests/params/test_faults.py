@@ -137,6 +137,7 @@ def test_many_deletions_on_one_side_of_a_cut_stay_dead(fleet: Fleet, count: int)
     cable.cut()
     assert right.do("set", name="/new/early", value=1, timeout=0.1)
     assert left.do("clear", namespace="/gone") == count
+    left.do("forget", keep=KEPT_TOMBSTONES)
     assert right.do("set", name="/new/late", value=2, timeout=0.1)
     cable.mend()
     until_known([left, right])
