@@ -194,11 +194,11 @@ class NodeCore:
         context = self.context
         leaving = self._owns_context or context.is_shutdown
         with context.session.close_links() if leaving else nullcontext():
-            self._lifecycle.close(self.log.flush, first=self._stop, reason=reason or context.reason)
-
-    def _stop(self) -> None:
-        self._remove_hook()
-        self.clock.close()
+            closed = self._lifecycle.close(
+                self.log.flush, first=self.clock.close, reason=reason or context.reason
+            )
+        if closed:  # until then a context that shuts down on another thread waits for this one
+            self._remove_hook()
 
     def __enter__(self) -> Self:
         return self

@@ -11,9 +11,11 @@ a lost announcement nor a link that was cut loses a sample that is still kept.
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
@@ -40,6 +42,7 @@ _AT_ONCE = 2 * _PIECE
 _MOST_BYTES = 1 << 28
 """Bytes that a publisher keeps at most, whatever the depth of its queue; one sample in any case."""
 _THREADS = 16
+_ROOM_SECONDS = 5.0
 _AGAIN_SECONDS = 1.0
 _RETURN_SECONDS = 60.0
 """Seconds in which a subscription that is gone may return, because only its link was cut."""
@@ -50,7 +53,7 @@ _TOKEN_SECONDS = 2.0
 """Seconds in which the token of a process comes that has others already."""
 _TIMEOUT = 5.0
 _SILENT_SECONDS = 2.0
-_CLOSE_SECONDS = 10.0
+_CLOSE_SECONDS = 8.0
 _SUBSCRIPTIONS = 1000
 """Subscriptions to remember; the oldest is forgotten."""
 
@@ -116,18 +119,19 @@ class FetchableSamples:
 
     Args:
         publisher: The publisher.
-        depth: The number of samples to keep.
+        depth: The number of samples to keep; ``None`` to wait for room instead, at most 5 seconds.
         report_dropped: Function called with the node of a subscription for each sample that it has
             not fetched before newer ones took its place.
     """
 
     def __init__(
-        self, publisher: Entity, depth: int, report_dropped: Callable[[str], object]
+        self, publisher: Entity, depth: int | None, report_dropped: Callable[[str], object]
     ) -> None:
         token = publisher.token
         self._publisher = publisher
         self._context = publisher.node.context
-        self._depth = depth
+        self._depth = sys.maxsize if depth is None else depth
+        self._waits = depth is None
         self._report_dropped = report_dropped
         self._key = _source_key(publisher.key, token.zid, token.entity_id)
         self._lock = threading.RLock()  # a signal handler may publish meanwhile
@@ -233,6 +237,8 @@ class FetchableSamples:
         Raises:
             ClosedError: The publisher is closed.
         """
+        if self._waits:
+            self._wait_for_room()
         with self._lock:
             if self._queryable is None:
                 self._serve()
@@ -248,11 +254,19 @@ class FetchableSamples:
             first, self._announcing = not self._announcing, True
         session = self._context.session
         for key in near:
-            session.put(key, payload, attachment=attachment, block=False)
+            session.put(key, payload, attachment=attachment, block=self._waits)
         for key in far:
             self._announce(key)
         if first:
             self._worker.later(_AGAIN_SECONDS, self._announce_again)
+
+    def _wait_for_room(self) -> None:
+        """Wait until something has been fetched, if too much waits."""
+        deadline = time.monotonic() + _ROOM_SECONDS
+        while self._bytes > _MOST_BYTES and (left := deadline - time.monotonic()) > 0:
+            self._progress.clear()
+            if self._bytes > _MOST_BYTES:
+                self._progress.wait(left)
 
     def _serve(self) -> None:
         self._queryable = queryable = self._context.session.pull_queryable(self._key)
@@ -287,8 +301,9 @@ class FetchableSamples:
         with self._lock:
             behind = self._behind()
             self._announcing = bool(behind or self._gone)
-        for key in behind:
-            self._announce(key)
+        with suppress(ClosedError):  # the session may close meanwhile
+            for key in behind:
+                self._announce(key)
         if self._announcing:
             self._worker.later(_AGAIN_SECONDS, self._announce_again)
 
@@ -326,7 +341,15 @@ class FetchableSamples:
             elif payload:
                 self._current.pop(key, None)
                 self._done[key] = max(sequence, self._done.get(key, 0))
+                self._forget_fetched()
             return payload, attachment
+
+    def _forget_fetched(self) -> None:
+        """Keep only what somebody still needs."""
+        waiting = (*self._far, *self._gone)
+        done = min((self._done.get(key, self._last) for key in waiting), default=self._last)
+        for sequence in [n for n in self._kept if n <= done]:
+            self._bytes -= len(self._kept.pop(sequence)[0])
 
     def flush(self) -> dict[str, int]:
         """Wait until all samples have been fetched, or nobody fetches any more.

@@ -69,7 +69,7 @@ class Publisher(Entity, Generic[M]):
 
     Of large samples, those of more than 32 kB, subscriptions on other machines fetch the newest
     ``queue_size`` in pieces, each at its own pace. When it closes, the publisher waits until they
-    have, at most 10 seconds.
+    have, at most 8 seconds.
 
     Attributes:
         message_type: The class of the messages.
@@ -97,8 +97,9 @@ class Publisher(Entity, Generic[M]):
         )
         self._put = self._raw.put
         self._fetchable: FetchableSamples | None = None
-        if qos.reliable and not self._blocks:
-            self._fetchable = self.keep(FetchableSamples(self, qos.depth, self._report_dropped))
+        if qos.reliable:
+            depth = None if self._blocks else qos.depth
+            self._fetchable = self.keep(FetchableSamples(self, depth, self._report_dropped))
         linked = node.context.mesh.linked.is_set()
         self._held: deque[_Held] | None = None if linked else deque()
         self._held_bytes = 0

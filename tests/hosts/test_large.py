@@ -19,7 +19,10 @@ from rosz.msgs.std_msgs.msg import Float64, UInt8MultiArray
 
 size = int(sys.argv[1])
 with rosz.Node("talker") as node:
-    large = node.publisher("large", UInt8MultiArray, latch=sys.argv[2:] == ["latch"])
+    latch, unlimited = "latch" in sys.argv, "unlimited" in sys.argv
+    large = node.publisher(
+        "large", UInt8MultiArray, latch=latch, queue_size=0 if unlimited else 10
+    )
     small = node.publisher("small", Float64)
     node.timer(0.02, lambda event: small.publish(time.time()))
     print("talking", flush=True)
@@ -91,18 +94,20 @@ def lost(listener: HostProgram) -> int:
     return sum(int(line.split()[3]) for line in listener.lines if line.startswith("large"))
 
 
-@pytest.mark.parametrize("linked", ["core", "nodes"])
+@pytest.mark.parametrize(
+    ("linked", "queue"), [("core", "limited"), ("nodes", "limited"), ("core", "unlimited")]
+)
 @pytest.mark.timeout(180)
-def test_all_arrive_over_a_slow_link(world: World, linked: str) -> None:
+def test_all_arrive_over_a_slow_link(world: World, linked: str, queue: str) -> None:
     """Small messages pass between the pieces."""
     robot, laptop = world.hosts("robot", "laptop")
     link(robot, laptop, linked=linked)
     listener = listen(laptop, "listener")
-    talker = robot.program(TALKER, "2000000")
+    talker = robot.program(TALKER, "2000000", queue)
     talker.wait_for("talking")
     laptop.link.degrade(rate=_BYTES_PER_SECOND)
     talker.say("1 0 4 0")
-    talker.wait_for("longest")
+    assert float(talker.wait_for("longest").split()[1]) < 0.5 * slack()
     listener.wait_for("large 3", 60)
     assert heard(listener) == [0, 1, 2, 3]
     assert lost(listener) == 0
@@ -213,6 +218,6 @@ def test_published_by_a_program_that_ends(world: World) -> None:
     talker.wait_for("longest")
     talker.send(signal.SIGINT)
     talker.exit_code(60)
+    assert "closed '/large'" not in talker.output
     listener.wait_for("large 1", 60)
     assert heard(listener) == [0, 1]
-    assert "closed '/large'" not in talker.output
