@@ -220,3 +220,24 @@ def test_timers_that_ended_are_not_kept(node: Node) -> None:
         called.get(timeout=TIMEOUT)
     # What else comes is the publisher of /rosout, which a thread opens.
     eventually(lambda: len(node._lifecycle._parts) <= before + 1, "only what still runs is kept")
+
+
+def test_a_context_waits_for_a_node_that_is_being_closed(network: Network) -> None:
+    """Ctrl-C shuts the context down on one thread, and leaves ``with`` on another."""
+    node = network.node()
+    session = node.context.session
+    closing, go_on = threading.Event(), threading.Event()
+
+    def close() -> None:
+        closing.set()
+        go_on.wait(TIMEOUT)
+
+    node.keep(Registration(close))
+    network.thread(node.close)
+    assert closing.wait(TIMEOUT)
+    shutdown = network.thread(node.context.shutdown)
+    shutdown.join(0.3)
+    assert not session.closed
+    go_on.set()
+    shutdown.join(TIMEOUT)
+    assert session.closed
