@@ -19,6 +19,7 @@ WORDS = {
     "endpoint": "a Zenoh address, such as tcp/robot1:7447",
     "entity": "a publisher, subscription, service or client of a node (rmw_zenoh)",
     "GID": "16 bytes that identify an entity",
+    "handover": "what a core leaves to itself when it starts afresh",
     "key expression": "a Zenoh key, maybe with wildcards",
     "latch": "keeping the last message for subscribers that come later",
     "launch": "the run of a plan",

@@ -20,7 +20,7 @@ def _namespaces() -> None:
         pytest.skip(reason)
 
 
-@pytest.mark.timeout(180)
+@pytest.mark.timeout(180 * repeats(1, 11))
 @pytest.mark.parametrize("neighbours", [MESH, CHAIN], ids=["mesh", "chain"])
 @pytest.mark.parametrize("what", ["core", "node"])
 def test_who_stood_still_is_back_soon(neighbours: dict[str, str], what: str) -> None:

@@ -17,6 +17,8 @@ __all__ = ("Result", "play")
 
 _PATIENCE = 60.0
 """Seconds after which what has not come together never does."""
+_STEADY = 3.0
+"""Seconds that all have to stay together."""
 
 _NODE = """
 import json, sys, threading, time, zlib
@@ -171,14 +173,16 @@ def _result(machines: list[_Machine], healed: float) -> Result:
         machine.quiet()
         machine.collect(live=True)
     names = sorted(f"/{machine.name}" for machine in machines)
+    since: float | None = None
     while True:
         views = {machine.name: machine.ask("view") for machine in machines}
         together = len({view["digest"] for view in views.values()}) == 1 and all(
             view["nodes"] == view["heard"] == names and view["replicas"] == 2 * len(names)
             for view in views.values()
         )
-        seconds = time.monotonic() - healed
-        if together or seconds > _PATIENCE:
+        now = time.monotonic()
+        since = (since or now) if together else None
+        if (since is not None and now - since > _STEADY) or now - healed > _PATIENCE:
             break
         time.sleep(0.1)
     acknowledged = [write for machine in machines for write in machine.acknowledged]
@@ -190,8 +194,8 @@ def _result(machines: list[_Machine], healed: float) -> Result:
         for line in machine.core.lines
         if "started afresh" in line
     ]
-    took = seconds if together else None
-    return Result(took, len(acknowledged), lost, {} if together else views, restarts)
+    took = None if since is None else since - healed
+    return Result(took, len(acknowledged), lost, {} if took else views, restarts)
 
 
 def _has(root: dict[str, Any], write: str) -> bool:
