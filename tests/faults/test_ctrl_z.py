@@ -194,7 +194,7 @@ def test_who_must_wait_for_it_names_it(network: Network) -> None:
     caller.say("")
     assert f"(pid {victim.pid}) is stopped: let it go on" in caller.wait_for("WaitTimeout")
     code, output = rosz(network, "service", "call", "--timeout", "0.5", "/reset_b")
-    assert code == 1
+    assert code == 2
     assert f"(pid {victim.pid}) is stopped: let it go on" in output.splitlines()[0]
     waiting = network.run("-m", "rosz", "service", "call", "/reset_b")
     waiting.wait_for(f"(pid {victim.pid}) is stopped")

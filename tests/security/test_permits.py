@@ -43,7 +43,7 @@ def test_permission_to_serve(pair: tuple[Host, Host]) -> None:
     assert "/lamp" in listed
     assert "/door" not in listed
     refused = robot.rosz("service", "call", "/door")
-    assert refused.exit_code(30) == 1
+    assert refused.exit_code(30) == 2
 
 
 LARGE = """
