@@ -42,7 +42,7 @@ with rosz.Node(name) as node:
         while writing:
             count += 1
             outcome = replica.set(f"/w/{name}/{count}", count)
-            print("set", count, len(outcome.slow), flush=True)
+            print("set", count, len(outcome.slow), len(replica.members()), flush=True)
             time.sleep(0.2)
         print("quiet", flush=True)
 
@@ -137,11 +137,12 @@ class _Machine:
     def collect(self, *, live: bool) -> None:
         """Note what the node has written, and who has it.
 
-        A write that some replica did not acknowledge may be lost together with its writer.
+        A write may be lost together with its writer if some replica did not acknowledge it, or if
+        there was no other.
         """
         for line in self.node.lines:
             word, *rest = line.split()
-            if word == "set" and (live or rest[1] == "0"):
+            if word == "set" and (live or (rest[1] == "0" and rest[2] != "0")):
                 self.acknowledged.append(f"{self.name}/{rest[0]}")
 
     def quiet(self) -> None:
