@@ -1,0 +1,120 @@
+"""Memory that Zenoh keeps for sessions that have gone: ``python -m tests.upstream.memory``.
+
+A peer of Zenoh alone stays, with two publishers; others link to it, declare what a node of rosz
+declares, under keys with their own id, close it all and go. Seen with eclipse-zenoh 1.10.2: the
+heap of the one that stays grows with each of them, and goes on to. Needs Linux with glibc.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+TOKENS = 6
+QUERYABLES = 8
+SUBSCRIBERS = 3
+
+
+def open_peer(way: str, endpoint: str) -> Any:
+    """Open a peer that only listens, or only connects."""
+    settings = {
+        "mode": "peer",
+        "listen": {"endpoints": []},
+        "connect": {"endpoints": []},
+        "scouting": {"multicast": {"enabled": False}},
+        way: {"endpoints": [endpoint]},
+    }
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
+
+
+def come_and_go(endpoint: str) -> None:
+    """Be one session after the other; each line of stdin asks for so many."""
+    for line in sys.stdin:
+        for _ in range(int(line)):
+            session = open_peer("connect", endpoint)
+            own = f"memory/{session.zid()}"
+            declared: list[Any] = [session.declare_subscriber("memory/all", _channel())]
+            declared += [session.declare_publisher(f"memory/{word}") for word in ("all", "**")]
+            for number in range(TOKENS):
+                declared.append(session.liveliness().declare_token(f"{own}/token/{number}"))
+            for number in range(QUERYABLES):
+                declared.append(session.declare_queryable(f"{own}/{number}/**", _channel()))
+            for number in range(SUBSCRIBERS):
+                declared.append(session.declare_subscriber(f"{own}/sample/{number}", _channel()))
+            declared[1].put(b"here")
+            for one in reversed(declared):
+                one.undeclare()
+            session.close()
+        print("gone", flush=True)
+
+
+def _channel() -> Any:
+    return zenoh.handlers.FifoChannel(100)
+
+
+def heap(folder: str) -> int:
+    """Return the bytes of the heap that are in use."""
+    library = ctypes.CDLL(None)
+    library.fopen.restype = ctypes.c_void_p
+    library.malloc_info.argtypes = [ctypes.c_int, ctypes.c_void_p]
+    library.fclose.argtypes = [ctypes.c_void_p]
+    report = Path(folder, "heap.xml")
+    file = library.fopen(str(report).encode(), b"w")
+    library.malloc_info(0, file)
+    library.fclose(file)
+    total = report.read_text().rpartition("</heap>")[2]
+    sizes = {kind: int(size) for kind, size in re.findall(r'type="(\w+)".* size="(\d+)"', total)}
+    return sizes["current"] - sizes["fast"] - sizes["rest"] + sizes["mmap"]
+
+
+def main() -> None:
+    """Print the heap after each round."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--sessions", type=int, default=50, help="in each round")
+    parser.add_argument("--rounds", type=int, default=8)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="zenoh-") as folder:
+        endpoint = f"unixsock-stream/{folder}/z.sock"
+        session = open_peer("listen", endpoint)
+        kept = [session.declare_publisher(f"memory/{word}") for word in ("all", "**")]
+        command = [sys.executable, "-m", "tests.upstream.memory", endpoint]
+        others = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+        )
+        assert others.stdin is not None
+        assert others.stdout is not None
+        found: list[int] = []
+        for number in range(given.rounds):
+            others.stdin.write(f"{given.sessions}\n")
+            others.stdout.readline()
+            time.sleep(0.5)  # the end of the last link is handled meanwhile
+            found.append(heap(folder))
+            print(
+                f"{(number + 1) * given.sessions} sessions: {found[-1] / 1024:.0f} kB", flush=True
+            )
+        others.stdin.close()
+        others.wait()
+        middle = len(found) // 2
+        sessions = max(1, (len(found) - 1 - middle) * given.sessions)
+        print(
+            f"{(found[-1] - found[middle]) / 1024 / sessions:.2f} kB for each session, later half"
+        )
+        del kept
+        session.close()
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] and sys.argv[1].startswith("unixsock"):
+        come_and_go(sys.argv[1])
+    else:
+        main()
