@@ -2,13 +2,15 @@
 
 A peer of Zenoh alone stays, with two publishers; others link to it, declare what a node of rosz
 declares, under keys with their own id, close it all and go. Seen with eclipse-zenoh 1.10.2: the
-heap of the one that stays grows with each of them, and goes on to. Needs Linux with glibc.
+heap of the one that stays grows with each of them, and goes on to. With ``--rosz`` the others are
+nodes of rosz, and only the one that stays is Zenoh alone. Needs Linux with glibc.
 """
 
 from __future__ import annotations
 
 import ctypes
 import json
+import os
 import re
 import subprocess
 import sys
@@ -23,6 +25,8 @@ import zenoh
 TOKENS = 6
 QUERYABLES = 8
 SUBSCRIBERS = 3
+DOMAIN = "47"
+NODES = ["-m", "tests.bench.soak.worker", "come", "8"]
 
 
 def open_peer(way: str, endpoint: str) -> Any:
@@ -41,10 +45,11 @@ def come_and_go(endpoint: str) -> None:
     """Be one session after the other; each line of stdin asks for so many."""
     for line in sys.stdin:
         for _ in range(int(line)):
+            print("comes", flush=True)
             session = open_peer("connect", endpoint)
             own = f"memory/{session.zid()}"
-            declared: list[Any] = [session.declare_subscriber("memory/all", _channel())]
-            declared += [session.declare_publisher(f"memory/{word}") for word in ("all", "**")]
+            declared: list[Any] = [session.declare_subscriber("memory/change", _channel())]
+            declared += [session.declare_publisher(f"memory/{word}") for word in ("change", "**")]
             for number in range(TOKENS):
                 declared.append(session.liveliness().declare_token(f"{own}/token/{number}"))
             for number in range(QUERYABLES):
@@ -55,7 +60,6 @@ def come_and_go(endpoint: str) -> None:
             for one in reversed(declared):
                 one.undeclare()
             session.close()
-        print("gone", flush=True)
 
 
 def _channel() -> Any:
@@ -82,27 +86,35 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--sessions", type=int, default=50, help="in each round")
     parser.add_argument("--rounds", type=int, default=8)
+    parser.add_argument("--rosz", action="store_true", help="let nodes of rosz come and go")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="zenoh-") as folder:
         endpoint = f"unixsock-stream/{folder}/z.sock"
         session = open_peer("listen", endpoint)
-        kept = [session.declare_publisher(f"memory/{word}") for word in ("all", "**")]
-        command = [sys.executable, "-m", "tests.upstream.memory", endpoint]
+        space = f"@rosz/{DOMAIN}/" if given.rosz else "memory/"
+        kept = [session.declare_publisher(f"{space}{word}") for word in ("change", "**")]
         others = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+            [sys.executable, *(NODES if given.rosz else [__file__, endpoint])],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+            env={**os.environ, "ROSZ_RENDEZVOUS": endpoint, "ROS_DOMAIN_ID": DOMAIN},
         )
         assert others.stdin is not None
         assert others.stdout is not None
         found: list[int] = []
         for number in range(given.rounds):
             others.stdin.write(f"{given.sessions}\n")
-            others.stdout.readline()
+            for _ in range(given.sessions):
+                others.stdout.readline()
             time.sleep(0.5)  # the end of the last link is handled meanwhile
             found.append(heap(folder))
             print(
                 f"{(number + 1) * given.sessions} sessions: {found[-1] / 1024:.0f} kB", flush=True
             )
         others.stdin.close()
+        others.terminate()
         others.wait()
         middle = len(found) // 2
         sessions = max(1, (len(found) - 1 - middle) * given.sessions)
