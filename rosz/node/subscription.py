@@ -65,6 +65,7 @@ class Subscription(Entity, Generic[M]):
         qos: The depth of the queue, and what is asked of publishers.
         raw: Whether to pass on the encoded bytes instead of messages.
         with_info: Whether the callback also gets a `MessageInfo`.
+        warn_dropped: Whether the first sample that is dropped is logged.
 
     Attributes:
         message_type: As given.
@@ -82,6 +83,7 @@ class Subscription(Entity, Generic[M]):
         *,
         raw: bool = False,
         with_info: bool = False,
+        warn_dropped: bool = True,
     ) -> None:
         name, type_hash = ANY, ANY
         if message_type is not None:
@@ -93,6 +95,7 @@ class Subscription(Entity, Generic[M]):
         self._callback = callback
         self._raw = raw
         self._with_info = with_info
+        self._warn_dropped = warn_dropped
         self._depth = _ALL if qos.history == "keep_all" else min(qos.depth, _MOST)
         self._queue = _Queue(self._depth)
         self._queue_worker: Worker[_Item] | None = None
@@ -378,7 +381,7 @@ class Subscription(Entity, Generic[M]):
 
     def _report_lost(self, kind: tuple[str, str], count: int) -> None:
         """Count samples that are missing, and warn of the first."""
-        if not self.dropped and self.qos.reliable and self._depth > 1:
+        if self._warn_dropped and not self.dropped and self.qos.reliable and self._depth > 1:
             self.node.log.warning(
                 "dropping messages on '%s', which come faster than they are taken or than a link"
                 " carries them: the newest queue_size=%d wait (told once; rosz topic info counts)",

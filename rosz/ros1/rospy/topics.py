@@ -413,7 +413,8 @@ class _SharedSubscription(_Shared):
         with self._lock:
             if self.closed:
                 return
-            qos = QoS(depth=self._depth if self._depth > 0 else _NO_LIMIT)
+            limited = self._depth > 0
+            qos = QoS(depth=self._depth if limited else _NO_LIMIT)
             name = self.name
             receive: Callable[[Any, MessageInfo], None] = self._receive
             kind: type[Any] | None = self.data_class
@@ -425,7 +426,17 @@ class _SharedSubscription(_Shared):
 
                 name, kind, receive = "/rosout", Ros2Log, self._receive_log
             self._subscription = node.keep(
-                Subscription(node, name, kind, receive, qos, raw=raw, with_info=True)
+                Subscription(
+                    node,
+                    name,
+                    kind,
+                    receive,
+                    qos,
+                    raw=raw,
+                    with_info=True,
+                    # As in rospy, what a queue_size does not hold is dropped silently.
+                    warn_dropped=not limited,
+                )
             )
 
     def add(
