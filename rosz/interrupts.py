@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from types import FrameType, TracebackType
     from typing import Any
 
-__all__ = ("InterruptDeferral", "is_interactive")
+__all__ = ("InterruptDeferral", "is_interactive", "raise_deferred")
 
 _SAME_SIGNAL = 0.1
 """Seconds in which a second signal counts as the first: timeout(1) signals the group as well."""
@@ -54,6 +54,11 @@ class InterruptDeferral:
         elif time.monotonic() - self._interrupted_at > _SAME_SIGNAL:
             os._exit(128 + number)
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C has been deferred."""
+        return bool(self._interrupted_at)
+
     def __enter__(self) -> None:
         self.replaced = signal.getsignal(signal.SIGINT)
         if self.replaced in (signal.default_int_handler, signal.SIG_IGN):
@@ -75,6 +80,13 @@ class InterruptDeferral:
             if self._undo is not None and failed is None:
                 self._undo()
             raise
+
+
+def raise_deferred() -> None:
+    """Raise `KeyboardInterrupt` if Ctrl-C was deferred, where nothing is half done."""
+    handler = signal.getsignal(signal.SIGINT)
+    if isinstance(handler, InterruptDeferral) and handler.interrupted:
+        raise KeyboardInterrupt
 
 
 def is_interactive() -> bool:

@@ -13,6 +13,7 @@ import msgspec
 import zenoh
 
 from rosz.errors import TransportError
+from rosz.interrupts import raise_deferred
 from rosz.session.config import (
     EPHEMERAL,
     SessionConfig,
@@ -44,14 +45,21 @@ _NOBODY = "Unable to connect to any of"
 _NO_SEGMENT = "Unable to create POSIX shm segment"
 _BUSY_TIMEOUT = 60.0
 """Seconds that a node waits for a busy router."""
-_QUIET_SECONDS = 2.0
-"""Seconds after which a node logs that it waits for another machine."""
+_ATTEMPT_SECONDS = 2.0
+"""Time limit of each attempt of a node that waits for other machines."""
 
 _log = logging.getLogger("rosz.session")
 
 
+class _Unanswered(TransportError):
+    """Nobody answers at any endpoint."""
+
+
 def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = None) -> Any:
     """Open a session of Zenoh.
+
+    A node that was told to connect to other machines waits until one of them answers; a command,
+    which may not hold the rendezvous, does not.
 
     Args:
         config: The configuration.
@@ -64,11 +72,37 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
             is refused.
         UsageError: The override text is malformed.
     """
+    waits = config.mode == "client" and config.hold_rendezvous and not config.must_connect
+    if not (waits and config.connect):
+        return _open_once(config, peers, own)
+    config = msgspec.structs.replace(config, open_timeout=_ATTEMPT_SECONDS)
+    others = " or ".join(config.connect)
+    waited = False
+    while True:
+        try:
+            raw = _open_once(config, peers, own)
+        except _Unanswered:
+            if not waited:
+                reasons = "; ".join(_refused_links(config))
+                _log.warning("waiting for %s: %s", others, reasons or "nobody answers")
+            waited = True
+            raise_deferred()
+            peers = LocalPeers.read(config.rendezvous)
+            continue
+        if waited:
+            _log.warning("connected to %s", others)
+        return raw
+
+
+def _open_once(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) -> Any:
     if config.mode == "client" and not config.must_connect and peers.is_any_running:
         # When many nodes start at once, some of them are answered late.
         longer = max(config.open_timeout, _BUSY_TIMEOUT)
         config = msgspec.structs.replace(config, open_timeout=longer)
-    config = _reachable(config, peers)
+    reachable = reachable_config(config, peers)
+    if reachable is None:
+        raise _nobody(config)
+    config = reachable
     if config.shared_memory and SEGMENTS.exists() and not os.access(SEGMENTS, os.W_OK):
         _log.warning("no shared memory: %s cannot be written to; samples go over links", SEGMENTS)
         config = msgspec.structs.replace(config, shared_memory=0)
@@ -88,7 +122,7 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
     except TransportError as error:
         if config.shared_memory and _NO_SEGMENT in str(error):
             _log.warning("no shared memory: %s is full; samples go over links", SEGMENTS)
-            return open_raw(msgspec.structs.replace(config, shared_memory=0), peers, own)
+            return _open_once(msgspec.structs.replace(config, shared_memory=0), peers, own)
         if _NOBODY not in str(error):
             raise
         raise _nobody(config) from error
@@ -136,28 +170,6 @@ def outlasted_silence(config: SessionConfig) -> float:
     return float(sending["lease"] * (1 - 1 / sending["keep_alive"]) / 1000)
 
 
-def _reachable(config: SessionConfig, peers: LocalPeers) -> SessionConfig:
-    """Return the configuration of a client, reduced to an endpoint that answers.
-
-    A node that was told to connect to other machines waits until one of them is up; a command,
-    which may not hold the rendezvous, does not.
-
-    Raises:
-        TransportError: Nobody answers.
-    """
-    waits = bool(config.connect) and config.hold_rendezvous and not config.must_connect
-    found = reachable_config(config, peers, _QUIET_SECONDS if waits else config.open_timeout)
-    if found is None and waits:
-        _log.warning("waiting for %s: nobody answers", " or ".join(config.connect))
-        while found is None:
-            peers = LocalPeers.read(config.rendezvous)
-            found = reachable_config(config, peers, config.open_timeout)
-        _log.warning("connected to %s", found.rendezvous)
-    if found is None:
-        raise _nobody(config)
-    return found
-
-
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
     if "id" not in overrides(config.override) and (zid := new_id(config)):
         settings.insert_json5("id", json.dumps(zid))
@@ -195,9 +207,9 @@ def _tls(keys: KeyFolder) -> dict[str, Any]:
     }
 
 
-def _nobody(config: SessionConfig) -> TransportError:
+def _nobody(config: SessionConfig) -> _Unanswered:
     reasons = "".join(f"; no link to {reason}" for reason in _refused_links(config))
-    return TransportError(
+    return _Unanswered(
         f"nobody answers at {_quoted(config)} within {config.open_timeout:g} s{reasons}: start"
         " 'rosz core', a launch or a node there first, or name another place in ROSZ_RENDEZVOUS"
     )

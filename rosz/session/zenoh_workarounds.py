@@ -126,18 +126,11 @@ def prepare_process(mode: str) -> Iterator[None]:
         os.environ.pop(_RUNTIME, None)
 
 
-def reachable_config(
-    config: SessionConfig, peers: LocalPeers, timeout: float
-) -> SessionConfig | None:
+def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig | None:
     """Return the configuration of a client, reduced to the first endpoint that answers.
 
     A command prefers the endpoints that it was given to this machine. A node is a client of the
     router of this machine first.
-
-    Args:
-        config: The configuration.
-        peers: The other sessions of this machine.
-        timeout: Time limit in seconds.
 
     Returns:
         The configuration, unchanged if it is not of a client; ``None`` if nobody answers anywhere.
@@ -157,7 +150,7 @@ def reachable_config(
     wanted = [*config.connect, *local] if config.must_connect else [*local, *config.connect]
     if wanted == [config.rendezvous]:
         return config
-    endpoint = first_listening(wanted, timeout)
+    endpoint = first_listening(wanted, config.open_timeout)
     return msgspec.structs.replace(config, rendezvous=endpoint, connect=()) if endpoint else None
 
 

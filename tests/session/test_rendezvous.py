@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -205,3 +206,23 @@ def test_a_unix_socket_in_no_folder(network: Network) -> None:
     nowhere = SessionConfig(rendezvous=f"unixsock-stream/{network.folder}/nowhere/z.sock")
     with pytest.raises(TransportError, match=r"there is no folder '.*/nowhere'"):
         Session.open(nowhere)
+
+
+def test_a_client_waits_for_another_machine(network: Network) -> None:
+    """What accepts its connections at first, such as a forwarded port, does not speak Zenoh."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+        early = network.program(PEER, "early", ROSZ_CONNECT=endpoint)
+        early.wait_for(f"waiting for {endpoint}", 30)
+    with Session.open(SessionConfig(mode="router", rendezvous=endpoint)):
+        early.wait_for(f"connected to {endpoint}", 30)
+        early.wait_for("ready")
+
+
+def test_ctrl_c_ends_a_client_that_waits(network: Network) -> None:
+    nobody = f"tcp/127.0.0.1:{free_port()}"
+    early = network.program(PEER, "early", ROSZ_CONNECT=nobody)
+    early.wait_for(f"waiting for {nobody}", 30)
+    early.send(signal.SIGINT)
+    assert early.exit_code(30) == -signal.SIGINT
+    assert "Traceback" not in early.output
