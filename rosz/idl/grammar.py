@@ -33,6 +33,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 _WORD = re.compile(r"[^\s#=]+")
 _TYPE_WORD = re.compile(r"([^\s#]*)(?:[ \t]+([A-Za-z][A-Za-z0-9_]*))?")
 _DIGITS = re.compile(r"[0-9]+", re.ASCII)
+_SURROGATE = re.compile(r"[\ud800-\udfff]")
 _BLANK = re.compile(r"[ \t]*")
 _SEPARATOR = "---"
 _LONGEST_INTEGER = 80  # characters; 64 binary digits are fewer
@@ -333,8 +334,8 @@ class _Line:
             text = text.strip()
             quoted = _QUOTED.match(text)
             if quoted and text[quoted.end() :].lstrip()[:1] in ("", "#"):
-                return Constant(name, kind.base, _unquote(quoted[0]), text)
-            return Constant(name, kind.base, text, text)
+                return Constant(name, kind.base, self._checked(_unquote(quoted[0])), text)
+            return Constant(name, kind.base, self._checked(text), text)
         text = text.partition("#")[0]
         self._at += len(text) - len(text.lstrip())
         text = text.strip()
@@ -409,15 +410,22 @@ class _Line:
             found = _QUOTED.match(self._text, self._at)
             if found is None:
                 self._fail(f"the string is not closed; expected {quote}")
-            value = _unquote(found[0])
+            value = self._checked(_unquote(found[0]))
         else:
             found = bare.match(self._text, self._at)
             if found is None:
                 self._fail("expected a string")
-            value = found[0]
+            value = self._checked(found[0])
         if kind.bound and len(value.encode()) > kind.bound:
             self._fail(f"'{value}' is longer than the {kind.bound} bytes of its type")
         self._at = found.end()
+        return value
+
+    def _checked(self, value: str) -> str:
+        """Return a string, which must be one that UTF-8 can encode."""
+        surrogate = _SURROGATE.search(value)
+        if surrogate is not None:
+            self._fail(f"'\\u{ord(surrogate[0]):04x}' is half a character, which no string holds")
         return value
 
     def _scalar(self, kind: str, text: str, wrong: str = "") -> Scalar:

@@ -4,6 +4,18 @@ from __future__ import annotations
 
 MESSAGES: list[tuple[str, str]] = [
     ("int32", "bad.msg:1:6: expected a name after type 'int32'"),
+    (
+        "string a 'x\\ud800'",
+        "bad.msg:1:10: field 'a': '\\ud800' is half a character, which no string holds",
+    ),
+    (
+        "string<=8 a \ud800",
+        "bad.msg:1:13: field 'a': '\\ud800' is half a character, which no string holds",
+    ),
+    (
+        "string A=\udfff",
+        "bad.msg:1:10: constant 'A': '\\udfff' is half a character, which no string holds",
+    ),
     ("int32 ", "bad.msg:1:7: expected a name after type 'int32'"),
     ("int33x", "bad.msg:1:7: expected a name after type 'int33x'"),
     (" int32 7seas", "bad.msg:1:8: expected a name that begins with a letter, got '7seas'"),
