@@ -25,6 +25,7 @@ from rosz.session.config import (
 )
 from rosz.session.declared import translate_errors
 from rosz.session.local_peers import LocalPeer, LocalPeers, direct_endpoint, is_private
+from rosz.session.probe import first_listening
 from rosz.session.zenoh_workarounds import (
     SEGMENTS,
     connect_to_running,
@@ -47,6 +48,8 @@ _BUSY_TIMEOUT = 60.0
 """Seconds that a node waits for a busy router."""
 _ATTEMPT_SECONDS = 2.0
 """Time limit of each attempt of a node that waits for other machines."""
+_LOOK_SECONDS = 0.5
+"""Seconds after which a node that waits for other machines looks for Ctrl-C."""
 
 _log = logging.getLogger("rosz.session")
 
@@ -87,6 +90,8 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
                 _log.warning("waiting for %s: %s", others, reasons or "nobody answers")
             waited = True
             raise_deferred()
+            while not first_listening(config.endpoints, _LOOK_SECONDS):
+                raise_deferred()
             peers = LocalPeers.read(config.rendezvous)
             continue
         if waited:
