@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
 from rosz.cli.console import count, print_error, print_lines, until_stopped
-from rosz.cli.declare import App, Option
+from rosz.cli.declare import App, Option, at_least
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
@@ -39,6 +39,8 @@ _NUMBER = re.compile(r"\d+")
 _EVERY_SECONDS = 60.0
 _KINDS = 100
 _STANDARD_OUTPUT = 1
+_MOST_PROCESSES = 1 << 22
+"""The limit of Linux for the number of a process."""
 
 app = App()
 
@@ -68,6 +70,7 @@ def core_command(
             "there is no master, and so no port: ROSZ_RENDEZVOUS moves the meeting point,"
             " ROS_DOMAIN_ID keeps groups of nodes apart"
         )
+    at_least("--owner", owner, 0, "as the number of a process", _MOST_PROCESSES)
     import msgspec
 
     from rosz.cli.core_restart import CoreWatch, Handover

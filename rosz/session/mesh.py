@@ -45,7 +45,8 @@ class MeshReadiness:
         timeout: Time in seconds after which the session counts as ready in any case; 0 if it is
             ready now.
         link_timeout: Time in seconds without a new link after which no more is expected: by then
-            Zenoh has given up each attempt.
+            Zenoh has given up each attempt, and a warning says so. Without it, as in a command,
+            the session waits for no more links than until it is ready.
         stop: Event that ends the waiting.
         mesh: Whether the session links to all its neighbours, rather than to one as a client does.
         everywhere: Whether it also links to peers of other machines, as with multicast.
@@ -69,7 +70,7 @@ class MeshReadiness:
         self.linked: threading.Event = threading.Event()
         self._session = session
         self._timeout = timeout
-        self._link_timeout = max(timeout, link_timeout)
+        self._link_timeout = link_timeout
         self._stop = stop
         self._mesh = mesh
         self._key = links_key("*", machine="*" if everywhere else "")
@@ -122,9 +123,9 @@ class MeshReadiness:
             if now - began >= self._timeout:
                 self.ready.set()
                 pause = _LATER_POLL_SECONDS
-            if now - latest >= self._link_timeout:
+            if now - latest >= max(self._timeout, self._link_timeout):
                 break
-        if missing and not self._stop.is_set():
+        if missing and self._link_timeout and not self._stop.is_set():
             _log.warning(
                 "not linked to %d other session(s) of this machine within %g s: what is published"
                 " does not reach them; use a core for so many nodes (rosz core)",

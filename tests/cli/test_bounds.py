@@ -14,6 +14,7 @@ from rosz.errors import UsageError
 COUNTS = ["0", "-1", "2000000000"]
 TIMES = ["0", "-1", "nan", "inf", "1e300"]
 LINES = {
+    "core --owner {}": ["-1", "2000000000"],
     "launch --sigint-timeout {} x.launch": TIMES,
     "launch --sigterm-timeout {} x.launch": TIMES,
     "launch --lost-after {} x.launch": TIMES,

@@ -25,7 +25,7 @@ def test_a_machine_with_keys(world: World, tmp_path: Path, control: bool) -> Non
     laptop.variables["ROSZ_CONNECT"] = "tcp/robot:7447"
     robot.rosz("core", "--listen", "tcp/0.0.0.0:7447").wait_for("started core")
     robot.rosz("run", "rosz_tutorials", "publisher.py", "__name:=publisher")
-    eventually(lambda: "/publisher" in laptop.ask("node", "list"), "the node")
+    eventually(lambda: laptop.lists("/publisher"), "the node")
     looked = laptop.rosz("doctor", "--wait", "0")
     looked.exit_code(60)
     assert "nobody-listens" not in looked.output

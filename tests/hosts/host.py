@@ -140,6 +140,12 @@ class Host:
         assert code == 0, f"rosz {' '.join(argv)}: exit code {code}\n{program.output}"
         return program.output
 
+    def lists(self, node: str) -> bool:
+        """Tell whether ``rosz node list`` shows a node; it fails where a link is not up yet."""
+        program = self.rosz("node", "list")
+        program.exit_code()
+        return node in program.lines
+
     def run(self, *command: str) -> str:
         """Run a command of the system that must succeed, and return its output."""
         return self.namespace.run(*command)

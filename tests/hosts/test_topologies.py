@@ -87,7 +87,7 @@ def test_a_core_on_each_machine(world: World) -> None:
     assert laptop.listening() == []
     here = laptop.program(TALKER, "here")
     here.wait_for("talking")
-    eventually(lambda: "/here" in robot.ask("node", "list"), "the graph on the other side")
+    eventually(lambda: robot.lists("/here"), "the graph on the other side")
 
 
 def test_a_robot_behind_nat_dials_out(world: World) -> None:
@@ -109,7 +109,7 @@ def test_a_robot_behind_nat_dials_out(world: World) -> None:
     core(robot, "--connect", f"tcp/{base.address}:7447")
     talker(robot)
     assert_soon("robot behind NAT", base)
-    eventually(lambda: "/talker" in base.ask("node", "list"), "the robot's node")
+    eventually(lambda: base.lists("/talker"), "the robot's node")
 
 
 def test_domains_on_one_router_keep_apart(world: World) -> None:
@@ -158,7 +158,7 @@ def test_cores_find_each_other_by_multicast(world: World) -> None:
         assert core(host, ROSZ_MULTICAST="1").lines[0] == f"listening on {LISTEN}"
     talker(robot)
     assert_soon("cores that find each other by multicast", laptop)
-    eventually(lambda: "/talker" in laptop.ask("node", "list"), "the graph on the other side")
+    eventually(lambda: laptop.lists("/talker"), "the graph on the other side")
 
 
 def test_a_core_listens_where_a_configuration_says(world: World) -> None:

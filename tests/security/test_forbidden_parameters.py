@@ -24,7 +24,7 @@ WRITER = """
     sync._Comparison._send = sent
     with rosz.Node("writer") as node:
         store = node.context.params
-        store._broadcaster.send = lambda *_: ()  # as if the link were cut
+        store._broadcaster.send = lambda *_: ((), {})  # as if the link were cut
         store.write(condense(spread("/", {
             "gains": {f"g{n}": n for n in range(2000)},
             "secrets": {"pin": 1, "word": "x"},

@@ -112,7 +112,7 @@ def test_a_plain_client_gets_no_further(pair: tuple[Host, Host], authority: Auth
     print(forger.output)
     for word in ("camera", "plan", "map", "lift", "format", "reset", "1234", "got a call", "@/"):
         assert word not in forger.output
-    eventually(lambda: "/robot" in robot.ask("node", "list"), "the node")
+    eventually(lambda: robot.lists("/robot"), "the node")
 
 
 @pytest.mark.parametrize("control", [True, False])
@@ -131,7 +131,7 @@ def test_taking_over_a_node_needs_control(
         """,
         ROSZ_CONNECT="tcp/robot:7447",
     )
-    eventually(lambda: "/witness" in robot.ask("node", "list"), "the other machine's node")
+    eventually(lambda: robot.lists("/witness"), "the other machine's node")
     if control:
         victim.wait_for("new node registered with same name")
         victim.exit_code()

@@ -127,7 +127,7 @@ def test_a_core_on_each_machine(world: World, authority: Authority) -> None:
     linked.wait_for("connected to tls/robot:7447")
     robot.program(TALKER, ROSZ_KEYS="").wait_for("talking")
     laptop.program(LISTENER, ROSZ_KEYS="").wait_for("heard")
-    eventually(lambda: "/listener" in robot.ask("node", "list"), "the graph on the other side")
+    eventually(lambda: robot.lists("/listener"), "the graph on the other side")
 
 
 def test_another_port_needs_no_sharing() -> None:

@@ -76,7 +76,7 @@ def test_permission_to_receive_large_messages(pair: tuple[Host, Host]) -> None:
 def test_permission_to_end_nodes(pair: tuple[Host, Host], control: bool) -> None:
     robot, laptop = pair
     node = start(pair, f"laptop: {{subscribe: ['/**'], control: {str(control).lower()}}}\n")
-    eventually(lambda: laptop.ask("node", "list") == "/publisher", "the node")
+    eventually(lambda: laptop.lists("/publisher"), "the node")
     killed = laptop.rosz("node", "kill", "/publisher")
     assert killed.exit_code(30) == (0 if control else 1), killed.output
     if control:

@@ -82,13 +82,15 @@ def test_access_control_of_rules() -> None:
     assert "@ros2_lv/*/*/*/*/MP/*/*/*/%arm%x/**" in allowed(one, "ingress", "liveliness_token")
 
 
-def test_missed_writes_are_taken_only_from_who_may_set_everything() -> None:
+def test_missed_writes_are_taken_only_from_who_may_get_and_set_everything() -> None:
     sync = "@rosz/*/store/*/sync"
-    assert sync not in allowed("a: {set: ['/gains/**']}", "ingress", "reply")
-    assert sync in allowed("a: {set: ['/**']}", "ingress", "reply")
+    assert sync not in allowed("a: {get: true, set: ['/gains/**']}", "ingress", "reply")
+    assert sync not in allowed("a: {set: ['/**']}", "ingress", "reply")
+    assert sync in allowed("a: {get: true, set: ['/**']}", "ingress", "reply")
     tell = "@rosz/*/store/*/tell"
-    part = allowed("a: {set: ['/gains/**']}", "ingress", "query")
+    part = allowed("a: {get: true, set: ['/gains/**']}", "ingress", "query")
     assert [key for key in part if key.startswith(tell)] == [f"{tell}/gains/**"]
+    assert not any(tell in key for key in allowed("a: {set: ['/gains/**']}", "ingress", "query"))
     assert not any(tell in key for key in allowed("a: {get: true}", "ingress", "query"))
 
 
