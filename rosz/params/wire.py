@@ -21,7 +21,8 @@ The protocol between replicas, and between a replica and its clients:
 Under ``@rosz/<domain>/``::
 
     param/<path>                 one key for each parameter: msgpack of the value, or deleted
-    change[/<path>]              batches that replicas publish to each other
+    change                       batches that replicas publish to each other
+    change/*[/<path>]            the same, where links need keys; each subscribes to change/<zid>/**
     ack/<zid>                    acknowledgements to the writer of that session
     store/<zid>/write[/<path>]   query to one replica: a batch that it has not acknowledged
     store/<zid>/sync             query to one replica: a digest, or the index of some buckets
@@ -148,6 +149,19 @@ class Keys:
     def of(self, zid: str, purpose: Purpose) -> str:
         """Return the key of queries to one replica."""
         return own_key(self._domain, "store", zid, purpose)
+
+    def scoped_change(self, zid: str = "*") -> str:
+        """Return the key of batches without a path, where the key of a write names its path.
+
+        A writer uses the one for all replicas. A replica subscribes below one of its own, since
+        Zenoh keeps memory for each session that declared a key expression with wildcards which
+        others keep (`tests/upstream/memory.py`).
+        """
+        return f"{self.change}/{zid}"
+
+    def change_reach(self, key: str) -> Path:
+        """Return the path that the key of a batch names; the error is that of `reach`."""
+        return () if key == self.change else self.reach(key, self.scoped_change())
 
     def scope(self, key: str, paths: Iterable[Path]) -> str:
         """Return the key for a write of some paths: with their common path if keys are scoped."""

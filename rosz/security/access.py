@@ -173,7 +173,9 @@ def _setting(names: Sequence[str], *, reads: bool) -> Iterator[_Grant]:
     """
     # A name, and all names below it.
     places = [at if at.endswith("**") else f"{at}/**" for at in map(_chunks, names)]
-    yield "ingress", _DATA, [f"{_OWN}/change/{at}" for at in places]
+    yield "ingress", _DATA, [f"{_OWN}/change/*/{at}" for at in places]
+    if EVERYTHING in names:
+        yield "ingress", _DATA, [f"{_OWN}/change"]
     verbs = ("write", "set", "tell") if reads else ("write", "set")
     yield "ingress", _ASK, [f"{_OWN}/store/*/{verb}/{at}" for verb in verbs for at in places]
     if not reads:

@@ -241,3 +241,28 @@ def test_a_context_waits_for_a_node_that_is_being_closed(network: Network) -> No
     go_on.set()
     shutdown.join(TIMEOUT)
     assert session.closed
+
+
+def test_nodes_declare_no_key_expression_with_wildcards_in_common(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of each session that did, Zenoh would keep kilobytes (`tests/upstream/memory.py`)."""
+    declared: dict[str, set[str]] = {}
+    for method in ("_subscribe", "queryable", "pull_queryable"):
+        original = getattr(Session, method)
+
+        def record(
+            session: Session, key: str, *args: Any, _original: Any = original, **options: Any
+        ) -> Any:
+            declared.setdefault(session.zid, set()).add(key)
+            return _original(session, key, *args, **options)
+
+        monkeypatch.setattr(Session, method, record)
+    for name in ("first", "second"):
+        node = network.node(name)
+        node.publisher("topic", String)
+        node.subscription("topic", String, lambda _: None)
+        node.params.set("~p", 1)
+    one, other = declared.values()
+    assert one & other
+    assert not [key for key in one & other if "*" in key]

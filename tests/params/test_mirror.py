@@ -54,6 +54,18 @@ def test_any_client_reads_the_keys(network: Network) -> None:
     assert [reply.ok for reply in refused] == [False]
 
 
+def test_one_replica_replies_for_all_and_another_when_it_is_gone(network: Network) -> None:
+    one, other = network.replicas(2)
+    one.set("/a", 1)
+    stranger = network.session()
+    key = KEYS.param(("a",))
+    eventually(lambda: len(stranger.get(key, timeout=5)) == 1)
+    one.close()
+    eventually(lambda: len(stranger.get(key, timeout=5)) == 1)
+    other.set("/a", 2)
+    assert ask(stranger, key) == {key: 2}
+
+
 def test_payloads_are_plain_msgpack(network: Network) -> None:
     replica = network.replica()
     replica.set("/a", {"x": [1, 2.5, "t", True, b"raw"]})

@@ -77,7 +77,8 @@ FORGER = """
         write = encode(batch("secrets/pin", 0))
         put = encode(ClientRequest("write", batch=batch("secrets/pin", 0), timeout=1.0))
         for reach in ("", "/gains", "/gains/p", "/*", "/**", "/secrets", "/gains/../secrets"):
-            for key in ("change", "param", "store/*/write", "store/*/set", "store/*/sync"):
+            stores = ("store/*/write", "store/*/set", "store/*/sync")
+            for key in ("change/*", "change", "param", *stores):
                 session.put(f"@rosz/0/{key}{reach}", add_header(str(zid), 1, write))
                 ask(f"@rosz/0/{key}{reach}", put)
                 ask(f"@rosz/0/{key}{reach}", encode(SyncRequest(digest=b"", records=records())))
@@ -85,7 +86,7 @@ FORGER = """
         session.put("@rosz/0/param/secrets/pin", b"\\x00")
         session.delete("@rosz/0/param/secrets")
         fair = add_header(str(zid), 2, encode(batch("gains/p", 77)))
-        session.put("@rosz/0/change/gains", fair)
+        session.put("@rosz/0/change/*/gains", fair)
         print("done", flush=True)
 """
 

@@ -76,8 +76,8 @@ def test_access_control_of_rules() -> None:
     assert "*/arm/x/*/*" not in allowed(one, "egress", "put")
     assert "*/arm$*/*/*/**" in allowed(one, "egress", "put")
     assert "*/go/*/*" in allowed(one, "ingress", "query")
-    assert "@rosz/*/change/gains/**" in allowed(one, "ingress", "put")
-    assert "@rosz/*/change/**" not in allowed(one, "ingress", "put")
+    assert "@rosz/*/change/*/gains/**" in allowed(one, "ingress", "put")
+    assert "@rosz/*/change/*/**" not in allowed(one, "ingress", "put")
     assert "@ros2_lv/*/*/*/*/MP/*/*/*/%arm$*/**" in allowed(one, "egress", "liveliness_token")
     assert "@ros2_lv/*/*/*/*/MP/*/*/*/%arm%x/**" in allowed(one, "ingress", "liveliness_token")
 

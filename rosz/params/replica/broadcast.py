@@ -209,7 +209,9 @@ class WriteBroadcaster:
         resent_key = keys.of(session.zid, "write")
         self._declared: list[Closable] = [
             session.subscriber(keys.change, self._on_change, remote_only=True),
-            session.subscriber(f"{keys.change}/*/**", self._on_change, remote_only=True),
+            session.subscriber(
+                f"{keys.scoped_change(session.zid)}/**", self._on_change, remote_only=True
+            ),
             session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
             session.queryable(f"{resent_key}/**", self._on_resent, complete=True),
         ]
@@ -271,7 +273,7 @@ class WriteBroadcaster:
 
     def _put(self, changes: list[Change], message: bytes) -> None:
         if self._keys.scoped:
-            key = self._keys.scope(self._keys.change, (path for path, _ in changes))
+            key = self._keys.scope(self._keys.scoped_change(), (path for path, _ in changes))
             self._session.put(key, message)
         else:
             self._publisher.put(message)
@@ -303,7 +305,7 @@ class WriteBroadcaster:
         """Apply a message on Zenoh's thread if that is quick, else on the worker."""
         message = sample.payload
         try:
-            reach = self._keys.reach(sample.key, self._keys.change)
+            reach = self._keys.change_reach(sample.key)
             sender, number, _ = read_header(message)
         except DecodeError as error:
             self._state.damage.report(NOT_A_PARAMETER, error)

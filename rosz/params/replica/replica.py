@@ -176,7 +176,8 @@ class Replica(_Copy):
         self._members.follow(self._on_member, _TOKENS_TIMEOUT)
         self._token = session.token(keys.token(self._own))
         self._join()
-        AntiEntropy(self._own, sync, self._parameter_keys, self._compact)
+        self._serve_parameter_keys()
+        AntiEntropy(self._is_oldest, sync, self._parameter_keys, self._compact)
 
     def set(
         self, name: str | Path, value: object, *, origin: str = "", timeout: float = ACK_TIMEOUT
@@ -333,11 +334,19 @@ class Replica(_Copy):
                 self._on_member(member, True)
 
     def _on_member(self, member: Member, alive: bool) -> None:
+        self._worker.submit(self._serve_parameter_keys)
         if not alive:
             self._broadcaster.drop_peer(member.zid)
             self._sync.drop_peer(member.zid)
         elif self._sync.ready and member < self._own:
             self._sync.compare_soon(member.zid)
+
+    def _serve_parameter_keys(self) -> None:
+        # Rules may keep replies of replicas on other machines away from this one.
+        self._parameter_keys.serve(lambda: self._keys.scoped or self._is_oldest())
+
+    def _is_oldest(self) -> bool:
+        return all(self._own < other for other in self._members.all())
 
     def _restore(self, handover: bytes) -> bool:
         """Restore what is handed over or stored; return whether the storage differs from it."""
@@ -431,7 +440,7 @@ class Follower(_Copy):
 
     def _receive(self, payload: bytes, key: str) -> None:
         try:
-            self._state.receive(payload, self._keys.reach(key, self._keys.change))
+            self._state.receive(payload, self._keys.change_reach(key))
         except DecodeError as error:
             self._state.damage.report(NOT_A_PARAMETER, error)
 

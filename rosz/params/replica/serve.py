@@ -20,6 +20,7 @@ from functools import partial
 from typing import Any, Final
 
 from rosz.errors import DecodeError, ParamError, ParamNotFound, RoszError
+from rosz.lifecycle import Closable
 from rosz.params.paths import Path, split
 from rosz.params.replica.members import Core
 from rosz.params.replica.state import TreeReader, names_beside
@@ -189,12 +190,34 @@ class ParameterKeys:
         self._state = core.state
         self._worker = core.worker
         self._publisher = session.publisher(keys.all_params)
-        self._queryable = session.queryable(keys.all_params, self._on_query, complete=True)
+        self._queryable: Closable | None = None
+        self._lock = threading.Lock()
+        self._closed = False
 
     @property
     def subscribed(self) -> bool:
         """Whether anybody subscribes to single parameters."""
         return self._publisher.matched
+
+    def serve(self, is_wanted: Callable[[], bool]) -> None:
+        """Reply to queries on the keys from now on, or stop.
+
+        One replica replies for all. If each did, all would declare one key expression with
+        wildcards, and Zenoh keeps memory for each session that declared one which others keep
+        (`tests/upstream/memory.py`).
+
+        Args:
+            is_wanted: Function that tells whether this replica is the one, now.
+        """
+        with self._lock:
+            wanted = is_wanted() and not self._closed
+            if wanted and self._queryable is None:
+                self._queryable = self._session.queryable(
+                    self._keys.all_params, self._on_query, complete=True
+                )
+            elif not wanted and self._queryable is not None:
+                self._queryable.close()
+                self._queryable = None
 
     def publish(self, change: TreeChange) -> None:
         """Write the keys that a change concerns, in the background."""
@@ -231,7 +254,8 @@ class ParameterKeys:
     def close(self) -> None:
         """Undeclare the keys; a second call has no effect."""
         self._publisher.close()
-        self._queryable.close()
+        self._closed = True
+        self.serve(lambda: False)
 
     def _query_storages(self) -> list[Reply]:
         try:

@@ -24,7 +24,6 @@ from rosz.params.replica.state import State
 from rosz.params.wire import (
     Index,
     Keys,
-    Member,
     Record,
     SyncReply,
     SyncRequest,
@@ -422,7 +421,7 @@ class AntiEntropy:
     It also compares storages with the tree, in the oldest replica.
 
     Args:
-        own: This replica.
+        is_oldest: Function that tells whether this is the oldest replica.
         sync: Synchroniser of the replica.
         parameter_keys: Keys that storages hold.
         on_forgotten: Function called when tombstones were dropped.
@@ -430,12 +429,12 @@ class AntiEntropy:
 
     def __init__(
         self,
-        own: Member,
+        is_oldest: Callable[[], bool],
         sync: Synchroniser,
         parameter_keys: ParameterKeys,
         on_forgotten: Callable[[], None],
     ) -> None:
-        self._own = own
+        self._is_oldest = is_oldest
         self._sync = sync
         self._parameter_keys = parameter_keys
         self._on_forgotten = on_forgotten
@@ -470,6 +469,3 @@ class AntiEntropy:
             # This waits for replies, which the worker must not.
             target = self._parameter_keys.reconcile
             start_thread(threading.Thread(target=target, name="rosz-params-mirror", daemon=True))
-
-    def _is_oldest(self) -> bool:
-        return all(self._own < other for other in self._sync.members.all())
