@@ -51,9 +51,9 @@ def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
     count = repeats(26, 100)  # more than form a mesh
     run = launch(fleet(network.folder, TALKER, count))
     run.wait_for(UP, 100, times=count)
-    pids = started(run)
     run.send(signal.SIGINT)
     assert run.exit_code(40) == 0
+    pids = started(run)
     assert [line for line in run.lines if not EXPECTED.match(line)] == []
     assert len(pids) == count
     assert "process[core]: started" in run.output
@@ -63,6 +63,7 @@ def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
 def test_a_killed_launch_takes_its_core_along(launch: Start, network: Network) -> None:
     run = launch(fleet(network.folder, STUBBORN, 1), ROSZ_CONNECT="tcp/127.0.0.1:9")
     run.wait_for(UP)
+    run.wait_for("started with pid", times=2)
     pids = [int(pid) for pid in re.findall(r"started with pid \[(\d+)\]", run.output)]
     assert len(pids) == 2
     run.send(signal.SIGKILL)
