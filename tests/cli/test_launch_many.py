@@ -17,9 +17,11 @@ from .launching import Start, runs, started
 
 TALKER = """#!/usr/bin/env python3
 import os
+from contextlib import suppress
 import rosz
 from std_msgs.msg import String
-with rosz.Node("talker") as node:
+# Ctrl-C may come anywhere in the program, as right after it wrote.
+with suppress(KeyboardInterrupt), rosz.Node("talker") as node:
     chatter = node.publisher("chatter", String)
     os.write(1, b"up\\n")  # one write, which those of other nodes cannot part
     for _ in node.rate(2):
