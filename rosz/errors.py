@@ -27,6 +27,8 @@ They have one root, so that ``except RoszError`` catches what rosz reports and n
     │   └── ServiceNotFound
     ├── ParamError                  a parameter value or write is not allowed
     ├── StoreError                  a file of parameters cannot be used
+    ├── BagError                    a bag cannot be read or written: path, offset
+    │   └── BagUnindexed            a bag has no index
     ├── TransformError              a transform between two frames is not available
     │   ├── FrameNotFound           no such frame
     │   ├── FramesNotConnected      the frames belong to separate trees
@@ -42,6 +44,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 __all__ = (
+    "BagError",
+    "BagUnindexed",
     "ClosedError",
     "DecodeError",
     "DefinitionError",
@@ -327,6 +331,27 @@ class ParamError(RoszError):
 
 class StoreError(RoszError):
     """A file of parameters that is damaged, in use, or cannot be read or written."""
+
+
+class BagError(RoszError):
+    """A bag that is damaged, or cannot be read or written.
+
+    Attributes:
+        reason: Description of the error, what was expected, and what to do.
+        path: Path of the bag.
+        offset: Offset in bytes from the start of the file; -1 if unknown.
+    """
+
+    def __init__(self, reason: str, path: str, offset: int = -1) -> None:
+        self.reason = reason
+        self.path = path
+        self.offset = offset
+        place = f" at byte {offset}" if offset >= 0 else ""
+        super().__init__(f"{path}{place}: {reason}")
+
+
+class BagUnindexed(BagError):
+    """A bag without an index, as a recorder leaves it that was killed."""
 
 
 class TransformError(RoszError):

@@ -1,0 +1,256 @@
+"""The values that bags hold, and what a reader and a writer of each format offers.
+
+All times are nanoseconds since the Unix epoch. A payload is the message as it was on the wire: CDR
+with its header of four bytes, or ROS 1's layout, as the encoding of the channel says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Literal, Protocol, Self, TypeAlias
+
+import msgspec
+
+from rosz.qos import QoS
+
+__all__ = (
+    "Attachment",
+    "BagReader",
+    "BagWriter",
+    "Channel",
+    "Chunk",
+    "Compression",
+    "DamageReport",
+    "Encoding",
+    "Entry",
+    "Payload",
+)
+
+Encoding: TypeAlias = Literal["cdr", "ros1"]
+Compression: TypeAlias = Literal["none", "lz4", "zstd", "bz2"]
+Payload: TypeAlias = bytes | bytearray | memoryview
+
+
+class Channel(msgspec.Struct, frozen=True):
+    """The messages of one publisher on one topic.
+
+    Attributes:
+        topic: Full name of the topic.
+        type: ``pkg/msg/Name``.
+        encoding: The layout of the payloads.
+        definition: Text of the type's definition; those of the types in it follow, each behind a
+            line of ``=`` and a line ``MSG: pkg/Name``. Empty if unknown.
+        md5: Hash of the type in ROS 1; empty if unknown.
+        type_hash: Hash of the type in ROS 2, ``RIHS01_…``; empty if unknown.
+        qos: What the publisher offers; several where a bag joins the publishers of a topic.
+        node: Full name of the publisher's node; empty if unknown.
+    """
+
+    topic: str
+    type: str
+    encoding: Encoding = "cdr"
+    definition: str = ""
+    md5: str = ""
+    type_hash: str = ""
+    qos: tuple[QoS, ...] = ()
+    node: str = ""
+
+    @property
+    def latched(self) -> bool:
+        """Whether late joiners receive earlier messages."""
+        return any(one.latched for one in self.qos)
+
+
+class Entry(msgspec.Struct, frozen=True, gc=False):
+    """One recorded message, encoded.
+
+    Attributes:
+        channel: The channel that it belongs to.
+        stamp: Time at which it was received.
+        sent: Time at which it was published; ``None`` if unknown.
+        sequence: Number that the publisher gave it; 0 if unknown.
+        data: The payload. A view stays valid while it is referenced.
+    """
+
+    channel: Channel
+    stamp: int
+    data: Payload
+    sent: int | None = None
+    sequence: int = 0
+
+
+class Chunk(msgspec.Struct, frozen=True):
+    """A part of a bag that is compressed as a whole.
+
+    Attributes:
+        offset: Place in the file, in bytes.
+        compression: Name of the compression.
+        size: Bytes in the file.
+        uncompressed: Bytes of the records in it.
+        start: Stamp of its earliest message.
+        end: Stamp of its latest message.
+        count: Number of messages in it.
+    """
+
+    offset: int
+    compression: Compression
+    size: int
+    uncompressed: int
+    start: int
+    end: int
+    count: int
+
+
+class Attachment(msgspec.Struct, frozen=True):
+    """A file within a bag.
+
+    Attributes:
+        name: Name of the file.
+        media_type: MIME type, such as ``text/plain``.
+        stamp: Time at which it was recorded.
+        data: Its bytes.
+    """
+
+    name: str
+    media_type: str
+    stamp: int
+    data: bytes
+
+
+DamageReport: TypeAlias = Callable[[Exception], object]
+"""Function called with the error of each damaged part, which is then left out."""
+
+
+class BagReader(Protocol):
+    """A bag that is read by its index, lazily.
+
+    Attributes:
+        path: The file or folder.
+        format: ``mcap``, ``rosbag`` (ROS 1) or ``rosbag2``.
+        version: Version of the format, such as ``2.0``; empty if it has none.
+        indexed: Whether the bag has its index. Without one, as after a recorder was killed, the
+            index is made by reading through the file.
+        size: Size in bytes.
+        channels: All channels, in the order of the file.
+        chunks: All chunks; empty in a format that has none.
+        start: Stamp of the earliest message; 0 in a bag without messages.
+        end: Stamp of the latest message; 0 in a bag without messages.
+        metadata: Named texts by name of the record.
+    """
+
+    path: Path
+    format: str
+    version: str
+    indexed: bool
+    size: int
+    channels: Sequence[Channel]
+    chunks: Sequence[Chunk]
+    start: int
+    end: int
+    metadata: Mapping[str, Mapping[str, str]]
+
+    def count(self, channel: Channel | None = None) -> int:
+        """Return the number of messages of a channel, or of all."""
+
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start: int | None = None,
+        end: int | None = None,
+        *,
+        reverse: bool = False,
+        damaged: DamageReport | None = None,
+    ) -> Iterator[Entry]:
+        """Yield messages in the order of their stamps.
+
+        Args:
+            topics: Full names of the topics; all when not given.
+            start: Earliest stamp.
+            end: Latest stamp; messages of this stamp are included.
+            reverse: Whether to begin with the latest.
+            damaged: Function called with each damaged part, which is left out; the first one is
+                raised when not given.
+
+        Raises:
+            BagError: A part of the file is damaged.
+        """
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the files within the bag.
+
+        Raises:
+            BagError: A part of the file is damaged.
+        """
+
+    def close(self) -> None:
+        """Close the file; a second call has no effect."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *exc_info: object) -> None: ...
+
+
+class BagWriter(Protocol):
+    """A bag that is written.
+
+    Attributes:
+        path: The file or folder.
+        format: ``mcap``, ``rosbag`` (ROS 1) or ``rosbag2``.
+        size: Bytes written so far, what waits for the disk included.
+    """
+
+    path: Path
+    format: str
+    size: int
+
+    def add(self, channel: Channel) -> int:
+        """Add a channel; one that equals an earlier one is the same.
+
+        Returns:
+            Its handle, for `write`.
+
+        Raises:
+            BagError: The format cannot hold messages of such a channel.
+        """
+
+    def write(
+        self, handle: int, stamp: int, data: Payload, sent: int | None = None, sequence: int = 0
+    ) -> None:
+        """Write a message.
+
+        Args:
+            handle: What `add` returned for its channel.
+            stamp: Time at which it was received.
+            data: The payload, in the encoding of the channel; must not change afterwards.
+            sent: Time at which it was published; the stamp when not given.
+            sequence: Number that the publisher gave it.
+
+        Raises:
+            BagError: The file cannot be written; also for earlier messages.
+        """
+
+    def add_metadata(self, name: str, texts: Mapping[str, str]) -> None:
+        """Write named texts; a format that has none leaves them out.
+
+        Raises:
+            BagError: The file cannot be written.
+        """
+
+    def flush(self) -> None:
+        """Write everything so far to the file.
+
+        Raises:
+            BagError: The file cannot be written.
+        """
+
+    def close(self) -> None:
+        """Finish the file with its index; a second call has no effect.
+
+        Raises:
+            BagError: The file cannot be written.
+        """
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *exc_info: object) -> None: ...
