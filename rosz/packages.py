@@ -10,6 +10,7 @@ Nothing is read before it is needed.
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -18,11 +19,12 @@ import msgspec
 
 from rosz.errors import ExecutableNotFound, NotFoundError, PackageError, PackageNotFound, near_miss
 
-__all__ = ("MANIFEST", "Package", "PackageIndex", "crawl")
+__all__ = ("MANIFEST", "Package", "PackageIndex", "crawl", "is_python", "start_words")
 
 MANIFEST = "package.xml"
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"})
 _NO_CODE = frozenset({"__pycache__", "node_modules"})
+_SHEBANG_BYTES = 256
 
 
 class Package(msgspec.Struct, frozen=True):
@@ -244,6 +246,28 @@ class PackageIndex:
 
 def _is_executable(file: Path) -> bool:
     return file.is_file() and os.access(file, os.X_OK)
+
+
+def is_python(program: Path) -> bool:
+    """Return whether a program is a Python script, by its suffix or its first line."""
+    if program.suffix == ".py" or ".py:" in program.name:  # an entry point has its function there
+        return True
+    try:
+        with program.open("rb") as file:
+            first = file.readline(_SHEBANG_BYTES)
+    except OSError:  # executable but not readable, so not a script
+        return False
+    return first.startswith(b"#!") and b"python" in first
+
+
+def start_words(program: Path) -> tuple[str, ...]:
+    """Return the words that start a program: rosz's interpreter first if it is a Python script.
+
+    Such a script can import ROS 1's modules.
+    """
+    # -P keeps modules in the working folder from hiding Python's own.
+    own = (sys.executable, "-P", "-m", "rosz.script") if is_python(program) else ()
+    return (*own, str(program))
 
 
 def crawl(root: Path) -> Iterator[Path]:

@@ -67,7 +67,6 @@ COMMANDS = {
     "rqt_topic": "use 'rosz topic list -v', 'rosz topic echo' and 'rosz topic hz'",
     "rviz": _of_ros2("rviz2"),
     "wstool": "git gets sources; a package below 'src' of the workspace is found as it is",
-    "xacro": "'pip install xacro' brings the command; in launch files: command=\"xacro FILE\"",
 }
 """Commands that people type; each has a program of this name in ``rosz/cli/absent``."""
 
@@ -111,7 +110,6 @@ _ALIASES = {
 
 _MODULES = {
     "PyKDL": "use tf.transformations: pip install 'rosz[numpy]'",
-    "ament_index_python": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
     "catkin": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
     "launch": _LAUNCH,
     "launch_ros": _LAUNCH,
@@ -122,6 +120,7 @@ _MODULES = {
         " pip install 'rosz[numpy]'"
     ),
     "tf2_py": _TRANSFORMS,
+    "xacro": "run: pip install 'rosz[xacro]'",
 }
 
 

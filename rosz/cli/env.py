@@ -37,6 +37,7 @@ ALIASES = {
     "rossrv": "srv",
     "rostopic": "topic",
     "roswtf": "doctor",
+    "xacro": "run xacro xacro",
 }
 """ROS 1's commands, with the commands of rosz that replace them."""
 

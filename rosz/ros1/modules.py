@@ -47,7 +47,11 @@ MODULES = (
 )
 """ROS 1's Python modules, which lie beside this one."""
 
-ELSEWHERE = {"rclpy": "ros2.rclpy", "tf_transformations": "ros1.tf.transformations"}
+ELSEWHERE = {
+    "ament_index_python": "ros2.ament_index_python",
+    "rclpy": "ros2.rclpy",
+    "tf_transformations": "ros1.tf.transformations",
+}
 """ROS 2's names, and where below ``rosz`` their modules lie."""
 
 _NAMES = (

@@ -20,8 +20,8 @@ from pathlib import Path
 
 from rosz.errors import LaunchFileError, NotFoundError, RoszError
 from rosz.launch.plan import NodePlan, SystemContext, describe_args, plan
-from rosz.launch.run.command import is_python, locate
-from rosz.packages import Package, PackageIndex
+from rosz.launch.run.command import locate
+from rosz.packages import Package, PackageIndex, is_python
 from rosz.ros1.python2 import explain
 from rosz.workspace.problem import Problem, error, from_error, warning
 

@@ -64,6 +64,7 @@ FLOORS = {
     "rosz.transforms": 6,
     "rosz.bridges": 7,
     "rosz.doctor": 7,
+    "rosz.programs": 7,
     "rosz.ros1": 7,
     "rosz.ros2": 7,
     "rosz.turtlebot3_sim": 7,

@@ -16,7 +16,7 @@ from typing import Protocol
 import msgspec
 
 from rosz.errors import LaunchError
-from rosz.packages import PackageIndex
+from rosz.packages import PackageIndex, start_words
 
 __all__ = ("LaunchArguments", "LaunchContext", "LaunchText", "SystemContext", "parse_arguments")
 
@@ -199,8 +199,10 @@ class SystemContext:
         import subprocess
 
         shown = " ".join(command)
+        program = Path(self.cwd, command[0])
+        words = (*start_words(program), *command[1:]) if program.is_file() else command
         with subprocess.Popen(
-            command, stdout=subprocess.PIPE, env=dict(self.environ), cwd=self.cwd
+            words, stdout=subprocess.PIPE, env=dict(self.environ), cwd=self.cwd
         ) as process:
             try:
                 assert process.stdout is not None  # noqa: S101  # it is a pipe

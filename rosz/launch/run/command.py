@@ -19,18 +19,16 @@ from rosz.environment import Environment
 from rosz.errors import ExecutableNotFound
 from rosz.launch.plan import NodePlan, report
 from rosz.launch.run.process_tree import TAG
-from rosz.packages import Package, PackageIndex
+from rosz.packages import Package, PackageIndex, is_python, start_words
 
 __all__ = (
     "Command",
     "Workplace",
     "base_environ",
-    "is_python",
     "locate",
     "run_command",
 )
 
-_SHEBANG_BYTES = 256
 _LAUNCH_SUFFIXES = (".launch", ".launch.xml")
 _PYTHON = re.compile(r"python[0-9.]*")
 _SCRIPT = ("-m", "rosz.script")
@@ -189,18 +187,6 @@ def locate(package: Package, name: str) -> Path:
     )
 
 
-def is_python(program: Path) -> bool:
-    """Return whether a program is a Python script, by its suffix or its first line."""
-    if program.suffix == ".py" or ".py:" in program.name:  # an entry point has its function there
-        return True
-    try:
-        with program.open("rb") as file:
-            first = file.readline(_SHEBANG_BYTES)
-    except OSError:  # executable but not readable, so not a script
-        return False
-    return first.startswith(b"#!") and b"python" in first
-
-
 def _start(prefix: Sequence[str], program: Path, *, python: bool) -> tuple[str, ...]:
     """Return the words before the program's own arguments."""
     if not python:
@@ -208,5 +194,4 @@ def _start(prefix: Sequence[str], program: Path, *, python: bool) -> tuple[str, 
     if prefix and _PYTHON.fullmatch(Path(prefix[0]).name):
         # "python3 -m pdb", "python -u": a named interpreter keeps its options.
         return (sys.executable, *prefix[1:], *_SCRIPT, str(program))
-    # -P keeps modules in the folder of the launch from hiding Python's own.
-    return (*prefix, sys.executable, "-P", *_SCRIPT, str(program))
+    return (*prefix, *start_words(program))
