@@ -203,7 +203,7 @@ class Rosz(Side):
         text = own.read_text(errors="replace")
         return {test.test_name: ("failed", f"{text}\nno results, exit code {code}")}
 
-    def _core(self) -> subprocess.Popen[bytes]:
+    def _core(self) -> Any:
         shutil.rmtree(self._sockets, ignore_errors=True)
         self._sockets.mkdir()
         with (self.folder / "core.log").open("w") as out:

@@ -78,14 +78,10 @@ def _tests(module: ModuleType) -> Iterator[Any]:
             yield unittest.FunctionTestCase(value, set_up, tear_down, f"{module.__name__}.{name}")
 
 
-class _Named(unittest.FunctionTestCase):
-    def id(self) -> str:
-        return str(self.shortDescription())
-
-
 def main(file: str, results: str) -> None:
     """Run the tests of a file."""
-    unittest.FunctionTestCase.id = _Named.id  # type: ignore[method-assign]
+    # The name of the function, in place of that of the class.
+    setattr(unittest.FunctionTestCase, "id", unittest.FunctionTestCase.shortDescription)  # noqa: B010
     sys.argv = [file]
     with open(results, "w", encoding="utf-8") as out:  # noqa: PTH123
         result = _Result(out)
