@@ -1,8 +1,14 @@
 """Bags: recorded messages in files, in MCAP and in ROS 1's own format.
 
-`BagReader` and `BagWriter` are what every format offers, with encoded messages. It may import
-nodes, and what stands below them; the libraries of the extra ``rosz[bag]`` are imported where they
-are used.
+`open` gives a program a bag with messages::
+
+    with rosz.bags.open("run.mcap") as bag:
+        for entry in bag.messages("/scan"):
+            print(entry.stamp, entry.message.ranges[0])
+
+`BagReader` and `BagWriter` are what every format offers, with encoded messages. The package may
+import nodes, and what stands below them; the libraries of the extra ``rosz[bag]`` are imported
+where they are used.
 """
 
 from rosz.bags.bag import (
@@ -13,20 +19,36 @@ from rosz.bags.bag import (
     Chunk,
     Compression,
     DamageReport,
-    Encoding,
     Entry,
     Payload,
 )
+from rosz.bags.mcap_reader import McapReader
+from rosz.bags.mcap_writer import McapWriter
+from rosz.bags.messages import Bag, BagMessage, BagOutput, class_of, decoder_of
+from rosz.bags.opening import create_writer, find_format, open, open_reader  # noqa: A004
+from rosz.bags.qos_text import format_profiles, parse_profiles
 
 __all__ = (
     "Attachment",
+    "Bag",
+    "BagMessage",
+    "BagOutput",
     "BagReader",
     "BagWriter",
     "Channel",
     "Chunk",
     "Compression",
     "DamageReport",
-    "Encoding",
     "Entry",
+    "McapReader",
+    "McapWriter",
     "Payload",
+    "class_of",
+    "create_writer",
+    "decoder_of",
+    "find_format",
+    "format_profiles",
+    "open",
+    "open_reader",
+    "parse_profiles",
 )

@@ -12,6 +12,7 @@ from typing import Literal, Protocol, Self, TypeAlias
 
 import msgspec
 
+from rosz.errors import BagError
 from rosz.qos import QoS
 
 __all__ = (
@@ -22,12 +23,10 @@ __all__ = (
     "Chunk",
     "Compression",
     "DamageReport",
-    "Encoding",
     "Entry",
     "Payload",
 )
 
-Encoding: TypeAlias = Literal["cdr", "ros1"]
 Compression: TypeAlias = Literal["none", "lz4", "zstd", "bz2"]
 Payload: TypeAlias = bytes | bytearray | memoryview
 
@@ -38,23 +37,25 @@ class Channel(msgspec.Struct, frozen=True):
     Attributes:
         topic: Full name of the topic.
         type: ``pkg/msg/Name``.
-        encoding: The layout of the payloads.
+        encoding: The layout of the payloads: ``cdr``, ``ros1``, or one that rosz does not decode.
         definition: Text of the type's definition; those of the types in it follow, each behind a
             line of ``=`` and a line ``MSG: pkg/Name``. Empty if unknown.
         md5: Hash of the type in ROS 1; empty if unknown.
         type_hash: Hash of the type in ROS 2, ``RIHS01_…``; empty if unknown.
         qos: What the publisher offers; several where a bag joins the publishers of a topic.
         node: Full name of the publisher's node; empty if unknown.
+        language: Language of the definition if it is not that of .msg files, such as ``protobuf``.
     """
 
     topic: str
     type: str
-    encoding: Encoding = "cdr"
+    encoding: str = "cdr"
     definition: str = ""
     md5: str = ""
     type_hash: str = ""
     qos: tuple[QoS, ...] = ()
     node: str = ""
+    language: str = ""
 
     @property
     def latched(self) -> bool:
@@ -90,7 +91,6 @@ class Chunk(msgspec.Struct, frozen=True):
         uncompressed: Bytes of the records in it.
         start: Stamp of its earliest message.
         end: Stamp of its latest message.
-        count: Number of messages in it.
     """
 
     offset: int
@@ -99,7 +99,6 @@ class Chunk(msgspec.Struct, frozen=True):
     uncompressed: int
     start: int
     end: int
-    count: int
 
 
 class Attachment(msgspec.Struct, frozen=True):
@@ -118,7 +117,7 @@ class Attachment(msgspec.Struct, frozen=True):
     data: bytes
 
 
-DamageReport: TypeAlias = Callable[[Exception], object]
+DamageReport: TypeAlias = Callable[[BagError], object]
 """Function called with the error of each damaged part, which is then left out."""
 
 
@@ -131,24 +130,36 @@ class BagReader(Protocol):
         version: Version of the format, such as ``2.0``; empty if it has none.
         indexed: Whether the bag has its index. Without one, as after a recorder was killed, the
             index is made by reading through the file.
-        size: Size in bytes.
-        channels: All channels, in the order of the file.
-        chunks: All chunks; empty in a format that has none.
         start: Stamp of the earliest message; 0 in a bag without messages.
         end: Stamp of the latest message; 0 in a bag without messages.
-        metadata: Named texts by name of the record.
     """
 
     path: Path
     format: str
     version: str
     indexed: bool
-    size: int
-    channels: Sequence[Channel]
-    chunks: Sequence[Chunk]
     start: int
     end: int
-    metadata: Mapping[str, Mapping[str, str]]
+
+    @property
+    def size(self) -> int:
+        """Size in bytes."""
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """All channels, in the order of the file."""
+
+    @property
+    def chunks(self) -> Sequence[Chunk]:
+        """All chunks; empty in a format that has none."""
+
+    @property
+    def metadata(self) -> Mapping[str, Mapping[str, str]]:
+        """Named texts by name of the record."""
+
+    @property
+    def problems(self) -> Sequence[BagError]:
+        """What was found damaged or missing as the bag was opened."""
 
     def count(self, channel: Channel | None = None) -> int:
         """Return the number of messages of a channel, or of all."""
@@ -197,12 +208,14 @@ class BagWriter(Protocol):
     Attributes:
         path: The file or folder.
         format: ``mcap``, ``rosbag`` (ROS 1) or ``rosbag2``.
-        size: Bytes written so far, what waits for the disk included.
     """
 
     path: Path
     format: str
-    size: int
+
+    @property
+    def size(self) -> int:
+        """Bytes written so far, and those that wait for the disk."""
 
     def add(self, channel: Channel) -> int:
         """Add a channel; one that equals an earlier one is the same.

@@ -1,0 +1,104 @@
+"""Opening bags: the format of a file that is read is told by its first bytes."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Literal, overload
+
+from rosz.bags.bag import BagReader, BagWriter, Compression
+from rosz.bags.mcap_reader import McapReader
+from rosz.bags.mcap_records import MAGIC
+from rosz.bags.mcap_writer import McapWriter
+from rosz.bags.messages import Bag, BagOutput
+from rosz.errors import BagError, UsageError
+from rosz.typestore import TypeStore
+
+__all__ = ("create_writer", "find_format", "open", "open_reader")
+
+_MOST_MAGIC = 16
+
+
+def find_format(path: str | os.PathLike[str]) -> str:
+    """Return the format of a bag: ``mcap``.
+
+    Raises:
+        BagError: The file cannot be read, or is no bag.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            magic = file.read(_MOST_MAGIC)
+    except OSError as error:
+        raise BagError(f"cannot open it: {error.strerror}", str(path)) from error
+    if magic.startswith(MAGIC):
+        return "mcap"
+    raise BagError(
+        f"it is not a bag: it begins with {magic[:8]!r}, expected MCAP's {MAGIC!r}", str(path), 0
+    )
+
+
+def open_reader(path: str | os.PathLike[str]) -> BagReader:
+    """Open a bag of any format.
+
+    Raises:
+        BagError: The file cannot be read, or is no bag.
+    """
+    find_format(path)
+    return McapReader(path)
+
+
+def create_writer(
+    path: str | os.PathLike[str], *, compression: Compression = "none", replace: bool = False
+) -> BagWriter:
+    """Create a bag; the suffix of the path tells the format.
+
+    Args:
+        path: Path that ends in ``.mcap``.
+        compression: Name of the compression.
+        replace: Whether a file that exists is replaced; otherwise it is an error.
+
+    Raises:
+        BagError: The file cannot be created.
+        UsageError: The suffix is not known, or the format has no such compression.
+    """
+    if Path(path).suffix == ".mcap":
+        return McapWriter(path, compression=compression, replace=replace)
+    raise UsageError(f"'{path}' does not tell the format of the bag; expected a name.mcap")
+
+
+@overload
+def open(  # noqa: A001
+    path: str | os.PathLike[str], mode: Literal["r"] = "r", *, types: TypeStore | None = None
+) -> Bag: ...
+
+
+@overload
+def open(  # noqa: A001
+    path: str | os.PathLike[str], mode: Literal["w", "x"], *, compression: Compression = "none"
+) -> BagOutput: ...
+
+
+def open(  # noqa: A001
+    path: str | os.PathLike[str],
+    mode: Literal["r", "w", "x"] = "r",
+    *,
+    compression: Compression = "none",
+    types: TypeStore | None = None,
+) -> Bag | BagOutput:
+    """Open a bag, as ``with rosz.bags.open("run.mcap") as bag:``.
+
+    Args:
+        path: Path of the bag. When it is written, its suffix tells the format.
+        mode: ``r`` to read, ``w`` to write a new file or replace one, ``x`` to write a new one.
+        compression: Compression of a bag that is written: ``none``, ``lz4`` or ``zstd``.
+        types: Types for channels without a definition; those that come with rosz when not given.
+
+    Raises:
+        BagError: The file cannot be read or created, or is no bag.
+        UsageError: The suffix or the compression is not known.
+    """
+    if mode == "r":
+        return Bag(open_reader(path), types or TypeStore())
+    writer = create_writer(path, compression=compression, replace=mode == "w")
+    return BagOutput(writer, time.time_ns)
