@@ -115,10 +115,6 @@ _MODULES = {
     "launch_ros": _LAUNCH,
     "roslaunch": _LAUNCH,
     "ros_numpy": "numpy.frombuffer reads the data of messages: pip install 'rosz[numpy]'",
-    "sensor_msgs.point_cloud2": (
-        "numpy.frombuffer(cloud.data, dtype) reads the points, with a dtype of cloud.fields:"
-        " pip install 'rosz[numpy]'"
-    ),
     "tf2_py": _TRANSFORMS,
     "xacro": "run: pip install 'rosz[xacro]'",
 }

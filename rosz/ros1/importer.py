@@ -18,7 +18,7 @@ from functools import cached_property
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
-from importlib.util import spec_from_file_location
+from importlib.util import find_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 
@@ -28,6 +28,7 @@ from rosz.packages import PackageIndex
 from rosz.replacements import instead_of
 from rosz.ros1.modules import (
     ELSEWHERE,
+    EXTRAS,
     MODULES,
     SUBMODULES,
     add_submodules,
@@ -156,6 +157,24 @@ def _alias(name: str, load: Callable[[], ModuleType]) -> ModuleSpec:
     return ModuleSpec(name, _AliasLoader(load), is_package=True)
 
 
+def _loaded(name: str, load: Callable[[], ModuleType]) -> ModuleType:
+    """Load a module of rosz.
+
+    Raises:
+        ModuleNotFoundError: It needs an extra, which the text names.
+    """
+    try:
+        module = load()
+    except ModuleNotFoundError as error:
+        extra = EXTRAS.get(name.partition(".")[0], {}).get(error.name or "")
+        if extra is None:
+            raise
+        text = f"{error}; {name} needs it, run: pip install 'rosz[{extra}]'"
+        raise ModuleNotFoundError(text, name=error.name) from error
+    explain_missing(name, module)
+    return module
+
+
 class _FrontFinder(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self.types = types
@@ -177,26 +196,23 @@ class _FrontFinder(MetaPathFinder):
             return self._of_package(fullname, root, _KINDS[first], inner, path)
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
-        if root in self._modules:
+        if root in self._modules or fullname in self._modules:
             return self._of_rosz(fullname, root)
         if root in self._shipped and not rest:
             return _alias(fullname, lambda: import_module(f"rosz.msgs.{root}"))
         return None
 
     def _of_rosz(self, name: str, root: str) -> ModuleSpec | None:
-        """Find ``rospy`` or one of its submodules."""
+        """Find ``rospy`` or one of its submodules; importing it may need an extra."""
         if name in SUBMODULES:
-            module = submodule(name)
-        else:
-            own = f"rosz.{ELSEWHERE.get(root, f'ros1.{root}')}{name[len(root) :]}"
-            try:
-                module = import_module(own)
-            except ModuleNotFoundError as error:
-                if error.name != own:
-                    raise
-                return None
-        explain_missing(name, module)
-        return _alias(name, lambda: module)
+            return _alias(name, lambda: _loaded(name, lambda: submodule(name)))
+        below = ELSEWHERE.get(root, f"ros1.{root}") + name.removeprefix(root)
+        own = f"rosz.{ELSEWHERE.get(name, below)}"
+        try:
+            known = own in sys.modules or find_spec(own) is not None
+        except ModuleNotFoundError:  # a plain module has no submodules
+            known = False
+        return _alias(name, lambda: _loaded(name, lambda: import_module(own))) if known else None
 
     def _compiled(self, name: str) -> ModuleSpec | None:
         """Find ``rosz.msgs.<package>`` of a package that is compiled, for pickle."""

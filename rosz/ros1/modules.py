@@ -15,6 +15,7 @@ from rosz.errors import near_miss
 
 __all__ = (
     "ELSEWHERE",
+    "EXTRAS",
     "MODULES",
     "SUBMODULES",
     "add_submodules",
@@ -50,9 +51,19 @@ MODULES = (
 ELSEWHERE = {
     "ament_index_python": "ros2.ament_index_python",
     "rclpy": "ros2.rclpy",
+    "sensor_msgs.point_cloud2": "ros1.point_cloud2",
     "tf_transformations": "ros1.tf.transformations",
 }
-"""ROS 2's names, and where below ``rosz`` their modules lie."""
+"""Modules that do not lie beside this one, or have another name there; where below ``rosz``."""
+
+_VISION = {"cv2": "vision", "numpy": "vision"}
+EXTRAS: Mapping[str, Mapping[str, str]] = {
+    "cv_bridge": _VISION,
+    "image_geometry": _VISION,
+    "laser_geometry": {"numpy": "numpy"},
+    "ros_numpy": {"numpy": "numpy"},
+}
+"""Modules that need other distributions: what they import, and the extra of rosz that has it."""
 
 _NAMES = (
     "is_legal_resource_base_name is_legal_resource_name package_resource_name resource_name"
