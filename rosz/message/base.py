@@ -31,6 +31,7 @@ __all__ = (
     "OCTETS",
     "SCALAR_CODES",
     "SCALAR_SIZES",
+    "SEQ",
     "Array",
     "Bytes",
     "Message",
@@ -201,6 +202,28 @@ class _Derived(Generic[_T]):
         return self._compute(owner)
 
 
+class _Ros1Codec:
+    """A function of ROS 1's codec, compiled for a class when it is asked for first.
+
+    Args:
+        maker: Name of the function in `rosz.message.ros1_codec` that compiles it.
+    """
+
+    def __init__(self, maker: str) -> None:
+        self._maker = maker
+
+    def __set_name__(self, owner: type[Any], name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: object, owner: type[Any]) -> Callable[[Any], Any]:
+        from rosz.message import ros1_codec
+
+        described = next(cls for cls in owner.__mro__ if "_schema" in vars(cls))
+        made: Callable[[Any], Any] = getattr(ros1_codec, self._maker)(described)
+        setattr(described, self._name, staticmethod(made))
+        return made
+
+
 def _slot_types(cls: type[Message]) -> list[str]:
     types = [slot_type(slot) for slot in slots(cls)]
     return ["uint32", *types] if issubclass(cls, Sequenced) else types
@@ -248,6 +271,8 @@ class Message(msgspec.Struct, gc=False):
         _slot_types: ROS 1 types of the fields, in the order of ``__slots__``.
         _has_header: Whether the first field is a ``std_msgs/Header`` named header.
         _ros1_names: Names of fields by the other names that ROS 1 has for them.
+        _encode_ros1: Function that returns a message in ROS 1's byte layout.
+        _decode_ros1: Function that returns the message in such bytes.
     """
 
     _type: ClassVar[str] = ""
@@ -275,6 +300,9 @@ class Message(msgspec.Struct, gc=False):
         """Return the message in these bytes; the generated fast path."""
         raise NotImplementedError(f"{len(data)} bytes")
 
+    _encode_ros1: ClassVar[Callable[[Any], bytes]] = _Ros1Codec("compile_encoder")  # type: ignore[assignment]
+    _decode_ros1: ClassVar[Callable[[bytes], Any]] = _Ros1Codec("compile_decoder")  # type: ignore[assignment]
+
     def to_cdr(self) -> bytes:
         """Return the message as XCDR1 little-endian bytes, with the 4-byte header.
 
@@ -293,26 +321,44 @@ class Message(msgspec.Struct, gc=False):
         message: Self = cls._decode(data if type(data) is bytes else bytes(data))
         return message
 
+    def to_ros1(self) -> bytes:
+        """Return the message in ROS 1's byte layout, in which bags and TCPROS hold it.
+
+        Raises:
+            EncodeError: A value does not fit its field, or ROS 1 has no such type.
+        """
+        return type(self)._encode_ros1(self)
+
+    @classmethod
+    def from_ros1(cls, data: bytes | bytearray | memoryview) -> Self:
+        """Return the message in bytes of ROS 1's layout; what lies behind it is ignored.
+
+        Raises:
+            DecodeError: The bytes are not a message of this type; the error says where and why.
+        """
+        message: Self = cls._decode_ros1(data if type(data) is bytes else bytes(data))
+        return message
+
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
         """Return the types of the fields by name, as rclpy spells them."""
         return {slot.name: rclpy_type(slot) for slot in slots(cls)}
 
     def serialize(self, buff: Writable) -> None:
-        """Write the CDR bytes into a file-like object (genpy's spelling of :meth:`to_cdr`).
+        """Write ROS 1's bytes into a file-like object (genpy's spelling of :meth:`to_ros1`).
 
         Raises:
             EncodeError: A value does not fit its field.
         """
-        buff.write(self._encode(self))
+        buff.write(self.to_ros1())
 
     def deserialize(self, data: bytes) -> Self:
-        """Fill this message from CDR bytes and return it (genpy's spelling).
+        """Fill this message from ROS 1's bytes and return it (genpy's spelling).
 
         Raises:
             DecodeError: The bytes are not a message of this type.
         """
-        other = self.from_cdr(data)
+        other = self.from_ros1(data)
         for name in self.__struct_fields__:
             setattr(self, name, getattr(other, name))
         return self
@@ -347,14 +393,15 @@ class Sequenced(Message):
         return all(getattr(self, n) == getattr(other, n) for n, _, _ in self._schema)
 
 
-_SEQ = Slot("seq", "uint32", 0, "one", 0)
+SEQ = Slot("seq", "uint32", 0, "one", 0)
+"""The sequence number of a header, which is not in its schema."""
 
 
 def ros1_slots(cls: Any) -> dict[str, Slot]:
     """Return the fields of a message class that have another name in ROS 1, or are only there."""
     found = {slot.name: slot for slot in slots(cls)}
     renamed = {old: found[new] for old, new in cls._ros1_names.items()}
-    return {**renamed, "seq": _SEQ} if issubclass(cls, Sequenced) else renamed
+    return {**renamed, "seq": SEQ} if issubclass(cls, Sequenced) else renamed
 
 
 class _TakesRos1Names(msgspec.StructMeta):

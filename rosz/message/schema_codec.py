@@ -21,6 +21,7 @@ from rosz.message.base import (
     Slot,
     slots,
 )
+from rosz.message.ros1_layout import ros1_fields
 from rosz.message.sequences import (
     TRUTH,
     flags,
@@ -31,7 +32,14 @@ from rosz.message.sequences import (
     read_wide,
 )
 
-__all__ = ("FAULTS", "decode_plainly", "encode_plainly", "shown")
+__all__ = (
+    "FAULTS",
+    "decode_plainly",
+    "decode_plainly_ros1",
+    "encode_plainly",
+    "encode_plainly_ros1",
+    "shown",
+)
 
 _T = TypeVar("_T")
 
@@ -85,6 +93,28 @@ def decode_plainly(data: bytes, cls: type[_T]) -> _T:
     return message
 
 
+def encode_plainly_ros1(message: Any, cls: type[Any]) -> bytes:
+    """Return a message in ROS 1's layout, or raise an error that says what is wrong with it.
+
+    Raises:
+        EncodeError: A value does not fit.
+    """
+    writer = _Ros1Writer(cls._type)
+    writer.message(message, cls, "")
+    return bytes(writer.data)
+
+
+def decode_plainly_ros1(data: bytes, cls: type[_T]) -> _T:
+    """Return the message in the bytes of ROS 1's layout.
+
+    Raises:
+        DecodeError: The bytes are not a message of that class.
+    """
+    type_name: str = cls._type  # type: ignore[attr-defined]
+    message: _T = _Ros1Reader(type_name, data).message(cls, "")
+    return message
+
+
 def shown(value: object) -> str:
     """Return the type and the beginning of a value, for errors."""
     text = repr(value)
@@ -93,6 +123,10 @@ def shown(value: object) -> str:
 
 class _Writer:
     """The encoded bytes; alignment counts from the first byte after the header."""
+
+    _fields = staticmethod(slots)
+    _text_bytes = staticmethod(put_text)
+    _zeros = 1  # behind a string
 
     def __init__(self, type_name: str) -> None:
         self._type = type_name
@@ -104,10 +138,14 @@ class _Writer:
 
     def _put(self, code: str, *values: object) -> None:
         packed = struct.pack("<" + code, *values)
-        self.data += bytes(-len(self.data) % min(len(packed), 8)) + packed
+        self._align(len(packed))
+        self.data += packed
+
+    def _align(self, size: int) -> None:
+        self.data += bytes(-len(self.data) % size)
 
     def message(self, value: Any, cls: Any, path: str) -> None:
-        fields = slots(cls)
+        fields = self._fields(cls)
         for slot in fields:
             name = f"{path}.{slot.name}" if path else slot.name
             try:
@@ -116,7 +154,10 @@ class _Writer:
                 self._refuse(path, cls._type, value, f"it has no field '{slot.name}'")
             self._field(slot, member, name)
         if not fields:
-            self.data += b"\0"
+            self._end_of_empty()
+
+    def _end_of_empty(self) -> None:
+        self.data += b"\0"
 
     def _field(self, slot: Slot, value: Any, path: str) -> None:
         if slot.shape == "one":
@@ -142,13 +183,13 @@ class _Writer:
         wide = slot.kind == "wstring"
         try:
             given = value.decode() if isinstance(value, bytes | bytearray) and not wide else value
-            packed = pack_wide(given) if wide else put_text(given)
+            packed = pack_wide(given) if wide else self._text_bytes(given)
         except AttributeError:
             self._refuse(path, str(slot.kind), value)
         except ValueError as error:
             self._refuse(path, str(slot.kind), value, str(error))
         length = len(packed) // 4 if wide else len(packed)
-        if slot.bound and length - (not wide) > slot.bound:
+        if slot.bound and length - (not wide) * self._zeros > slot.bound:
             units = "code units" if wide else "bytes of UTF-8"
             self._refuse(path, f"at most {slot.bound} {units}", value)
         self._put("I", length)
@@ -176,7 +217,7 @@ class _Writer:
             count = len(block)
         self._count(slot, value, count, path)
         if count:
-            self.data += bytes(-len(self.data) % SCALAR_SIZES[kind])
+            self._align(SCALAR_SIZES[kind])
             self.data += block
 
     def _by_number(self, kind: str, value: Any, path: str, error: Exception) -> bytes:
@@ -205,6 +246,25 @@ class _Writer:
         self._count(slot, value, len(value), path)
         for index, element in enumerate(value):
             self._one(slot, element, f"{path}[{index}]")
+
+
+class _Ros1Writer(_Writer):
+    """The encoded bytes in ROS 1's layout."""
+
+    _fields = staticmethod(ros1_fields)
+    _text_bytes = staticmethod(str.encode)
+    _zeros = 0
+
+    def _align(self, size: int) -> None:
+        """Add no padding, which ROS 1 does not have."""
+
+    def _end_of_empty(self) -> None:
+        """Add nothing: a message without fields has no bytes."""
+
+    def _text(self, slot: Slot, value: Any, path: str) -> None:
+        if slot.kind == "wstring":
+            self._refuse(path, "a type that ROS 1 has, which has no wstring", value)
+        super()._text(slot, value, path)
 
 
 _BLOCKS = frozenset({*ARRAY_CODES, *OCTETS, "bool"})
@@ -243,18 +303,21 @@ def _number(kind: str, value: Any) -> Any:
 class _Reader:
     """A position in the bytes; alignment counts from the first byte after the header."""
 
-    def __init__(self, type_name: str, data: bytes, order: str) -> None:
+    _fields = staticmethod(slots)
+    _zeros = 1  # behind a string
+
+    def __init__(self, type_name: str, data: bytes, order: str, at: int = len(_HEADER)) -> None:
         self._type = type_name
         self._data = data
         self._order = order
-        self._at = len(_HEADER)
+        self._at = at
 
     def _refuse(self, path: str, reason: str) -> NoReturn:
         text = f"{path}: {reason}" if path else reason
         raise DecodeError(self._type, self._at, text) from None
 
     def _take(self, size: int, path: str, what: str, alignment: int = 1) -> bytes:
-        start = self._at + (len(_HEADER) - self._at) % alignment
+        start = self._at + self._padding(alignment)
         left = len(self._data) - start
         if size > left:
             self._at = min(start, len(self._data))
@@ -262,17 +325,23 @@ class _Reader:
         self._at = start + size
         return self._data[start : self._at]
 
+    def _padding(self, alignment: int) -> int:
+        return (len(_HEADER) - self._at) % alignment
+
     def _scalar(self, kind: str, path: str) -> Any:
         size = SCALAR_SIZES[kind]
         packed = self._take(size, path, kind, size)
         return struct.unpack(self._order + SCALAR_CODES[kind], packed)[0]
 
     def message(self, cls: Any, path: str) -> Any:
-        fields = slots(cls)
+        fields = self._fields(cls)
         if not fields:
-            self._take(1, path, "an empty message")
+            self._take_empty(path)
         prefix = f"{path}." if path else ""
         return cls(**{slot.name: self._field(slot, prefix + slot.name) for slot in fields})
+
+    def _take_empty(self, path: str) -> None:
+        self._take(1, path, "an empty message")
 
     def _field(self, slot: Slot, path: str) -> Any:
         if slot.shape == "one":
@@ -301,15 +370,18 @@ class _Reader:
         wide = slot.kind == "wstring"
         length = self._scalar("uint32", path)
         packed = self._take(length * 4 if wide else length, path, f"a {slot.kind}")
-        content = length if wide else max(length - 1, 0)
+        content = length if wide else max(length - self._zeros, 0)
         if slot.bound and content > slot.bound:
             self._refuse(path, f"expected at most {slot.bound} units, got {content}")
         try:
             if not wide:
-                return packed[:-1].decode()
+                return self._text_of(packed)
             return read_wide(self._swapped("I", packed).tobytes())
         except (UnicodeDecodeError, OverflowError) as error:
             self._refuse(path, f"not a valid {slot.kind}: {error}")
+
+    def _text_of(self, packed: bytes) -> str:
+        return packed[:-1].decode()
 
     def _block(self, kind: str, count: int, path: str) -> Any:
         if not count:
@@ -328,3 +400,28 @@ class _Reader:
         if (self._order == ">") != (sys.byteorder == "big"):
             block.byteswap()
         return block
+
+
+class _Ros1Reader(_Reader):
+    """A position in the bytes of ROS 1's layout."""
+
+    _fields = staticmethod(ros1_fields)
+    _zeros = 0
+
+    def __init__(self, type_name: str, data: bytes) -> None:
+        super().__init__(type_name, data, "<", 0)
+
+    def _padding(self, _alignment: int) -> int:
+        return 0
+
+    def _take_empty(self, path: str) -> None:
+        """Take nothing: a message without fields has no bytes."""
+
+    def _text(self, slot: Slot, path: str) -> str:
+        if slot.kind == "wstring":
+            self._refuse(path, "ROS 1 has no wstring")
+        return super()._text(slot, path)
+
+    def _text_of(self, packed: bytes) -> str:
+        # roscpp sends any bytes as a string, and genpy replaces those that are no UTF-8.
+        return packed.decode(errors="replace")
