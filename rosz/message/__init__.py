@@ -9,19 +9,21 @@ modules ``convert`` (plain values, JSON, YAML) and ``text`` are public and impor
 from __future__ import annotations
 
 from rosz.message.base import (
-    ARRAY_CODES,
-    INTEGER_RANGES,
-    OCTETS,
-    SCALAR_CODES,
     Array,
     Bytes,
     Message,
     Renamed,
     Sequenced,
     Service,
-    Slot,
     Writable,
     ros1_slots,
+)
+from rosz.message.schema import (
+    ARRAY_CODES,
+    INTEGER_RANGES,
+    OCTETS,
+    SCALAR_CODES,
+    Slot,
     slot_type,
     slots,
 )

@@ -19,16 +19,8 @@ from typing import Any, NoReturn, TypeAlias, TypeVar
 import yaml
 
 from rosz.errors import EncodeError, near_miss
-from rosz.message.base import (
-    ARRAY_CODES,
-    INTEGER_RANGES,
-    OCTETS,
-    Message,
-    Sequenced,
-    Slot,
-    ros1_slots,
-    slots,
-)
+from rosz.message.base import Message, Sequenced, ros1_slots
+from rosz.message.schema import ARRAY_CODES, INTEGER_RANGES, OCTETS, Slot, slots
 from rosz.message.schema_codec import shown
 from rosz.message.sequences import numbers
 from rosz.message.text import strify_message

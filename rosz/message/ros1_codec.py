@@ -16,9 +16,9 @@ from itertools import starmap
 from struct import Struct, calcsize
 from typing import Any, TypeAlias
 
-from rosz.message.base import ARRAY_CODES, OCTETS, SCALAR_CODES, Slot
 from rosz.message.ros1_layout import ros1_fields
 from rosz.message.runtime import read_block, read_flags
+from rosz.message.schema import ARRAY_CODES, OCTETS, SCALAR_CODES, Slot
 from rosz.message.schema_codec import FAULTS, decode_plainly_ros1, encode_plainly_ros1
 from rosz.message.sequences import TRUTH, flags, numbers, octets
 
@@ -54,7 +54,8 @@ def compile_encoder(cls: type[Any]) -> Callable[[Any], bytes]:
     source.emit(f"return {writer.joined()}")
     source.lines.insert(1, "    try:")
     source.lines += ["    except FAULTS:", "        return plain(m, cls)"]
-    return source.function(plain=encode_plainly_ros1, cls=cls)
+    encode: Callable[[Any], bytes] = source.function(plain=encode_plainly_ros1, cls=cls)
+    return encode
 
 
 def compile_decoder(cls: type[Any]) -> Callable[[bytes], Any]:
@@ -74,7 +75,8 @@ def compile_decoder(cls: type[Any]) -> Callable[[bytes], Any]:
     source.emit(f"return {value}")
     source.lines.insert(1, "    try:")
     source.lines += ["    except FAULTS:", "        return plain(data, cls)"]
-    return source.function(plain=decode_plainly_ros1, cls=cls)
+    decode: Callable[[bytes], Any] = source.function(plain=decode_plainly_ros1, cls=cls)
+    return decode
 
 
 class _Source:
@@ -135,7 +137,7 @@ class _Writer:
         """Return an expression of all bytes."""
         self._flush()
         if len(self._pieces) == 1:
-            return self._pieces[0]
+            return f"bytes({self._pieces[0]})"  # an array's buffer, or bytes as they are
         return f'b"".join(({", ".join(self._pieces)}))' if self._pieces else 'b""'
 
     def _piece(self, expression: str) -> None:
@@ -188,12 +190,13 @@ class _Writer:
         if isinstance(kind, str):
             length = self._source.constant("pack", "I", lambda: _LENGTH.pack)
             octets = self._source.fresh("s")
+            self._source.emit(f"if type({local}) is str: raise ValueError")
             self._source.emit(f"{octets} = [s.encode() for s in {local}]")
             self._piece(f'b"".join([b for s in {octets} for b in ({length}(len(s)), s)])')
             return
         leaves = _leaves(kind, "e")
         if leaves is None:
-            encode = self._source.constant("encode", kind, lambda: kind._encode_ros1)
+            encode = self._source.constant("encode", kind, lambda: compile_encoder(kind))
             self._piece(f'b"".join([{encode}(e) for e in {local}])')
         elif leaves:
             pack = self._source.method(_form(leaves), "pack")

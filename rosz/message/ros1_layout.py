@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from rosz.message.base import SEQ, Sequenced, Slot, slots
+from rosz.message.schema import SEQ, Slot, slots
 
 __all__ = ("ros1_fields",)
 
-_ADDED_BY_ROS2 = {
+_ADDED_BY_ROS2: dict[str, set[str]] = {
     "sensor_msgs/Range": {"variance"},
     "shape_msgs/SolidPrimitive": {"polygon"},
     "visualization_msgs/Marker": {"texture_resource", "texture", "uv_coordinates", "mesh_file"},
@@ -20,12 +20,16 @@ _STAMPS = {"builtin_interfaces/Time": "uint32", "builtin_interfaces/Duration": "
 """The type of both numbers of ROS 1's built-in ``time`` and ``duration``."""
 
 
-@lru_cache(maxsize=4096)
 def ros1_fields(cls: Any) -> tuple[Slot, ...]:
     """Return the fields of a message class in the order of ROS 1's layout."""
+    return _ros1_fields(cls)
+
+
+@lru_cache(maxsize=4096)
+def _ros1_fields(cls: Any) -> tuple[Slot, ...]:
     kind = _STAMPS.get(cls._type)
     if kind is not None:
         return tuple(Slot(slot.name, kind, 0, "one", 0) for slot in slots(cls))
-    absent = _ADDED_BY_ROS2.get(cls._type, frozenset())
+    absent = _ADDED_BY_ROS2.get(cls._type, set())
     fields = tuple(slot for slot in slots(cls) if slot.name not in absent)
-    return (SEQ, *fields) if issubclass(cls, Sequenced) else fields
+    return (SEQ, *fields) if cls._sequenced else fields

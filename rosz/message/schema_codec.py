@@ -12,7 +12,8 @@ from array import array
 from typing import Any, NoReturn, TypeVar
 
 from rosz.errors import DecodeError, EncodeError
-from rosz.message.base import (
+from rosz.message.ros1_layout import ros1_fields
+from rosz.message.schema import (
     ARRAY_CODES,
     INTEGER_RANGES,
     OCTETS,
@@ -21,7 +22,6 @@ from rosz.message.base import (
     Slot,
     slots,
 )
-from rosz.message.ros1_layout import ros1_fields
 from rosz.message.sequences import (
     TRUTH,
     flags,
@@ -248,11 +248,16 @@ class _Writer:
             self._one(slot, element, f"{path}[{index}]")
 
 
+def _utf_8(value: Any) -> bytes:
+    encoded: bytes = value.encode()
+    return encoded
+
+
 class _Ros1Writer(_Writer):
     """The encoded bytes in ROS 1's layout."""
 
     _fields = staticmethod(ros1_fields)
-    _text_bytes = staticmethod(str.encode)
+    _text_bytes = staticmethod(_utf_8)
     _zeros = 0
 
     def _align(self, size: int) -> None:

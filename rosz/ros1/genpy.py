@@ -1,8 +1,6 @@
 """genpy: messages, times and durations as generated ROS 1 code uses them (ROS wiki, genpy).
 
-``genpy.dynamic`` is missing: rosz compiles definitions with ``rosz.typestore``. The methods
-``serialize`` and ``deserialize`` of a message use CDR, the format of messages on the network, and
-not ROS 1's.
+``genpy.dynamic`` is missing: rosz compiles definitions with ``rosz.typestore``.
 """
 
 from __future__ import annotations

@@ -212,7 +212,7 @@ def test_published_by_a_program_that_ends(world: World) -> None:
     link(robot, laptop, linked="core")
     listener = listen(laptop, "listener")
     laptop.link.degrade(rate=_BYTES_PER_SECOND)
-    talker = robot.program(TALKER, "2000000")
+    talker = robot.program(TALKER, "500000")
     talker.wait_for("talking")
     talker.say("1 0 2 0")
     talker.wait_for("longest")

@@ -180,7 +180,7 @@ def test_services() -> None:
 def test_genpy_spellings_of_the_codec() -> None:
     buffer = io.BytesIO()
     String("hi").serialize(buffer)
-    assert buffer.getvalue() == String("hi").to_cdr()
+    assert buffer.getvalue() == String("hi").to_ros1() == b"\x02\0\0\0hi"
     message = String("old")
     assert message.deserialize(buffer.getvalue()) is message
     assert message.data == "hi"

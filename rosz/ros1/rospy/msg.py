@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 from rosz.errors import EncodeError
-from rosz.message import Writable
+from rosz.message import Message, Writable
 from rosz.time import DurationValue, TimeValue
 
 __all__ = ("AnyMsg", "args_kwds_to_message", "encode", "in_words_of_genpy", "to_ros1_log")
@@ -18,7 +18,8 @@ class AnyMsg:
     """A message of any type, not decoded.
 
     Attributes:
-        _buff: Bytes of the message in CDR, including the header of four bytes.
+        _buff: Bytes of the message in ROS 1's layout. A received message is converted when they are
+            asked for; reading them raises TypeNotFound where the type is not known here.
         _connection_header: ``type``, ``md5sum``, ``message_definition``, ``topic``, ``callerid``.
     """
 
@@ -26,13 +27,50 @@ class AnyMsg:
     _type: ClassVar[str] = "*"
     _has_header: ClassVar[bool] = False
     _full_text: ClassVar[str] = ""
-    __slots__ = ("_buff", "_connection_header")
+    __slots__ = ("_bytes", "_connection_header", "_find_type", "_payload")
 
     def __init__(self, *args: object) -> None:
         if args:
             raise TypeError(f"AnyMsg takes no values, got {len(args)}")
-        self._buff = b""
+        self._bytes: bytes | None = b""
+        self._payload: Any = None
+        self._find_type: Any = None
         self._connection_header: dict[str, str] = {}
+
+    @classmethod
+    def received(
+        cls, payload: bytes, header: dict[str, str], find_type: Callable[[str], type[Message]]
+    ) -> Self:
+        """Return the message that a sample holds.
+
+        Args:
+            payload: The sample's bytes in CDR.
+            header: The connection header.
+            find_type: Function that returns a message class by its name.
+        """
+        message = cls()
+        message._bytes, message._payload = None, payload
+        message._connection_header, message._find_type = header, find_type
+        return message
+
+    @property
+    def _buff(self) -> bytes:
+        if self._bytes is None:
+            kind = self._find_type(self._connection_header["type"])
+            self._bytes = kind.from_cdr(self._payload).to_ros1()
+        return self._bytes
+
+    @_buff.setter
+    def _buff(self, data: bytes) -> None:
+        self._bytes, self._payload = data, None
+
+    def payload(self, kind: type[Message]) -> bytes:
+        """Return the bytes in CDR of a message of a type.
+
+        Raises:
+            DecodeError: The bytes are not a message of this type.
+        """
+        return self._payload if self._payload is not None else kind.from_ros1(self._buff).to_cdr()
 
     def serialize(self, buff: Writable) -> None:
         """Write the bytes to a file-like object."""

@@ -361,7 +361,7 @@ class _SharedPublisher(_Shared):
                 package, _, name = origin["type"].partition("/")
                 kind: Any = node.context.types.message(f"{package}/msg/{name}")
                 self._publisher = self._declare(node, kind, QoS())
-        self._publisher.publish_raw(message._buff)  # noqa: SLF001
+        self._publisher.publish_raw(message.payload(self._publisher.message_type))
 
     def _refuse(self, publisher: NodePublisher[Any], error: EncodeError) -> None:
         """Raise an error for an invalid message; without subscribers only log it, as in rospy."""
@@ -535,10 +535,8 @@ class _SharedSubscription(_Shared):
         self._receive(to_ros1_log(message), info)
 
     def _receive_any(self, payload: bytes, info: MessageInfo) -> None:
-        message = AnyMsg()
-        message._buff = payload  # noqa: SLF001  # rospy's names for it
-        message._connection_header = self.connection_header(info)  # noqa: SLF001
-        self._receive(message, info)
+        header = self.connection_header(info)
+        self._receive(AnyMsg.received(payload, header, context().types.message), info)
 
     def _deliver(self, message: Any, info: MessageInfo, members: tuple[_Member, ...]) -> None:
         state.local.delivery = (message, self, info)
