@@ -1,0 +1,157 @@
+"""The programs ``transform`` and ``relay_field``: messages made of parts of other messages.
+
+Both evaluate Python that the command line gives, with the message, or its field, as ``m``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import yaml
+
+from rosz.errors import NotFoundError, RoszError
+from rosz.introspect.fields import Target, find_target
+from rosz.message.convert import fill_message_args
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.node import Node, serve_loggers
+from rosz.programs.topic_tools.passing import words
+
+__all__ = ("relay_field", "transform")
+
+_FOREVER = 1e9
+_NANOSECONDS = 1_000_000_000
+
+
+def transform() -> None:
+    """Publish what an expression makes of each message."""
+    parser = _parser("Publish what a Python expression makes of each message, or field, 'm'.")
+    parser.add_argument("expression", nargs="?", default="m", help="expression with 'm' in it")
+    parser.add_argument(
+        "-i", "--import", dest="modules", nargs="+", default=["numpy"], help="modules to import"
+    )
+    parser.add_argument("--latch", action="store_true", help="keep the last message for newcomers")
+    options = parser.parse_args(words())
+    modules = _import_all(options.modules)
+    code = _compile(parser, options.expression)
+
+    def make(node: Node, message_type: type[Any], part: Any) -> Any:  # noqa: ARG001
+        result = eval(code, dict(modules), {"m": part})  # noqa: S307  # what the program is for
+        return message_type(*(result if isinstance(result, list | tuple) else [result]))
+
+    _run("transform", options, make, latch=options.latch)
+
+
+def relay_field() -> None:
+    """Publish messages whose fields are expressions on each message."""
+    parser = _parser("Publish messages whose fields are given in YAML, as expressions on 'm'.")
+    parser.add_argument("expression", help="fields in YAML, such as 'frame_id: m.data'")
+    options = parser.parse_args(words())
+    try:
+        fields = yaml.safe_load(options.expression)
+    except yaml.YAMLError as error:
+        parser.error(f"the fields are not YAML: {error}")
+    if not isinstance(fields, dict):
+        parser.error(f"expected fields in YAML, such as 'data: m.x', got '{options.expression}'")
+
+    def make(node: Node, message_type: type[Any], part: Any) -> Any:
+        now = Time(*divmod(node.now(), _NANOSECONDS))
+        message = message_type()
+        fill_message_args(message, [_evaluate(fields, part)], {"now": now})
+        return message
+
+    _run("relay_field", options, make)
+
+
+def _parser(description: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("input", help="topic, or field of a topic")
+    parser.add_argument("output_topic", help="topic to publish")
+    parser.add_argument("output_type", help="type of that topic")
+    parser.add_argument(
+        "--wait-for-start", action="store_true", help="wait until the input is published"
+    )
+    parser.add_argument("--tcpnodelay", action="store_true", help="ignored: there is no TCPROS")
+    return parser
+
+
+def _import_all(modules: list[str]) -> dict[str, Any]:
+    """Return the modules by their first names; one that is missing is reported."""
+    found: dict[str, Any] = {}
+    for name in modules:
+        try:
+            found[name] = import_module(name)
+        except ImportError as error:
+            sys.stderr.write(f"transform: cannot import module '{name}': {error}\n")
+    for name in [name for name in found if "." in name]:
+        found[name.partition(".")[0]] = import_module(name.partition(".")[0])
+    return found
+
+
+def _compile(parser: argparse.ArgumentParser, expression: str) -> Any:
+    try:
+        return compile(expression.strip(), "<expression>", "eval")
+    except SyntaxError as error:
+        parser.error(f"'{expression}' is not a Python expression: {error.msg}")
+
+
+def _evaluate(fields: Any, part: Any) -> Any:
+    """Return fields with their texts evaluated; a text that is no expression stays as it is."""
+    if isinstance(fields, dict):
+        return {name: _evaluate(value, part) for name, value in fields.items()}
+    if not isinstance(fields, str):
+        return fields
+    try:
+        return eval(fields, {}, {"m": part})  # noqa: S307  # what the program is for
+    except (NameError, SyntaxError):
+        return fields
+
+
+def _run(
+    name: str,
+    options: argparse.Namespace,
+    make: Callable[[Node, type[Any], Any], Any],
+    *,
+    latch: bool = False,
+) -> None:
+    """Publish what a function makes of the messages, or fields, of the input."""
+    with Node(name, anonymous=True) as node:
+        serve_loggers(node)
+        try:
+            message_type = node.context.types.message(options.output_type)
+            target = _find(node, options.input, wait=options.wait_for_start)
+        except RoszError as error:
+            if node.is_shutdown:
+                return
+            sys.exit(f"{name}: {error}")
+        output = node.publisher(options.output_topic, message_type, queue_size=1, latch=latch)
+
+        def pass_on(message: Any) -> None:
+            output.publish(make(node, message_type, target.path.read(message)))
+
+        node.subscription(target.topic, target.type_name, pass_on)
+        node.spin()
+
+
+def _find(node: Node, name: str, *, wait: bool) -> Target:
+    """Return the topic that a text names, and the field of its messages."""
+    head, bracket, rest = name.partition("[")
+    name = f"{node.resolve(head)}{bracket}{rest}"
+    graph, load = node.context.graph, node.context.types.message
+
+    def found(topics: Any) -> Target | None:
+        try:
+            return find_target(name, topics, load)
+        except NotFoundError:
+            if wait:
+                return None
+            raise
+
+    view = graph.refresh()
+    if wait and found(view.topics()) is None:
+        sys.stderr.write(f"WARNING: topic [{name}] does not appear to be published yet\n")
+        view = graph.wait_for(lambda view: found(view.topics()) is not None, _FOREVER, name)
+    return find_target(name, view.topics(), load)

@@ -1,0 +1,197 @@
+"""Topics of any type: an input that is received as bytes, and an output that sends such bytes.
+
+What an output is, its type and whether it latches, follows from the first message that it sends, as
+in ROS 1. No definition of the type is needed.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any, cast
+
+from rosz import names
+from rosz.errors import InvalidName
+from rosz.message import Message
+from rosz.node import MessageInfo, Node, Publisher, Subscription
+from rosz.qos import QoS
+
+__all__ = ("NONE", "Input", "Output", "base_name", "words")
+
+NONE = "__none"
+"""What stands for no topic in a mux and a demux."""
+
+_DEPTH = 10
+
+Receive = Callable[[bytes, MessageInfo, "Input"], object]
+
+
+def words() -> list[str]:
+    """Return the command line of the program without its name, remappings and parameters."""
+    return [word for word in sys.argv[1:] if ":=" not in word]
+
+
+def base_name(topic: str) -> str:
+    """Return the last part of the name of a topic, which is part of the name of a node.
+
+    Ends the program if the text is not the name of a topic.
+    """
+    try:
+        names.check(topic)
+    except InvalidName as error:
+        sys.exit(f"{sys.argv[0].rpartition('/')[2]}: {error}")
+    return names.basename(topic).strip("~/") or "root"
+
+
+class Input:
+    """A topic that is received while it is open.
+
+    Args:
+        node: The node.
+        topic: Name of the topic.
+        receive: Function that gets the bytes of a message, its info, and this input.
+        unreliable: Whether samples may be lost, which a slow link then does not delay.
+
+    Attributes:
+        name: Global name of the topic.
+    """
+
+    def __init__(
+        self, node: Node, topic: str, receive: Receive, *, unreliable: bool = False
+    ) -> None:
+        self.name: str = node.resolve(topic)
+        self._node = node
+        self._receive = receive
+        self._qos = QoS(_DEPTH, "best_effort" if unreliable else "reliable")
+        self._lock = threading.Lock()
+        self._subscription: Subscription[Any] | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether messages are received."""
+        return self._subscription is not None
+
+    def is_latched(self, info: MessageInfo) -> bool:
+        """Return whether the publishers of a type latch their messages."""
+        publishers = self._node.context.graph.view().publishers(self.name)
+        return any(
+            token.qos is not None and token.qos.latched
+            for token in publishers
+            if token.type_hash == info.type_hash
+        )
+
+    def open(self) -> None:
+        """Subscribe; a second call has no effect."""
+        with self._lock:
+            if self._subscription is None:
+                self._subscription = self._node.subscription(
+                    self.name,
+                    None,
+                    lambda data, info: self._receive(data, info, self),
+                    qos=self._qos,
+                    raw=True,
+                    with_info=True,
+                )
+
+    def close(self) -> None:
+        """Unsubscribe; a second call has no effect."""
+        with self._lock:
+            closing, self._subscription = self._subscription, None
+        if closing is not None:
+            closing.close()
+
+
+class Output:
+    """A topic to send to.
+
+    Args:
+        node: The node.
+        topic: Name of the topic.
+        latch: Whether late subscribers get the last message; as the input does when None.
+        changed: Function called whenever a subscriber has come or gone.
+
+    Attributes:
+        name: Global name of the topic.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        *,
+        latch: bool | None = None,
+        changed: Callable[[], object] | None = None,
+    ) -> None:
+        self.name: str = node.resolve(topic)
+        self._node = node
+        self._latch = latch
+        self._changed = changed
+        self._lock = threading.Lock()
+        self._publisher: Publisher[Any] | None = None
+        self._refused: set[str] = set()
+
+    @property
+    def advertised(self) -> bool:
+        """Whether the topic is announced, which the first message does."""
+        return self._publisher is not None
+
+    @property
+    def subscribed(self) -> bool:
+        """Whether anybody subscribes to it."""
+        return self._publisher is not None and bool(self._publisher.subscribers())
+
+    def advertise(self, info: MessageInfo, source: Input) -> None:
+        """Announce the topic with the type of a message; a second call has no effect."""
+        with self._lock:
+            if self._publisher is not None:
+                return
+            latch = source.is_latched(info) if self._latch is None else self._latch
+            kind = _message_type(info)
+            self._publisher = made = self._node.publisher(
+                self.name, kind, queue_size=_DEPTH, latch=latch
+            )
+        self._node.log.info("advertised as %s", self.name)
+        if self._changed is not None:
+            made.on_connection(lambda _: self._notify(), lambda _: self._notify())
+
+    def _notify(self) -> None:
+        if self._changed is not None:
+            self._changed()
+
+    def close(self) -> None:
+        """Take the topic back; a second call has no effect."""
+        with self._lock:
+            closing, self._publisher = self._publisher, None
+        if closing is not None:
+            closing.close()
+
+    def publish(self, data: bytes, info: MessageInfo, source: Input) -> None:
+        """Send a message; one of another type than the first is reported once and dropped."""
+        self.advertise(info, source)
+        publisher = self._publisher
+        if publisher is None:
+            return
+        if publisher.token.type_hash == info.type_hash:
+            publisher.publish_raw(data)
+        elif info.type_hash not in self._refused:
+            self._refused.add(info.type_hash)
+            self._node.log.warning(
+                "dropping what '%s' brings of type %s: '%s' has type %s",
+                source.name,
+                info.type_name,
+                self.name,
+                publisher.token.type_name,
+            )
+
+
+def _message_type(info: MessageInfo) -> type[Message]:
+    """Return what a publisher needs to know of a type, which may have no definition here."""
+    package, _, name = info.type_name.split("/")
+    fields = {
+        "_type": f"{package}/{name}",
+        "_type_name": info.type_name,
+        "_type_hash": info.type_hash,
+        "_encode": staticmethod(bytes),
+    }
+    return cast("type[Message]", type(name, (), fields))
