@@ -101,7 +101,7 @@ class Ros1Reader:
         self.connections: list[Connection] = []
         self._ranks: dict[int, int] = {}
         self._chunks: list[_Chunk] = []
-        self._damage: list[Exception] = []
+        self._damage: list[BagError] = []
         self._buffers: OrderedDict[int, bytes] = OrderedDict()
         try:
             self._file = path.open("rb", buffering=0)
@@ -215,7 +215,7 @@ class Ros1Reader:
     def _scan_chunk(self, head: RecordHead, place: int) -> None:
         chunk = _Chunk(place, 0, 0, {}, head)
         stamps: list[int] = []
-        problems: list[Exception] = []
+        problems: list[BagError] = []
         self._chunks.append(chunk)
         buffer = self._load(chunk, problems.append)
         for when, connection, _ in self._walk(chunk, buffer, problems.append):
@@ -368,7 +368,6 @@ class Ros1Reader:
                         uncompressed=number(head.fields, "size", one.offset),
                         start=one.start,
                         end=one.end,
-                        count=sum(one.counts.values()),
                     )
                 )
             except RecordError:

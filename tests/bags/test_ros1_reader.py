@@ -75,7 +75,7 @@ def test_chunks_that_overlap_are_merged(tmp_path: Path) -> None:
 
 
 def _read(path: Path) -> tuple[list[bytes], list[str]]:
-    problems: list[Exception] = []
+    problems: list[BagError] = []
     with Ros1Reader(path) as bag:
         found = [bytes(one.data) for one in bag.messages(damaged=problems.append)]
     return found, [str(one) for one in problems]
