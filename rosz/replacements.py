@@ -27,9 +27,7 @@ _IMAGES = (
     "numpy.frombuffer(image.data, numpy.uint8).reshape(image.height, image.width, -1) is the array"
     " that OpenCV takes: pip install 'rosz[numpy]' opencv-python"
 )
-_BAGS = (
-    "rosz has no bags yet; " + _of_ros2("'ros2 bag record'") + "; 'pip install rosbags' reads files"
-)
+_BAGS = "use 'rosz bag info', 'rosz bag play' and 'rosz bag export'; Foxglove shows MCAP files"
 _GAZEBO = "'rosz launch turtlebot3_sim turtlebot3_sim.launch' simulates a TurtleBot3; " + _of_ros2(
     "ros_gz_bridge"
 )
@@ -46,7 +44,6 @@ COMMANDS = {
     "gzclient": _GAZEBO,
     "gzserver": _GAZEBO,
     "ros2": "'rosz topic', 'rosz node', 'rosz param' and so on take its place: rosz --help",
-    "rosbag": _BAGS,
     "rosclean": "the size of log files is bounded; remove old ones by hand",
     "rosdep": _NOTHING_TO_INSTALL,
     "rosinstall": "git gets sources; a package below 'src' of the workspace is found as it is",

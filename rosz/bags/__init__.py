@@ -8,7 +8,7 @@
 
 `BagReader` and `BagWriter` are what every format offers, with encoded messages. The package may
 import nodes, and what stands below them; the libraries of the extra ``rosz[bag]`` are imported
-where they are used.
+where they are used. Commands import its public modules alone, since they have to start fast.
 """
 
 from rosz.bags.bag import (
@@ -27,6 +27,8 @@ from rosz.bags.mcap_writer import McapWriter
 from rosz.bags.messages import Bag, BagMessage, BagOutput, class_of, decoder_of
 from rosz.bags.opening import create_writer, find_format, open, open_reader  # noqa: A004
 from rosz.bags.qos_text import format_profiles, parse_profiles
+
+PUBLIC_MODULES = ("opening", "repair")
 
 __all__ = (
     "Attachment",

@@ -250,6 +250,13 @@ class BagWriter(Protocol):
             BagError: The file cannot be written.
         """
 
+    def add_attachment(self, attachment: Attachment) -> None:
+        """Write a file into the bag; a format that has none leaves it out.
+
+        Raises:
+            BagError: The file cannot be written.
+        """
+
     def flush(self) -> None:
         """Write everything so far to the file.
 

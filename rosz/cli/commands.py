@@ -18,6 +18,7 @@ COMMANDS = {
     "param": "get and set parameters",
     "reconfigure": "read and change settings of nodes while they run",
     "topic": "list, show, measure and publish topics",
+    "bag": "record and play bags, show, change and repair them",
     "service": "list and call services",
     "node": "list, inspect, ping and kill nodes",
     "msg": "show message types",

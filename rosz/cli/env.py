@@ -35,6 +35,7 @@ ALIASES = {
     "rosrun": "run",
     "rosservice": "service",
     "rossrv": "srv",
+    "rosbag": "bag",
     "rostopic": "topic",
     "roswtf": "doctor",
     "xacro": "run xacro xacro",

@@ -1,0 +1,197 @@
+"""Copying bags: to recover what can be read, to give them an index, to compress them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from rosz.bags.bag import BagReader, BagWriter, Channel, Compression, Entry
+from rosz.bags.messages import class_of
+from rosz.bags.opening import create_writer, open_reader
+from rosz.errors import BagError, RoszError
+from rosz.typestore import TypeStore
+
+__all__ = (
+    "ACTIVE",
+    "Copied",
+    "Difference",
+    "check_bag",
+    "copy_bag",
+    "find_differences",
+    "recover",
+    "rewrite",
+)
+
+ACTIVE = ".active"
+"""Suffix of a bag that is being recorded, or was when its recorder was killed."""
+
+
+class Copied(msgspec.Struct):
+    """What became of a bag that was copied.
+
+    Attributes:
+        path: The new bag.
+        backup: Where the old one is, if it had the same name.
+        count: Number of messages in the new one.
+        problems: What was damaged, and is left out.
+    """
+
+    path: Path
+    backup: Path | None
+    count: int
+    problems: list[BagError]
+
+
+class Difference(msgspec.Struct, frozen=True):
+    """A type that has another definition here than in a bag.
+
+    Attributes:
+        type: ``pkg/msg/Name``.
+        reason: What is different.
+    """
+
+    type: str
+    reason: str
+
+
+def copy_bag(reader: BagReader, writer: BagWriter, problems: list[BagError] | None = None) -> int:
+    """Write everything in a bag into another one of the same encoding.
+
+    Args:
+        reader: The bag to read.
+        writer: The bag to write.
+        problems: List that damaged parts are added to; the first one is raised when not given.
+
+    Returns:
+        The number of messages.
+
+    Raises:
+        BagError: A part of the bag is damaged, or the other one cannot be written.
+    """
+    handles = {channel: writer.add(channel) for channel in reader.channels}
+    for name, texts in reader.metadata.items():
+        writer.add_metadata(name, texts)
+    for attachment in reader.attachments():
+        writer.add_attachment(attachment)
+    count = 0
+    entry: Entry
+    for entry in reader.messages(damaged=None if problems is None else problems.append):
+        handle = handles[entry.channel]
+        writer.write(handle, entry.stamp, entry.data, entry.sent, entry.sequence)
+        count += 1
+    return count
+
+
+def recover(path: Path, target: Path, *, compression: Compression = "none") -> Copied:
+    """Write what can be read of a bag into a new one.
+
+    Args:
+        path: The bag, which may be damaged or have no index.
+        target: The new bag; must not exist.
+        compression: Compression of the new bag.
+
+    Raises:
+        BagError: The bag cannot be read at all, or the new one cannot be written.
+        UsageError: The format of the new bag has no such compression.
+    """
+    with open_reader(path) as reader:
+        problems = list(reader.problems)
+        with create_writer(target, compression=compression) as writer:
+            count = copy_bag(reader, writer, problems)
+    return Copied(target, None, count, problems)
+
+
+def rewrite(
+    path: Path,
+    compression: Compression | None,
+    *,
+    folder: Path | None = None,
+    force: bool = False,
+) -> Copied:
+    """Replace a bag by a copy, and keep the old one as ``NAME.orig.SUFFIX``, as rosbag does.
+
+    The copy takes its place when it is complete. ``NAME.SUFFIX.active`` stays as it is, and the
+    copy is ``NAME.SUFFIX``.
+
+    Args:
+        path: The bag.
+        compression: Compression of the copy; that of the bag when not given.
+        folder: Folder of the copy, where it has the name of the bag; the bag then stays as it is.
+        force: Whether an older backup is replaced.
+
+    Raises:
+        BagError: There is a backup already, the bag cannot be read at all, or the copy cannot be
+            written.
+        UsageError: The format has no such compression.
+    """
+    name = path.name.removesuffix(ACTIVE)
+    target = (folder or path.parent) / name
+    in_place = target.absolute() == path.absolute()
+    backup = path.with_name(f"{path.stem}.orig{path.suffix}") if in_place else None
+    if backup is not None and backup.exists() and not force:
+        raise BagError(f"the backup '{backup}' exists already; -f replaces it", str(path))
+    if backup is None and target.exists():
+        raise BagError(f"'{target}' exists already", str(path))
+    made = target.with_name(f"{target.stem}.part{os.getpid()}{target.suffix}")
+    try:
+        with open_reader(path) as reader:
+            wanted = _compression_of(reader) if compression is None else compression
+        copied = recover(path, made, compression=wanted)
+        if backup is not None:
+            path.replace(backup)
+        made.replace(target)
+    finally:
+        made.unlink(missing_ok=True)
+    return msgspec.structs.replace(copied, path=target, backup=backup)
+
+
+def _compression_of(reader: BagReader) -> Compression:
+    found: list[Compression] = [chunk.compression for chunk in reader.chunks]
+    return max(found, key=found.count) if found else "none"
+
+
+def check_bag(path: Path) -> tuple[int, list[BagError]]:
+    """Read a whole bag.
+
+    Returns:
+        The number of messages that can be read, and what is damaged.
+
+    Raises:
+        BagError: The bag cannot be read at all.
+    """
+    with open_reader(path) as reader:
+        problems = list(reader.problems)
+        count = sum(1 for _ in reader.messages(damaged=problems.append))
+    return count, problems
+
+
+def find_differences(channels: Sequence[Channel], types: TypeStore) -> list[Difference]:
+    """Return the types that have another definition here than in a bag.
+
+    Args:
+        channels: Channels of the bag.
+        types: The types that are known here.
+    """
+    found: dict[str, Difference] = {}
+    for channel in channels:
+        reason = _difference(channel, types)
+        if reason:
+            found.setdefault(channel.type, Difference(channel.type, reason))
+    return sorted(found.values(), key=lambda one: one.type)
+
+
+def _difference(channel: Channel, types: TypeStore) -> str:
+    try:
+        recorded = class_of(channel, types)
+    except RoszError as error:
+        return f"the definition in the bag cannot be used: {error}"
+    try:
+        known = types.message(channel.type)
+    except RoszError:
+        return ""  # the definition in the bag serves
+    if known is recorded or known._md5sum == recorded._md5sum:
+        return ""
+    return f"its hash is {recorded._md5sum} in the bag, and {known._md5sum} here"

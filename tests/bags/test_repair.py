@@ -1,0 +1,130 @@
+"""Bags that are damaged or unfinished: recovered, indexed, compressed."""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+
+import pytest
+
+from rosz.bags import Channel, McapReader, McapWriter
+from rosz.bags.repair import check_bag, recover, rewrite
+from rosz.cli.main import run
+from rosz.errors import BagError
+from rosz.msgs.std_msgs.msg import String
+
+CHATTER = Channel("/chatter", "std_msgs/msg/String", definition="string data\n")
+COUNT = 500
+
+
+def unfinished(path: Path) -> bytes:
+    """Write a bag as it is before its recorder ends; return the bytes of the finished one."""
+    with McapWriter(path, chunk_size=4000) as writer:
+        handle = writer.add(CHATTER)
+        for number in range(COUNT):
+            writer.write(handle, number, String(data=f"hello {number}").to_cdr())
+        writer.flush()
+        begun = path.read_bytes()
+    whole = path.read_bytes()
+    path.write_bytes(begun)
+    return whole
+
+
+def test_reindex_replaces_the_bag_and_keeps_the_old_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    whole = unfinished(path)
+    begun = path.read_bytes()
+    copied = rewrite(path, None)
+    assert (copied.count, copied.backup) == (COUNT, tmp_path / "a.orig.mcap")
+    assert (tmp_path / "a.orig.mcap").read_bytes() == begun
+    with McapReader(path) as reader:
+        assert reader.indexed
+        assert [one.data for one in reader.messages()] == [
+            String(data=f"hello {number}").to_cdr() for number in range(COUNT)
+        ]
+    path.write_bytes(whole)
+    with pytest.raises(BagError, match="exists already; -f replaces it"):
+        rewrite(path, None)
+    assert path.read_bytes() == whole
+    assert rewrite(path, "zstd", force=True).count == COUNT
+    assert path.stat().st_size < len(whole) / 2
+    assert {one.name for one in tmp_path.iterdir()} == {"a.mcap", "a.orig.mcap"}
+
+
+def test_an_active_bag_gets_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap.active"
+    unfinished(path)
+    assert rewrite(path, None).path == tmp_path / "a.mcap"
+    assert path.exists()
+    with pytest.raises(BagError, match="exists already"):
+        rewrite(path, None)
+
+
+def test_the_rest_of_a_damaged_bag_is_recovered(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, target = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    path.write_bytes(unfinished(path))
+    with McapReader(path) as reader:
+        chunk = reader.chunks[2]
+    data = bytearray(path.read_bytes())
+    data[chunk.offset + 300] ^= 4
+    path.write_bytes(data)
+
+    count, problems = check_bag(path)
+    assert [one.offset for one in problems] == [chunk.offset]
+    assert run(["bag", "check", str(path)]) == 1
+    assert f"ERROR: {path} at byte {chunk.offset}: the checksum" in capsys.readouterr().err
+    assert run(["bag", "fix", str(path), str(target)]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == f"{target}: {count} messages\n"
+    assert f"{path} at byte {chunk.offset}" in captured.err
+    assert run(["bag", "check", str(target), "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert row == {"bag": str(target), "messages": count, "problems": [], "types": {}}
+    assert run(["bag", "fix", str(path), str(target)]) == 1
+    assert "File exists" in capsys.readouterr().err
+
+
+def test_a_bag_cut_anywhere_is_recovered_up_to_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    whole = unfinished(path)
+    counts = []
+    for size in range(100, len(whole), 1000):
+        path.write_bytes(whole[:size])
+        copied = recover(path, tmp_path / f"{size}.mcap")
+        counts.append(copied.count)
+        assert check_bag(copied.path) == (copied.count, [])
+    assert counts == sorted(counts)
+    assert counts[-1] == COUNT
+
+
+def test_compress_and_decompress(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(unfinished(path))
+    folder = tmp_path / "out"
+    folder.mkdir()
+    assert run(["bag", "compress", "--lz4", str(path), "--output-dir", str(folder)]) == 0
+    assert capsys.readouterr().out == f"{folder / 'a.mcap'}: {COUNT} messages\n"
+    with McapReader(folder / "a.mcap") as reader:
+        assert {one.compression for one in reader.chunks} == {"lz4"}
+    assert run(["bag", "decompress", "-q", str(folder / "a.mcap")]) == 0
+    assert capsys.readouterr().out == ""
+    with McapReader(folder / "a.mcap") as reader:
+        assert {one.compression for one in reader.chunks} == {"none"}
+        assert reader.count() == COUNT
+    assert run(["bag", "compress", "-j", str(path)]) == 2
+    assert "MCAP has no compression 'bz2'" in capsys.readouterr().err
+    assert path.exists()
+    assert run(["bag", "reindex", str(tmp_path / "none.mcap")]) == 1
+    assert "cannot open it: No such file" in capsys.readouterr().err
+
+
+def test_types_that_differ_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.mcap"
+    with McapWriter(path) as writer:
+        handle = writer.add(Channel("/a", "std_msgs/msg/String", definition="string text\n"))
+        writer.write(handle, 1, random.Random(1).randbytes(8))
+    assert run(["bag", "check", str(path)]) == 1
+    assert "std_msgs/msg/String: its hash is " in capsys.readouterr().out
