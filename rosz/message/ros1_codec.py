@@ -136,9 +136,9 @@ class _Writer:
     def joined(self) -> str:
         """Return an expression of all bytes."""
         self._flush()
-        if len(self._pieces) == 1:
-            return f"bytes({self._pieces[0]})"  # an array's buffer, or bytes as they are
-        return f'b"".join(({", ".join(self._pieces)}))' if self._pieces else 'b""'
+        if len(self._pieces) == 1 and self._pieces[0].endswith(")"):  # a call, which returns bytes
+            return self._pieces[0]
+        return f'b"".join(({", ".join(self._pieces)},))' if self._pieces else 'b""'
 
     def _piece(self, expression: str) -> None:
         self._flush()

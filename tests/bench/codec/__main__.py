@@ -15,11 +15,11 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from .cases import CASES, VARIANTS
-from .systems import Genpy, Rosbags, Rosz, System
+from .systems import Genpy, Rosbags, Rosz, RoszInRos1, System
 
 
 def available() -> Iterator[System]:
-    for system in (Rosz, Genpy, Rosbags):
+    for system in (Rosz, RoszInRos1, Genpy, Rosbags):
         try:
             yield system()
         except ImportError as error:
@@ -69,12 +69,14 @@ def main() -> None:
     titles = [case[0] for case in CASES]
     print("| as | " + " | ".join(titles) + " |")
     print("|---" * (len(titles) + 1) + "|")
-    for system in systems[1:]:
-        cells = []
-        for title in titles:
-            ours, theirs = figures[title, "rosz"], figures[title, system.name]
-            cells.append(f"{theirs[0] / ours[0]:.1f} / {theirs[1] / ours[1]:.1f}")
-        print(f"| {system.name} | " + " | ".join(cells) + " |")
+    for name, own, other in (
+        *((system.name, Rosz.name, system.name) for system in systems[2:]),
+        ("genpy, ROS 1's layout", RoszInRos1.name, Genpy.name),
+    ):
+        if any(system.name == other for system in systems):
+            pairs = [(figures[title, own], figures[title, other]) for title in titles]
+            cells = [f"{b[0] / a[0]:.1f} / {b[1] / a[1]:.1f}" for a, b in pairs]
+            print(f"| {name} | " + " | ".join(cells) + " |")
     if options.times:
         for system in systems:
             cells = [

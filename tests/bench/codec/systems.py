@@ -36,10 +36,12 @@ class System(Protocol):
 
 
 class RoszCodec:
-    def __init__(self, cls: type[Message]) -> None:
+    def __init__(
+        self, cls: type[Message], encode: Callable[[Any], Any], decode: Callable[[Any], Any]
+    ) -> None:
         self._cls = cls
-        self.encode = cls._encode
-        self.decode = cls._decode
+        self.encode = encode
+        self.decode = decode
 
     def build(self, plain: Plain) -> Any:
         return _build_rosz(self._cls, plain)
@@ -66,7 +68,21 @@ class Rosz:
         self._store = TypeStore()
 
     def codec(self, type_name: str) -> Codec:
-        return RoszCodec(self._store.message(type_name))
+        cls = self._store.message(type_name)
+        return RoszCodec(cls, cls._encode, cls._decode)
+
+
+class RoszInRos1:
+    """Rosz with ROS 1's byte layout."""
+
+    name = "rosz, ROS 1"
+
+    def __init__(self) -> None:
+        self._store = TypeStore()
+
+    def codec(self, type_name: str) -> Codec:
+        cls = self._store.message(type_name)
+        return RoszCodec(cls, cls._encode_ros1, cls._decode_ros1)
 
 
 class GenpyCodec:
