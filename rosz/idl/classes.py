@@ -202,12 +202,11 @@ def _zeros(kind: FieldType, names: ClassNames) -> str:
     fixed = kind.size if kind.shape == "fixed" else 0
     if kind.base in OCTETS:
         return names.module.define("_z", f"bytes({fixed})") if fixed else 'b""'
-    if kind.base in ARRAY_CODES:
-        maker, size = ("zeros", f", {fixed}") if fixed else ("empty", "")
-        make = f'{names.module.use(maker)}("{ARRAY_CODES[kind.base]}"{size})'
-        return f"_field(default_factory={names.module.define('_d', make)})"
     if not fixed:
         return "[]"
+    if kind.base in ARRAY_CODES:
+        make = f"([{_zero(kind, names)}] * {fixed}).copy"
+        return f"_field(default_factory={names.module.define('_d', make)})"
     if kind.primitive:
         return f"_field(default_factory=lambda: [{_zero(kind, names)}] * {fixed})"
     return f"_field(default_factory=lambda: [{names.cls(kind.base)}() for _ in range({fixed})])"
@@ -221,8 +220,6 @@ def _default_list(kind: FieldType, values: tuple[Scalar, ...], names: ClassNames
     listed = f"[{', '.join(_literal(value) for value in values)}]"
     if kind.base in OCTETS:
         return names.module.define("_z", repr(bytes(int(value) & 0xFF for value in values)))
-    if kind.base in ARRAY_CODES:
-        return f'_field(default_factory=lambda: _array("{ARRAY_CODES[kind.base]}", {listed}))'
     return f"_field(default_factory=lambda: {listed})"
 
 

@@ -32,7 +32,6 @@ __all__ = (
     "StringList",
     "Template",
     "decode_plainly",
-    "empty",
     "encode_plainly",
     "flags",
     "numbers",
@@ -42,7 +41,6 @@ __all__ = (
     "read_flags",
     "read_wide",
     "texts",
-    "zeros",
 )
 
 _T = TypeVar("_T")
@@ -122,13 +120,3 @@ def read_block(code: str, data: bytes, start: int, end: int) -> array[Any]:
     block = array(code)
     block.frombytes(memoryview(data)[start:end])
     return block
-
-
-def empty(code: str) -> Callable[[], array[Any]]:
-    """Return a function that makes empty arrays."""
-    return array(code).__copy__
-
-
-def zeros(code: str, size: int) -> Callable[[], array[Any]]:
-    """Return a function that makes arrays of zeros."""
-    return array(code, bytes(size * array(code).itemsize)).__copy__

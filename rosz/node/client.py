@@ -53,6 +53,7 @@ class Client(Entity):
         )
         self.service_type = service_type
         self.timeout: float = clamp_timeout(timeout)
+        self._decode = node.context.decoder(service_type.Response)
         self._numbers = itertools.count(1)
         self._cancel = Cancellation()
         self._known: tuple[View | None, bool] = None, False
@@ -139,7 +140,7 @@ class Client(Entity):
                 raise self._late(limit)
             raise ServiceError(f"service [{self.name}] responded with an error: {text}")
         try:
-            response: Message = self.service_type.Response._decode(reply.payload)
+            response: Message = self._decode(reply.payload)
         except DecodeError as error:
             raise ServiceError(f"service [{self.name}] sent a damaged response: {error}") from error
         return response

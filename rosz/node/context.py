@@ -8,7 +8,7 @@ import logging
 import socket
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rosz import remap
 from rosz.environment import Environment, package_index
@@ -31,6 +31,7 @@ from rosz.session import (
 )
 
 if TYPE_CHECKING:
+    from rosz.message import Message
     from rosz.params.replica import Replica
     from rosz.security import LocalPermissions
     from rosz.typestore import TypeStore
@@ -164,6 +165,10 @@ class Context:
         if self._lifecycle.closing:  # perhaps too late for the thread that closes the context
             self._params = None
             replica.close()
+
+    def decoder(self, message_type: type[Message]) -> Callable[[bytes], Any]:
+        """Return the function that decodes messages of a class for the nodes of this context."""
+        return message_type._decode
 
     @property
     def types(self) -> TypeStore:

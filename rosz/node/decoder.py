@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
@@ -13,9 +13,6 @@ from rosz.errors import DecodeError
 from rosz.node.fetch import FetchedSample
 from rosz.session import Reply, Sample
 from rosz.wire import read_attachment
-
-if TYPE_CHECKING:
-    from rosz.message import Message
 
 __all__ = ("AnySample", "Decoder", "MessageInfo", "Received")
 
@@ -73,7 +70,8 @@ class Decoder:
         topic: Name of the topic, for the log.
         type_name: ``pkg/msg/Name``.
         type_hash: ``RIHS01_…``.
-        message_type: Class of the messages; when not given, the encoded bytes are the messages.
+        decode: Function that decodes a message; when not given, the encoded bytes are the messages.
+        has_header: Whether messages have a header, which gets the sequence number.
         log: Logger for damage, which is logged once per kind.
         report_lost: Function called with the number of samples that are missing before one.
         with_info: Whether to make a `MessageInfo` for each message.
@@ -84,20 +82,18 @@ class Decoder:
         topic: str,
         type_name: str,
         type_hash: str,
-        message_type: type[Message] | None,
+        decode: Callable[[bytes], Any] | None,
         log: logging.Logger,
         report_lost: Callable[[int], object],
         *,
+        has_header: bool,
         with_info: bool,
     ) -> None:
         self._topic = topic
         self._type_name = type_name
         self._type_hash = type_hash
-        self._decode: Callable[[bytes], Any] | None = None
-        self._has_header = False
-        if message_type is not None:
-            self._decode = message_type._decode
-            self._has_header = message_type._has_header
+        self._decode = decode
+        self._has_header = has_header
         self._log = log
         self._report_lost = report_lost
         self._with_info = with_info

@@ -53,6 +53,7 @@ class Service(Entity):
         )
         self.service_type = service_type
         self._handler = handler
+        self._decode = node.context.decoder(service_type.Request)
         self._open(threads)
         self.announce()
 
@@ -76,7 +77,7 @@ class Service(Entity):
             sequence, gid = 0, _NO_GID
             if attachment is not None:
                 sequence, _, gid = read_attachment(attachment)
-            request = self.service_type.Request._decode(query.payload or b"")
+            request = self._decode(query.payload or b"")
             payload = self.respond(request, gid)
             query.reply(
                 self.key, payload, attachment=pack_attachment(sequence, time.time_ns(), gid)

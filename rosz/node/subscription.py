@@ -373,9 +373,10 @@ class Subscription(Entity, Generic[M]):
             self.name,
             type_name,
             type_hash,
-            message_type,
+            None if message_type is None else self.node.context.decoder(message_type),
             self.node.log,
             partial(self._report_lost, (type_name, type_hash)),
+            has_header=message_type is not None and bool(message_type._has_header),
             with_info=self._with_info,
         )
 

@@ -23,6 +23,7 @@ from rosz.wire import Token
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
+    from rosz.message import Message
 
 __all__ = (
     "NO_NODE",
@@ -108,7 +109,16 @@ state = State()
 
 
 class _Context(Context):
-    """A context that runs rospy's shutdown hooks first, while everything still works."""
+    """A context that runs rospy's shutdown hooks first, while everything still works.
+
+    What its nodes receive has tuples for sequences of numbers.
+    """
+
+    def decoder(self, message_type: type[Message]) -> Callable[[bytes], Any]:
+        """Return the function that decodes messages of a class as ROS 1 code knows them."""
+        from rosz.ros1.tuples import decoder
+
+        return decoder(message_type)
 
     def shutdown(self, reason: str = "") -> None:
         """Run rospy's hooks, then shut down; shutting down again is not an error."""

@@ -108,7 +108,7 @@ def test_any_text_may_be_a_constant_and_a_default(value: str) -> None:
 )
 def test_fields_may_have_the_names_of_classes(text: str) -> None:
     cls = module_of(text).It
-    assert cls.from_cdr(cls().to_cdr()) == cls()
+    assert cls.from_cdr(cls().to_cdr()).to_cdr() == cls().to_cdr()
 
 
 @settings(max_examples=300)
@@ -118,4 +118,4 @@ def test_any_definition_runs_or_is_refused(text: str) -> None:
         cls = module_of(text).It
     except DefinitionError:
         return
-    assert cls.from_cdr(cls().to_cdr()) == cls()
+    assert cls.from_cdr(cls().to_cdr()).to_cdr() == cls().to_cdr()

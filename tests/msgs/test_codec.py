@@ -69,7 +69,7 @@ def test_the_plain_codec_and_big_endian(cls: type[Message], spec: MessageSpec) -
 
 def test_defaults_can_be_sent() -> None:
     for name, cls, _ in TYPES:
-        assert cls.from_cdr(cls().to_cdr()) == cls(), name
+        assert values.plain(cls.from_cdr(cls().to_cdr())) == values.plain(cls()), name
 
 
 @settings(max_examples=60)
@@ -125,7 +125,7 @@ def test_numpy_arrays_need_no_conversion() -> None:
 def test_any_buffer_is_decoded(kind: type) -> None:
     cls = STORE.message("sensor_msgs/JointState")
     data = cls().to_cdr()
-    assert cls.from_cdr(kind(data)) == cls()
+    assert values.plain(cls.from_cdr(kind(data))) == values.plain(cls())
 
 
 def test_trailing_bytes_are_none_of_our_business() -> None:

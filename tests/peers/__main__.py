@@ -3,9 +3,10 @@
     python -m tests.peers [--path ROOT]… [--only rosz|ros1] [--why] [--json FILE] FILE|FOLDER…
 
 A FILE is a ``test_*.py`` (a file of unittest cases or of nose's functions) or a ``.test`` file of
-rostest; a FOLDER stands for all such files below it. Packages on which they depend are searched
-below each ROOT, and below the repository that the first FILE or FOLDER is in: their messages are
-generated with genpy for real ROS 1, and found on the package path by rosz.
+rostest; a FOLDER stands for all such files below it, except nodes that a ``.test`` file starts.
+Packages on which they depend are searched below each ROOT, and below the repository that the
+first FILE or FOLDER is in: their messages are generated with genpy for real ROS 1, and found on
+the package path by rosz.
 
 For each file it prints how many tests pass on ROS 1, how many of those pass on rosz, and each one
 that does not, with the last line of its error; ``--why`` prints the whole error. Tests of what is
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -29,6 +31,7 @@ from pathlib import Path
 from .internal import reason
 from .sides import Outcome, Ros, Rosz, Side, package_of
 
+_NODE = re.compile(r"\brosrun\(|\brostest\.(run|unitrun)\(")
 _USAGE = "python -m tests.peers"
 
 
@@ -62,7 +65,8 @@ def main(argv: Sequence[str]) -> int:
 def _files(given: Path) -> list[Path]:
     if given.is_file():
         return [given]
-    return sorted([*given.rglob("test_*.py"), *given.rglob("*.test")])
+    units = (file for file in given.rglob("test_*.py") if not _NODE.search(file.read_text()))
+    return sorted([*units, *given.rglob("*.test")])
 
 
 def _repository(file: Path) -> Path:

@@ -14,7 +14,6 @@ from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
@@ -400,14 +399,11 @@ class Float32(_Message):
             return _explain(data, Float32)
 
 
-_d1 = _empty("f")
-
-
 class Float32MultiArray(_Message):
     """A multi-dimensional array of single-precision numbers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[float] = _field(default_factory=_d1)
+    data: _Array[float] = []
     _type = "example_interfaces/Float32MultiArray"
     _type_name = "example_interfaces/msg/Float32MultiArray"
     _type_hash = "RIHS01_8705278e8d206a9711133794ce6466281e9698138331c4b3d91e6cc9e9dfee26"
@@ -502,7 +498,6 @@ class Float64(_Message):
             return _explain(data, Float64)
 
 
-_d2 = _empty("d")
 _t3 = _Stride("I $ I I", None, 8)
 
 
@@ -510,7 +505,7 @@ class Float64MultiArray(_Message):
     """A multi-dimensional array of double-precision numbers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[float] = _field(default_factory=_d2)
+    data: _Array[float] = []
     _type = "example_interfaces/Float64MultiArray"
     _type_name = "example_interfaces/msg/Float64MultiArray"
     _type_hash = "RIHS01_62a0985e7920b7bc489d1392f08c06ba0080fff5b8eaa09b27dcac122f50ad95"
@@ -609,14 +604,11 @@ class Int16(_Message):
             return _explain(data, Int16)
 
 
-_d3 = _empty("h")
-
-
 class Int16MultiArray(_Message):
     """A multi-dimensional array of signed 16-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d3)
+    data: _Array[int] = []
     _type = "example_interfaces/Int16MultiArray"
     _type_name = "example_interfaces/msg/Int16MultiArray"
     _type_hash = "RIHS01_d663e739410479619bfb7b9b94b0a764998acffadb8b7f5b200affa87b7ffdd2"
@@ -711,14 +703,11 @@ class Int32(_Message):
             return _explain(data, Int32)
 
 
-_d4 = _empty("i")
-
-
 class Int32MultiArray(_Message):
     """A multi-dimensional array of signed 32-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d4)
+    data: _Array[int] = []
     _type = "example_interfaces/Int32MultiArray"
     _type_name = "example_interfaces/msg/Int32MultiArray"
     _type_hash = "RIHS01_b347aff8e38e2ce3f7f4023db7922d2d4abb9d593b03c40b1427640c26595bfa"
@@ -813,14 +802,11 @@ class Int64(_Message):
             return _explain(data, Int64)
 
 
-_d5 = _empty("q")
-
-
 class Int64MultiArray(_Message):
     """A multi-dimensional array of signed 64-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d5)
+    data: _Array[int] = []
     _type = "example_interfaces/Int64MultiArray"
     _type_name = "example_interfaces/msg/Int64MultiArray"
     _type_hash = "RIHS01_ebce42c0d2b81bc5309deb0b2d83e30236aeb4899aea3cc7ddd18787af39c94a"
@@ -919,14 +905,11 @@ class Int8(_Message):
             return _explain(data, Int8)
 
 
-_d6 = _empty("b")
-
-
 class Int8MultiArray(_Message):
     """A multi-dimensional array of signed 8-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d6)
+    data: _Array[int] = []
     _type = "example_interfaces/Int8MultiArray"
     _type_name = "example_interfaces/msg/Int8MultiArray"
     _type_hash = "RIHS01_6d26932aefc0e5c0c473613376338609bac9925e3527dc4e8fab6b6783b6d680"
@@ -1063,14 +1046,11 @@ class UInt16(_Message):
             return _explain(data, UInt16)
 
 
-_d7 = _empty("H")
-
-
 class UInt16MultiArray(_Message):
     """A multi-dimensional array of unsigned 16-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d7)
+    data: _Array[int] = []
     _type = "example_interfaces/UInt16MultiArray"
     _type_name = "example_interfaces/msg/UInt16MultiArray"
     _type_hash = "RIHS01_507f6456c1965ef6eab8a9cfa8860bd484e1b7039b4c4ea2c75c648182fceade"
@@ -1161,14 +1141,11 @@ class UInt32(_Message):
             return _explain(data, UInt32)
 
 
-_d8 = _empty("I")
-
-
 class UInt32MultiArray(_Message):
     """A multi-dimensional array of unsigned 32-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d8)
+    data: _Array[int] = []
     _type = "example_interfaces/UInt32MultiArray"
     _type_name = "example_interfaces/msg/UInt32MultiArray"
     _type_hash = "RIHS01_0683176c523a116c76141c6d4abd150dbff492b72185f1260ce38a18a35aafcf"
@@ -1263,14 +1240,11 @@ class UInt64(_Message):
             return _explain(data, UInt64)
 
 
-_d9 = _empty("Q")
-
-
 class UInt64MultiArray(_Message):
     """A multi-dimensional array of unsigned 64-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d9)
+    data: _Array[int] = []
     _type = "example_interfaces/UInt64MultiArray"
     _type_name = "example_interfaces/msg/UInt64MultiArray"
     _type_hash = "RIHS01_c05a348bd887aac76a947c901f67f93bf9a7fa14b28dce02eb495dadeb8842e4"

@@ -15,7 +15,6 @@ from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import texts as _texts
-from rosz.message.runtime import zeros as _zeros
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion
 from rosz.msgs.std_msgs.msg import Header
@@ -345,7 +344,7 @@ class GeoPointStamped(_Message):
             return _explain(data, GeoPointStamped)
 
 
-_d1 = _zeros("d", 36)
+_d1 = ([0.0] * 36).copy
 
 
 class GeoPoseWithCovariance(_Message):

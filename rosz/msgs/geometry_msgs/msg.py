@@ -16,7 +16,6 @@ from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import texts as _texts
-from rosz.message.runtime import zeros as _zeros
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from struct import Struct as _Struct
@@ -190,7 +189,7 @@ class AccelStamped(_Message):
             return _explain(data, AccelStamped)
 
 
-_d1 = _zeros("d", 36)
+_d1 = ([0.0] * 36).copy
 
 
 class AccelWithCovariance(_Message):

@@ -13,7 +13,6 @@ from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
@@ -191,7 +190,6 @@ class MapMetaData(_Message):
             return _explain(data, MapMetaData)
 
 
-_d1 = _empty("b")
 _t2 = _Template("I i I I $ i I f I I d d d d d d d I", -4)
 _u5 = _Struct("<iIf2I").unpack_from
 _u6 = _Struct("<7dI").unpack_from
@@ -202,7 +200,7 @@ class OccupancyGrid(_Message):
 
     header: Header = _field(default_factory=Header)
     info: MapMetaData = _field(default_factory=MapMetaData)
-    data: _Array[int] = _field(default_factory=_d1)
+    data: _Array[int] = []
     _type = "nav_msgs/OccupancyGrid"
     _type_name = "nav_msgs/msg/OccupancyGrid"
     _type_hash = "RIHS01_8d348150c12913a31ee0ec170fbf25089e4745d17035792a1ba94d6f0bc0cfc7"

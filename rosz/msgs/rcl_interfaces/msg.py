@@ -16,7 +16,6 @@ from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import flags as _flags
 from rosz.message.runtime import numbers as _numbers
@@ -336,8 +335,6 @@ class LoggerLevel(_Message):
             return _explain(data, LoggerLevel)
 
 
-_d1 = _empty("q")
-_d2 = _empty("d")
 _t5 = _Stride("I B ? q d I $ I", -4, 8)
 _t6 = _Stride("I", None, 8)
 _s3 = _StringList()
@@ -354,8 +351,8 @@ class ParameterValue(_Message):
     string_value: str = ""
     byte_array_value: _Bytes = b""
     bool_array_value: list[bool] = []
-    integer_array_value: _Array[int] = _field(default_factory=_d1)
-    double_array_value: _Array[float] = _field(default_factory=_d2)
+    integer_array_value: _Array[int] = []
+    double_array_value: _Array[float] = []
     string_array_value: list[str] = []
     _type = "rcl_interfaces/ParameterValue"
     _type_name = "rcl_interfaces/msg/ParameterValue"

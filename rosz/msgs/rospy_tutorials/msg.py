@@ -10,7 +10,6 @@ from rosz.message import Message as _Message
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
@@ -25,7 +24,6 @@ __all__ = (
     "HeaderString",
 )
 
-_d1 = _empty("f")
 _p1 = _Struct("<2I").pack
 _u1 = _Struct("<2I").unpack_from
 
@@ -33,7 +31,7 @@ _u1 = _Struct("<2I").unpack_from
 class Floats(_Message):
     """A list of numbers, which rospy's tutorial on numpy sends."""
 
-    data: _Array[float] = _field(default_factory=_d1)
+    data: _Array[float] = []
     _type = "rospy_tutorials/Floats"
     _type_name = "rospy_tutorials/msg/Floats"
     _type_hash = "RIHS01_af9f50fd77037d1bfe3875e3804e6995fc9b0a7a143c023d8d5d8f2be8048326"

@@ -17,13 +17,11 @@ from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
 from rosz.message.runtime import read_block as _read_block
 from rosz.message.runtime import texts as _texts
-from rosz.message.runtime import zeros as _zeros
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Point32
 from rosz.msgs.geometry_msgs.msg import Quaternion
@@ -65,7 +63,6 @@ __all__ = (
     "TimeReference",
 )
 
-_d1 = _empty("f")
 _t1 = _Template("I i I I $ f f f f f f f B B B ? I", -4)
 _p1 = _Struct("<I").pack
 _t2 = _Stride("I $", 0, 4)
@@ -90,8 +87,8 @@ class BatteryState(_Message):
     power_supply_health: int = 0
     power_supply_technology: int = 0
     present: bool = False
-    cell_voltage: _Array[float] = _field(default_factory=_d1)
-    cell_temperature: _Array[float] = _field(default_factory=_d1)
+    cell_voltage: _Array[float] = []
+    cell_temperature: _Array[float] = []
     location: str = ""
     serial_number: str = ""
     POWER_SUPPLY_STATUS_UNKNOWN = 0
@@ -292,9 +289,8 @@ class RegionOfInterest(_Message):
             return _explain(data, RegionOfInterest)
 
 
-_d2 = _empty("d")
-_d3 = _zeros("d", 9)
-_d4 = _zeros("d", 12)
+_d1 = ([0.0] * 9).copy
+_d2 = ([0.0] * 12).copy
 _t4 = _Stride("I i I I $ I I I $ I", -4, 8)
 _t5 = _Template("|8", None)
 _p3 = _Struct("<6I?").pack
@@ -309,10 +305,10 @@ class CameraInfo(_Renamed):
     height: int = 0
     width: int = 0
     distortion_model: str = ""
-    d: _Array[float] = _field(default_factory=_d2)
-    k: _Array[float] = _field(default_factory=_d3)
-    r: _Array[float] = _field(default_factory=_d3)
-    p: _Array[float] = _field(default_factory=_d4)
+    d: _Array[float] = []
+    k: _Array[float] = _field(default_factory=_d1)
+    r: _Array[float] = _field(default_factory=_d1)
+    p: _Array[float] = _field(default_factory=_d2)
     binning_x: int = 0
     binning_y: int = 0
     roi: RegionOfInterest = _field(default_factory=RegionOfInterest)
@@ -462,7 +458,7 @@ class ChannelFloat32(_Message):
     """One further value for each point of a PointCloud, such as its brightness."""
 
     name: str = ""
-    values: _Array[float] = _field(default_factory=_d1)
+    values: _Array[float] = []
     _type = "sensor_msgs/ChannelFloat32"
     _type_name = "sensor_msgs/msg/ChannelFloat32"
     _type_hash = "RIHS01_92665437ddf39346f4ba39ee32e648390605b633cc077d40f4bd4d7b58af6cd4"
@@ -742,11 +738,11 @@ class Imu(_Message):
 
     header: Header = _field(default_factory=Header)
     orientation: Quaternion = _field(default_factory=Quaternion)
-    orientation_covariance: _Array[float] = _field(default_factory=_d3)
+    orientation_covariance: _Array[float] = _field(default_factory=_d1)
     angular_velocity: Vector3 = _field(default_factory=Vector3)
-    angular_velocity_covariance: _Array[float] = _field(default_factory=_d3)
+    angular_velocity_covariance: _Array[float] = _field(default_factory=_d1)
     linear_acceleration: Vector3 = _field(default_factory=Vector3)
-    linear_acceleration_covariance: _Array[float] = _field(default_factory=_d3)
+    linear_acceleration_covariance: _Array[float] = _field(default_factory=_d1)
     _type = "sensor_msgs/Imu"
     _type_name = "sensor_msgs/msg/Imu"
     _type_hash = "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"
@@ -851,9 +847,9 @@ class JointState(_Message):
 
     header: Header = _field(default_factory=Header)
     name: list[str] = []
-    position: _Array[float] = _field(default_factory=_d2)
-    velocity: _Array[float] = _field(default_factory=_d2)
-    effort: _Array[float] = _field(default_factory=_d2)
+    position: _Array[float] = []
+    velocity: _Array[float] = []
+    effort: _Array[float] = []
     _type = "sensor_msgs/JointState"
     _type_name = "sensor_msgs/msg/JointState"
     _type_hash = "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"
@@ -942,7 +938,6 @@ class JointState(_Message):
             return _explain(data, JointState)
 
 
-_d5 = _empty("i")
 _t13 = _Template("I i I I $ I", -4)
 
 
@@ -950,8 +945,8 @@ class Joy(_Message):
     """Sticks and buttons of a joystick or game pad."""
 
     header: Header = _field(default_factory=Header)
-    axes: _Array[float] = _field(default_factory=_d1)
-    buttons: _Array[int] = _field(default_factory=_d5)
+    axes: _Array[float] = []
+    buttons: _Array[int] = []
     _type = "sensor_msgs/Joy"
     _type_name = "sensor_msgs/msg/Joy"
     _type_hash = "RIHS01_0d356c79cad3401e35ffeb75a96a96e08be3ef896b8b83841d73e890989372c5"
@@ -1101,7 +1096,7 @@ class JoyFeedbackArray(_Message):
 class LaserEcho(_Message):
     """What came back of one beam of a laser scanner that tells several echoes apart."""
 
-    echoes: _Array[float] = _field(default_factory=_d1)
+    echoes: _Array[float] = []
     _type = "sensor_msgs/LaserEcho"
     _type_name = "sensor_msgs/msg/LaserEcho"
     _type_hash = "RIHS01_0fbc05a0db7d37fe52c0f0375356db55da0046f7ef5bd27ca6b34bd0582bc952"
@@ -1153,8 +1148,8 @@ class LaserScan(_Message):
     scan_time: float = 0.0
     range_min: float = 0.0
     range_max: float = 0.0
-    ranges: _Array[float] = _field(default_factory=_d1)
-    intensities: _Array[float] = _field(default_factory=_d1)
+    ranges: _Array[float] = []
+    intensities: _Array[float] = []
     _type = "sensor_msgs/LaserScan"
     _type_name = "sensor_msgs/msg/LaserScan"
     _type_hash = "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828"
@@ -1236,7 +1231,7 @@ class MagneticField(_Message):
 
     header: Header = _field(default_factory=Header)
     magnetic_field: Vector3 = _field(default_factory=Vector3)
-    magnetic_field_covariance: _Array[float] = _field(default_factory=_d3)
+    magnetic_field_covariance: _Array[float] = _field(default_factory=_d1)
     _type = "sensor_msgs/MagneticField"
     _type_name = "sensor_msgs/msg/MagneticField"
     _type_hash = "RIHS01_e80f32f56a20486c9923008fc1a1db07bbb273cbbf6a5b3bfa00835ee00e4dff"
@@ -1576,7 +1571,7 @@ class NavSatFix(_Message):
     latitude: float = 0.0
     longitude: float = 0.0
     altitude: float = 0.0
-    position_covariance: _Array[float] = _field(default_factory=_d3)
+    position_covariance: _Array[float] = _field(default_factory=_d1)
     position_covariance_type: int = 0
     COVARIANCE_TYPE_UNKNOWN = 0
     COVARIANCE_TYPE_APPROXIMATED = 1

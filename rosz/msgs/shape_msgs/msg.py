@@ -11,11 +11,9 @@ from rosz.message import Message as _Message
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
-from rosz.message.runtime import zeros as _zeros
 from rosz.msgs.geometry_msgs.msg import Point
 from rosz.msgs.geometry_msgs.msg import Point32
 from rosz.msgs.geometry_msgs.msg import Polygon
@@ -29,7 +27,7 @@ __all__ = (
     "SolidPrimitive",
 )
 
-_d1 = _zeros("I", 3)
+_d1 = ([0] * 3).copy
 _p1 = _Struct("<I").pack
 _u1 = _Struct("<I").unpack_from
 
@@ -148,7 +146,7 @@ class Mesh(_Message):
             return _explain(data, Mesh)
 
 
-_d2 = _zeros("d", 4)
+_d2 = ([0.0] * 4).copy
 
 
 class Plane(_Message):
@@ -189,7 +187,6 @@ class Plane(_Message):
             return _explain(data, Plane)
 
 
-_d3 = _empty("d")
 _p4 = _Struct("<IB3xI").pack
 _p5 = _Struct("<3f").pack
 _u3 = _Struct("<IB3xI").unpack_from
@@ -200,7 +197,7 @@ class SolidPrimitive(_Message):
     """A simple solid about the origin of its frame."""
 
     type: int = 0
-    dimensions: _Array[float] = _field(default_factory=_d3)
+    dimensions: _Array[float] = []
     polygon: Polygon = _field(default_factory=Polygon)
     BOX = 1
     SPHERE = 2

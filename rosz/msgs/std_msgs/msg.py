@@ -15,7 +15,6 @@ from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import octets as _octets
@@ -484,14 +483,11 @@ class Float32(_Message):
             return _explain(data, Float32)
 
 
-_d1 = _empty("f")
-
-
 class Float32MultiArray(_Message):
     """A multi-dimensional array of single-precision numbers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[float] = _field(default_factory=_d1)
+    data: _Array[float] = []
     _type = "std_msgs/Float32MultiArray"
     _type_name = "std_msgs/msg/Float32MultiArray"
     _type_hash = "RIHS01_0599f6f85b4bfca379873a0b4375a0aca022156bd2d7021275d116ed1fa8bfe0"
@@ -586,7 +582,6 @@ class Float64(_Message):
             return _explain(data, Float64)
 
 
-_d2 = _empty("d")
 _t3 = _Stride("I $ I I", None, 8)
 
 
@@ -594,7 +589,7 @@ class Float64MultiArray(_Message):
     """A multi-dimensional array of double-precision numbers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[float] = _field(default_factory=_d2)
+    data: _Array[float] = []
     _type = "std_msgs/Float64MultiArray"
     _type_name = "std_msgs/msg/Float64MultiArray"
     _type_hash = "RIHS01_1025ddc6b9552d191f89ef1a8d2f60f3d373e28b283d8891ddcc974e8c55397f"
@@ -739,14 +734,11 @@ class Int16(_Message):
             return _explain(data, Int16)
 
 
-_d3 = _empty("h")
-
-
 class Int16MultiArray(_Message):
     """A multi-dimensional array of signed 16-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d3)
+    data: _Array[int] = []
     _type = "std_msgs/Int16MultiArray"
     _type_name = "std_msgs/msg/Int16MultiArray"
     _type_hash = "RIHS01_b58810e8e5b90fb19a5062469eb8409f5ab11a446d60de7157a1457e52a076ce"
@@ -841,14 +833,11 @@ class Int32(_Message):
             return _explain(data, Int32)
 
 
-_d4 = _empty("i")
-
-
 class Int32MultiArray(_Message):
     """A multi-dimensional array of signed 32-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d4)
+    data: _Array[int] = []
     _type = "std_msgs/Int32MultiArray"
     _type_name = "std_msgs/msg/Int32MultiArray"
     _type_hash = "RIHS01_84a7346323525d1b4dfca899df3820f245e54009dac5a6b69217d14fdefd1701"
@@ -943,14 +932,11 @@ class Int64(_Message):
             return _explain(data, Int64)
 
 
-_d5 = _empty("q")
-
-
 class Int64MultiArray(_Message):
     """A multi-dimensional array of signed 64-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d5)
+    data: _Array[int] = []
     _type = "std_msgs/Int64MultiArray"
     _type_name = "std_msgs/msg/Int64MultiArray"
     _type_hash = "RIHS01_e60f9fe34d697f0939ad49d33158693c1277fbac0e2f04b7c2995dc21c89b422"
@@ -1049,14 +1035,11 @@ class Int8(_Message):
             return _explain(data, Int8)
 
 
-_d6 = _empty("b")
-
-
 class Int8MultiArray(_Message):
     """A multi-dimensional array of signed 8-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d6)
+    data: _Array[int] = []
     _type = "std_msgs/Int8MultiArray"
     _type_name = "std_msgs/msg/Int8MultiArray"
     _type_hash = "RIHS01_f21998d4b492abd63330765d75d5831238d400740386f651f13a872a4d2188db"
@@ -1226,14 +1209,11 @@ class UInt16(_Message):
             return _explain(data, UInt16)
 
 
-_d7 = _empty("H")
-
-
 class UInt16MultiArray(_Message):
     """A multi-dimensional array of unsigned 16-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d7)
+    data: _Array[int] = []
     _type = "std_msgs/UInt16MultiArray"
     _type_name = "std_msgs/msg/UInt16MultiArray"
     _type_hash = "RIHS01_94fe73428ec63baecc774f8fb82406123e9291cf728f1b7c91caf5335129492b"
@@ -1324,14 +1304,11 @@ class UInt32(_Message):
             return _explain(data, UInt32)
 
 
-_d8 = _empty("I")
-
-
 class UInt32MultiArray(_Message):
     """A multi-dimensional array of unsigned 32-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d8)
+    data: _Array[int] = []
     _type = "std_msgs/UInt32MultiArray"
     _type_name = "std_msgs/msg/UInt32MultiArray"
     _type_hash = "RIHS01_6c2577c7ad3cbdcc2164a41c12f1d5ad314ea320f3fb1ee47e78019fe16bb5b0"
@@ -1426,14 +1403,11 @@ class UInt64(_Message):
             return _explain(data, UInt64)
 
 
-_d9 = _empty("Q")
-
-
 class UInt64MultiArray(_Message):
     """A multi-dimensional array of unsigned 64-bit integers."""
 
     layout: MultiArrayLayout = _field(default_factory=MultiArrayLayout)
-    data: _Array[int] = _field(default_factory=_d9)
+    data: _Array[int] = []
     _type = "std_msgs/UInt64MultiArray"
     _type_name = "std_msgs/msg/UInt64MultiArray"
     _type_hash = "RIHS01_fc1c685c2f76bdc6983da025cb25d2db5fb5157b059e300f6d957d86f981b366"

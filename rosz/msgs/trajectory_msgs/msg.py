@@ -12,7 +12,6 @@ from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
 from rosz.message.runtime import decode_plainly as _explain
-from rosz.message.runtime import empty as _empty
 from rosz.message.runtime import encode_plainly as _plain
 from rosz.message.runtime import numbers as _numbers
 from rosz.message.runtime import read_block as _read_block
@@ -34,7 +33,6 @@ __all__ = (
     "MultiDOFJointTrajectoryPoint",
 )
 
-_d1 = _empty("d")
 _p1 = _Struct("<2I").pack
 _p2 = _Struct("<I").pack
 _p3 = _Struct("<iI").pack
@@ -47,10 +45,10 @@ class JointTrajectoryPoint(_Message):
     """What the joints of a JointTrajectory shall do at one moment. Lists follow the order of its
     joint_names; one that does not matter is empty."""
 
-    positions: _Array[float] = _field(default_factory=_d1)
-    velocities: _Array[float] = _field(default_factory=_d1)
-    accelerations: _Array[float] = _field(default_factory=_d1)
-    effort: _Array[float] = _field(default_factory=_d1)
+    positions: _Array[float] = []
+    velocities: _Array[float] = []
+    accelerations: _Array[float] = []
+    effort: _Array[float] = []
     time_from_start: Duration = _field(default_factory=Duration)
     _type = "trajectory_msgs/JointTrajectoryPoint"
     _type_name = "trajectory_msgs/msg/JointTrajectoryPoint"

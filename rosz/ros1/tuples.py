@@ -1,0 +1,182 @@
+"""Numeric sequences of received messages as ROS 1 code knows them: tuples.
+
+`decoder` returns a generated decoder that makes tuples where the native one makes arrays. A tuple
+needs an object for each number, so a long sequence becomes a `LongTuple`: an array that behaves as
+a tuple.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from struct import Struct, calcsize
+from types import FunctionType
+from typing import Any
+
+from rosz.message import ARRAY_CODES, Message, slots
+
+__all__ = ("LONGEST_TUPLE", "LongTuple", "decoder")
+
+LONGEST_TUPLE = 4096
+"""Largest number of elements of a tuple, which takes 50 µs to make; more become a `LongTuple`."""
+
+_MOST_SHAPES = 1024
+
+
+class LongTuple(array):  # type: ignore[type-arg]
+    """An array that compares, adds, hashes and prints as the tuple of its elements.
+
+    It is a buffer, so numpy reads it without a copy. ``isinstance(value, tuple)`` is true, and
+    ``json`` writes it as a list.
+    """
+
+    __slots__ = ()
+    __class__: Any = property(lambda _: tuple)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, array):
+            return array.__eq__(self, other)
+        return tuple(self) == other if type(other) is tuple else NotImplemented
+
+    def __ne__(self, other: object) -> bool:
+        equal = self.__eq__(other)
+        return equal if equal is NotImplemented else not equal
+
+    def __lt__(self, other: Any) -> bool:
+        return tuple(self) < tuple(other)
+
+    def __le__(self, other: Any) -> bool:
+        return tuple(self) <= tuple(other)
+
+    def __gt__(self, other: Any) -> bool:
+        return tuple(self) > tuple(other)
+
+    def __ge__(self, other: Any) -> bool:
+        return tuple(self) >= tuple(other)
+
+    def __copy__(self) -> LongTuple:
+        return self
+
+    def __deepcopy__(self, memo: object) -> LongTuple:
+        return self
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(tuple(self))
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+    def __getitem__(self, index: Any) -> Any:
+        found = array.__getitem__(self, index)
+        return tuple(found) if isinstance(index, slice) else found
+
+    def __add__(self, other: Any) -> Any:
+        return tuple(self) + _plain(other)
+
+    def __radd__(self, other: Any) -> Any:
+        return other + tuple(self)
+
+    def __iadd__(self, other: Any) -> Any:
+        return tuple(self) + _plain(other)
+
+    def __mul__(self, times: Any) -> Any:
+        return tuple(self) * times
+
+    __rmul__ = __imul__ = __mul__
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        raise TypeError("'tuple' object does not support item assignment")
+
+    def __delitem__(self, index: Any) -> None:
+        raise TypeError("'tuple' object doesn't support item deletion")
+
+
+def _plain(other: Any) -> Any:
+    return tuple(other) if isinstance(other, LongTuple) else other
+
+
+def _long(code: str, block: Any) -> LongTuple:
+    _teach_json()
+    found = LongTuple(code)
+    found.frombytes(block)
+    return found
+
+
+@cache
+def _teach_json() -> None:
+    """Let ``json`` write a `LongTuple`: its encoder in C knows tuples by their memory alone."""
+    from json import JSONEncoder
+
+    refuse = JSONEncoder.default
+
+    def default(self: JSONEncoder, o: Any) -> Any:
+        return o.tolist() if type(o) is LongTuple else refuse(self, o)
+
+    JSONEncoder.default = default  # type: ignore[method-assign]
+
+
+class _Makers(dict[tuple[str, int], Callable[[Any], Any]]):
+    """Functions that make tuples, by the type code and the number of bytes."""
+
+    def __missing__(self, key: tuple[str, int]) -> Callable[[Any], Any]:
+        code, size = key
+        count = size // calcsize(f"<{code}")
+        if count > LONGEST_TUPLE:
+            return partial(_long, code)
+        if len(self) >= _MOST_SHAPES:
+            self.clear()
+        self[key] = unpack = Struct(f"<{count}{code}").unpack
+        return unpack
+
+
+_makers = _Makers()
+
+
+def _make(code: str, block: Any) -> Any:
+    return _makers[code, len(block)](block)
+
+
+def _make_of(code: str, data: bytes, start: int, end: int) -> Any:
+    return _make(code, memoryview(data)[start:end])
+
+
+_INSTEAD = {"_array": _make, "_read_block": _make_of}
+"""The functions that stand in generated decoders, by the names that these have for them."""
+
+
+@cache
+def decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
+    """Return the decoder of a message class that makes tuples.
+
+    It is the generated one, with other functions in its global names.
+    """
+    plain: Any = message_type._decode
+    if not isinstance(plain, FunctionType) or _INSTEAD.keys().isdisjoint(plain.__code__.co_names):
+        decode: Callable[[bytes], Any] = plain
+        return decode
+    explain = plain.__globals__["_explain"]
+
+    def decode_plainly(data: bytes, cls: type[Any]) -> Any:
+        message = explain(data, cls)
+        _convert(message)
+        return message
+
+    names = {**plain.__globals__, **_INSTEAD, "_explain": decode_plainly}
+    return FunctionType(plain.__code__, names, plain.__name__)
+
+
+def _convert(message: Any) -> None:
+    """Convert the numeric sequences of a message from arrays, in place."""
+    for slot in slots(type(message)):
+        value = getattr(message, slot.name)
+        for one in _messages(value):
+            _convert(one)
+        if slot.shape != "one" and slot.kind in ARRAY_CODES:
+            setattr(message, slot.name, _make(ARRAY_CODES[str(slot.kind)], value.tobytes()))
+
+
+def _messages(value: Any) -> Iterator[Any]:
+    for one in value if isinstance(value, list) else [value]:
+        if isinstance(one, Message):
+            yield one
