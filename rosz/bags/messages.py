@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Self
 
 from rosz.bags.bag import Attachment, BagReader, BagWriter, Channel, Entry, Payload
+from rosz.errors import TypeNotFound
 from rosz.message import Message
 from rosz.typestore import TypeStore
 
@@ -39,7 +40,13 @@ def decoder_of(channel: Channel, types: TypeStore) -> Callable[[Payload], Messag
             are neither CDR nor in ROS 1's layout.
         DefinitionError: The definition is not well-formed.
     """
-    return class_of(channel, types).from_cdr
+    if channel.encoding == "ros1":
+        return class_of(channel, types).from_ros1
+    if channel.encoding == "cdr":
+        return class_of(channel, types).from_cdr
+    raise TypeNotFound(
+        channel.type, f"topic '{channel.topic}' is encoded as '{channel.encoding}', not as CDR"
+    )
 
 
 class BagMessage:

@@ -12,20 +12,26 @@ from rosz.bags.mcap_reader import McapReader
 from rosz.bags.mcap_records import MAGIC
 from rosz.bags.mcap_writer import McapWriter
 from rosz.bags.messages import Bag, BagOutput
+from rosz.bags.ros1_reader import Ros1Reader
+from rosz.bags.ros1_records import describe_begin
+from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
 from rosz.errors import BagError, UsageError
 from rosz.typestore import TypeStore
 
 __all__ = ("create_writer", "find_format", "open", "open_reader")
 
 _MOST_MAGIC = 16
+_SQLITE = b"SQLite format 3"
 
 
 def find_format(path: str | os.PathLike[str]) -> str:
-    """Return the format of a bag: ``mcap``.
+    """Return the format of a bag: ``mcap``, ``rosbag`` (ROS 1) or ``rosbag2``.
 
     Raises:
         BagError: The file cannot be read, or is no bag.
     """
+    if Path(path).is_dir():
+        return "rosbag2"
     try:
         with Path(path).open("rb") as file:
             magic = file.read(_MOST_MAGIC)
@@ -33,8 +39,17 @@ def find_format(path: str | os.PathLike[str]) -> str:
         raise BagError(f"cannot open it: {error.strerror}", str(path)) from error
     if magic.startswith(MAGIC):
         return "mcap"
+    if magic.startswith(b"#ROS"):
+        return "rosbag"
+    if magic.startswith(_SQLITE):
+        return "rosbag2"
+    if not magic:
+        raise BagError(describe_begin(magic), str(path), 0)
     raise BagError(
-        f"it is not a bag: it begins with {magic[:8]!r}, expected MCAP's {MAGIC!r}", str(path), 0
+        f"it is not a bag: it begins with {magic[:8]!r}, expected MCAP's {MAGIC!r}, '#ROSBAG V2.0'"
+        f" or '{_SQLITE.decode()}'",
+        str(path),
+        0,
     )
 
 
@@ -43,8 +58,13 @@ def open_reader(path: str | os.PathLike[str]) -> BagReader:
 
     Raises:
         BagError: The file cannot be read, or is no bag.
+        UsageError: The library for its compression is not installed.
     """
-    find_format(path)
+    kind = find_format(path)
+    if kind == "rosbag":
+        return Ros1Reader(path)
+    if kind == "rosbag2":
+        return Rosbag2Reader(path) if Path(path).is_dir() else SqliteReader(path)
     return McapReader(path)
 
 

@@ -95,8 +95,8 @@ class Ros1Reader:
     format = "rosbag"
     version = "2.0"
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
         self.metadata: Mapping[str, Mapping[str, str]] = {}
         self.connections: list[Connection] = []
         self._ranks: dict[int, int] = {}
@@ -104,7 +104,7 @@ class Ros1Reader:
         self._damage: list[BagError] = []
         self._buffers: OrderedDict[int, bytes] = OrderedDict()
         try:
-            self._file = path.open("rb", buffering=0)
+            self._file = self.path.open("rb", buffering=0)
         except OSError as error:
             raise BagError(error.strerror or str(error), str(path)) from error
         try:
@@ -353,6 +353,11 @@ class Ros1Reader:
 
     # The contents.
 
+    @property
+    def problems(self) -> Sequence[BagError]:
+        """What was found damaged or missing as the bag was opened."""
+        return self._damage
+
     @cached_property
     def chunks(self) -> Sequence[Chunk]:
         """The chunks whose heads can be read."""
@@ -380,11 +385,8 @@ class Ros1Reader:
         return sum(n for one in self._chunks for key, n in one.counts.items() if key in keys)
 
     def connection(self, channel: Channel) -> Connection:
-        """Return the connection of a channel of this reader; the first if several are equal."""
-        for one in self.connections:
-            if one.channel is channel:
-                return one
-        return next(one for one in self.connections if one.channel == channel)
+        """Return the connection of a channel of this reader."""
+        return next(one for one in self.connections if one.channel is channel)
 
     def stamps(self, channel: Channel) -> list[int]:
         """Return the stamps of all messages of a channel by the index, sorted.
@@ -441,9 +443,7 @@ class Ros1Reader:
             and (end is None or one.start <= end)
         ]
         places = self._merged(wanted, ranks, (start, end), reverse, report)
-        yield from self._entries(places, report)
-        for error in self._damage:
-            report(error)
+        return self._entries(places, report)
 
     def _merged(
         self,

@@ -78,6 +78,7 @@ def _read(path: Path) -> tuple[list[bytes], list[str]]:
     problems: list[BagError] = []
     with Ros1Reader(path) as bag:
         found = [bytes(one.data) for one in bag.messages(damaged=problems.append)]
+        problems += bag.problems
     return found, [str(one) for one in problems]
 
 

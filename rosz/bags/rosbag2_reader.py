@@ -1,0 +1,346 @@
+"""Reading of rosbag2's bags: folders with ``metadata.yaml``, and files of SQLite or MCAP in them.
+
+The files of a bag are read one after the other, merged where they overlap in time. The contents
+count, not what ``metadata.yaml`` says of them, which is missing where a recorder was killed.
+"""
+
+from __future__ import annotations
+
+import heapq
+import os
+import sqlite3
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol, Self
+from urllib.parse import quote
+
+import yaml
+
+from rosz.bags.bag import Attachment, Channel, Chunk, DamageReport, Entry, Payload
+from rosz.bags.mcap_reader import McapReader
+from rosz.bags.qos_text import parse_profiles
+from rosz.errors import BagError, UsageError
+
+__all__ = ("METADATA", "Rosbag2Reader", "SqliteReader")
+
+METADATA = "metadata.yaml"
+_SUFFIXES = (".db3", ".mcap")
+_ZSTD_FRAME = b"\x28\xb5\x2f\xfd"
+
+
+class _Part(Protocol):
+    """A file of a bag."""
+
+    start: int
+    end: int
+    indexed: bool
+
+    @property
+    def channels(self) -> Sequence[Channel]: ...
+    @property
+    def problems(self) -> Sequence[BagError]: ...
+    def count(self, channel: Channel | None = None) -> int: ...
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start: int | None = None,
+        end: int | None = None,
+        *,
+        reverse: bool = False,
+        damaged: DamageReport | None = None,
+    ) -> Iterator[Entry]: ...
+    def close(self) -> None: ...
+
+
+class SqliteReader:
+    """A file that rosbag2's SQLite storage has written.
+
+    Args:
+        path: The file.
+
+    Raises:
+        BagError: The file cannot be read, or is none of rosbag2.
+    """
+
+    format = "rosbag2"
+    metadata: Mapping[str, Mapping[str, str]] = {}
+    chunks: Sequence[Chunk] = ()
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self.version = ""
+        self.problems: Sequence[BagError] = ()
+        if not self.path.is_file():
+            raise BagError("there is no such file", str(path))
+        self.size: int = self.path.stat().st_size
+        address = f"file:{quote(str(self.path.absolute()))}?mode=ro"
+        self._database = sqlite3.connect(address, uri=True, check_same_thread=False)
+        try:
+            self._channels = self._read_channels()
+            self._counts: dict[int, int] = dict(
+                self._rows("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
+            )
+            ((first, last),) = self._rows("SELECT MIN(timestamp), MAX(timestamp) FROM messages")
+            self.indexed = bool(
+                self._rows("SELECT 1 FROM sqlite_master WHERE name = 'timestamp_idx'")
+            )
+        except BaseException:
+            self._database.close()
+            raise
+        self.start: int = first or 0
+        self.end: int = last or 0
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """All channels, in the order of the file."""
+        return list(self._channels.values())
+
+    def _rows(self, query: str) -> list[Any]:
+        try:
+            return self._database.execute(query).fetchall()
+        except sqlite3.Error as error:
+            raise BagError(f"not a bag of rosbag2, or damaged: {error}", str(self.path)) from error
+
+    def _read_channels(self) -> dict[int, Channel]:
+        tables = {name for (name,) in self._rows("SELECT name FROM sqlite_master")}
+        columns = [row[1] for row in self._rows("PRAGMA table_info(topics)")]
+        definitions: dict[str, tuple[str, str]] = {}
+        if "message_definitions" in tables:
+            definitions = {
+                name: (text, encoding)
+                for name, encoding, text in self._rows(
+                    "SELECT topic_type, encoding, encoded_message_definition"
+                    " FROM message_definitions"
+                )
+            }
+        found = {}
+        for row in self._rows("SELECT * FROM topics"):
+            topic = dict(zip(columns, row, strict=True))
+            text, language = definitions.get(topic["type"], ("", ""))
+            found[topic["id"]] = Channel(
+                topic=topic["name"],
+                type=topic["type"],
+                encoding=topic["serialization_format"],
+                definition=text,
+                type_hash=topic.get("type_description_hash") or "",
+                qos=parse_profiles(topic.get("offered_qos_profiles") or ""),
+                language="" if language in {"", "unknown", "ros2msg"} else language,
+            )
+        return found
+
+    def count(self, channel: Channel | None = None) -> int:
+        """Return the number of messages of a channel, or of all."""
+        return sum(
+            number
+            for key, number in self._counts.items()
+            if channel is None or self._channels.get(key) == channel
+        )
+
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start: int | None = None,
+        end: int | None = None,
+        *,
+        reverse: bool = False,
+        damaged: DamageReport | None = None,
+    ) -> Iterator[Entry]:
+        """Yield messages in the order of their stamps; see `rosz.bags.BagReader`.
+
+        Raises:
+            BagError: The file is damaged.
+        """
+        keys = [key for key, one in self._channels.items() if topics is None or one.topic in topics]
+        order = "DESC" if reverse else "ASC"
+        query = (
+            "SELECT topic_id, timestamp, data FROM messages"  # noqa: S608  # values are parameters
+            f" WHERE topic_id IN ({','.join('?' * len(keys))}) AND timestamp BETWEEN ? AND ?"
+            f" ORDER BY timestamp {order}, id {order}"
+        )
+        limits = (start or 0, (1 << 63) - 1 if end is None else end)
+        try:
+            for key, stamp, data in self._database.execute(query, (*keys, *limits)):
+                yield Entry(self._channels[key], stamp, data)
+        except sqlite3.Error as error:
+            problem = BagError(f"damaged: {error}", str(self.path))
+            if damaged is None:
+                raise problem from error
+            damaged(problem)
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield nothing: the format has no files within."""
+        return iter(())
+
+    def close(self) -> None:
+        """Close the file; a second call has no effect."""
+        self._database.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+
+class Rosbag2Reader:
+    """A folder of rosbag2; see `rosz.bags.BagReader`.
+
+    Args:
+        path: The folder.
+
+    Raises:
+        BagError: The folder is no bag, or a file in it cannot be read.
+        UsageError: The bag is compressed, and the library for it is not installed.
+    """
+
+    format = "rosbag2"
+    metadata: Mapping[str, Mapping[str, str]] = {}
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self._stack = ExitStack()
+        self.problems: list[BagError] = []
+        found = self._read_metadata()
+        self.version = str(found.get("version", ""))
+        compressed = str(found.get("compression_mode", "")).lower()
+        self._by_message = compressed == "message" and found.get("compression_format") == "zstd"
+        self._parts: list[_Part] = []
+        try:
+            for file in self._files(found):
+                self._open(file)
+        except BaseException:
+            self.close()
+            raise
+        if not self._parts:
+            raise self.problems[-1] if self.problems else self._no_bag()
+        self.indexed = (self.path / METADATA).exists() and all(one.indexed for one in self._parts)
+        counted = [one for one in self._parts if one.count()]
+        self.start: int = min((one.start for one in counted), default=0)
+        self.end: int = max((one.end for one in counted), default=0)
+
+    def _read_metadata(self) -> dict[str, Any]:
+        file = self.path / METADATA
+        try:
+            found = yaml.safe_load(file.read_text("utf-8", "replace"))
+            information = found["rosbag2_bagfile_information"]
+            return dict(information)
+        except FileNotFoundError:
+            return {}
+        except (OSError, yaml.YAMLError, LookupError, TypeError, ValueError) as error:
+            self.problems.append(
+                BagError(f"damaged, not used: {' '.join(str(error).split())}", str(file))
+            )
+            return {}
+
+    def _files(self, found: Mapping[str, Any]) -> list[Path]:
+        """Return the files of the bag: those that the metadata has, or else all that are there."""
+        named = found.get("relative_file_paths")
+        if isinstance(named, list) and named:
+            # Older versions wrote the name of the folder too.
+            paths = [self.path / str(one) for one in named]
+            return [one if one.exists() else self.path / one.name for one in paths]
+        try:
+            there = sorted(self.path.iterdir())
+        except OSError as error:
+            raise BagError(f"cannot open it: {error.strerror}", str(self.path)) from error
+        return [one for one in there if one.suffix in _SUFFIXES or one.suffixes[-1:] == [".zstd"]]
+
+    def _no_bag(self) -> BagError:
+        return BagError(f"the folder has no {METADATA}, and no .db3 or .mcap file", str(self.path))
+
+    def _open(self, file: Path) -> None:
+        try:
+            plain = self._decompress(file) if file.suffix == ".zstd" else file
+            part: _Part = McapReader(plain) if plain.suffix == ".mcap" else SqliteReader(plain)
+        except BagError as error:
+            self.problems.append(error)
+            return
+        self._stack.callback(part.close)
+        self._parts.append(part)
+        self.problems += part.problems
+
+    def _decompress(self, file: Path) -> Path:
+        """Return a temporary file with the contents of a compressed one."""
+        import tempfile
+
+        zstandard = _zstandard()
+        folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="rosz-bag-"))
+        plain = Path(folder, file.stem)
+        try:
+            with file.open("rb") as source, plain.open("wb") as target:
+                zstandard.ZstdDecompressor().copy_stream(source, target)
+        except (OSError, zstandard.ZstdError) as error:
+            self.problems.append(BagError(f"damaged: {error}", str(file)))
+        return plain
+
+    @property
+    def size(self) -> int:
+        """Size of all files in bytes."""
+        return sum(one.stat().st_size for one in self.path.iterdir() if one.is_file())
+
+    @cached_property
+    def channels(self) -> Sequence[Channel]:
+        """All channels, in the order of the files."""
+        return list(dict.fromkeys(one for part in self._parts for one in part.channels))
+
+    @property
+    def chunks(self) -> Sequence[Chunk]:
+        """None: offsets would be those of several files."""
+        return ()
+
+    def count(self, channel: Channel | None = None) -> int:
+        """Return the number of messages of a channel, or of all."""
+        return sum(part.count(channel) for part in self._parts)
+
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        start: int | None = None,
+        end: int | None = None,
+        *,
+        reverse: bool = False,
+        damaged: DamageReport | None = None,
+    ) -> Iterator[Entry]:
+        """Yield messages in the order of their stamps; see `rosz.bags.BagReader`.
+
+        Raises:
+            BagError: A part of the bag is damaged.
+        """
+        parts = [
+            part.messages(topics, start, end, reverse=reverse, damaged=damaged)
+            for part in self._parts
+        ]
+        merged = heapq.merge(*parts, key=lambda one: one.stamp, reverse=reverse)
+        if not self._by_message:
+            return merged
+        unpack = _zstandard().ZstdDecompressor().decompress
+
+        def plain(data: Payload) -> bytes:
+            found: bytes = unpack(data) if bytes(data[:4]) == _ZSTD_FRAME else bytes(data)
+            return found
+
+        return (Entry(one.channel, one.stamp, plain(one.data)) for one in merged)
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield nothing: the format has no files within."""
+        return iter(())
+
+    def close(self) -> None:
+        """Close the files; a second call has no effect."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+
+def _zstandard() -> Any:
+    try:
+        import zstandard
+    except ImportError as error:
+        raise UsageError("bags compressed by zstd need: pip install 'rosz[bag]'") from error
+    return zstandard
