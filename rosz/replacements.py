@@ -23,10 +23,6 @@ _GRAPHS = "use 'rosz node list', 'rosz node info' and 'rosz topic info', or " + 
     "rqt_graph"
 )
 _PICTURES = _of_ros2("rqt_image_view")
-_IMAGES = (
-    "numpy.frombuffer(image.data, numpy.uint8).reshape(image.height, image.width, -1) is the array"
-    " that OpenCV takes: pip install 'rosz[numpy]' opencv-python"
-)
 _BAGS = "use 'rosz bag info', 'rosz bag play' and 'rosz bag export'; Foxglove shows MCAP files"
 _GAZEBO = "'rosz launch turtlebot3_sim turtlebot3_sim.launch' simulates a TurtleBot3; " + _of_ros2(
     "ros_gz_bridge"
@@ -71,10 +67,8 @@ _PACKAGES = {
     "actionlib_tutorials": "actionlib itself is importable: rosz help rospy",
     "amcl": _of_ros2("nav2_amcl"),
     "beginner_tutorials": "it is the package that the tutorials create: rosz pkg create --bare",
-    "cv_bridge": _IMAGES,
     "gazebo_ros": _GAZEBO,
     "gmapping": _of_ros2("slam_toolbox"),
-    "image_geometry": _IMAGES,
     "image_transport": "publish sensor_msgs/Image, or sensor_msgs/CompressedImage, itself",
     "image_view": _PICTURES,
     "joint_state_publisher_gui": "publish sensor_msgs/JointState, or use 'rosz topic pub'",
