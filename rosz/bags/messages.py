@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any, Self
 
 from rosz.bags.bag import Attachment, BagReader, BagWriter, Channel, Entry, Payload
-from rosz.errors import TypeNotFound
+from rosz.errors import DefinitionError, TypeNotFound
 from rosz.message import Message
 from rosz.typestore import TypeStore
 
@@ -27,6 +27,13 @@ def class_of(channel: Channel, types: TypeStore) -> type[Message]:
         TypeNotFound: The bag has no definition, and there is no such type here.
         DefinitionError: The definition is not well-formed.
     """
+    if channel.encoding == "ros1" and channel.md5:
+        try:
+            known = types.message(channel.type)
+        except (TypeNotFound, DefinitionError):
+            known = None
+        if known is not None and known._md5sum == channel.md5:
+            return known  # with what ROS 2 has added to the type
     if channel.definition and channel.language in _PARSED:
         return types.message_from_text(channel.type, channel.definition)
     return types.message(channel.type)
