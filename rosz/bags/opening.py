@@ -7,21 +7,27 @@ import time
 from pathlib import Path
 from typing import Literal, overload
 
-from rosz.bags.bag import BagReader, BagWriter, Compression
+from rosz.bags.bag import BagReader, Compression
+from rosz.bags.chunk_writer import ChunkWriter
 from rosz.bags.mcap_reader import McapReader
 from rosz.bags.mcap_records import MAGIC
 from rosz.bags.mcap_writer import McapWriter
 from rosz.bags.messages import Bag, BagOutput
 from rosz.bags.ros1_reader import Ros1Reader
 from rosz.bags.ros1_records import describe_begin
+from rosz.bags.ros1_writer import Ros1Writer
 from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
 from rosz.errors import BagError, UsageError
 from rosz.typestore import TypeStore
 
-__all__ = ("create_writer", "find_format", "open", "open_reader")
+__all__ = ("ACTIVE", "create_writer", "find_format", "open", "open_reader")
 
 _MOST_MAGIC = 16
 _SQLITE = b"SQLite format 3"
+_WRITERS: dict[str, type[ChunkWriter]] = {".mcap": McapWriter, ".bag": Ros1Writer}
+
+ACTIVE = ".active"
+"""Suffix of a bag that is being recorded, or was when its recorder was killed."""
 
 
 def find_format(path: str | os.PathLike[str]) -> str:
@@ -69,22 +75,38 @@ def open_reader(path: str | os.PathLike[str]) -> BagReader:
 
 
 def create_writer(
-    path: str | os.PathLike[str], *, compression: Compression = "none", replace: bool = False
-) -> BagWriter:
+    path: str | os.PathLike[str],
+    *,
+    compression: Compression = "none",
+    replace: bool = False,
+    chunk_size: int = 768 << 10,
+    capacity: int = 64 << 20,
+) -> ChunkWriter:
     """Create a bag; the suffix of the path tells the format.
 
     Args:
-        path: Path that ends in ``.mcap``.
+        path: Path that ends in ``.mcap``, or ``.bag`` for a bag of ROS 1; ``.active`` may follow.
         compression: Name of the compression.
         replace: Whether a file that exists is replaced; otherwise it is an error.
+        chunk_size: Bytes of messages that are written, and compressed, together.
+        capacity: Bytes that may wait for the disk.
 
     Raises:
         BagError: The file cannot be created.
         UsageError: The suffix is not known, or the format has no such compression.
     """
-    if Path(path).suffix == ".mcap":
-        return McapWriter(path, compression=compression, replace=replace)
-    raise UsageError(f"'{path}' does not tell the format of the bag; expected a name.mcap")
+    suffix = Path(str(path).removesuffix(ACTIVE)).suffix
+    if suffix not in _WRITERS:
+        raise UsageError(
+            f"'{path}' does not tell the format of the bag; expected a name.mcap or a name.bag"
+        )
+    return _WRITERS[suffix](
+        path,
+        compression=compression,
+        replace=replace,
+        chunk_size=chunk_size,
+        capacity=capacity,
+    )
 
 
 @overload

@@ -10,12 +10,11 @@ import msgspec
 
 from rosz.bags.bag import BagReader, BagWriter, Channel, Compression, Entry
 from rosz.bags.messages import class_of
-from rosz.bags.opening import create_writer, open_reader
+from rosz.bags.opening import ACTIVE, create_writer, open_reader
 from rosz.errors import BagError, RoszError
 from rosz.typestore import TypeStore
 
 __all__ = (
-    "ACTIVE",
     "Copied",
     "Difference",
     "check_bag",
@@ -24,9 +23,6 @@ __all__ = (
     "recover",
     "rewrite",
 )
-
-ACTIVE = ".active"
-"""Suffix of a bag that is being recorded, or was when its recorder was killed."""
 
 
 class Copied(msgspec.Struct):

@@ -18,6 +18,7 @@ from rosz.message.base import (
     Writable,
     ros1_slots,
 )
+from rosz.message.ros1_layout import ros1_fields
 from rosz.message.schema import (
     ARRAY_CODES,
     INTEGER_RANGES,
@@ -43,6 +44,7 @@ __all__ = (
     "Service",
     "Slot",
     "Writable",
+    "ros1_fields",
     "ros1_slots",
     "slot_type",
     "slots",
