@@ -75,7 +75,7 @@ class Rosz:
     """
 
     def __init__(self, environ: Mapping[str, str]) -> None:
-        self._index = PackageIndex([Path(environ["ROS_PACKAGE_PATH"])])
+        self._index = PackageIndex(list(map(Path, environ["ROS_PACKAGE_PATH"].split(":"))))
         self._environ = environ
 
     def context(self, cwd: Path, environ: Mapping[str, str] | None = None) -> SystemContext:

@@ -1,0 +1,60 @@
+"""Compares what rosz and roslaunch make of launch files."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from plan.roslaunch_oracle import Roslaunch, Rosz, differences, environment
+
+from .packages import Corpus, Repository
+
+__all__ = ("compare",)
+
+_ROOT = re.compile(rb"<launch[\s>]")
+
+
+def compare(corpus: Corpus, repositories: list[Repository]) -> list[dict[str, Any]]:
+    """Return a row for each launch file: both errors, the differences, and whether it is equal.
+
+    A file that both refuse, without arguments, is equal.
+    """
+    return [row for repository in repositories for row in _rows(corpus, repository)]
+
+
+def files(repository: Repository) -> Iterator[Path]:
+    """Yield the launch files of a repository."""
+    for suffix in ("launch", "xml", "test"):
+        for path in sorted(repository.path.rglob(f"*.{suffix}")):
+            # Includes are often called NAME.launch.xml, or lie in a folder of launch files.
+            if path.is_file() and path.name != "package.xml" and _ROOT.search(path.read_bytes()):
+                yield path
+
+
+def _rows(corpus: Corpus, repository: Repository) -> Iterator[dict[str, Any]]:
+    found = list(files(repository))
+    if not found:
+        return
+    with TemporaryDirectory() as home:
+        paths = [corpus.path(repository, real=real) for real in (True, False)]
+        variables = [environment(Path(), Path(home)) | {"ROS_PACKAGE_PATH": path} for path in paths]
+        roslaunch, rosz = Roslaunch(variables[0]), Rosz(variables[1])
+        try:
+            for path in found:
+                print(f"launch {path}", file=sys.stderr, flush=True)
+                real = roslaunch.ask([path.name], path.parent)
+                ours = rosz.ask([path.name], path.parent)
+                differing = differences(ours, real)
+                yield {
+                    "case": f"{repository.name}:{path.relative_to(repository.path)}",
+                    "rosz": ours["error"],
+                    "ros1": real["error"],
+                    "differences": [text[:2000] for text in differing],
+                    "equal": not differing,
+                }
+        finally:
+            roslaunch.close()
