@@ -101,7 +101,6 @@ _MODULES = {
     "launch": _LAUNCH,
     "launch_ros": _LAUNCH,
     "roslaunch": _LAUNCH,
-    "ros_numpy": "numpy.frombuffer reads the data of messages: pip install 'rosz[numpy]'",
     "tf2_py": _TRANSFORMS,
     "xacro": "run: pip install 'rosz[xacro]'",
 }
