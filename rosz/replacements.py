@@ -100,7 +100,6 @@ _MODULES = {
     "catkin": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
     "launch": _LAUNCH,
     "launch_ros": _LAUNCH,
-    "roslaunch": _LAUNCH,
     "tf2_py": _TRANSFORMS,
     "xacro": "run: pip install 'rosz[xacro]'",
 }

@@ -39,6 +39,7 @@ MODULES = (
     "message_filters",
     "ros_numpy",
     "rosgraph",
+    "roslaunch",
     "roslib",
     "rosmsg",
     "rosnode",
@@ -130,6 +131,16 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "rosgraph.rosenv": {
         "ros1.rosgraph.names": "DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP ROS_IPV6"
         " ROS_MASTER_URI ROS_NAMESPACE get_master_uri"
+    },
+    "roslaunch.arg_dump": {"ros1.roslaunch.node_args": "dump_args get_args"},
+    "roslaunch.launch": {
+        "ros1.roslaunch.parent": "ROSLaunchRunner",
+        "ros1.roslaunch.core": "RLException",
+    },
+    "roslaunch.nodeprocess": {"ros1.roslaunch.pmon": "LocalProcess=Process"},
+    "roslaunch.param_dump": {"ros1.roslaunch.node_args": "dump_params"},
+    "roslaunch.xmlloader": {
+        "ros1.roslaunch.loader": "LoadException Loader XmlLoader XmlParseException"
     },
     "roslib.launcher": {"ros1.roslib": "load_manifest"},
     "roslib.message": {**_MESSAGE, "time": "TVal=StampValue"},

@@ -63,4 +63,4 @@ __all__ = (
     "plan",
 )
 
-PUBLIC_MODULES = ("report",)
+PUBLIC_MODULES = ("document", "report", "scope", "substitution")

@@ -18,13 +18,15 @@ from rosz.launch.run.network import (
     write_params,
 )
 from rosz.launch.run.process_tree import ProcessTree
-from rosz.launch.run.runner import Options, Runner
-from rosz.launch.run.supervisor import Timeouts
+from rosz.launch.run.runner import Options, Runner, describe_plan
+from rosz.launch.run.supervisor import Process as LaunchProcess
+from rosz.launch.run.supervisor import Supervisor, Timeouts
 
 __all__ = (
     "Child",
     "Command",
     "Host",
+    "LaunchProcess",
     "LaunchStatus",
     "MachineOption",
     "Network",
@@ -35,9 +37,11 @@ __all__ = (
     "RouterProcess",
     "Runner",
     "StatusClient",
+    "Supervisor",
     "Timeouts",
     "Workplace",
     "core_params",
+    "describe_plan",
     "interrupted_by_signals",
     "needs_router",
     "run_command",

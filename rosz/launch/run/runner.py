@@ -55,6 +55,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
         silence: Time in seconds without a message from another machine after which it counts as
             lost, and its agent ends what runs there.
         timeouts: Time that processes have to end.
+        stay: Whether the launch goes on when all processes have ended, since more may come.
     """
 
     screen: bool = False
@@ -68,6 +69,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
     machines: tuple[MachineOption, ...] = ()
     silence: float = 30.0
     timeouts: Timeouts = Timeouts()
+    stay: bool = False
 
 
 def apply_options(plan: Plan, options: Options) -> Plan:
@@ -104,6 +106,7 @@ class Runner:
         options: The options.
         out: Stream for normal messages.
         err: Stream for errors.
+        begun: Function called with the supervisor once the processes have been started.
 
     Raises:
         UsageError: If the options do not fit the plan.
@@ -118,7 +121,9 @@ class Runner:
         *,
         out: TextIO,
         err: TextIO,
+        begun: Callable[[Supervisor], None] | None = None,
     ) -> None:
+        self._begun = begun
         self._plan = apply_options(plan, options)
         self._workplace = workplace
         self._network = network
@@ -251,7 +256,7 @@ class Runner:
 
     def _make_supervisor(self, hosts: Callable[[NodePlan], Host]) -> Supervisor:
         alone = self._network.alone
-        if not self._plan.nodes:
+        if not self._plan.nodes and not self._options.stay:
             self._console.strong("No processes to monitor")
             if alone:
                 self._console.say("nobody else holds the parameters: staying until Ctrl-C")
@@ -262,7 +267,7 @@ class Runner:
             self._console,
             timeouts=self._options.timeouts,
             holds=self._network.holds,
-            stay=alone and not self._plan.nodes,
+            stay=self._options.stay or (alone and not self._plan.nodes),
         )
 
     def _supervise(self, supervisor: Supervisor) -> None:
@@ -280,6 +285,8 @@ class Runner:
         with stopped_by_signals(self._loop, self.stop, supervisor.kill, console.dump_stacks):
             try:
                 supervisor.start()
+                if self._begun is not None:
+                    self._begun(supervisor)
                 self._loop.run()
             finally:
                 if clock is not None:

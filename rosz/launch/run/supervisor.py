@@ -352,6 +352,8 @@ class Supervisor:
         self.closing = False
         self._begun = False
         self._callbacks: dict[int, list[Callable[[], None]]] = {}
+        self._host_of = host_of
+        self._deaths: list[Callable[[Process], None]] = []
         self.failed = False
         self.failures: list[Process] = []
         self.processes = [
@@ -370,6 +372,18 @@ class Supervisor:
                 process.begin()
         self._begun = True
         self._end_when_over()
+
+    def add(self, node: NodePlan) -> Process:
+        """Start a further process, and return it; only on the loop's thread."""
+        number = len(self.processes) + 1
+        process = Process(node, number, self._host_of(node), self)
+        self.processes.append(process)
+        process.begin()
+        return process
+
+    def on_death(self, callback: Callable[[Process], None]) -> None:
+        """Call a function with each process that ends by itself, on the loop's thread."""
+        self._deaths.append(callback)
 
     def find(self, name: str) -> Process:
         """Return the process of a node.
@@ -449,6 +463,8 @@ class Supervisor:
 
     def died(self, process: Process) -> None:
         """Report that a process ended by itself, and end the others if it was required."""
+        for callback in self._deaths:
+            callback(process)
         text = self._describe_death(process)
         if process not in self.failures and (process.code != 0 or process.node.required):
             self.failures.append(process)
