@@ -134,6 +134,7 @@ class Rosz(Side):
         bin_folder = _REPOSITORY / "rosz" / "cli" / "bin"
         own = Path(sys.executable).parent
         self._environ = {
+            "ROS_ROOT": "/usr/share/ros",
             "PATH": f"{bin_folder}:{own}:/usr/bin:/bin:/usr/sbin:/sbin",
             "HOME": str(folder),
             "ROS_HOME": str(folder / "home"),

@@ -44,6 +44,7 @@ def plan(
     *,
     ns: str = "",
     faults: list[LaunchFileError] | None = None,
+    assign_machines: bool = True,
 ) -> Plan:
     """Read launch files into a plan.
 
@@ -55,6 +56,7 @@ def plan(
         faults: List for the error of each tag that is refused, and then left out; the first one is
             raised when not given. What follows a refused ``<arg>`` may depend on it, so its error
             is always raised.
+        assign_machines: Whether every node is assigned to its machine, which has to be declared.
 
     Raises:
         LaunchFileError: If a file is refused, or cannot be read.
@@ -62,7 +64,7 @@ def plan(
     loader = _Loader(context, args, ns, faults=faults)
     for file in files:
         loader.load(file)
-    return loader.finish()
+    return loader.finish(assign_machines=assign_machines)
 
 
 def describe_args(
@@ -118,14 +120,14 @@ class _Loader:
         self._stack: list[_Frame] = []
         self._chain: tuple[tuple[str, str], ...] = ()
 
-    def finish(self) -> Plan:
+    def finish(self, *, assign_machines: bool) -> Plan:
         used = self._declared | self._substitution.used
         unused = tuple(name for name in self._given if name not in used)
         for name in unused:
             hint = near_miss(name, self._declared)
             text = f"no file declares an arg '{name}', so '{name}:=…' does nothing{hint}"
             self.builder.warnings.append(Notice(text, Place("<command line>")))
-        return self.builder.build(unused)
+        return self.builder.build(unused, assign_machines=assign_machines)
 
     def load(self, file: str | Path | LaunchText) -> None:
         """Read one file into the plan."""

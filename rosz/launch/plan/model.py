@@ -430,14 +430,20 @@ class PlanBuilder:
             name = f"{base}_{number}"
         return name
 
-    def build(self, unused_args: tuple[str, ...]) -> Plan:
-        """Return the plan, with every node assigned to its machine.
+    def build(self, unused_args: tuple[str, ...], *, assign_machines: bool = True) -> Plan:
+        """Return the plan.
+
+        Args:
+            unused_args: Names of the args given that no file declares.
+            assign_machines: Whether to assign every node to its machine.
 
         Raises:
             LaunchFileError: If a node names a machine that is not declared.
         """
-        nodes = [self._assign_machine(node) for node in self._nodes.values()]
-        tests = [replace(test, node=self._assign_machine(test.node)) for test in self._tests]
+        nodes, tests = list(self._nodes.values()), self._tests
+        if assign_machines:
+            nodes = [self._assign_machine(node) for node in nodes]
+            tests = [replace(test, node=self._assign_machine(test.node)) for test in tests]
         return Plan(
             files=tuple(self.files),
             clear=tuple(ns for ns in self._clear if not self._parent_cleared(ns)),

@@ -10,8 +10,7 @@ import msgspec
 
 from rosz.errors import RoszError
 from rosz.launch.plan import MachinePlan, NodePlan, ParamPlan, Place, Plan
-from rosz.names import canonical
-from rosz.ros1.rosgraph.names import anonymous_name, resolve_name
+from rosz.ros1.rosgraph.names import anonymous_name
 from rosz.ros1.roslaunch.core import (
     Executable,
     Machine,
@@ -160,7 +159,7 @@ class ROSLaunchConfig:
             ValueError: It is a node of the core, and has no package, type or name.
         """
         if node.name:
-            full = canonical(resolve_name(node.name, node.namespace))
+            full = f"{node.namespace}{node.name}"
             if full in self.resolved_node_names:
                 raise RLException(
                     f"roslaunch file contains multiple nodes named [{full}].\nPlease check all"
@@ -227,10 +226,11 @@ def node_plan(node: Node) -> NodePlan:
         "respawn_delay": node.respawn_delay,
         "required": node.required,
         "output": "screen" if node.output == "screen" else "log",
-        "cwd": node.cwd or "ROS_HOME",
         "remaps": tuple((old, new) for old, new in node.remap_args),
         "env": tuple((key, value) for key, value in node.env_args),
     }
+    if node.cwd is not None or node.plan is None:
+        changes["cwd"] = node.cwd or "ROS_HOME"
     if node.plan is not None:
         return msgspec.structs.replace(node.plan, **changes)
     return NodePlan(package=node.package, type=node.type, place=_PLACE, **changes)

@@ -55,9 +55,10 @@ TEST_TIME_LIMIT_DEFAULT = 60
 
 _REGISTER_TIMEOUT = 10.0
 _SSH_PORT = 22
+_CWDS = {"node": "node", "ros_home": "ROS_HOME"}
 
 F = TypeVar("F", bound=Callable[..., Any])
-Pairs = Sequence[tuple[str, str]]
+Pairs = Sequence[Sequence[str]]
 
 
 class RLException(Exception):
@@ -187,7 +188,7 @@ def setup_env(
     if node is not None:
         if node.namespace not in {"", "/"}:
             made["ROS_NAMESPACE"] = node.namespace.rstrip("/")
-        made.update(node.env_args)
+        made.update((name, value) for name, value in node.env_args)
     return made
 
 
@@ -271,7 +272,8 @@ class Machine:
         """Return a text that differs between machines that are not the same."""
         return (
             f"Machine(address[{self.address}] env_loader[{self.env_loader}]"
-            f" ssh_port[{self.ssh_port}] user[{self.user}] password[{self.password}])"
+            f" ssh_port[{self.ssh_port}] user[{self.user or ''}] password[{self.password or ''}]"
+            f" timeout[{self.timeout}])"
         )
 
     def config_equals(self, m2: object) -> bool:
@@ -302,7 +304,7 @@ _local: list[Machine] = []
 def local_machine() -> Machine:
     """Return this machine."""
     if not _local:
-        _local.append(Machine("", network.get_host_name()))
+        _local.append(Machine("", "localhost"))
     return _local[0]
 
 
@@ -377,7 +379,7 @@ class Node:
         self.remap_args = list(remap_args or ())
         self.env_args = list(env_args or ())
         self.output = output
-        self.cwd = "ROS_HOME" if cwd and cwd.lower() == "ros_home" else cwd or None
+        self.cwd = _CWDS.get(cwd.lower()) if cwd else None
         self.launch_prefix = launch_prefix or None
         self.required = required
         self.filename = filename
@@ -390,6 +392,10 @@ class Node:
             raise ValueError("type must be non-empty")
         if self.name and "/" in self.name:
             raise ValueError("node name cannot contain a namespace")
+        if output not in {None, "", "log", "screen"}:
+            raise ValueError(f"output must be one of 'log', 'screen', not '{output}'")
+        if cwd and self.cwd is None:
+            raise ValueError(f"cwd must be one of 'ROS_HOME', 'node', not '{cwd}'")
         if self.required and self.respawn:
             raise ValueError("respawn and required cannot both be set to true")
 
@@ -475,7 +481,7 @@ class Test(Node):
         self.test_name = test_name
         self.retry = retry or 0
         limit = time_limit or TEST_TIME_LIMIT_DEFAULT
-        if not isinstance(limit, int | float):
+        if isinstance(limit, bool) or not isinstance(limit, int | float):
             raise ValueError("'time-limit' must be a number")  # noqa: TRY004  # as ROS 1
         self.time_limit: float = float(limit)
         if self.time_limit <= 0:
@@ -487,10 +493,10 @@ class Test(Node):
 
     def xmlattrs(self) -> list[tuple[str, Any]]:
         """Return the attributes of the tag."""
-        kept = [pair for pair in super().xmlattrs() if pair[0] != "respawn"]
+        kept = [pair for pair in super().xmlattrs() if not pair[0].startswith("respawn")]
         extra: list[tuple[str, Any]] = [("test-name", self.test_name)]
         if self.retry:
-            extra.append(("retry", self.retry))
+            extra.append(("retry", str(self.retry)))
         if self.time_limit != TEST_TIME_LIMIT_DEFAULT:
             extra.append(("time-limit", self.time_limit))
         return [*kept, *extra]

@@ -49,7 +49,7 @@ class LoadException(RLException):
     """A launch file cannot be used."""
 
 
-class XmlParseException(RLException):
+class XmlParseException(LoadException):
     """A launch file cannot be read."""
 
 
@@ -173,7 +173,7 @@ class XmlLoader(Loader):
             if self.args_only:
                 self.args = describe_args([source], given, plan_context(), ns=namespace)
                 return
-            read = plan([source], given, plan_context(), ns=namespace)
+            read = plan([source], given, plan_context(), ns=namespace, assign_machines=False)
         except RoszError as error:
             raise XmlParseException(str(error)) from error
         _fill(config, read, core=core, verbose=verbose)
@@ -186,7 +186,12 @@ def _fill(config: Any, read: Plan, *, core: bool, verbose: bool) -> None:
     for notice in (*read.warnings, *read.deprecations):
         config.add_config_error(str(notice))
     for step in read.setup:
-        words = ("dump", step.file, step.name) if step.action == "dump" else ("delete", step.name)
+        # ROS 1 names what it dumps as a namespace.
+        words = (
+            ("dump", step.file, f"{step.name.rstrip('/')}/")
+            if step.action == "dump"
+            else ("delete", step.name)
+        )
         command = RosbinExecutable("rosparam", words, PHASE_SETUP)
         command.step = step
         config.add_executable(command)
@@ -224,9 +229,9 @@ def _shared(found: NodePlan) -> dict[str, Any]:
         "namespace": found.namespace,
         "machine_name": found.machine or None,
         "args": shlex.join(found.args),
-        "remap_args": found.remaps,
+        "remap_args": [list(pair) for pair in found.remaps],
         "env_args": found.env,
-        "cwd": None if found.cwd == "ROS_HOME" else found.cwd,
+        "cwd": "node" if found.cwd == "node" else None,
         "launch_prefix": shlex.join(found.launch_prefix) or None,
         "filename": found.place.file,
     }

@@ -42,7 +42,10 @@ def resolve_args(
     if not arg_str or (not resolve_anon and "$(anon" in arg_str):
         return arg_str
     known = {} if context is None else context
-    scope = Scope("/", filename or known.get("filename") or "")
+    file = filename or known.get("filename") or ""
+    if "$(dirname)" in arg_str and not file:
+        raise SubstitutionException("$(dirname) needs the path of a launch file, and there is none")
+    scope = Scope("/", file)
     scope.args = known.setdefault("arg", {})
     scope.anonymous = known.setdefault("anon", {})
     try:
