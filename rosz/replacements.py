@@ -96,6 +96,7 @@ _ALIASES = {
 }
 
 _MODULES = {
+    "moveit_commander": "it needs MoveIt, which is C++; " + _of_ros2("moveit_py"),
     "PyKDL": "use tf.transformations: pip install 'rosz[numpy]'",
     "catkin": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
     "launch": _LAUNCH,

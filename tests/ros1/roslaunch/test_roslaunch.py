@@ -73,8 +73,8 @@ from roslaunch.substitution_args import resolve_args
 context = {"arg": {"a": "1"}}
 texts = ["$(arg a)/x", "$(optenv NO_SUCH b c)", "$(eval 1 + arg('a'))", "$(arg b)", "$(find)", "x",
          "$(dirname)", "$(env NO_SUCH)", ""]
-pairs = [("1", "auto"), ("1.5", "auto"), ("true", "auto"), ("1", "bool"), ("x", "int"), ("1", "double"),
-         ("[1, a]", "yaml"), ("2", "str"), ("maybe", "bool"), ("1", "odd")]
+pairs = [("1", "auto"), ("1.5", "auto"), ("true", "auto"), ("1", "bool"), ("x", "int"),
+         ("1", "double"), ("[1, a]", "yaml"), ("2", "str"), ("maybe", "bool"), ("1", "odd")]
 env = setup_env(Node("p", "t", namespace="/a/b/", env_args=[("K", "v")]), None, "http://m", {})
 result = [
     [tried(resolve_args, text, context) for text in texts],
