@@ -59,7 +59,8 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> s
     """
     name = class_name(spec.name)
     renamed = _ros1_names(spec)
-    base = "_Renamed" if renamed else BASES.get(spec.name, "_Message")
+    plain = "_Stamped" if _is_stamped(spec) else "_Message"
+    base = "_Renamed" if renamed else BASES.get(spec.name, plain)
     fields = {attribute(field.name) for field in spec.fields}
     names = ClassNames(module, fields | {attribute(one.name) for one in spec.constants})
     body = [_field(field, names) for field in spec.fields]
@@ -137,6 +138,16 @@ def _codec(signature: str, lines: list[str], fallback: str, name: str) -> list[s
     code = ["@staticmethod", f"def {signature}:", "    try:"]
     code += [f"        {line}" for line in lines]
     return [*code, "    except _FAULTS:", f"        return {fallback.format(name)}"]
+
+
+def _is_stamped(spec: MessageSpec) -> bool:
+    """Return whether a message begins with a header, which ROS 1 fills in."""
+    first = spec.fields[0] if spec.fields else None
+    return first is not None and (first.name, first.type.base, first.type.shape) == (
+        "header",
+        _HEADER,
+        "one",
+    )
 
 
 def _ros1_names(spec: MessageSpec) -> dict[str, str]:

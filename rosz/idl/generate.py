@@ -36,6 +36,7 @@ _ALWAYS = {
     "_Renamed": "from rosz.message import Renamed as _Renamed",
     "_Sequenced": "from rosz.message import Sequenced as _Sequenced",
     "_Service": "from rosz.message import Service as _Service",
+    "_Stamped": "from rosz.message import Stamped as _Stamped",
     "_Struct": "from struct import Struct as _Struct",
     "_TimeValue": "from rosz.time import TimeValue as _TimeValue",
     "_array": "from array import array as _array",

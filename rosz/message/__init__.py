@@ -11,10 +11,12 @@ from __future__ import annotations
 from rosz.message.base import (
     Array,
     Bytes,
+    Derived,
     Message,
     Renamed,
     Sequenced,
     Service,
+    Stamped,
     Writable,
     ros1_slots,
 )
@@ -29,7 +31,7 @@ from rosz.message.schema import (
     slots,
 )
 
-PUBLIC_MODULES = ("convert", "runtime", "text")
+PUBLIC_MODULES = ("convert", "runtime", "text", "tuples")
 
 __all__ = (
     "ARRAY_CODES",
@@ -38,11 +40,13 @@ __all__ = (
     "SCALAR_CODES",
     "Array",
     "Bytes",
+    "Derived",
     "Message",
     "Renamed",
     "Sequenced",
     "Service",
     "Slot",
+    "Stamped",
     "Writable",
     "ros1_fields",
     "ros1_slots",

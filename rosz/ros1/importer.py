@@ -26,6 +26,7 @@ from rosz.environment import Environment, package_index
 from rosz.errors import PackageError, RoszError
 from rosz.packages import PackageIndex
 from rosz.replacements import instead_of
+from rosz.ros1 import derived
 from rosz.ros1.modules import (
     ELSEWHERE,
     EXTRAS,
@@ -52,6 +53,7 @@ def install(store: TypeStore | None = None, packages: PackageIndex | None = None
     """
     if any(isinstance(finder, _FrontFinder) for finder in sys.meta_path):
         return
+    derived.install()
     types = _Types(store, packages)
     sys.meta_path.insert(0, _FrontFinder(types))
     sys.meta_path.append(_EndFinder(types))

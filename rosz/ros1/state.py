@@ -116,7 +116,7 @@ class _Context(Context):
 
     def decoder(self, message_type: type[Message]) -> Callable[[bytes], Any]:
         """Return the function that decodes messages of a class as ROS 1 code knows them."""
-        from rosz.ros1.tuples import decoder
+        from rosz.message.tuples import decoder
 
         return decoder(message_type)
 

@@ -319,3 +319,9 @@ def test_stamps_are_ros_1_times() -> None:
     assert header.stamp.secs == 5
     assert Duration(1, 0) + Duration(2, 0) == Duration(3, 0)
     assert Float64(header.stamp.to_sec()).data == 5.0
+
+
+def test_none_is_the_default_header() -> None:
+    header: Any = None
+    assert PoseStamped(header).header == Header()
+    assert PoseStamped(header=header).to_cdr() == PoseStamped().to_cdr()

@@ -4,9 +4,8 @@
 
 A FILE is a ``test_*.py`` (a file of unittest cases or of nose's functions) or a ``.test`` file of
 rostest; a FOLDER stands for all such files below it, except nodes that a ``.test`` file starts.
-Packages on which they depend are searched below each ROOT, and below the repository that the
-first FILE or FOLDER is in: their messages are generated with genpy for real ROS 1, and found on
-the package path by rosz.
+Packages on which those of the files depend are searched below each ROOT: their messages are
+generated with genpy for real ROS 1, and found on the package path by rosz.
 
 For each file it prints how many tests pass on ROS 1, how many of those pass on rosz, and each one
 that does not, with the last line of its error; ``--why`` prints the whole error. Tests of what is
@@ -15,7 +14,7 @@ Nothing is fetched: check repositories out outside of this one. Debian's package
 ``python3-rospy``, ``python3-rostest`` and the messages that tests use have to be installed.
 ``--work DIR`` keeps the generated modules for the next run, and the logs of all programs.
 
-Example: ``python -m tests.peers ~/ros_comm/test/test_rospy/test/unit``
+Example: ``python -m tests.peers --path ~/ros_comm/test ~/ros_comm/test/test_rospy/test/unit``
 """
 
 from __future__ import annotations
@@ -47,7 +46,8 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--seconds", type=float, default=120, metavar="N")
     options = parser.parse_args(argv)
     files = [file.resolve() for given in options.files for file in _files(given)]
-    roots = [_repository(files[0]), *(path.resolve() for path in options.path)] if files else []
+    given = (*map(package_of, files), *(path.resolve() for path in options.path))
+    roots = list(dict.fromkeys(given))
     with tempfile.TemporaryDirectory() as temporary:
         work = (options.work or Path(temporary)).resolve()
         sides: list[Side] = []
@@ -67,10 +67,6 @@ def _files(given: Path) -> list[Path]:
         return [given]
     units = (file for file in given.rglob("test_*.py") if not _NODE.search(file.read_text()))
     return sorted([*units, *given.rglob("*.test")])
-
-
-def _repository(file: Path) -> Path:
-    return next((up for up in file.parents if (up / ".git").exists()), package_of(file))
 
 
 def _report(found: dict[Path, dict[str, dict[str, Outcome]]], *, why: bool) -> int:

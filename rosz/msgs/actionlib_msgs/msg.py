@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from msgspec import field as _field
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
@@ -157,7 +158,7 @@ _t5 = _Stride("i I I $ B", None, 4)
 _u3 = _Struct("<i2I").unpack_from
 
 
-class GoalStatusArray(_Message):
+class GoalStatusArray(_Stamped):
     """How far all goals of a ROS 1 action server have come."""
 
     header: Header = _field(default_factory=Header)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from msgspec import field as _field
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import TRUTH as _TRUTH
@@ -78,7 +79,7 @@ _u4 = _Struct("<?").unpack_from
 _u5 = _Struct("<2f").unpack_from
 
 
-class Status(_Message):
+class Status(_Stamped):
     """What one end of a bond says of itself."""
 
     header: Header = _field(default_factory=Header)

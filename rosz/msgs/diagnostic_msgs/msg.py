@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from msgspec import field as _field
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
@@ -182,7 +183,7 @@ _t6 = _Stride("B I $ I $", None, 4)
 _u4 = _Struct("<Ii2I").unpack_from
 
 
-class DiagnosticArray(_Message):
+class DiagnosticArray(_Stamped):
     """How parts of a robot are doing, sent on /diagnostics."""
 
     header: Header = _field(default_factory=Header)

@@ -7,6 +7,7 @@ from array import array as _array
 from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import Template as _Template
@@ -173,7 +174,7 @@ _u4 = _Struct("<Ii2I").unpack_from
 _u5 = _Struct("<7d").unpack_from
 
 
-class GeoPoseStamped(_Message):
+class GeoPoseStamped(_Stamped):
     """A position on the WGS 84 ellipsoid and a heading, with their time."""
 
     header: Header = _field(default_factory=Header)
@@ -226,7 +227,7 @@ _u6 = _Struct("<I").unpack_from
 _u7 = _Struct("<i2I").unpack_from
 
 
-class GeoPath(_Message):
+class GeoPath(_Stamped):
     """Places and headings to pass one after the other."""
 
     header: Header = _field(default_factory=Header)
@@ -300,7 +301,7 @@ _t4 = _Template("I i I I $ d d d", -4)
 _u8 = _Struct("<3d").unpack_from
 
 
-class GeoPointStamped(_Message):
+class GeoPointStamped(_Stamped):
     """A position on the WGS 84 ellipsoid, with its time."""
 
     header: Header = _field(default_factory=Header)
@@ -399,7 +400,7 @@ class GeoPoseWithCovariance(_Message):
             return _explain(data, GeoPoseWithCovariance)
 
 
-class GeoPoseWithCovarianceStamped(_Message):
+class GeoPoseWithCovarianceStamped(_Stamped):
     """An estimated position and heading with covariance and time."""
 
     header: Header = _field(default_factory=Header)
@@ -681,7 +682,7 @@ _u13 = _Struct("<6dI").unpack_from
 _u14 = _Struct("<3dI").unpack_from
 
 
-class GeographicMap(_Message):
+class GeographicMap(_Stamped):
     """A map of points and features. What they stand for is told by their properties."""
 
     header: Header = _field(default_factory=Header)
@@ -887,7 +888,7 @@ class GeographicMap(_Message):
 _t12 = _Template("I i I I $ i I I $ 16s d d d d d d I", -4)
 
 
-class GeographicMapChanges(_Message):
+class GeographicMapChanges(_Stamped):
     """What changed in a map."""
 
     header: Header = _field(default_factory=Header)
@@ -1196,7 +1197,7 @@ _t13 = _Stride("16s 16s 16s I", None, 8)
 _u16 = _Struct("<16s16s16s").unpack_from
 
 
-class RouteNetwork(_Message):
+class RouteNetwork(_Stamped):
     """Points and the ways from one to another: a graph to plan routes on."""
 
     header: Header = _field(default_factory=Header)
@@ -1393,7 +1394,7 @@ class RouteNetwork(_Message):
 _t14 = _Template("I i I I $ 16s I", -4)
 
 
-class RoutePath(_Message):
+class RoutePath(_Stamped):
     """A way through a route network."""
 
     header: Header = _field(default_factory=Header)

@@ -8,6 +8,7 @@ from itertools import starmap as _starmap
 from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
@@ -143,7 +144,7 @@ _u3 = _Struct("<Ii2I").unpack_from
 _u4 = _Struct("<6d").unpack_from
 
 
-class AccelStamped(_Message):
+class AccelStamped(_Stamped):
     """An acceleration with its time and the frame it is expressed in."""
 
     header: Header = _field(default_factory=Header)
@@ -240,7 +241,7 @@ class AccelWithCovariance(_Message):
             return _explain(data, AccelWithCovariance)
 
 
-class AccelWithCovarianceStamped(_Message):
+class AccelWithCovarianceStamped(_Stamped):
     """An estimated acceleration with covariance, time and frame."""
 
     header: Header = _field(default_factory=Header)
@@ -360,7 +361,7 @@ _t2 = _Template("I i I I $ d d d d d d d d d d", -4)
 _u6 = _Struct("<10d").unpack_from
 
 
-class InertiaStamped(_Message):
+class InertiaStamped(_Stamped):
     """Mass properties of a rigid body, with time and frame."""
 
     header: Header = _field(default_factory=Header)
@@ -487,7 +488,7 @@ _t3 = _Template("I i I I $ d d d", -4)
 _u8 = _Struct("<3d").unpack_from
 
 
-class PointStamped(_Message):
+class PointStamped(_Stamped):
     """A position with its time and the frame it is expressed in."""
 
     header: Header = _field(default_factory=Header)
@@ -622,7 +623,7 @@ _t5 = _Stride("I i I I $ I", -4, 8)
 _u11 = _Struct("<I").unpack_from
 
 
-class PolygonInstanceStamped(_Message):
+class PolygonInstanceStamped(_Stamped):
     """A numbered outline with its time and the frame it is expressed in."""
 
     header: Header = _field(default_factory=Header)
@@ -678,7 +679,7 @@ class PolygonInstanceStamped(_Message):
 _t6 = _Template("I i I I $ I", -4)
 
 
-class PolygonStamped(_Message):
+class PolygonStamped(_Stamped):
     """An outline with its time and the frame it is expressed in."""
 
     header: Header = _field(default_factory=Header)
@@ -851,7 +852,7 @@ _p9 = _Struct("<7d").pack
 _i2 = _Struct("<7d").iter_unpack
 
 
-class PoseArray(_Message):
+class PoseArray(_Stamped):
     """Several poses of one time and frame."""
 
     header: Header = _field(default_factory=Header)
@@ -911,7 +912,7 @@ _t7 = _Template("I i I I $ d d d d d d d", -4)
 _u14 = _Struct("<7d").unpack_from
 
 
-class PoseStamped(_Message):
+class PoseStamped(_Stamped):
     """A pose with its time and the frame it is expressed in."""
 
     header: Header = _field(default_factory=Header)
@@ -1006,7 +1007,7 @@ class PoseWithCovariance(_Message):
             return _explain(data, PoseWithCovariance)
 
 
-class PoseWithCovarianceStamped(_Message):
+class PoseWithCovarianceStamped(_Stamped):
     """An estimated pose with covariance, time and frame."""
 
     header: Header = _field(default_factory=Header)
@@ -1069,7 +1070,7 @@ _t8 = _Template("I i I I $ d d d d", -4)
 _u15 = _Struct("<4d").unpack_from
 
 
-class QuaternionStamped(_Message):
+class QuaternionStamped(_Stamped):
     """A rotation with its time and the frame it is relative to."""
 
     header: Header = _field(default_factory=Header)
@@ -1153,7 +1154,7 @@ class Transform(_Message):
 _t9 = _Template("I i I I $ I $ d d d d d d d", -4)
 
 
-class TransformStamped(_Message):
+class TransformStamped(_Stamped):
     """The pose of one coordinate frame in another at a time."""
 
     header: Header = _field(default_factory=Header)
@@ -1246,7 +1247,7 @@ class Twist(_Message):
             return _explain(data, Twist)
 
 
-class TwistStamped(_Message):
+class TwistStamped(_Stamped):
     """A velocity with its time and the frame it is expressed in."""
 
     header: Header = _field(default_factory=Header)
@@ -1340,7 +1341,7 @@ class TwistWithCovariance(_Message):
             return _explain(data, TwistWithCovariance)
 
 
-class TwistWithCovarianceStamped(_Message):
+class TwistWithCovarianceStamped(_Stamped):
     """An estimated velocity with covariance, time and frame."""
 
     header: Header = _field(default_factory=Header)
@@ -1398,7 +1399,7 @@ class TwistWithCovarianceStamped(_Message):
             return _explain(data, TwistWithCovarianceStamped)
 
 
-class Vector3Stamped(_Message):
+class Vector3Stamped(_Stamped):
     """A vector with its time and the frame it is expressed in."""
 
     header: Header = _field(default_factory=Header)
@@ -1444,7 +1445,7 @@ _t10 = _Stride("I i I I $ I $", -4, 8)
 _t11 = _Template("I $ d d d d d d", None)
 
 
-class VelocityStamped(_Message):
+class VelocityStamped(_Stamped):
     """How one frame moves as seen from a second one, written in the axes of a third."""
 
     header: Header = _field(default_factory=Header)
@@ -1549,7 +1550,7 @@ class Wrench(_Message):
             return _explain(data, Wrench)
 
 
-class WrenchStamped(_Message):
+class WrenchStamped(_Stamped):
     """Force and torque with their time and the frame they are expressed in."""
 
     header: Header = _field(default_factory=Header)

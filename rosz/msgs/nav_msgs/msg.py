@@ -8,6 +8,7 @@ from itertools import starmap as _starmap
 from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
@@ -83,7 +84,7 @@ _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<i2I").unpack_from
 
 
-class GetMapActionGoal(_Message):
+class GetMapActionGoal(_Stamped):
     """Goal of ROS 1's GetMap action, as it is sent."""
 
     header: Header = _field(default_factory=Header)
@@ -195,7 +196,7 @@ _u5 = _Struct("<iIf2I").unpack_from
 _u6 = _Struct("<7dI").unpack_from
 
 
-class OccupancyGrid(_Message):
+class OccupancyGrid(_Stamped):
     """A map of square cells that says how likely each is occupied."""
 
     header: Header = _field(default_factory=Header)
@@ -328,7 +329,7 @@ _t5 = _Template("I $ i I f I I d d d d d d d I", None)
 _u7 = _Struct("<I").unpack_from
 
 
-class GetMapActionResult(_Message):
+class GetMapActionResult(_Stamped):
     """Result of ROS 1's GetMap action, as it is sent."""
 
     header: Header = _field(default_factory=Header)
@@ -458,7 +459,7 @@ _t6 = _Stride("I i I I $ i I I $ B", -4, 4)
 _t7 = _Stride("I $ x", None, 4)
 
 
-class GetMapActionFeedback(_Message):
+class GetMapActionFeedback(_Stamped):
     """Feedback of ROS 1's GetMap action, as it is sent."""
 
     header: Header = _field(default_factory=Header)
@@ -700,7 +701,7 @@ _u8 = _Struct("<2fI").unpack_from
 _i1 = _Struct("<3d").iter_unpack
 
 
-class GridCells(_Message):
+class GridCells(_Stamped):
     """A set of equal rectangular cells, such as the obstacles of a costmap."""
 
     header: Header = _field(default_factory=Header)
@@ -763,7 +764,7 @@ _u9 = _Struct("<7d").unpack_from
 _u10 = _Struct("<6d").unpack_from
 
 
-class Odometry(_Message):
+class Odometry(_Stamped):
     """Where a robot estimates it is and how it moves."""
 
     header: Header = _field(default_factory=Header)
@@ -855,7 +856,7 @@ _t14 = _Stride("I i I I $ I", -4, 8)
 _t15 = _Template("i I I $ d d d d d d d", None)
 
 
-class Path(_Message):
+class Path(_Stamped):
     """Poses for a robot to pass one after the other."""
 
     header: Header = _field(default_factory=Header)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from msgspec import field as _field
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
@@ -69,7 +70,7 @@ _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
 
-class Log(_Message):
+class Log(_Stamped):
     """One line of a node's log, as ROS 1 sends it on /rosout."""
 
     header: Header = _field(default_factory=Header)

@@ -7,6 +7,7 @@ from array import array as _array
 from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import decode_plainly as _explain
@@ -73,7 +74,7 @@ _u2 = _Struct("<Ii2I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
 
-class HeaderString(_Message):
+class HeaderString(_Stamped):
     """A text with a header."""
 
     header: Header = _field(default_factory=Header)

@@ -10,6 +10,7 @@ from rosz.message import Array as _Array
 from rosz.message import Bytes as _Bytes
 from rosz.message import Message as _Message
 from rosz.message import Renamed as _Renamed
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
@@ -72,7 +73,7 @@ _u2 = _Struct("<7f3B?I").unpack_from
 _u3 = _Struct("<I").unpack_from
 
 
-class BatteryState(_Message):
+class BatteryState(_Stamped):
     """State of one battery. What the hardware does not measure is NaN."""
 
     header: Header = _field(default_factory=Header)
@@ -505,7 +506,7 @@ class ChannelFloat32(_Message):
 _t7 = _Template("I i I I $ I $ I", -4)
 
 
-class CompressedImage(_Message):
+class CompressedImage(_Stamped):
     """A compressed picture."""
 
     header: Header = _field(default_factory=Header)
@@ -567,7 +568,7 @@ _t8 = _Template("I i I I $ d d", -4)
 _u8 = _Struct("<2d").unpack_from
 
 
-class FluidPressure(_Message):
+class FluidPressure(_Stamped):
     """Pressure of air or of another fluid around the sensor."""
 
     header: Header = _field(default_factory=Header)
@@ -611,7 +612,7 @@ class FluidPressure(_Message):
             return _explain(data, FluidPressure)
 
 
-class Illuminance(_Message):
+class Illuminance(_Stamped):
     """How bright it is where the sensor looks, as the eye sees it."""
 
     header: Header = _field(default_factory=Header)
@@ -657,7 +658,7 @@ class Illuminance(_Message):
 _t9 = _Template("I i I I $ I I I $ B I I", -4)
 
 
-class Image(_Message):
+class Image(_Stamped):
     """A picture without compression. Rows run from top to bottom, pixels from left to right."""
 
     header: Header = _field(default_factory=Header)
@@ -733,7 +734,7 @@ _u9 = _Struct("<4d").unpack_from
 _u10 = _Struct("<3d").unpack_from
 
 
-class Imu(_Message):
+class Imu(_Stamped):
     """Readings of an inertial measurement unit in its own frame."""
 
     header: Header = _field(default_factory=Header)
@@ -842,7 +843,7 @@ _t11 = _Stride("I i I I $ |4", -4, 8)
 _t12 = _Stride("I", None, 8)
 
 
-class JointState(_Message):
+class JointState(_Stamped):
     """State of a set of joints. Element i of each list belongs to name[i]."""
 
     header: Header = _field(default_factory=Header)
@@ -941,7 +942,7 @@ class JointState(_Message):
 _t13 = _Template("I i I I $ I", -4)
 
 
-class Joy(_Message):
+class Joy(_Stamped):
     """Sticks and buttons of a joystick or game pad."""
 
     header: Header = _field(default_factory=Header)
@@ -1137,7 +1138,7 @@ _t14 = _Template("I i I I $ f f f f f f f I", -4)
 _u12 = _Struct("<7fI").unpack_from
 
 
-class LaserScan(_Message):
+class LaserScan(_Stamped):
     """One sweep of a planar laser scanner."""
 
     header: Header = _field(default_factory=Header)
@@ -1226,7 +1227,7 @@ class LaserScan(_Message):
 _t15 = _Template("I i I I $ d d d", -4)
 
 
-class MagneticField(_Message):
+class MagneticField(_Stamped):
     """The magnetic field at the sensor."""
 
     header: Header = _field(default_factory=Header)
@@ -1291,7 +1292,7 @@ _i2 = _Struct("<7d").iter_unpack
 _i3 = _Struct("<6d").iter_unpack
 
 
-class MultiDOFJointState(_Message):
+class MultiDOFJointState(_Stamped):
     """State of a set of joints with several degrees of freedom. Element i of each list belongs to
     joint_names[i]; a list of what is not known is empty."""
 
@@ -1392,7 +1393,7 @@ class MultiDOFJointState(_Message):
             return _explain(data, MultiDOFJointState)
 
 
-class MultiEchoLaserScan(_Message):
+class MultiEchoLaserScan(_Stamped):
     """One sweep of a planar laser scanner that tells several echoes of a beam apart."""
 
     header: Header = _field(default_factory=Header)
@@ -1563,7 +1564,7 @@ _u14 = _Struct("<b").unpack_from
 _u15 = _Struct("<H").unpack_from
 
 
-class NavSatFix(_Message):
+class NavSatFix(_Stamped):
     """A position from satellites, on the WGS 84 ellipsoid."""
 
     header: Header = _field(default_factory=Header)
@@ -1650,7 +1651,7 @@ _t17 = _Template("I $ I", 0)
 _i4 = _Struct("<3f").iter_unpack
 
 
-class PointCloud(_Message):
+class PointCloud(_Stamped):
     """A set of points in single precision, each with any number of further values."""
 
     header: Header = _field(default_factory=Header)
@@ -1801,7 +1802,7 @@ _u17 = _Struct("<?3x3I").unpack_from
 _u18 = _Struct("<?").unpack_from
 
 
-class PointCloud2(_Message):
+class PointCloud2(_Stamped):
     """A set of points, each a block of bytes that fields explains."""
 
     header: Header = _field(default_factory=Header)
@@ -1894,7 +1895,7 @@ _t21 = _Template("I i I I $ B f f f f f", -4)
 _u19 = _Struct("<5f").unpack_from
 
 
-class Range(_Message):
+class Range(_Stamped):
     """A distance that one beam of sound or light measured, along the x axis of the frame."""
 
     header: Header = _field(default_factory=Header)
@@ -1959,7 +1960,7 @@ class Range(_Message):
             return _explain(data, Range)
 
 
-class RelativeHumidity(_Message):
+class RelativeHumidity(_Stamped):
     """How close the air at the sensor is to holding all the water that it can."""
 
     header: Header = _field(default_factory=Header)
@@ -2004,7 +2005,7 @@ class RelativeHumidity(_Message):
             return _explain(data, RelativeHumidity)
 
 
-class Temperature(_Message):
+class Temperature(_Stamped):
     """The temperature at the sensor."""
 
     header: Header = _field(default_factory=Header)
@@ -2051,7 +2052,7 @@ _t22 = _Stride("I i I I $ i I I $", -4, 4)
 _u20 = _Struct("<i2I").unpack_from
 
 
-class TimeReference(_Message):
+class TimeReference(_Stamped):
     """What a foreign clock showed at a moment, so that its offset can be worked out."""
 
     header: Header = _field(default_factory=Header)

@@ -7,6 +7,7 @@ from array import array as _array
 from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
@@ -138,7 +139,7 @@ _t2 = _Stride("I", None, 8)
 _u4 = _Struct("<Ii2I").unpack_from
 
 
-class JointTrajectory(_Message):
+class JointTrajectory(_Stamped):
     """How a set of joints shall move."""
 
     header: Header = _field(default_factory=Header)
@@ -346,7 +347,7 @@ class MultiDOFJointTrajectoryPoint(_Message):
 _s2 = _StringList()
 
 
-class MultiDOFJointTrajectory(_Message):
+class MultiDOFJointTrajectory(_Stamped):
     """How a set of joints with several degrees of freedom, or of free bodies, shall move."""
 
     header: Header = _field(default_factory=Header)

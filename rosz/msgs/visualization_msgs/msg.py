@@ -7,6 +7,7 @@ from itertools import starmap as _starmap
 from msgspec import field as _field
 from rosz.message import Bytes as _Bytes
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
@@ -56,7 +57,7 @@ _i1 = _Struct("<3d").iter_unpack
 _i2 = _Struct("<4f").iter_unpack
 
 
-class ImageMarker(_Message):
+class ImageMarker(_Stamped):
     """A drawing on top of an image. Coordinates are pixels."""
 
     header: Header = _field(default_factory=Header)
@@ -351,7 +352,7 @@ _i3 = _Struct("<2f").iter_unpack
 _u10 = _Struct("<?").unpack_from
 
 
-class Marker(_Message):
+class Marker(_Stamped):
     """Something to draw in a 3D view."""
 
     header: Header = _field(default_factory=Header)
@@ -864,7 +865,7 @@ _u13 = _Struct("<fI").unpack_from
 _u14 = _Struct("<3I").unpack_from
 
 
-class InteractiveMarker(_Message):
+class InteractiveMarker(_Stamped):
     """A thing in a 3D view that a person can drag, turn, click or call a menu on."""
 
     header: Header = _field(default_factory=Header)
@@ -1161,7 +1162,7 @@ _t20 = _Template("I $ B d d d d d d d I d d d ?", None)
 _u15 = _Struct("<7dI4x3d?").unpack_from
 
 
-class InteractiveMarkerFeedback(_Message):
+class InteractiveMarkerFeedback(_Stamped):
     """What a person did with an interactive marker."""
 
     header: Header = _field(default_factory=Header)
@@ -1582,7 +1583,7 @@ class InteractiveMarkerInit(_Message):
             return _explain(data, InteractiveMarkerInit)
 
 
-class InteractiveMarkerPose(_Message):
+class InteractiveMarkerPose(_Stamped):
     """A new place for an interactive marker."""
 
     header: Header = _field(default_factory=Header)

@@ -34,7 +34,16 @@ def numpy_msg(msg_type: type[Any]) -> type[Any]:
         _convert(plain, np)
         return made(**{name: getattr(plain, name) for name in plain.__struct_fields__})
 
-    members = {"_decode": staticmethod(decode), "__module__": msg_type.__module__}
+    def deserialize(self: Any, data: bytes) -> Any:
+        msg_type.deserialize(self, data)
+        _convert(self, np)
+        return self
+
+    members = {
+        "_decode": staticmethod(decode),
+        "deserialize": deserialize,
+        "__module__": msg_type.__module__,
+    }
     package = msg_type._type.replace("/", "__")
     metaclass: Any = type(msg_type)
     made: type[Any] = metaclass(f"Numpy_{package}", (msg_type,), members)
@@ -52,4 +61,6 @@ def _convert(message: Message, np: Any) -> None:
                 _convert(each, np)
         elif slot.shape != "one" and slot.kind in ARRAY_CODES:
             # Python and numpy have the same type codes; the array uses the same memory.
-            setattr(message, slot.name, np.frombuffer(value, dtype=ARRAY_CODES[str(slot.kind)]))
+            kind = ARRAY_CODES[str(slot.kind)]
+            make = np.array if type(value) is tuple else np.frombuffer
+            setattr(message, slot.name, make(value, dtype=kind))

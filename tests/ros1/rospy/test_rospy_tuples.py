@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from rosz.errors import DecodeError
+from rosz.message.tuples import LONGEST_TUPLE, LongTuple, decoder
 from rosz.msgs.geometry_msgs.msg import PoseWithCovariance
 from rosz.msgs.std_msgs.msg import Float32MultiArray, String
-from rosz.ros1.tuples import LONGEST_TUPLE, LongTuple, decoder
 from rosz.typestore import TypeStore, shipped_packages, shipped_types
 
 from .rospy_programs import Printed

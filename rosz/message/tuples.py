@@ -1,8 +1,8 @@
 """Numeric sequences of received messages as ROS 1 code knows them: tuples.
 
-`decoder` returns a generated decoder that makes tuples where the native one makes arrays. A tuple
-needs an object for each number, so a long sequence becomes a `LongTuple`: an array that behaves as
-a tuple.
+`decoder` and `ros1_decoder` return generated decoders that make tuples where the native ones make
+arrays. A tuple needs an object for each number, so a long sequence becomes a `LongTuple`: an array
+that behaves as a tuple.
 """
 
 from __future__ import annotations
@@ -12,19 +12,24 @@ from collections.abc import Callable, Iterator
 from functools import cache, partial
 from struct import Struct, calcsize
 from types import FunctionType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rosz.message import ARRAY_CODES, Message, slots
+from rosz.message.schema import ARRAY_CODES, slots
 
-__all__ = ("LONGEST_TUPLE", "LongTuple", "decoder")
+__all__ = ("LONGEST_TUPLE", "LongTuple", "decoder", "ros1_decoder")
 
 LONGEST_TUPLE = 4096
 """Largest number of elements of a tuple, which takes 50 µs to make; more become a `LongTuple`."""
 
 _MOST_SHAPES = 1024
 
+if TYPE_CHECKING:
+    _Array = array[Any]
+else:  # Python 3.11's array takes no type argument
+    _Array = array
 
-class LongTuple(array):  # type: ignore[type-arg]
+
+class LongTuple(_Array):
     """An array that compares, adds, hashes and prints as the tuple of its elements.
 
     It is a buffer, so numpy reads it without a copy. ``isinstance(value, tuple)`` is true, and
@@ -83,7 +88,11 @@ class LongTuple(array):  # type: ignore[type-arg]
     def __mul__(self, times: Any) -> Any:
         return tuple(self) * times
 
-    __rmul__ = __imul__ = __mul__
+    def __rmul__(self, times: Any) -> Any:
+        return tuple(self) * times
+
+    def __imul__(self, times: Any) -> Any:
+        return tuple(self) * times
 
     def __setitem__(self, index: Any, value: Any) -> None:
         raise TypeError("'tuple' object does not support item assignment")
@@ -141,29 +150,43 @@ def _make_of(code: str, data: bytes, start: int, end: int) -> Any:
     return _make(code, memoryview(data)[start:end])
 
 
-_INSTEAD = {"_array": _make, "_read_block": _make_of}
+_INSTEAD = {"_array": _make, "_read_block": _make_of, "read_block": _make_of}
 """The functions that stand in generated decoders, by the names that these have for them."""
+
+_EXPLAIN = "_explain", "plain"
+"""Names that generated decoders have for the slow codec."""
 
 
 @cache
 def decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
-    """Return the decoder of a message class that makes tuples.
+    """Return the decoder of CDR of a message class that makes tuples."""
+    return _with_tuples(message_type._decode)
 
-    It is the generated one, with other functions in its global names.
-    """
-    plain: Any = message_type._decode
-    if not isinstance(plain, FunctionType) or _INSTEAD.keys().isdisjoint(plain.__code__.co_names):
+
+@cache
+def ros1_decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
+    """Return the decoder of ROS 1's byte layout of a message class that makes tuples."""
+    return _with_tuples(message_type._decode_ros1)  # noqa: SLF001  # rosz's
+
+
+def _with_tuples(plain: Any) -> Callable[[bytes], Any]:
+    """Return a generated decoder with other functions in its global names."""
+    if not isinstance(plain, FunctionType):
         decode: Callable[[bytes], Any] = plain
         return decode
-    explain = plain.__globals__["_explain"]
+    names = plain.__globals__
+    used = {name for name in _EXPLAIN if name in plain.__code__.co_names}
+    if not used or _INSTEAD.keys().isdisjoint(plain.__code__.co_names):
+        return plain
+    explain = names[used.pop()]
 
     def decode_plainly(data: bytes, cls: type[Any]) -> Any:
         message = explain(data, cls)
         _convert(message)
         return message
 
-    names = {**plain.__globals__, **_INSTEAD, "_explain": decode_plainly}
-    return FunctionType(plain.__code__, names, plain.__name__)
+    instead = {**_INSTEAD, **dict.fromkeys(_EXPLAIN, decode_plainly)}
+    return FunctionType(plain.__code__, {**names, **instead}, plain.__name__)
 
 
 def _convert(message: Any) -> None:
@@ -172,11 +195,11 @@ def _convert(message: Any) -> None:
         value = getattr(message, slot.name)
         for one in _messages(value):
             _convert(one)
-        if slot.shape != "one" and slot.kind in ARRAY_CODES:
-            setattr(message, slot.name, _make(ARRAY_CODES[str(slot.kind)], value.tobytes()))
+        if slot.shape != "one" and slot.kind in ARRAY_CODES and isinstance(value, array):
+            setattr(message, slot.name, _make(value.typecode, value.tobytes()))
 
 
 def _messages(value: Any) -> Iterator[Any]:
     for one in value if isinstance(value, list) else [value]:
-        if isinstance(one, Message):
+        if hasattr(one, "_schema"):
             yield one
