@@ -19,7 +19,7 @@ from typing import Literal
 import msgspec
 
 from rosz.errors import UsageError
-from rosz.packages import PackageIndex
+from rosz.packages import PackageIndex, manifest_of
 
 __all__ = ("DEFAULT_RENDEZVOUS", "Environment", "package_index")
 
@@ -166,9 +166,9 @@ def _workspace(cwd: Path) -> list[Path]:
     for folder in [cwd, *cwd.parents]:
         if folder.name == "src":
             return [folder]
-        if (folder / "src").is_dir() and not (folder / "package.xml").is_file():
+        if (folder / "src").is_dir() and manifest_of(folder) is None:
             return [folder / "src"]
-    packages = (folder for folder in [cwd, *cwd.parents] if (folder / "package.xml").is_file())
+    packages = (folder for folder in [cwd, *cwd.parents] if manifest_of(folder) is not None)
     return list(islice(packages, 1))
 
 

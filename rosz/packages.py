@@ -1,7 +1,9 @@
-"""ROS packages on disk: folders with a package.xml (REP 127, REP 149).
+"""ROS packages on disk: folders with a package.xml (REP 127, REP 149), or rosbuild's manifest.xml.
 
-Programs of a package are its executable files. A package in Python of ROS 2 (ament_python) has them
-as entry points in setup.py, from which colcon would make files; they are found there.
+Programs of a package are its executable files, and the scripts that ``catkin_install_python`` lists
+in CMakeLists.txt, of which a build would make executable ones. A package in Python of ROS 2
+(ament_python) has them as entry points in setup.py, from which colcon would make files; they are
+found there.
 
 The index searches its folders in order, and the first package of a name wins, as in ``rospack``.
 Nothing is read before it is needed.
@@ -10,6 +12,7 @@ Nothing is read before it is needed.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
@@ -19,12 +22,27 @@ import msgspec
 
 from rosz.errors import ExecutableNotFound, NotFoundError, PackageError, PackageNotFound, near_miss
 
-__all__ = ("MANIFEST", "Package", "PackageIndex", "crawl", "is_python", "start_words")
+__all__ = (
+    "MANIFEST",
+    "ROSBUILD_MANIFEST",
+    "Package",
+    "PackageIndex",
+    "crawl",
+    "is_python",
+    "manifest_of",
+    "start_words",
+)
 
 MANIFEST = "package.xml"
+ROSBUILD_MANIFEST = "manifest.xml"
+"""The file of rosbuild's packages, which have the names of their folders."""
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"})
 _NO_CODE = frozenset({"__pycache__", "node_modules"})
 _SHEBANG_BYTES = 256
+_COMMENT = re.compile(r"#.*")
+_INSTALLED = re.compile(
+    r"\bcatkin_install_python\s*\(\s*PROGRAMS\b(.*?)\bDESTINATION\b", re.DOTALL | re.IGNORECASE
+)
 
 
 class Package(msgspec.Struct, frozen=True):
@@ -54,7 +72,19 @@ class Package(msgspec.Struct, frozen=True):
     def executables(self) -> list[str]:
         """Return the names of all executable files and entry points of the package, sorted."""
         files = {file.name for file in self._files() if _is_executable(file)}
+        files |= {file.name for file in self.installed_scripts()}
         return sorted(files | self._entry_points().keys())
+
+    def installed_scripts(self) -> list[Path]:
+        """Return the scripts of ``catkin_install_python``, which need not be executable."""
+        try:
+            text = (self.path / "CMakeLists.txt").read_text("utf-8", "replace")
+        except OSError:
+            return []
+        listed = " ".join(_INSTALLED.findall(_COMMENT.sub("", text))).replace('"', " ").split()
+        here = [word.replace("${PROJECT_SOURCE_DIR}/", "") for word in listed]
+        files = [self.path / word.replace("${CMAKE_CURRENT_SOURCE_DIR}/", "") for word in here]
+        return [file for file in files if file.is_file()]
 
     def files(self, name: str) -> list[Path]:
         """Return all files of a name in the package."""
@@ -71,6 +101,9 @@ class Package(msgspec.Struct, frozen=True):
         found = self.files(name)
         for file in found:
             if _is_executable(file):
+                return file
+        for file in self.installed_scripts() if found else ():
+            if file.name == name:
                 return file
         entry = self._entry_points().get(name)
         if entry is not None:
@@ -196,7 +229,7 @@ class PackageIndex:
             # Of two packages of one name, the one nearer to the root wins.
             for folder in sorted(crawl(root), key=lambda folder: len(folder.parts)):
                 try:
-                    package = Package(_name_in(folder / MANIFEST), folder)
+                    package = Package(_name_of(folder), folder)
                 except PackageError as error:
                     # A package that cannot be read does not hide the others, as in rospack.
                     broken.append(error)
@@ -230,8 +263,7 @@ class PackageIndex:
         if not name or "/" in name or not self.roots:
             return None
         folder = self.roots[0] / name
-        manifest = folder / MANIFEST
-        if manifest.is_file() and _name_in(manifest) == name:
+        if manifest_of(folder) is not None and _name_of(folder) == name:
             return Package(name, folder)
         return None
 
@@ -270,16 +302,31 @@ def start_words(program: Path) -> tuple[str, ...]:
     return (*own, str(program))
 
 
+def manifest_of(folder: Path) -> Path | None:
+    """Return the file that makes a folder a package, or None if it is none."""
+    for name in (MANIFEST, ROSBUILD_MANIFEST):
+        if (folder / name).is_file():
+            return folder / name
+    return None
+
+
 def crawl(root: Path) -> Iterator[Path]:
-    """Yield the folders that hold a package.xml; packages are not searched for further ones."""
+    """Yield the folders that are packages; packages are not searched for further ones."""
     for folder, names, files in os.walk(root, followlinks=True):
-        if MANIFEST in files:
+        if MANIFEST in files or ROSBUILD_MANIFEST in files:
             names.clear()
             if not _IGNORE_MARKERS & set(files):
                 yield Path(folder)
         elif _IGNORE_MARKERS & set(files):
             names.clear()
         names[:] = sorted(n for n in names if not n.startswith(".") and n not in _NO_CODE)
+
+
+def _name_of(folder: Path) -> str:
+    """Return the name of the package in a folder."""
+    if not (folder / MANIFEST).is_file() and (folder / ROSBUILD_MANIFEST).is_file():
+        return folder.name
+    return _name_in(folder / MANIFEST)
 
 
 def _name_in(manifest: Path) -> str:

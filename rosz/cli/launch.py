@@ -17,6 +17,7 @@ from rosz.cli.console import print_error, print_json, print_lines
 from rosz.cli.declare import App, Argument, Option, seconds
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, NotFoundError, TransportError, UsageError
+from rosz.packages import manifest_of
 
 if TYPE_CHECKING:
     from rosz.launch.plan import LaunchText, Plan
@@ -203,7 +204,7 @@ class _Launch:
         roots = self.environment.package_roots
         for file in self.files:
             folders = Path(file).absolute().parents if isinstance(file, str) else ()
-            own = next((folder for folder in folders if (folder / "package.xml").is_file()), None)
+            own = next((folder for folder in folders if manifest_of(folder) is not None), None)
             if own is not None and not any(own.is_relative_to(root) for root in roots):
                 roots = (*roots, own)
         if roots != self.environment.package_roots:

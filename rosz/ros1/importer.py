@@ -3,9 +3,10 @@
 It adds two finders to ``sys.meta_path``. The first one stands in front and finds what rosz ships
 (``std_msgs``, ``rospy``, …), and ``<package>.msg``, ``<package>.srv`` and ``<package>.cfg`` of any
 package on the package path. The second one stands at the end and finds packages that nothing else
-provides; only it searches the package path for a plain name.
+provides; only it searches the package path for a plain name. It finds the Python modules that
+packages offer (`python_setup`), with their messages in them as in catkin's devel space.
 
-Such a module is the same object as rosz's own: ``std_msgs.msg`` is ``rosz.msgs.std_msgs.msg``.
+A module of rosz is the same object as rosz's own: ``std_msgs.msg`` is ``rosz.msgs.std_msgs.msg``.
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ from contextlib import suppress
 from functools import cached_property
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from importlib.util import find_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from rosz.environment import Environment, package_index
 from rosz.errors import PackageError, RoszError
@@ -37,6 +39,9 @@ from rosz.ros1.modules import (
     submodule,
 )
 from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
+
+if TYPE_CHECKING:
+    from rosz.ros1.python_setup import Offers
 
 __all__ = ("install", "package_path", "type_store", "uninstall")
 
@@ -96,8 +101,19 @@ class _Types:
         return package_index(self._environment)
 
     @cached_property
+    def _cache(self) -> Path:
+        return self._environment.home / "rosz"
+
+    @cached_property
     def store(self) -> TypeStore:
-        return TypeStore(self.packages, self._environment.home / "rosz")
+        return TypeStore(self.packages, self._cache)
+
+    @cached_property
+    def offers(self) -> Offers:
+        """The Python modules of packages."""
+        from rosz.ros1.python_setup import Offers
+
+        return Offers(self.packages, self._cache / "modules.json")
 
     def shipped(self, package: str, kind: Kind) -> ModuleType:
         """Return a shipped module; types that it lacks come from a package of the same name."""
@@ -269,6 +285,7 @@ class _FrontFinder(MetaPathFinder):
 class _EndFinder(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self._types = types
+        self._shipped = shipped_packages()
 
     def find_spec(
         self,
@@ -276,27 +293,64 @@ class _EndFinder(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> ModuleSpec | None:
-        """Find a package on the package path.
+        """Find a module of a package on the package path.
 
         Raises:
             ModuleNotFoundError: ROS has such a module and rosz has not; the text says what to use.
         """
-        folder = self._types.folder(fullname) if path is None and "." not in fullname else None
-        if folder is None:
-            instead = instead_of(fullname)
-            if instead:
-                text = f"No module named '{fullname}': rosz does not have it: {instead}"
-                raise ModuleNotFoundError(text, name=fullname)
+        root, _, rest = fullname.partition(".")
+        # Python's library tries modules of other systems while modules that are needed here load.
+        if root in sys.stdlib_module_names:
             return None
-        # The folder of catkin_python_setup.
-        code = folder / "src" / fullname
-        if (code / "__init__.py").is_file():
+        found = None
+        if path is None and not rest:
+            found = self._of_package(fullname)
+        elif root in self._shipped and "." not in rest:
+            code = self._types.offers.find(root)
+            found = PathFinder.find_spec(fullname, [str(code)]) if code is not None else None
+        if found is not None:
+            return found
+        instead = instead_of(fullname)
+        if instead:
+            text = f"No module named '{fullname}': rosz does not have it: {instead}"
+            raise ModuleNotFoundError(text, name=fullname)
+        return None
+
+    def _of_package(self, name: str) -> ModuleSpec | None:
+        """Find what a package offers: its Python code, its types, or both."""
+        code = self._types.offers.find(name)
+        types = self._types.folder(name)
+        if code is not None:
+            whole = code.suffix != ".py"
+            file = code / "__init__.py" if whole else code
             return spec_from_file_location(
-                fullname, code / "__init__.py", submodule_search_locations=[str(code)]
+                name,
+                file,
+                loader=_CodeLoader(name, str(file)),
+                submodule_search_locations=[str(code)] if whole else [] if types else None,
             )
-        spec = ModuleSpec(fullname, None, is_package=True)
+        if types is None:
+            return None
+        spec = ModuleSpec(name, None, is_package=True)
+        code = types / "src" / name
         spec.submodule_search_locations = [str(code)] if code.is_dir() else []
         return spec
+
+
+class _CodeLoader(SourceFileLoader):
+    """Loads a module of a package.
+
+    As in catkin's devel space, the folder that it lies in goes on ``sys.path`` first, since modules
+    import others that lie beside them.
+    """
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Run the module."""
+        file = Path(self.path)
+        folder = str((file.parent if file.name == "__init__.py" else file).parent)
+        if folder not in sys.path:
+            sys.path.insert(0, folder)
+        super().exec_module(module)
 
 
 def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:

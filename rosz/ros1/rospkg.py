@@ -201,7 +201,7 @@ class Manifest:
 
 
 def read_manifest(folder: Path, packages: Container[str]) -> Manifest:
-    """Read the package.xml of a folder.
+    """Read the package.xml of a folder, or the manifest.xml of a package of rosbuild.
 
     Args:
         folder: Folder of the package.
@@ -210,6 +210,8 @@ def read_manifest(folder: Path, packages: Container[str]) -> Manifest:
     Raises:
         InvalidManifest: The file cannot be read.
     """
+    if not (folder / PACKAGE_FILE).is_file() and (folder / MANIFEST_FILE).is_file():
+        return _read_rosbuild(folder)
     top = _parse(folder / PACKAGE_FILE)
     manifest = Manifest(filename=str(folder / MANIFEST_FILE), is_catkin=True)
     manifest.name = _text(top, "name")
@@ -225,12 +227,34 @@ def read_manifest(folder: Path, packages: Container[str]) -> Manifest:
     names = {_content(one): None for tag in _DEPENDS for one in top.findall(tag)}
     manifest.depends = [Depend(name) for name in names if name in packages]
     manifest.rosdeps = [RosDep(name) for name in names if name not in packages]
+    manifest.exports = _exports(top)
+    return manifest
+
+
+def _read_rosbuild(folder: Path) -> Manifest:
+    """Read a manifest.xml, whose dependencies are packages and rosdeps by their tags."""
+    top = _parse(folder / MANIFEST_FILE)
+    manifest = Manifest(filename=str(folder / MANIFEST_FILE))
+    manifest.name = folder.name
+    manifest.description = _text(top, "description")
+    described = top.find("description")
+    manifest.brief = "" if described is None else described.get("brief", "")
+    manifest.license = _text(top, "license")
+    manifest.url = _text(top, "url")
+    manifest.author = _text(top, "author")
+    manifest.depends = [Depend(one.get("package", "")) for one in top.findall("depend")]
+    manifest.rosdeps = [RosDep(one.get("name", "")) for one in top.findall("rosdep")]
+    manifest.exports = _exports(top)
+    return manifest
+
+
+def _exports(top: ET.Element) -> list[Export]:
+    """Return the elements of the ``<export>`` section."""
     exported = top.find("export")
-    manifest.exports = [
+    return [
         Export(one.tag, dict(one.attrib), _content(one))
         for one in (() if exported is None else exported)
     ]
-    return manifest
 
 
 def _parse(path: Path) -> ET.Element:

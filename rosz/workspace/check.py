@@ -11,7 +11,7 @@ import msgspec
 from rosz.environment import Environment, package_index
 from rosz.errors import DefinitionError, NotFoundError, RoszError, TypeNotFound
 from rosz.idl import Catalog, Definition, parse_action, read_definition
-from rosz.packages import MANIFEST, Package, PackageIndex, crawl
+from rosz.packages import MANIFEST, Package, PackageIndex, crawl, manifest_of
 from rosz.typestore import TypeStore
 from rosz.workspace.manifest import check_manifest
 from rosz.workspace.problem import REMEDY, Problem, error, from_error
@@ -189,6 +189,6 @@ def _folders(words: Sequence[str], cwd: Path, index: PackageIndex) -> Iterator[P
             raise NotFoundError(f"'{word}' is a file; expected a package or a folder")
         if path.is_dir():
             inside = path / "src" if (path / "src").is_dir() else path
-            yield from crawl(path if (path / MANIFEST).is_file() else inside)
+            yield from crawl(path if manifest_of(path) is not None else inside)
         else:
             yield index.find(word).path

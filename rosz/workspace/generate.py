@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rosz.errors import NotFoundError, PackageNotFound, TypeNotFound, UsageError
 from rosz.idl.generate import MARKER, shipped_sources, stale, write
-from rosz.packages import MANIFEST, Package, PackageIndex
+from rosz.packages import MANIFEST, Package, PackageIndex, manifest_of
 from rosz.typestore import TypeStore, shipped_packages
 
 __all__ = ("Generator",)
@@ -70,7 +70,7 @@ class Generator:
     def _of_packages(self, words: list[str]) -> Iterator[tuple[Path, dict[str, str]]]:
         for word in words:
             folder = (self._cwd / word).resolve()
-            given = [folder] if (folder / MANIFEST).is_file() else []
+            given = [folder] if manifest_of(folder) else []
             index = PackageIndex([*given, *self._index.roots])
             package = PackageIndex(given).packages()[0] if given else _find(index, word, folder)
             sources = _sources(index, package.name)
@@ -81,7 +81,7 @@ class Generator:
 
     def _around(self) -> str:
         for folder in (self._cwd, *self._cwd.parents):
-            if (folder / MANIFEST).is_file():
+            if manifest_of(folder) is not None:
                 return str(folder)
         raise UsageError("no package is given, and this folder is in none: rosz gen PACKAGE")
 
