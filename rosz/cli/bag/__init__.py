@@ -1,6 +1,6 @@
 """``rosz bag``: the commands of rosbag."""
 
-from rosz.cli.bag import repair
+from rosz.cli.bag import play, repair
 from rosz.cli.bag.group import app
 
-__all__ = ("app", "repair")
+__all__ = ("app", "play", "repair")
