@@ -8,4 +8,6 @@ modules, because each is loaded alone.
 from rosz.turtlesim.snapshot import Picture, fetch
 from rosz.turtlesim.world import Pen, Turtle, World
 
+PUBLIC_MODULES = ("teleop",)
+
 __all__ = ("Pen", "Picture", "Turtle", "World", "fetch")
