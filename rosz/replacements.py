@@ -64,7 +64,6 @@ COMMANDS = {
 """Commands that people type; each has a program of this name in ``rosz/cli/absent``."""
 
 _PACKAGES = {
-    "actionlib_tutorials": "actionlib itself is importable: rosz help rospy",
     "amcl": _of_ros2("nav2_amcl"),
     "beginner_tutorials": "it is the package that the tutorials create: rosz pkg create --bare",
     "gazebo_ros": _GAZEBO,

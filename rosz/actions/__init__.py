@@ -3,11 +3,21 @@
 The protocol is that of actionlib: five topics below the name of the action (``goal``, ``cancel``,
 ``status``, ``feedback``, ``result``) and the goal states of ``actionlib_msgs/GoalStatus``. `types`
 holds the message classes of an action and the kinds of states, `client` sends goals, `server`
-executes them one at a time. May import nodes and everything below them.
+receives them, and `simple_server` executes them one at a time. May import nodes and everything
+below them.
 """
 
-from rosz.actions.client import ActionClient, ClientGoal
+from rosz.actions.client import ActionClient, ClientGoal, CommState
 from rosz.actions.server import ActionServer, ServerGoal
+from rosz.actions.simple_server import SimpleActionServer
 from rosz.actions.types import ActionTypes
 
-__all__ = ("ActionClient", "ActionServer", "ActionTypes", "ClientGoal", "ServerGoal")
+__all__ = (
+    "ActionClient",
+    "ActionServer",
+    "ActionTypes",
+    "ClientGoal",
+    "CommState",
+    "ServerGoal",
+    "SimpleActionServer",
+)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-from rosz.actions.types import RUNNING, TERMINAL, ActionTypes, run_callback
-from rosz.errors import WaitTimeout
+from rosz.actions.comm_state import CommState, path
+from rosz.actions.types import RUNNING, TERMINAL, ActionTypes, publish, run_callback
+from rosz.errors import ClosedError, WaitTimeout
 from rosz.graph import View
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
 
-__all__ = ("ActionClient", "ClientGoal")
+__all__ = ("ActionClient", "ClientGoal", "CommState")
 
 _FOREVER = threading.TIMEOUT_MAX / 2
 _CHECK_PERIOD = 0.1
@@ -36,6 +37,7 @@ class ClientGoal:
     Attributes:
         id: Identification of the goal in messages.
         status: Last known state, with the text of the server.
+        comm_state: How far the exchange with the server is, a constant of `CommState`.
         result: Result of the goal; None while there is none.
         started: Whether the server has begun to execute the goal.
     """
@@ -47,8 +49,10 @@ class ClientGoal:
         on_done: Callable[[ClientGoal], object] | None,
         on_active: Callable[[], object] | None,
         on_feedback: Callable[[Any], object] | None,
+        on_transition: Callable[[ClientGoal], object] | None,
     ) -> None:
         self.id: GoalID = goal_id
+        self.comm_state: int = CommState.WAITING_FOR_GOAL_ACK
         self.status: GoalStatus = GoalStatus(goal_id, GoalStatus.PENDING)
         self.result: Any = None
         self.started: bool = False
@@ -56,6 +60,8 @@ class ClientGoal:
         self._on_done = on_done
         self._on_active = on_active
         self._on_feedback = on_feedback
+        self._on_transition = on_transition
+        self._transition_lock = threading.RLock()
         self._lock = threading.RLock()
         self._active_thread = 0
         self._active_over = threading.Event()
@@ -93,6 +99,8 @@ class ClientGoal:
     def cancel(self) -> None:
         """Ask the server to cancel the goal."""
         self._client.publish_cancel(GoalID(Time(), self.id.id))
+        if not self._finished:
+            self._transition((CommState.WAITING_FOR_CANCEL_ACK,))
 
     def forget(self) -> None:
         """Stop following the goal; the server continues with it."""
@@ -117,8 +125,33 @@ class ClientGoal:
                 return  # the end comes with the result message
             self.status = status
             starts = self._starts(status.status in RUNNING)
+        self._follow(status.status)
         if starts:
             self._activate()
+
+    def _follow(self, status: int) -> None:
+        states = path(self.comm_state, status)
+        if states is None:
+            self._client.node.log.error(
+                "a goal of action '%s' in state %s cannot get status %s",
+                self._client.name,
+                self.comm_state,
+                status,
+            )
+        else:
+            self._transition(states)
+
+    def _transition(self, states: Iterable[int]) -> None:
+        """Call the function of the program for each state, in order."""
+        # A callback that waits for the end of the goal must not keep the end from coming.
+        taken = self._transition_lock.acquire(timeout=_ACTIVE_TIMEOUT)
+        try:
+            for state in states:
+                self.comm_state = state
+                self._call(self._on_transition, self)
+        finally:
+            if taken:
+                self._transition_lock.release()
 
     def _starts(self, running: bool) -> bool:
         """Return whether this state is the first one in which the goal is executed."""
@@ -147,6 +180,9 @@ class ClientGoal:
             self._finished = True
             self.status, self.result = status, result
             starts = self._starts(status.status in _EXECUTED)
+        if status.status != GoalStatus.LOST:
+            self._follow(status.status)
+        self._transition((CommState.DONE,))
         if starts:
             self._activate()
         # `on_done` is called after `on_active`, but waits only a limited time for it.
@@ -197,7 +233,7 @@ class ActionClient:
             timeout: Time limit in seconds; none when not given or 0.
 
         Returns:
-            Whether a server is connected.
+            Whether a server is connected; not if the node is shut down meanwhile.
         """
         topics = [f"{self.name}/{topic}" for topic in ("status", "feedback", "result")]
 
@@ -212,7 +248,16 @@ class ActionClient:
             graph.wait_for(is_connected, timeout or _FOREVER, f"action server '{self.name}'")
         except WaitTimeout:
             return False
+        except ClosedError:
+            if not self.node.is_shutdown:
+                raise
+            return False
         return True
+
+    def stop(self) -> None:
+        """Close all topics; goals are not followed any more."""
+        for entity in (self._goal_publisher, self._cancel_publisher, *self._subscriptions):
+            entity.close()
 
     def send(
         self,
@@ -221,14 +266,16 @@ class ActionClient:
         on_done: Callable[[ClientGoal], object] | None = None,
         on_active: Callable[[], object] | None = None,
         on_feedback: Callable[[Any], object] | None = None,
+        on_transition: Callable[[ClientGoal], object] | None = None,
     ) -> ClientGoal:
-        """Send a goal.
+        """Send a goal; after the shutdown of the node it goes nowhere.
 
         Args:
             goal: The goal message, such as a ``FibonacciGoal``.
             on_done: Function called with the goal when it has ended.
             on_active: Function called when the server begins to execute the goal.
             on_feedback: Function called with each feedback message.
+            on_transition: Function called with the goal at each change of its `comm_state`.
 
         Returns:
             The goal, which is followed until it has ended or is forgotten.
@@ -236,19 +283,20 @@ class ActionClient:
         now = Time(*divmod(self.node.now(), 10**9))
         number = next(_numbers)
         goal_id = GoalID(now, f"{self.node.name}-{number}-{now.sec}.{now.nanosec:09d}")
-        sent = ClientGoal(self, goal_id, on_done, on_active, on_feedback)
+        sent = ClientGoal(self, goal_id, on_done, on_active, on_feedback, on_transition)
         self._goals[goal_id.id] = sent
-        self._goal_publisher.publish(self._types.action_goal(Header(stamp=now), goal_id, goal))
+        message = self._types.action_goal(Header(stamp=now), goal_id, goal)
+        publish(self.node, self._goal_publisher, message)
         return sent
 
     def publish_cancel(self, goal_id: GoalID) -> None:
-        """Ask the server to cancel goals.
+        """Ask the server to cancel goals; after the shutdown of the node do nothing.
 
         Args:
             goal_id: Identification of a goal; a time instead cancels all goals sent until then,
                 and an empty one cancels all goals, including those of other clients.
         """
-        self._cancel_publisher.publish(goal_id)
+        publish(self.node, self._cancel_publisher, goal_id)
 
     def forget(self, goal: ClientGoal) -> None:
         """Stop following a goal; see `ClientGoal.forget`."""

@@ -1,76 +1,168 @@
-"""Action servers, which execute one goal at a time."""
+"""Action servers: goals, each with a state of its own."""
 
 from __future__ import annotations
 
+import itertools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from rosz.actions.types import RUNNING, TERMINAL, ActionTypes, run_callback
+from rosz.actions.types import ActionTypes, publish, run_callback
+from rosz.errors import EncodeError
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
 from rosz.qos import QoS
-from rosz.worker import Worker
 
 __all__ = ("ActionServer", "ServerGoal")
 
-_STATUS_PERIOD = 0.2
-_STATUS_KEPT = 5 * 10**9
-"""Nanoseconds for which the state of a goal that has ended is still published."""
+_STATUS_FREQUENCY = 5.0
+_STATUS_TIMEOUT = 5.0
+_QUEUE_SIZE = 50
+_CANCELLED_BEFORE = "This goal was canceled: it was sent before the last cancel request"
 
-_SUPERSEDED = "This goal was canceled because another goal was received by the simple action server"
-_QUEUE = QoS(depth=50)
+_numbers = itertools.count(1)
+
+Moves = Mapping[int, int]
+_ACCEPT: Moves = {
+    GoalStatus.PENDING: GoalStatus.ACTIVE,
+    GoalStatus.RECALLING: GoalStatus.PREEMPTING,
+}
+_REQUEST_CANCEL: Moves = {
+    GoalStatus.PENDING: GoalStatus.RECALLING,
+    GoalStatus.ACTIVE: GoalStatus.PREEMPTING,
+}
+_CANCEL: Moves = {
+    GoalStatus.PENDING: GoalStatus.RECALLED,
+    GoalStatus.RECALLING: GoalStatus.RECALLED,
+    GoalStatus.ACTIVE: GoalStatus.PREEMPTED,
+    GoalStatus.PREEMPTING: GoalStatus.PREEMPTED,
+}
+_REJECT: Moves = dict.fromkeys((GoalStatus.PENDING, GoalStatus.RECALLING), GoalStatus.REJECTED)
+_RUNNING = (GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
+_ABORT: Moves = dict.fromkeys(_RUNNING, GoalStatus.ABORTED)
+_SUCCEED: Moves = dict.fromkeys(_RUNNING, GoalStatus.SUCCEEDED)
+_NAMES = {
+    value: name
+    for name, value in vars(GoalStatus).items()
+    if name.isupper() and isinstance(value, int)
+}
 
 
 class ServerGoal:
-    """A goal that was received.
+    """A goal that was received; a program accepts it and ends it.
 
     Args:
-        message: Message that carried the goal.
-        now: Time of arrival in nanoseconds.
+        server: Its server.
+        message: Message that carried it.
 
     Attributes:
-        id: Identification of the goal.
-        goal: The goal message.
+        server: As given.
+        message: As given; None for a goal of which only the cancellation has arrived.
         status: State of the goal.
         ended_at: Time of its end in nanoseconds; 0 while it has not ended.
-        cancelled: Whether its cancellation was requested.
-        order: Time in nanoseconds by which goals are ordered.
     """
 
-    def __init__(self, message: Any, now: int) -> None:
-        stamp = message.goal_id.stamp
-        self.id: GoalID = GoalID(stamp, message.goal_id.id)
-        self.goal: Any = message.goal
-        self.status: GoalStatus = GoalStatus(self.id, GoalStatus.PENDING)
+    def __init__(self, server: ActionServer, message: Any) -> None:
+        stamp, name = message.goal_id.stamp, message.goal_id.id
+        if not stamp.to_nsec():
+            stamp = Time.from_nsec(server.node.now())
+        if not name:
+            name = f"{server.node.name}-{next(_numbers)}-{stamp.sec}.{stamp.nanosec}"
+        self.server: ActionServer = server
+        self.message: Any = message
+        self.status: GoalStatus = GoalStatus(GoalID(stamp, name), GoalStatus.PENDING)
         self.ended_at: int = 0
-        self.cancelled: bool = False
-        self.order: int = stamp.to_nsec() or now
+
+    @property
+    def id(self) -> GoalID:
+        """Identification of the goal in messages."""
+        return self.status.goal_id
+
+    def accept(self, text: str = "") -> None:
+        """Begin to execute the goal."""
+        with self.server.lock:
+            state = self._next(_ACCEPT, "accept")
+            if state is not None:
+                self.status.status, self.status.text = state, text
+                self.server.publish_status()
+
+    def request_cancel(self) -> bool:
+        """Note that a client wants the goal to end; return whether that is possible and new."""
+        with self.server.lock:
+            state = _REQUEST_CANCEL.get(self.status.status)
+            if state is None:
+                return False
+            self.status.status = state
+            self.server.publish_status()
+            return True
+
+    def cancel(self, result: Any = None, text: str = "") -> None:
+        """End the goal as recalled or preempted."""
+        self._end(_CANCEL, "cancel", result, text)
+
+    def reject(self, result: Any = None, text: str = "") -> None:
+        """End the goal before it is accepted."""
+        self._end(_REJECT, "reject", result, text)
+
+    def abort(self, result: Any = None, text: str = "") -> None:
+        """End the goal as failed."""
+        self._end(_ABORT, "abort", result, text)
+
+    def succeed(self, result: Any = None, text: str = "") -> None:
+        """End the goal as reached."""
+        self._end(_SUCCEED, "succeed", result, text)
+
+    def publish_feedback(self, feedback: Any) -> None:
+        """Publish feedback about the goal."""
+        self.server.publish_feedback(self.status, feedback)
+
+    def _next(self, moves: Moves, doing: str) -> int | None:
+        state = moves.get(self.status.status)
+        if state is None:
+            self.server.node.log.error(
+                "cannot %s a goal of action '%s': its state is %s; expected %s",
+                doing,
+                self.server.name,
+                _NAMES[self.status.status],
+                " or ".join(_NAMES[one] for one in moves),
+            )
+        return state
+
+    def _end(self, moves: Moves, doing: str, result: Any, text: str) -> None:
+        with self.server.lock:
+            state = self._next(moves, doing)
+            if state is None:
+                return
+            before, self.status = self.status, GoalStatus(self.id, state, text)
+            try:
+                self.server.publish_result(self.status, result)
+            except EncodeError:
+                self.status = before  # it can still be ended with a proper result
+                raise
+            self.ended_at = self.server.node.now()
+            self.server.publish_status()
 
 
 class ActionServer:
-    """Execute one goal at a time; a newer goal preempts the current one.
-
-    A goal that arrives becomes the `next_goal`, and recalls an earlier one that still waits there.
-    `accept_new_goal` makes it the `current_goal`. Without ``execute``, the program calls that when
-    `on_goal` is called.
+    """Receive goals, and publish what becomes of them.
 
     Args:
         node: Node that the server belongs to.
         name: Name of the action; resolved and remapped.
         action_type: Class of the action, such as ``FibonacciAction``.
-        execute: Function called with each goal message on a thread of the server. It must end with
-            `set_succeeded`, `set_aborted` or `set_preempted`.
+        on_goal: Function called with each `ServerGoal` that arrives.
+        on_cancel: Function called with each goal that is requested to end.
+        status_frequency: How often per second states are published; 0 for only when they change.
+        status_timeout: Seconds for which the state of a goal that has ended is published.
+        queue_size: Number of messages that wait to be sent.
 
     Attributes:
         node: As given.
         name: Full name of the action.
-        current_goal: Goal that was accepted last; None at first.
-        next_goal: Goal that waits to be accepted.
-        on_goal: Function called when a goal has arrived.
-        on_preempt: Function called when the current goal is asked to end.
+        lock: Lock that is held while a goal changes, and while states are published.
+        goals: The goals whose states are published.
 
     Raises:
         UsageError: The class is not that of an action.
@@ -83,197 +175,139 @@ class ActionServer:
         node: Node,
         name: str,
         action_type: type[Any],
-        execute: Callable[[Any], object] | None = None,
+        on_goal: Callable[[Any], object] | None = None,
+        on_cancel: Callable[[Any], object] | None = None,
+        *,
+        status_frequency: float = _STATUS_FREQUENCY,
+        status_timeout: float = _STATUS_TIMEOUT,
+        queue_size: int = _QUEUE_SIZE,
     ) -> None:
-        self._types = ActionTypes.of(action_type)
+        self.types: ActionTypes = ActionTypes.of(action_type)
         self.node: Node = node
         self.name: str = node.resolve(name)
-        self.execute_callback: Callable[[Any], object] | None = execute
-        self.current_goal: Any = None
-        self.next_goal: Any = None
-        self.on_goal: Callable[[], object] | None = None
-        self.on_preempt: Callable[[], object] | None = None
-        self._goals: dict[str, ServerGoal] = {}
-        self._changed = threading.Condition(threading.RLock())
+        self.on_goal = on_goal
+        self.on_cancel = on_cancel
+        self.lock = threading.RLock()
+        self.goals: list[Any] = []
+        self.status_frequency: float = status_frequency
+        self.status_timeout: float = status_timeout
+        self.queue_size: int = queue_size
+        self._callback_lock = threading.RLock()
+        self._cancelled_until = 0
+        self._cancelled_early: dict[str, int] = {}
         self._publishers: dict[str, Any] = {}
+        self._others: list[Any] = []
 
     def start(self) -> None:
-        """Begin to receive goals."""
-        node, types = self.node, self._types
-        self._publishers = {
-            "status": node.publisher(f"{self.name}/status", GoalStatusArray, qos=_QUEUE),
-            "result": node.publisher(f"{self.name}/result", types.action_result, qos=_QUEUE),
-            "feedback": node.publisher(f"{self.name}/feedback", types.action_feedback, qos=_QUEUE),
-        }
-        node.subscription(f"{self.name}/cancel", GoalID, self._receive_cancel, qos=_QUEUE)
-        node.subscription(f"{self.name}/goal", types.action_goal, self._receive_goal, qos=_QUEUE)
-        node.timer(_STATUS_PERIOD, lambda _: self._publish_status())
-        if self.execute_callback is not None:
-            Worker(f"rosz-action{self.name}", self._execute, receive=self._wait_for_goal)
-        node.on_shutdown(lambda _: self._wake())
+        """Begin to receive goals; a started server does nothing."""
+        with self.lock:
+            if self._publishers:
+                return
+            node, types, qos = self.node, self.types, QoS(depth=self.queue_size)
+            kinds: dict[str, type[Any]] = {
+                "status": GoalStatusArray,
+                "result": types.action_result,
+                "feedback": types.action_feedback,
+            }
+            self._publishers = {
+                topic: node.publisher(f"{self.name}/{topic}", kind, qos=qos)
+                for topic, kind in kinds.items()
+            }
+            self._others = [
+                node.subscription(f"{self.name}/cancel", GoalID, self._receive_cancel, qos=qos),
+                node.subscription(
+                    f"{self.name}/goal", types.action_goal, self._receive_goal, qos=qos
+                ),
+            ]
+            if self.status_frequency > 0:
+                period = 1 / self.status_frequency
+                self._others.append(node.timer(period, lambda _: self.publish_status()))
+            self.publish_status()
 
-    def is_new_goal_available(self) -> bool:
-        """Return whether there is a goal to accept."""
-        return self.next_goal is not None
+    def stop(self) -> None:
+        """Stop receiving goals; a server that is not started does nothing."""
+        with self.lock:
+            entities = (*self._others, *self._publishers.values())
+            self._others, self._publishers = [], {}
+        for entity in entities:  # which waits for callbacks, so without the lock
+            entity.close()
 
-    def is_preempt_requested(self) -> bool:
-        """Return whether the current goal was cancelled or a newer goal waits."""
-        with self._changed:
-            goal = self.current_goal
-            return goal is not None and (goal.cancelled or self.next_goal is not None)
+    def publish_status(self) -> None:
+        """Publish the states of all goals."""
+        with self.lock:
+            if not self._publishers:
+                return
+            oldest = self.node.now() - round(self.status_timeout * 1e9)
+            self.goals[:] = [g for g in self.goals if not g.ended_at or g.ended_at > oldest]
+            early = self._cancelled_early
+            for name in [name for name, moment in early.items() if moment <= oldest]:
+                del early[name]
+            statuses = [goal.status for goal in self.goals]
+            statuses += [GoalStatus(GoalID(id=name), GoalStatus.RECALLING) for name in early]
+            self._publish("status", GoalStatusArray(self._header(), statuses))
 
-    def is_active(self) -> bool:
-        """Return whether a goal is being executed."""
-        goal = self.current_goal
-        return goal is not None and goal.status.status in RUNNING
+    def publish_result(self, status: GoalStatus, result: Any = None) -> None:
+        """Publish the result of a goal.
 
-    def accept_new_goal(self) -> Any:
-        """Accept the goal that waits; a goal that is being executed is preempted.
+        Args:
+            status: Final state of the goal.
+            result: The result; an empty one when not given.
 
-        Returns:
-            The goal message; None if no goal waits.
+        Raises:
+            EncodeError: The result is not one of the action.
         """
-        with self._changed:
-            goal = self.next_goal
-            if goal is None:
-                self.node.log.error("cannot accept a goal: none is waiting")
-                return None
-            if self.is_active():
-                self.set_preempted(text=_SUPERSEDED)
-            self.current_goal, self.next_goal = goal, None
-            goal.status.status = GoalStatus.PREEMPTING if goal.cancelled else GoalStatus.ACTIVE
-            goal.status.text = "This goal has been accepted by the simple action server"
-        self._publish_status()
-        return goal.goal
+        outcome = result or self.types.result()
+        self._publish("result", self.types.action_result(self._header(), status, outcome))
 
-    def set_succeeded(self, result: Any = None, text: str = "") -> None:
-        """End the current goal as succeeded."""
-        self._end_current(GoalStatus.SUCCEEDED, result, text)
+    def publish_feedback(self, status: GoalStatus, feedback: Any) -> None:
+        """Publish feedback about a goal.
 
-    def set_aborted(self, result: Any = None, text: str = "") -> None:
-        """End the current goal as aborted."""
-        self._end_current(GoalStatus.ABORTED, result, text)
+        Args:
+            status: State of the goal.
+            feedback: The feedback.
 
-    def set_preempted(self, result: Any = None, text: str = "") -> None:
-        """End the current goal as preempted: cancelled, or replaced by a newer one."""
-        self._end_current(GoalStatus.PREEMPTED, result, text)
+        Raises:
+            EncodeError: The feedback is not one of the action.
+        """
+        self._publish("feedback", self.types.action_feedback(self._header(), status, feedback))
 
-    def publish_feedback(self, feedback: Any) -> None:
-        """Publish feedback about the current goal."""
-        goal = self.current_goal
-        if goal is None:
-            self.node.log.error("cannot publish feedback: no goal was accepted")
-            return
-        message = self._types.action_feedback(self._header(), goal.status, feedback)
-        self._publishers["feedback"].publish(message)
-
-    def get_default_result(self) -> Any:
-        """Return an empty result message."""
-        return self._types.result()
+    def _publish(self, topic: str, message: Any) -> None:
+        publisher = self._publishers.get(topic)
+        if publisher is not None:
+            publish(self.node, publisher, message)
 
     def _header(self) -> Header:
-        return Header(stamp=Time(*divmod(self.node.now(), 10**9)))
-
-    def _wake(self) -> None:
-        with self._changed:
-            self._changed.notify_all()
+        return Header(stamp=Time.from_nsec(self.node.now()))
 
     def _receive_goal(self, message: Any) -> None:
-        with self._changed:
-            if message.goal_id.id in self._goals:
-                return  # sent twice
-            goal = self._goal_class(message, self.node.now())
-            self._goals[goal.id.id] = goal
-            newest = max(
-                (one.order for one in (self.current_goal, self.next_goal) if one is not None),
-                default=0,
-            )
-            if goal.order < newest:
-                self._end(goal, GoalStatus.RECALLED, None, _SUPERSEDED)
-                return
-            older, self.next_goal = self.next_goal, goal
-            if older is not None:
-                self._end(older, GoalStatus.RECALLED, None, _SUPERSEDED)
-            preempts = self.is_active()
-            self._changed.notify_all()
-        self._publish_status()
-        if preempts:
-            run_callback(self.node, self.name, self.on_preempt)
-        run_callback(self.node, self.name, self.on_goal)
+        with self._callback_lock:
+            with self.lock:
+                name = message.goal_id.id
+                if name and any(goal.id.id == name for goal in self.goals):
+                    return  # sent twice
+                goal = self._goal_class(self, message)
+                self.goals.append(goal)
+                if self._cancelled_early.pop(name, None) is not None:
+                    goal.cancel()
+                    return
+                if 0 < message.goal_id.stamp.to_nsec() <= self._cancelled_until:
+                    goal.cancel(text=_CANCELLED_BEFORE)
+                    return
+            run_callback(self.node, self.name, self.on_goal, goal)
 
     def _receive_cancel(self, message: GoalID) -> None:
         until = message.stamp.to_nsec()
         everything = not message.id and not until
-        with self._changed:
-            cancelled = [
-                goal
-                for goal in self._goals.values()
-                if goal.status.status not in TERMINAL
-                and (everything or goal.id.id == message.id or (until and goal.order <= until))
-            ]
+        with self._callback_lock:
+            with self.lock:
+                cancelled = [
+                    goal
+                    for goal in self.goals
+                    if (everything or goal.id.id == message.id or goal.id.stamp.to_nsec() <= until)
+                    and goal.request_cancel()
+                ]
+                if message.id and all(goal.id.id != message.id for goal in self.goals):
+                    self._cancelled_early[message.id] = self.node.now()
+                self._cancelled_until = max(self._cancelled_until, until)
             for goal in cancelled:
-                goal.cancelled = True
-                active = goal.status.status == GoalStatus.ACTIVE
-                goal.status.status = GoalStatus.PREEMPTING if active else GoalStatus.RECALLING
-            current = any(goal is self.current_goal for goal in cancelled)
-            self._changed.notify_all()
-        self._publish_status()
-        if current:
-            run_callback(self.node, self.name, self.on_preempt)
-
-    def _end_current(self, status: int, result: Any, text: str) -> None:
-        with self._changed:
-            goal = self.current_goal
-            if goal is None or goal.status.status in TERMINAL:
-                self.node.log.error("cannot end a goal: none is being executed")
-                return
-            self._end(goal, status, result, text)
-
-    def _end(self, goal: ServerGoal, status: int, result: Any, text: str) -> None:
-        goal.status.status, goal.status.text = status, text
-        goal.ended_at = self.node.now()
-        outcome = self._types.result() if result is None else result
-        message = self._types.action_result(self._header(), goal.status, outcome)
-        self._publishers["result"].publish(message)
-        self._publish_status()
-
-    def _publish_status(self) -> None:
-        with self._changed:
-            now = self.node.now()
-            self._goals = {
-                name: goal
-                for name, goal in self._goals.items()
-                if not goal.ended_at or now - goal.ended_at < _STATUS_KEPT
-            }
-            statuses = [goal.status for goal in self._goals.values()]
-            self._publishers["status"].publish(GoalStatusArray(self._header(), statuses))
-
-    def _wait_for_goal(self) -> Any:
-        """Accept the next goal when it has arrived; None when the node is shut down."""
-        with self._changed:
-            while not self.node.is_shutdown:
-                if self.next_goal is not None:
-                    return self.accept_new_goal()
-                self._changed.wait(_STATUS_PERIOD)
-        return None
-
-    def _execute(self, goal: Any) -> None:
-        node, execute = self.node, self.execute_callback
-        if execute is None:
-            return
-        try:
-            execute(goal)
-        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
-            if node.is_shutdown:
-                return
-            node.log.report(f"the execute function of action '{self.name}' failed", error)
-            if self.is_active():
-                self.set_aborted(None, f"Exception in execute callback: {error}")
-            return
-        if self.is_active() and not node.is_shutdown:
-            node.log.warning(
-                "the execute function of action '%s' returned without ending the goal, which is"
-                " aborted; call set_succeeded, set_aborted or set_preempted",
-                self.name,
-            )
-            self.set_aborted(None, "No terminal state was set.")
+                run_callback(self.node, self.name, self.on_cancel, goal)

@@ -7,11 +7,11 @@ from typing import Any
 
 import msgspec
 
-from rosz.errors import UsageError
+from rosz.errors import ClosedError, UsageError
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.node import Node
 
-__all__ = ("RUNNING", "TERMINAL", "ActionTypes", "run_callback")
+__all__ = ("RUNNING", "TERMINAL", "ActionTypes", "publish", "run_callback")
 
 RUNNING = frozenset({GoalStatus.ACTIVE, GoalStatus.PREEMPTING})
 """States of a goal that the server is executing."""
@@ -57,6 +57,20 @@ class ActionTypes(msgspec.Struct, frozen=True):
             raise UsageError(
                 f"{action_type.__name__} is not an action; expected a class such as FibonacciAction"
             ) from error
+
+
+def publish(node: Node, publisher: Any, message: Any) -> None:
+    """Publish a message; after the shutdown of the node do nothing.
+
+    Raises:
+        EncodeError: A value does not fit its field.
+        ClosedError: The publisher is closed.
+    """
+    try:
+        publisher.publish(message)
+    except ClosedError:
+        if not node.is_shutdown:
+            raise
 
 
 def run_callback(

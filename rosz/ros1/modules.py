@@ -50,6 +50,8 @@ MODULES = (
     "rostest",
     "rostopic",
     "rosunit",
+    "smach",
+    "smach_ros",
     "smclib",
     "tf",
     "tf2_geometry_msgs",

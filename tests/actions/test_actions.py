@@ -10,7 +10,13 @@ from typing import Any
 import pytest
 from network import Network, eventually
 
-from rosz.actions import ActionClient, ActionServer, ActionTypes, ClientGoal
+from rosz.actions import (
+    ActionClient,
+    ActionServer,
+    ActionTypes,
+    ClientGoal,
+    SimpleActionServer,
+)
 from rosz.errors import UsageError
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
 from rosz.msgs.std_msgs.msg import String
@@ -44,8 +50,10 @@ class World:
         self.count = Count(network.folder / "src")
         self.server_node, self.client_node = network.node("server"), network.node("client")
 
-    def server(self, execute: Any = None) -> ActionServer:
-        server = ActionServer(self.server_node, "count", self.count.action, execute)
+    def server(self, execute: Any = None) -> SimpleActionServer:
+        server = SimpleActionServer(
+            ActionServer(self.server_node, "count", self.count.action), execute
+        )
         server.start()
         return server
 
@@ -112,7 +120,7 @@ def test_a_goal_that_waits_is_recalled_by_a_newer_one(world: World) -> None:
     first, second = client.send(world.count.goal(1)), client.send(world.count.goal(2))
     assert first.wait(TIMEOUT)
     assert (first.status.status, first.started) == (GoalStatus.RECALLED, False)
-    assert server.next_goal.goal.top == 2
+    assert server.next_goal.message.goal.top == 2
     assert not second.done
 
 

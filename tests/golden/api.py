@@ -31,7 +31,12 @@ _TABLE = {
     "genpy": "message rostime",
     "genmsg": "names",
     "message_filters": "",
-    "actionlib": "",
+    "actionlib": "action_client action_server exceptions goal_id_generator handle_tracker_deleter "
+    "server_goal_handle simple_action_client simple_action_server status_tracker",
+    "smach": "concurrence container exceptions iterator log sequence state state_machine user_data "
+    "util",
+    "smach_ros": "action_server_wrapper condition_state introspection monitor_state ros_state "
+    "service_state simple_action_state util",
     "tf": "broadcaster listener transformations",
     "tf_transformations": "",
     "tf2_ros": "buffer",

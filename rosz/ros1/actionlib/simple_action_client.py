@@ -1,20 +1,22 @@
-"""actionlib: the simple action client and server of ROS 1 (ROS wiki, actionlib).
-
-Each handles one goal at a time. ``ActionClient``, ``ActionServer`` and their goal handles are
-missing; `rosz.actions` holds the logic.
-"""
+"""actionlib.simple_action_client: sending one goal at a time (ROS wiki, actionlib)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from rosz.actions import ActionClient, ActionServer, ClientGoal, ServerGoal
-from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
-from rosz.msgs.builtin_interfaces.msg import Time
-from rosz.ros1 import state
+from rosz.actions import ClientGoal
+from rosz.errors import EncodeError
+from rosz.msgs.actionlib_msgs.msg import GoalStatus
+from rosz.ros1.actionlib.action_client import (
+    ActionClient,
+    ClientGoalHandle,
+    get_name_of_constant,
+    seconds,
+)
+from rosz.ros1.exceptions import ROSSerializationException
 
-__all__ = ("SimpleActionClient", "SimpleActionServer", "SimpleGoalState")
+__all__ = ("SimpleActionClient", "SimpleGoalState")
 
 _SIMPLE = {GoalStatus.RECALLING: GoalStatus.PENDING, GoalStatus.PREEMPTING: GoalStatus.ACTIVE}
 """States that the simple client does not show, and the ones that it shows instead."""
@@ -27,6 +29,11 @@ class SimpleGoalState:
     ACTIVE = 1
     DONE = 2
 
+    @classmethod
+    def to_string(cls, state: int) -> str:
+        """Return the name of a value."""
+        return get_name_of_constant(cls, state)
+
 
 class SimpleActionClient:
     """Send one goal at a time to an action server, and follow the newest one.
@@ -35,13 +42,18 @@ class SimpleActionClient:
         ns: Name of the action.
         ActionSpec: Class of the action, such as ``DoAction``.
 
+    Attributes:
+        ns: Full name of the action.
+        action_client: Client that sends the goals.
+
     Raises:
         ROSInitException: ``rospy.init_node`` was not called.
-        UsageError: The class is not that of an action.
+        ActionException: The class is not that of an action.
     """
 
     def __init__(self, ns: str, ActionSpec: type[Any]) -> None:  # noqa: N803  # ROS 1's
-        self._client = ActionClient(state.node(), ns, ActionSpec)
+        self.action_client: ActionClient = ActionClient(ns, ActionSpec)
+        self._client = self.action_client.client
         self._goal: ClientGoal | None = None
         self.ns: str = self._client.name
 
@@ -54,7 +66,7 @@ class SimpleActionClient:
         Returns:
             Whether one is.
         """
-        return self._client.wait_for_server(_seconds(timeout))
+        return self.action_client.wait_for_server(timeout)
 
     def send_goal(
         self,
@@ -70,6 +82,9 @@ class SimpleActionClient:
             done_cb: Function called with the final state and the result.
             active_cb: Function called when the server begins to execute the goal.
             feedback_cb: Function called with each feedback message.
+
+        Raises:
+            ROSSerializationException: The goal is not one of the action.
         """
 
         def on_done(sent: ClientGoal) -> None:
@@ -77,9 +92,12 @@ class SimpleActionClient:
                 done_cb(_simple_state(sent), sent.result)
 
         self.stop_tracking_goal()
-        self._goal = self._client.send(
-            goal, on_done=on_done, on_active=active_cb, on_feedback=feedback_cb
-        )
+        try:
+            self._goal = self._client.send(
+                goal, on_done=on_done, on_active=active_cb, on_feedback=feedback_cb
+            )
+        except EncodeError as error:
+            raise ROSSerializationException(str(error)) from error
 
     def send_goal_and_wait(
         self, goal: Any, execute_timeout: Any = None, preempt_timeout: Any = None
@@ -112,7 +130,12 @@ class SimpleActionClient:
         if self._goal is None:
             self._client.node.log.error("cannot wait for a result: no goal was sent")
             return False
-        return self._goal.wait(_seconds(timeout))
+        return self._goal.wait(seconds(timeout))
+
+    @property
+    def gh(self) -> ClientGoalHandle | None:
+        """The handle of the goal; None without a goal."""
+        return None if self._goal is None else ClientGoalHandle(self._goal)
 
     def get_result(self) -> Any:
         """Return the result; None while there is none."""
@@ -140,11 +163,11 @@ class SimpleActionClient:
 
     def cancel_all_goals(self) -> None:
         """Ask the server to cancel all goals, including those of other clients."""
-        self._client.publish_cancel(GoalID())
+        self.action_client.cancel_all_goals()
 
     def cancel_goals_at_and_before_time(self, time: Any) -> None:
         """Ask the server to cancel all goals that were sent until a time."""
-        self._client.publish_cancel(GoalID(Time(time.secs, time.nsecs), ""))
+        self.action_client.cancel_goals_at_and_before_time(time)
 
     def stop_tracking_goal(self) -> None:
         """Stop following the goal; the server continues with it."""
@@ -153,71 +176,5 @@ class SimpleActionClient:
             self._goal = None
 
 
-class _Goal(ServerGoal):
-    """A goal with the methods of ROS 1's goal handles."""
-
-    def get_goal(self) -> Any:
-        """Return the goal message."""
-        return self.goal
-
-    def get_goal_id(self) -> GoalID:
-        """Return the identification of the goal."""
-        return self.id
-
-    def get_goal_status(self) -> GoalStatus:
-        """Return the state of the goal."""
-        return self.status
-
-
-class SimpleActionServer(ActionServer):
-    """Execute one goal at a time; a newer goal preempts the current one.
-
-    Args:
-        name: Name of the action.
-        ActionSpec: Class of the action, such as ``DoAction``.
-        execute_cb: Function called with each goal on a thread of its own. It must end with
-            `set_succeeded`, `set_aborted` or `set_preempted`. Without one, use
-            `register_goal_callback` and `accept_new_goal`.
-        auto_start: Whether the server starts at once, and not with `start`.
-
-    Raises:
-        ROSInitException: ``rospy.init_node`` was not called.
-        UsageError: The class is not that of an action.
-    """
-
-    _goal_class = _Goal
-
-    def __init__(
-        self,
-        name: str,
-        ActionSpec: type[Any],  # noqa: N803  # ROS 1's
-        execute_cb: Callable[[Any], object] | None = None,
-        auto_start: bool = True,
-    ) -> None:
-        super().__init__(state.node(), name, ActionSpec, execute_cb)
-        if auto_start:
-            self.start()
-
-    def register_goal_callback(self, cb: Callable[[], object]) -> None:
-        """Call a function when there is a new goal to accept."""
-        if self.execute_callback is not None:
-            self.node.log.warning(
-                "register_goal_callback() has no effect: the server has an execute callback"
-            )
-        else:
-            self.on_goal = cb
-
-    def register_preempt_callback(self, cb: Callable[[], object]) -> None:
-        """Call a function when the goal is asked to end."""
-        self.on_preempt = cb
-
-
 def _simple_state(goal: ClientGoal) -> int:
     return _SIMPLE.get(goal.status.status, goal.status.status)
-
-
-def _seconds(duration: Any) -> float:
-    """Return a duration, or a number of seconds, as seconds; 0 for None."""
-    if duration is None:
-        return 0.0
-    return float(duration.to_sec()) if hasattr(duration, "to_sec") else float(duration)

@@ -1,0 +1,97 @@
+"""What a client knows of a goal, and how states from the server change it (ROS wiki, actionlib)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rosz.msgs.actionlib_msgs.msg import GoalStatus
+
+__all__ = ("CommState", "path")
+
+
+class CommState:
+    """How far the exchange with the server about a goal is."""
+
+    WAITING_FOR_GOAL_ACK = 0
+    PENDING = 1
+    ACTIVE = 2
+    WAITING_FOR_RESULT = 3
+    WAITING_FOR_CANCEL_ACK = 4
+    RECALLING = 5
+    PREEMPTING = 6
+    DONE = 7
+    LOST = 8
+
+
+_C, _S = CommState, GoalStatus
+_RESULT = _C.WAITING_FOR_RESULT
+_TO_ACTIVE: Mapping[int, tuple[int, ...]] = {
+    _S.ACTIVE: (_C.ACTIVE,),
+    _S.PREEMPTING: (_C.ACTIVE, _C.PREEMPTING),
+    _S.PREEMPTED: (_C.ACTIVE, _C.PREEMPTING, _RESULT),
+    _S.SUCCEEDED: (_C.ACTIVE, _RESULT),
+    _S.ABORTED: (_C.ACTIVE, _RESULT),
+}
+_TO_PREEMPTING: Mapping[int, tuple[int, ...]] = {
+    _S.PREEMPTING: (_C.PREEMPTING,),
+    _S.PREEMPTED: (_C.PREEMPTING, _RESULT),
+    _S.SUCCEEDED: (_C.PREEMPTING, _RESULT),
+    _S.ABORTED: (_C.PREEMPTING, _RESULT),
+}
+_OVER = (_S.REJECTED, _S.RECALLED, _S.PREEMPTED, _S.SUCCEEDED, _S.ABORTED)
+
+_PATHS: Mapping[int, Mapping[int, tuple[int, ...]]] = {
+    _C.WAITING_FOR_GOAL_ACK: {
+        **_TO_ACTIVE,
+        _S.PENDING: (_C.PENDING,),
+        _S.REJECTED: (_C.PENDING, _RESULT),
+        _S.RECALLING: (_C.PENDING, _C.RECALLING),
+        _S.RECALLED: (_C.PENDING, _RESULT),
+    },
+    _C.PENDING: {
+        **_TO_ACTIVE,
+        _S.PENDING: (),
+        _S.REJECTED: (_RESULT,),
+        _S.RECALLING: (_C.RECALLING,),
+        _S.RECALLED: (_C.RECALLING, _RESULT),
+    },
+    _C.ACTIVE: {
+        _S.ACTIVE: (),
+        _S.PREEMPTING: (_C.PREEMPTING,),
+        _S.PREEMPTED: (_C.PREEMPTING, _RESULT),
+        _S.SUCCEEDED: (_RESULT,),
+        _S.ABORTED: (_RESULT,),
+    },
+    _RESULT: dict.fromkeys((_S.ACTIVE, *_OVER), ()),
+    _C.WAITING_FOR_CANCEL_ACK: {
+        **_TO_PREEMPTING,
+        _S.PENDING: (),
+        _S.ACTIVE: (),
+        _S.REJECTED: (_RESULT,),
+        _S.RECALLING: (_C.RECALLING,),
+        _S.RECALLED: (_C.RECALLING, _RESULT),
+    },
+    _C.RECALLING: {
+        **_TO_PREEMPTING,
+        _S.REJECTED: (_RESULT,),
+        _S.RECALLING: (),
+        _S.RECALLED: (_RESULT,),
+    },
+    _C.PREEMPTING: {
+        _S.PREEMPTING: (),
+        _S.PREEMPTED: (_RESULT,),
+        _S.SUCCEEDED: (_RESULT,),
+        _S.ABORTED: (_RESULT,),
+    },
+    _C.DONE: dict.fromkeys(_OVER, ()),
+}
+
+
+def path(state: int, status: int) -> tuple[int, ...] | None:
+    """Return the states that a status of the server leads through; None if it cannot follow.
+
+    Args:
+        state: State of the client, a constant of `CommState`.
+        status: State from the server, a constant of GoalStatus.
+    """
+    return _PATHS[state].get(status)

@@ -1,0 +1,207 @@
+"""actionlib.action_client: sending goals, and following their states (ROS wiki, actionlib)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rosz import actions
+from rosz.actions import ClientGoal, CommState
+from rosz.errors import EncodeError
+from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.ros1 import rospy, state
+from rosz.ros1.exceptions import ROSSerializationException
+
+__all__ = (
+    "ActionClient",
+    "ClientGoalHandle",
+    "CommState",
+    "GoalManager",
+    "TerminalState",
+    "get_name_of_constant",
+    "seconds",
+)
+
+
+def get_name_of_constant(C: type[Any], n: int) -> str:  # noqa: N803  # ROS 1's
+    """Return the name of the constant of a class that has a value."""
+    found = (name for name, value in vars(C).items() if isinstance(value, int) and value == n)
+    return next(found, f"NO_SUCH_STATE_{n}")
+
+
+class TerminalState:
+    """States that a goal never leaves."""
+
+    RECALLED = GoalStatus.RECALLED
+    REJECTED = GoalStatus.REJECTED
+    PREEMPTED = GoalStatus.PREEMPTED
+    ABORTED = GoalStatus.ABORTED
+    SUCCEEDED = GoalStatus.SUCCEEDED
+    LOST = GoalStatus.LOST
+
+
+for _class in (GoalStatus, CommState, TerminalState):
+    _class.to_string = classmethod(get_name_of_constant)  # type: ignore[union-attr]
+
+
+def seconds(duration: Any) -> float:
+    """Return a duration, or a number of seconds, as seconds; 0 for None."""
+    if duration is None:
+        return 0.0
+    return float(duration.to_sec()) if hasattr(duration, "to_sec") else float(duration)
+
+
+class ClientGoalHandle:
+    """A goal that was sent.
+
+    Args:
+        goal: The goal.
+    """
+
+    def __init__(self, goal: ClientGoal) -> None:
+        self._goal = goal
+
+    def __eq__(self, o: object) -> bool:
+        return isinstance(o, ClientGoalHandle) and self._goal.id.id == o._goal.id.id
+
+    def __hash__(self) -> int:
+        return hash(self._goal.id.id)
+
+    def cancel(self) -> None:
+        """Ask the server to cancel the goal."""
+        self._goal.cancel()
+
+    def get_comm_state(self) -> int:
+        """Return how far the exchange with the server is, a constant of `CommState`."""
+        return self._goal.comm_state
+
+    def get_goal_status(self) -> int:
+        """Return the last known state, a constant of GoalStatus."""
+        return self._goal.status.status
+
+    def get_goal_status_text(self) -> str:
+        """Return the text of the server about the state."""
+        return self._goal.status.text
+
+    def get_result(self) -> Any:
+        """Return the result; None while there is none."""
+        return self._goal.result
+
+    def get_terminal_state(self) -> int:
+        """Return the final state, a constant of `TerminalState`; LOST while there is none."""
+        status = self._goal.status.status
+        if self._goal.comm_state != CommState.DONE:
+            name = get_name_of_constant(CommState, self._goal.comm_state)
+            rospy.logwarn(f"Asking for the terminal state when we're in [{name}]")
+        if get_name_of_constant(TerminalState, status).startswith("NO_SUCH"):
+            rospy.logerr(f"the goal has no terminal state yet: its status is {status}")
+            return GoalStatus.LOST
+        return status
+
+
+class GoalManager:
+    """Sends the goals of a client.
+
+    Args:
+        client: The client.
+    """
+
+    def __init__(self, client: actions.ActionClient) -> None:
+        self._client = client
+
+    def init_goal(
+        self,
+        goal: Any,
+        transition_cb: Callable[[ClientGoalHandle], object] | None = None,
+        feedback_cb: Callable[[ClientGoalHandle, Any], object] | None = None,
+    ) -> ClientGoalHandle:
+        """Send a goal; see `ActionClient.send_goal`."""
+
+        def on_feedback(feedback: Any) -> None:
+            if feedback_cb is not None:
+                feedback_cb(ClientGoalHandle(sent), feedback)
+
+        def on_transition(one: ClientGoal) -> None:
+            if transition_cb is not None:
+                transition_cb(ClientGoalHandle(one))
+
+        try:
+            sent = self._client.send(goal, on_feedback=on_feedback, on_transition=on_transition)
+        except EncodeError as error:
+            raise ROSSerializationException(str(error)) from error
+        return ClientGoalHandle(sent)
+
+
+class ActionClient:
+    """Send goals to an action server, and follow all of them.
+
+    Args:
+        ns: Name of the action.
+        ActionSpec: Class of the action, such as ``DoAction``.
+
+    Attributes:
+        ns: Full name of the action.
+        ActionSpec: As given.
+        manager: Sends the goals.
+
+    Raises:
+        ROSInitException: ``rospy.init_node`` was not called.
+        ActionException: The class is not that of an action.
+    """
+
+    def __init__(self, ns: str, ActionSpec: type[Any]) -> None:  # noqa: N803  # ROS 1's
+        self.ns: str = ns
+        self.ActionSpec: type[Any] = ActionSpec
+        self.client = actions.ActionClient(state.node(), ns, ActionSpec)
+        self.manager = GoalManager(self.client)
+        whole = ActionSpec()
+        self.ActionGoal: type[Any] = type(whole.action_goal)
+        self.ActionResult: type[Any] = type(whole.action_result)
+        self.ActionFeedback: type[Any] = type(whole.action_feedback)
+
+    def send_goal(
+        self,
+        goal: Any,
+        transition_cb: Callable[[ClientGoalHandle], object] | None = None,
+        feedback_cb: Callable[[ClientGoalHandle, Any], object] | None = None,
+    ) -> ClientGoalHandle:
+        """Send a goal.
+
+        Args:
+            goal: The goal, such as a ``DoGoal``.
+            transition_cb: Function called with the handle when its `CommState` has changed.
+            feedback_cb: Function called with the handle and each feedback message.
+
+        Returns:
+            The handle of the goal.
+
+        Raises:
+            ROSSerializationException: The goal is not one of the action.
+        """
+        return self.manager.init_goal(goal, transition_cb, feedback_cb)
+
+    def cancel_all_goals(self) -> None:
+        """Ask the server to cancel all goals, including those of other clients."""
+        self.client.publish_cancel(GoalID())
+
+    def cancel_goals_at_and_before_time(self, time: Any) -> None:
+        """Ask the server to cancel all goals that were sent until a time."""
+        self.client.publish_cancel(GoalID(Time(time.secs, time.nsecs), ""))
+
+    def wait_for_server(self, timeout: Any = None) -> bool:
+        """Wait until a server of the action is connected.
+
+        Args:
+            timeout: Time limit, a Duration or seconds; none when not given or 0.
+
+        Returns:
+            Whether one is.
+        """
+        return self.client.wait_for_server(seconds(timeout))
+
+    wait_for_action_server_to_start = wait_for_server
+
+    def stop(self) -> None:
+        """Close all topics; goals are not followed any more."""
+        self.client.stop()
