@@ -24,14 +24,24 @@ import pytest
 
 from rosz.ros1.importer import install, uninstall
 
-__all__ = ("MESSAGES", "PYTHON", "Worker", "is_installed", "ours", "real", "require", "same")
+__all__ = (
+    "HEAD",
+    "MESSAGES",
+    "PYTHON",
+    "Worker",
+    "is_installed",
+    "ours",
+    "real",
+    "require",
+    "same",
+)
 
 PYTHON = "/usr/bin/python3"
 MESSAGES = Path("/usr/lib/python3/dist-packages")
 """Folder of Debian's generated message modules."""
 
 _RESULT = "\x1eresult:"
-_HEAD = """
+HEAD = """
 import json, os, sys
 def tried(function, *arguments):
     try:
@@ -89,7 +99,7 @@ def real(snippet: str, module: str, package: str, *, given: Any = None, home: st
     end = f"sys.__stdout__.write({_RESULT!r} + json.dumps(plain(result)))"
     end += "\nsys.__stdout__.flush()\nos._exit(0)\n"  # threads of a snippet may still run
     done = subprocess.run(
-        [PYTHON, "-c", f"{_HEAD}\ngiven = json.load(sys.stdin)\n{dedent(snippet)}\n{end}"],
+        [PYTHON, "-c", f"{HEAD}\ngiven = json.load(sys.stdin)\n{dedent(snippet)}\n{end}"],
         input=json.dumps(given),
         check=False,
         capture_output=True,
@@ -114,7 +124,7 @@ def ours(snippet: str) -> Any:
     install()
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            exec(_HEAD + dedent(snippet) + "\nresult = plain(result)\n", space)
+            exec(HEAD + dedent(snippet) + "\nresult = plain(result)\n", space)
     finally:
         uninstall()
     return json.loads(json.dumps(space["result"]))

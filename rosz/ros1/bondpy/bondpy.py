@@ -82,6 +82,7 @@ class Bond:
         heartbeat_period: Seconds or Duration between two messages; 1.
         instance_id: Identifier of this end.
         sister_instance_id: Identifier of the other end; None until it is heard.
+        sister_died_first: Whether the other end broke the bond; it is answered each time.
 
     Raises:
         ROSInitException: ``rospy.init_node`` was not called.
@@ -106,6 +107,7 @@ class Bond:
         self.on_broken = on_broken
         self.on_formed = on_formed
         self.is_shutdown = False
+        self.sister_died_first = False
         self.lock = threading.RLock()
         self.condition = threading.Condition(self.lock)
         self.sub: Any = None
@@ -215,6 +217,8 @@ class Bond:
                 )
                 return
             self._happens("other alive" if msg.active else "other dead")
+            if self.sister_died_first and not msg.active:
+                self._publish(active=False)
         self._call()
 
     def _happens(self, event: str) -> None:
@@ -228,7 +232,7 @@ class Bond:
             elif action == "hear":
                 self._set_deadline("heartbeat timeout")
             elif action == "answer":
-                self._publish(active=False)
+                self.sister_died_first = True
             elif action == "start dying":
                 self._deadlines.clear()
                 self._set_deadline("disconnect timeout")
