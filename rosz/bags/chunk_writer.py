@@ -122,9 +122,9 @@ class ChunkWriter:
         return self._offset + self._waiting + self._chunk.size
 
     @property
-    def full(self) -> bool:
-        """Whether so many bytes wait for the disk that `write` would wait too."""
-        return self._waiting >= self._capacity
+    def waiting(self) -> int:
+        """Bytes that wait for the disk."""
+        return self._waiting
 
     @property
     def complete(self) -> bool:

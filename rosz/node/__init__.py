@@ -1,6 +1,7 @@
 """Nodes and their parts: publishers, subscriptions, services, clients, timers, a log.
 
-`type_description` is imported on its own: only what asks other nodes for definitions loads it.
+`type_description` and `ros2_parameters` are imported on their own, by what needs definitions of
+other nodes, or parameters in the form of ROS 2.
 """
 
 from rosz.node.client import Client
@@ -26,7 +27,7 @@ from rosz.node.standard import serve_loggers, simulate
 from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Rate, Timer, TimerEvent
 
-PUBLIC_MODULES = ("type_description",)
+PUBLIC_MODULES = ("ros2_parameters", "type_description")
 
 __all__ = (
     "Client",

@@ -1,0 +1,134 @@
+"""Recording the parameters: all of them at the begin of each bag, and every change.
+
+Changes are messages of ROS 2's type on ``/parameter_events``, which any tool can read. The metadata
+``parameters`` has all values as YAML, also those that ROS 2 has no type for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Self
+
+from rosz.bags.bag import Channel
+from rosz.bags.recording import BagFiles, Track
+from rosz.errors import BagError, ClosedError, NoReplica, RoszError
+from rosz.lifecycle import Closable
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.rcl_interfaces.msg import Parameter, ParameterEvent
+from rosz.node.ros2_parameters import to_ros2
+from rosz.params.remote import ParamClient
+from rosz.params.yaml import dump
+from rosz.qos import PARAMETERS
+from rosz.worker import Worker
+
+if TYPE_CHECKING:
+    from rosz.node import Node
+    from rosz.params.replica import Changed, Follower
+
+__all__ = ("ParameterRecord",)
+
+_TOPIC = "/parameter_events"
+_RETRY_SECONDS = 1.0
+_SECOND = 1_000_000_000
+
+
+class ParameterRecord:
+    """Records the parameters of a network into bags.
+
+    Where no process holds parameters yet, it looks again until one does.
+
+    Args:
+        node: Node whose session it uses.
+        files: The bags.
+        report: Function called with a sentence for the user.
+    """
+
+    def __init__(self, node: Node, files: BagFiles, report: Callable[[str], object]) -> None:
+        self._node = node
+        self._files = files
+        self._report = report
+        self._follower: Follower | None = None
+        self._parts: list[Closable] = []
+        cls = ParameterEvent
+        channel = Channel(
+            _TOPIC,
+            cls._type_name,
+            definition=cls._full_text,
+            md5=cls._md5sum,
+            type_hash=cls._type_hash,
+            qos=(PARAMETERS,),
+        )
+        self._track: Track = files.track(channel, node.context.types)
+        self._worker: Worker[Callable[[], object]] = Worker("rosz-bag-parameters")
+        self._worker.submit(self._connect)
+
+    def _connect(self) -> None:
+        context = self._node.context
+        try:
+            follower = ParamClient(context.session, context.domain).follow()
+        except NoReplica:
+            self._worker.later(_RETRY_SECONDS, self._connect)
+            return
+        except ClosedError:
+            return
+        except RoszError as error:
+            self._report(f"WARNING: parameters are not recorded: {error}")
+            return
+        self._follower = follower
+        self._parts = [follower.watch("/", self._on_change), follower]
+        self.begin(self._files)
+
+    def begin(self, files: BagFiles) -> None:
+        """Write all parameters into a bag that has been opened.
+
+        Raises:
+            BagError: The file cannot be written.
+        """
+        if self._follower is None:
+            return
+        tree = self._follower.get("/")
+        files.add_metadata("parameters", {"yaml": dump(tree)})
+        rows = [Parameter(name, to_ros2(value)) for name, value in _leaves("", tree)]
+        self._write(ParameterEvent(new_parameters=rows), self._node.now())
+
+    def _on_change(self, change: Changed) -> None:
+        event = ParameterEvent(node="")
+        old = dict(_leaves(change.name.rstrip("/"), change.old))
+        new = dict(_leaves(change.name.rstrip("/"), change.new))
+        for name, value in new.items():
+            if name not in old:
+                event.new_parameters.append(Parameter(name, to_ros2(value)))
+            elif old[name] != value:
+                event.changed_parameters.append(Parameter(name, to_ros2(value)))
+        event.deleted_parameters = [
+            Parameter(name, to_ros2(value)) for name, value in old.items() if name not in new
+        ]
+        with suppress(BagError):  # the recorder sees it too
+            self._write(event, change.time)
+
+    def _write(self, event: ParameterEvent, sent: int) -> None:
+        now = self._node.now()
+        event.stamp = Time(*divmod(now, _SECOND))
+        self._files.write(self._track, now, event.to_cdr(), sent, 0)
+
+    def close(self) -> None:
+        """Stop following the parameters; a second call has no effect."""
+        self._worker.close()
+        for part in self._parts:
+            part.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the values below a name that are no dictionaries, by full name."""
+    if isinstance(value, dict) and value:
+        for key, below in value.items():
+            yield from _leaves(f"{name}/{key}", below)
+    elif value is not None and value != {}:
+        yield name or "/", value

@@ -1,0 +1,281 @@
+"""Recording topics: subscriptions that pass encoded messages on to files.
+
+A message is never decoded, unless the format needs another layout. Each publisher is a channel of
+its own, with its QoS and its node. A type that is not known here is described by the publisher's
+node; until that has replied, the messages of the channel wait in memory.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Self
+
+from rosz.bags.bag import Channel, Payload
+from rosz.bags.recording import Selection, Sink, Track
+from rosz.errors import BagError, ClosedError, MessageError, RoszError
+from rosz.node import Subscription
+from rosz.node.type_description import request_definition
+from rosz.qos import QoS
+from rosz.wire import NO_HASH, Token, format_token, gid
+from rosz.worker import Worker
+
+if TYPE_CHECKING:
+    from rosz.graph import View
+    from rosz.node import MessageInfo, Node
+
+__all__ = ("Recorder",)
+
+_QOS = QoS(depth=8192)
+"""Samples of a topic that wait while another one is written."""
+_DEFINITION_TIMEOUT = 10.0
+_MOST_HELD = 64 << 20
+_RULE = "=" * 80
+
+_Row = tuple[int, Payload, int | None, int]
+"""Stamp, payload, time of sending, sequence number."""
+
+
+class _Source:
+    """One publisher: its track once its definition is known, and what waits until then."""
+
+    def __init__(self, topic: str, info: MessageInfo, token: Token | None) -> None:
+        self.topic = topic
+        self.type_name = info.type_name
+        self.type_hash = info.type_hash
+        self.token = token
+        self.track: Track | None = None
+        self.held: list[_Row] = []
+        self.size = 0
+        self.lock = threading.Lock()
+
+    def channel(self, definition: str, md5: str) -> Channel:
+        """Return its channel."""
+        token = self.token
+        return Channel(
+            self.topic,
+            self.type_name,
+            definition=definition,
+            md5=md5,
+            type_hash="" if self.type_hash == NO_HASH else self.type_hash,
+            qos=(token.qos,) if token is not None and token.qos is not None else (),
+            node="" if token is None else token.node_name,
+        )
+
+
+class Recorder:
+    """Records topics until it is closed.
+
+    Args:
+        node: The node that subscribes.
+        selection: The topics.
+        sink: What takes the messages.
+        report: Function called with a sentence for the user.
+        limit: Number of messages to record of each topic; 0 for all.
+
+    Attributes:
+        ended: Set when recording has come to its end, or failed.
+        lost: Number of messages that did not arrive or found no room.
+        error: What made it fail.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        selection: Selection,
+        sink: Sink,
+        report: Callable[[str], object],
+        limit: int = 0,
+    ) -> None:
+        self._node = node
+        self._selection = selection
+        self._sink = sink
+        self._report = report
+        self._limit = limit
+        self._lock = threading.Lock()
+        self._subscribed: dict[str, Subscription[bytes]] = {}
+        self._sources: dict[bytes, _Source] = {}
+        self._unknown: dict[tuple[str, str, str], tuple[View, _Source]] = {}
+        self._counts: Counter[str] = Counter()
+        self._warned: set[str] = set()
+        self._worker: Worker[Callable[[], object]] = Worker("rosz-bag-recorder", threads=4)
+        self.ended: threading.Event = threading.Event()
+        self.lost: int = 0
+        self.error: BagError | None = None
+        for name in selection.at_once:
+            self._subscribe(name)
+        self._listener = node.listen(self._follow)
+
+    @property
+    def topics(self) -> list[str]:
+        """The topics that are recorded, sorted."""
+        return sorted(self._subscribed)
+
+    def _follow(self, token: Token, alive: bool) -> None:
+        own = token.zid == self._node.context.session.zid
+        if alive and not own and token.qos is not None and self._selection.has(token):
+            self._worker.submit(partial(self._subscribe, token.name))
+
+    def _subscribe(self, topic: str) -> None:
+        with self._lock:
+            if topic in self._subscribed or self._worker.closed:
+                return
+            self._report(f"Subscribing to {topic}")
+            try:
+                subscription: Subscription[bytes] = Subscription(
+                    self._node,
+                    topic,
+                    None,
+                    partial(self._receive, topic),
+                    _QOS,
+                    raw=True,
+                    with_info=True,
+                    warn_dropped=False,
+                )
+                self._subscribed[topic] = self._node.keep(subscription)
+            except ClosedError:
+                return  # the node ends
+
+    # Messages; of one topic one at a time, of several topics at once.
+
+    def _receive(self, topic: str, data: Payload, info: MessageInfo) -> None:
+        self.lost += info.lost
+        if self.error is not None or (self._limit and self._counts[topic] >= self._limit):
+            return
+        source = self._sources.get(info.gid) or self._source(topic, info)
+        clock = self._node.clock
+        stamp = clock.now() if clock.simulated else info.reception_time
+        row = (stamp, data, info.source_time or None, info.sequence)
+        if source.track is None:
+            with source.lock:
+                if source.track is None:
+                    self._hold(source, row)
+                    return
+        self._write(source, row)
+
+    def _hold(self, source: _Source, row: _Row) -> None:
+        if source.size > _MOST_HELD:
+            self.lost += 1
+            return
+        source.held.append(row)
+        source.size += len(row[1])
+
+    def _write(self, source: _Source, row: _Row) -> None:
+        track = source.track
+        if track is None:
+            return
+        try:
+            if not self._sink.write(track, *row):
+                self._warn_once("the buffer is full: messages are lost; the disk is too slow")
+                return
+        except MessageError as error:
+            self.lost += 1
+            self._warn_once(f"a message of {source.topic} is left out: {error}")
+            return
+        except BagError as error:
+            self._fail(error)
+            return
+        if self._limit:
+            self._count(source.topic)
+
+    def _count(self, topic: str) -> None:
+        self._counts[topic] += 1
+        wanted = self._selection.topics
+        named = self._selection.named
+        if named and all(self._counts[name] >= self._limit for name in wanted):
+            self.ended.set()
+
+    def _fail(self, error: BagError) -> None:
+        self.error = error
+        self.ended.set()
+
+    def _warn_once(self, text: str) -> None:
+        """Report something once."""
+        if text not in self._warned:
+            self._warned.add(text)
+            self._report(f"WARNING: {text}")
+
+    # Channels.
+
+    def _source(self, topic: str, info: MessageInfo) -> _Source:
+        """Return the publisher of a message; one without a token as long as that is not there."""
+        view = self._node.context.graph.view()
+        key = (topic, info.type_name, info.type_hash)
+        known = self._unknown.get(key)
+        if known is not None and known[0] is view:
+            return known[1]
+        for token in view.publishers(topic):
+            if gid(format_token(token)) == info.gid:
+                source = self._sources[info.gid] = _Source(topic, info, token)
+                self._define(source)
+                return source
+        source = _Source(topic, info, None) if known is None else known[1]
+        self._unknown[key] = view, source
+        if known is None:
+            self._define(source)
+        return source
+
+    def _define(self, source: _Source) -> None:
+        """Begin to record a publisher, with its definition from here or from its node."""
+        types = self._node.context.types
+        try:
+            cls = types.message(source.type_name)
+        except RoszError:
+            cls = None
+        if cls is not None and source.type_hash in {NO_HASH, cls._type_hash}:
+            self._begin(source, cls._full_text, cls._md5sum)
+        elif source.token is None:
+            self._begin(source, "", "")
+        else:
+            self._worker.submit(partial(self._request_definition, source, source.token))
+
+    def _request_definition(self, source: _Source, token: Token) -> None:
+        try:
+            found = request_definition(self._node, token, _DEFINITION_TIMEOUT)
+        except RoszError as error:
+            self._warn_once(
+                f"{source.topic} is recorded without the definition of its type: {error}"
+            )
+            self._begin(source, "", "")
+            return
+        texts = [found.text]
+        texts += [f"{_RULE}\nMSG: {name}\n{text}" for name, text in found.others.items()]
+        text = "\n".join(texts)
+        try:
+            md5 = self._node.context.types.message_from_text(found.name, text)._md5sum
+        except RoszError as error:
+            self._warn_once(f"the definition of {found.name} is not well-formed: {error}")
+            md5 = ""
+        self._begin(source, text, md5)
+
+    def _begin(self, source: _Source, definition: str, md5: str) -> None:
+        channel = source.channel(definition, md5)
+        try:
+            track = self._sink.track(channel, self._node.context.types)
+        except RoszError as error:
+            self._warn_once(f"{source.topic} is not recorded: {error}")
+            return
+        with source.lock:
+            rows, source.held = source.held, []
+            source.track = track
+            for row in rows:
+                self._write(source, row)
+
+    def close(self) -> None:
+        """Stop receiving; a second call has no effect."""
+        self._listener.close()
+        self._worker.close()
+        with self._lock:
+            for subscription in self._subscribed.values():
+                subscription.close()
+        for source in [*self._sources.values(), *(one for _, one in self._unknown.values())]:
+            if source.track is None:
+                self._begin(source, "", "")  # its node has not replied in time
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()

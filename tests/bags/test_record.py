@@ -1,0 +1,437 @@
+"""Recording: what is published is in the bag, whatever happens to the recorder."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from network import TIMEOUT, Network, Program, eventually
+from oracle import PYTHON, require
+from rosbags.highlevel import AnyReader
+
+from bags.messages import MESSAGES
+from rosz.bags import Channel, open_reader
+from rosz.bags.parameters import ParameterRecord
+from rosz.bags.recorder import Recorder
+from rosz.bags.recording import BagFiles, RecordOptions, Ring, Selection
+from rosz.bags.repair import recover
+from rosz.cli.main import run
+from rosz.msgs.std_msgs.msg import String
+from rosz.msgs.std_srvs.srv import Trigger, TriggerRequest
+from rosz.node import Publisher
+from rosz.qos import LATCHED
+
+SECOND = 1_000_000_000
+CUSTOM = """
+import rosz
+with rosz.Node("custom") as node:
+    cls = node.context.types.message("strange_msgs/Strange")
+    inner = node.context.types.message("strange_msgs/Inner")
+    publisher = node.publisher("/strange", cls, latch=True)
+    publisher.publish(cls(name="x", parts=[inner(a=1), inner(a=2)]))
+    print("ready", flush=True)
+    node.spin()
+"""
+
+
+class Recording:
+    """A recorder in this process."""
+
+    def __init__(self, network: Network, options: RecordOptions, selection: Selection) -> None:
+        self.node = network.node("record")
+        self.said: list[str] = []
+        self.files = BagFiles(options, self.said.append)
+        self.parameters = ParameterRecord(self.node, self.files, self.said.append)
+        self.files.begin = self.parameters.begin
+        self.recorder = Recorder(self.node, selection, self.files, self.said.append)
+
+    @property
+    def count(self) -> int:
+        """Number of messages that are no parameters."""
+        tracks = list(self.files._tracks)
+        return sum(one.count for one in tracks if one.channel.topic != "/parameter_events")
+
+    def wait_for_count(self, count: int) -> None:
+        eventually(lambda: self.count >= count)
+
+    def close(self) -> None:
+        self.recorder.close()
+        self.parameters.close()
+        self.files.close()
+
+
+@contextmanager
+def recording(
+    network: Network, name: str, *topics: str, every: bool = False, **options: Any
+) -> Iterator[Recording]:
+    made = Recording(
+        network,
+        RecordOptions(name=str(network.folder / name), **options),
+        Selection(topics, every=every),
+    )
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def connect(publisher: Publisher[Any]) -> Publisher[Any]:
+    publisher.wait_for_subscribers(timeout=TIMEOUT)
+    return publisher
+
+
+def strange(network: Network) -> Program:
+    """Start a publisher of a type that nobody else knows."""
+    folder = network.folder / "src" / "strange_msgs"
+    (folder / "msg").mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>strange_msgs</name></package>")
+    (folder / "msg" / "Inner.msg").write_text("int32 a\n")
+    (folder / "msg" / "Strange.msg").write_text("string name\nInner[] parts\n")
+    program = network.program(CUSTOM, ROSZ_PACKAGE_PATH=str(network.folder / "src"))
+    program.wait_for("ready")
+    return program
+
+
+def test_many_types_are_read_by_others(network: Network) -> None:
+    node = network.node("talker")
+    latched = {
+        topic: node.publisher(topic, type(message), latch=True)
+        for topic, message in MESSAGES.items()
+    }
+    for topic, message in MESSAGES.items():
+        latched[topic].publish(message)
+    strange(network)
+    wanted = len(MESSAGES) + 1
+    with recording(network, "a.mcap", *MESSAGES, "/strange") as made:
+        made.wait_for_count(wanted)
+    path = made.files.done[0]
+    with open_reader(path) as reader:
+        assert not reader.problems
+        channels = [one for one in reader.channels if one.topic != "/parameter_events"]
+        assert sum(map(reader.count, channels)) == wanted
+        assert {channel.topic for channel in channels if channel.latched} >= {*MESSAGES}
+        assert {one.node for one in channels} == {"/talker", "/custom"}
+        for entry in reader.messages(MESSAGES):
+            assert entry.data == MESSAGES[entry.channel.topic].to_cdr()
+            assert entry.channel.type_hash == MESSAGES[entry.channel.topic]._type_hash
+            assert entry.sequence == 1
+    check_by_mcap(path)
+    check_by_rosbags(path)
+
+
+def check_by_mcap(path: Path) -> None:
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        found = {row.channel.topic: row.decoded_message for row in reader.iter_decoded_messages()}
+    assert found["/string"].data == MESSAGES["/string"].data
+    assert list(found["/camera_info"].d) == [0.1, 0.2]
+    assert bytes(found["/image"].data) == bytes(range(6))
+    assert found["/pose"].pose.position.y == 2.5
+    assert [part.a for part in found["/strange"].parts] == [1, 2]
+    assert found.keys() >= {*MESSAGES, "/strange"}
+
+
+def check_by_rosbags(path: Path) -> None:
+    with AnyReader([path]) as reader:
+        rows: dict[str, Any] = {
+            connection.topic: reader.deserialize(data, connection.msgtype)
+            for connection, _, data in reader.messages()
+        }
+    assert rows.keys() >= {*MESSAGES, "/strange"}
+    assert rows["/scan"].ranges.tolist() == [1.0, 2.0]
+    assert rows["/strange"].name == "x"
+
+
+NODE_SCRIPT = """
+const { McapIndexedReader } = require("@mcap/core");
+const { FileHandleReadable } = require("@mcap/nodejs");
+const { open } = require("fs/promises");
+(async () => {
+  const file = await open(process.argv[2], "r");
+  const reader = await McapIndexedReader.Initialize({ readable: new FileHandleReadable(file) });
+  const rows = [];
+  for await (const message of reader.readMessages()) {
+    const channel = reader.channelsById.get(message.channelId);
+    const schema = reader.schemasById.get(channel.schemaId);
+    const data = Buffer.from(message.data).toString("hex");
+    rows.push([channel.topic, schema.name, schema.encoding, data]);
+  }
+  console.log(JSON.stringify(rows));
+})();
+"""
+
+
+def test_npm_reads_the_same(network: Network) -> None:
+    folder = network.folder / "npm"
+    folder.mkdir()
+    (folder / "package.json").write_text("{}")
+    try:
+        done = subprocess.run(
+            ["npm", "install", "--no-audit", "--no-fund", "@mcap/core@2", "@mcap/nodejs@1"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=50,
+            check=False,
+        )
+    except (FileNotFoundError, subprocess.TimeoutExpired) as error:
+        pytest.skip(f"needs npm and its registry: {error}")
+    if done.returncode:
+        pytest.skip(f"npm cannot install @mcap/core: {done.stderr[-200:]}")
+    node = network.node("talker")
+    topics = ["/string", "/image", "/cloud"]
+    for topic in topics:
+        node.publisher(topic, type(MESSAGES[topic]), latch=True).publish(MESSAGES[topic])
+    with recording(network, "a.mcap", *topics) as made:
+        made.wait_for_count(3)
+    (folder / "read.js").write_text(NODE_SCRIPT)
+    read = subprocess.run(
+        ["node", "read.js", str(made.files.done[0])],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+    )
+    assert read.returncode == 0, read.stderr
+    rows = [row for row in json.loads(read.stdout) if row[0] in topics]
+    assert sorted(rows) == sorted(
+        [topic, MESSAGES[topic]._type_name, "ros2msg", MESSAGES[topic].to_cdr().hex()]
+        for topic in topics
+    )
+
+
+def test_topics_that_appear_later(network: Network) -> None:
+    node = network.node("talker")
+    with recording(network, "a.mcap", every=True) as made:
+        for number in range(5):
+            connect(node.publisher(f"/t{number}", String)).publish(String(data=str(number)))
+        made.wait_for_count(5)
+    with open_reader(made.files.done[0]) as reader:
+        assert {f"/t{number}" for number in range(5)} <= {one.topic for one in reader.channels}
+
+
+def test_each_split_begins_with_latched_messages_and_parameters(network: Network) -> None:
+    node = network.node("talker")
+    node.params.set("/gain", 5)
+    node.publisher("/map", String, latch=True).publish(String(data="map"))
+    with recording(network, "a.mcap", "/map", "/big", split=True, size=3000, max_splits=2) as made:
+        big = connect(node.publisher("/big", String))
+        eventually(lambda: made.files.count >= 2)  # the map and the parameters
+        for number in range(4):
+            before = made.count
+            big.publish(String(data=f"{number}" * 4000))
+            made.wait_for_count(before + 1)
+        before = made.files.count
+        node.params.set("/gain", 6)
+        eventually(lambda: made.files.count > before)
+    names = sorted(one.name for one in network.folder.glob("a_*"))
+    assert len(names) == 2, names
+    changed: list[Any] = []
+    for name in names:
+        with rosz_bag(network.folder / name) as bag:
+            assert "/map" in bag.topics
+            assert [entry.message.data for entry in bag.messages("/map")] == ["map"]
+            assert "gain: " in bag.metadata["parameters"]["yaml"]
+            for entry in bag.messages("/parameter_events"):
+                changed += [(one.name, one.value) for one in entry.message.changed_parameters]
+    assert [(name, value.integer_value) for name, value in changed] == [("/gain", 6)]
+
+
+def rosz_bag(path: Path) -> Any:
+    import rosz.bags
+
+    return rosz.bags.open(path)
+
+
+def record(network: Network, *words: str) -> Program:
+    """Start the command in the folder of the network."""
+    command = [sys.executable, "-P", "-m", "rosz", "bag", "record", *words]
+    program = Program(command, network.variables(), network.folder)
+    network._keep(program)
+    return program
+
+
+def talker(network: Network, topic: str = "/chatter") -> Publisher[Any]:
+    publisher = network.node("talker").publisher(topic, String, latch=True)
+    publisher.publish(String(data="hello"))
+    return publisher
+
+
+def test_the_command(network: Network) -> None:
+    talker(network)
+    assert record(network, "/chatter", "-l", "1", "-O", "one").exit_code() == 0
+    with rosz_bag(network.folder / "one.mcap") as bag:
+        assert [entry.message.data for entry in bag.messages("/chatter")] == ["hello"]
+    again = record(network, "/chatter", "-O", "one.mcap")
+    assert again.exit_code() == 1
+    assert "one.mcap: it exists already, and nothing is overwritten" in again.lines[-1]
+
+    dated = record(network, "-e", "/chat.*", "-x", "/rosout", "-o", "lab", "--zstd")
+    dated.wait_for("Subscribing to /chatter")
+    dated.send(signal.SIGINT)
+    assert dated.exit_code() == 0
+    (path,) = network.folder.glob("lab_????-??-??-??-??-??.mcap")
+    with open_reader(path) as reader:
+        assert not reader.problems
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ((), "expected a TOPIC, or -a"),
+        (("-a", "-o", "x", "-O", "y"), "-o and -O exclude each other"),
+        (("-a", "--split"), "--split needs a limit"),
+        (("-a", "--duration", "5x"), "--duration is '5x'"),
+        (("-e", "("), "'(' is not a regular expression"),
+        (("-a", "-j", "--lz4"), "exclude each other"),
+    ],
+)
+def test_wrong_usage(words: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["bag", "record", *words]) == 2
+    assert text in capsys.readouterr().err
+
+
+def test_a_path_that_is_not_writable(network: Network) -> None:
+    network.node("talker")
+    program = record(network, "-a", "-O", "missing/x.mcap")
+    assert program.exit_code() == 1
+    assert "missing/x.mcap.active: cannot create it: No such file" in program.lines[-1]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_recorder_that_is_killed(network: Network, seed: int) -> None:
+    rng = random.Random(seed)
+    publisher = network.node("talker").publisher("/chatter", String, queue_size=1000)
+    program = record(network, "/chatter", "-O", "x.mcap")
+    program.wait_for("Subscribing to /chatter")
+    connect(publisher)
+    killed_after = rng.uniform(0.3, 1.5)
+    begun, sent = time.monotonic(), 0
+    times = []
+    while time.monotonic() - begun < killed_after:
+        publisher.publish(String(data=str(sent)))
+        times.append(time.monotonic())
+        sent += 1
+        time.sleep(0.001)  # the load, not synchronisation
+    program.kill()
+    end = time.monotonic()
+    path = network.folder / "x.mcap.active"
+    copied = recover(path, network.folder / "y.mcap")
+    with rosz_bag(copied.path) as bag:
+        found = [int(entry.message.data) for entry in bag.messages("/chatter")]
+    assert found == list(range(found[0], found[0] + len(found))) if found else True
+    last = times[found[-1]] if found else begun
+    assert end - last < 1.5 + (0 if found else killed_after)
+
+
+def test_a_full_disk(network: Network) -> None:
+    disk = network.folder / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)]
+    if os.geteuid() or subprocess.run(mount, check=False, capture_output=True).returncode:
+        pytest.skip("needs to mount a small disk, as root")
+    try:
+        publisher = network.node("talker").publisher("/big", String, queue_size=1000)
+        program = record(network, "/big", "-O", "disk/x.mcap")
+        program.wait_for("Subscribing to /big")
+        connect(publisher)
+        sent = 0
+        while program.process.poll() is None and sent < 1000:
+            publisher.publish(String(data=f"{sent}" + " " * 50_000))
+            sent += 1
+            time.sleep(0.01)  # the load, not synchronisation
+        assert program.exit_code() == 1
+        assert "ERROR: disk/x.mcap.active at byte" in program.lines[-1]
+        assert "No space left on device; what was written before can be read" in program.lines[-1]
+        (path,) = disk.iterdir()
+        with open_reader(path) as reader:
+            found = [int(bytes(one.data[8:20]).split()[0]) for one in reader.messages({"/big"})]
+        assert found == list(range(len(found)))
+        assert len(found) * 50_000 > 1_500_000
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_snapshots_are_of_the_last_seconds(network: Network) -> None:
+    publisher = network.node("talker").publisher("/chatter", String, latch=True)
+    node = network.node("record")
+    ring = Ring(RecordOptions(prefix=str(network.folder / "x")), 10 * SECOND, lambda _: None)
+    now = 100 * SECOND
+    channel = Channel("/map", "std_msgs/msg/String", definition="string data\n", qos=(LATCHED,))
+    track = ring.track(channel, node.context.types)
+    other = ring.track(Channel("/a", "std_msgs/msg/String"), node.context.types)
+    ring.write(track, now, b"old", None, 0)
+    ring.write(track, now + 1, b"map", None, 0)
+    for second in range(30):
+        ring.write(other, now + second * SECOND, bytes([second]), None, 0)
+    path = ring.save(now + 30 * SECOND)
+    with open_reader(path) as reader:
+        rows = [(one.channel.topic, bytes(one.data)) for one in reader.messages()]
+    assert rows == [("/map", b"map"), *(("/a", bytes([second])) for second in range(20, 30))]
+
+    program = record(network, "-a", "--snapshot", "60", "-o", "snap", "__name:=keeper")
+    program.wait_for("SIGUSR1")
+    connect(publisher).publish(String(data="now"))
+    program.wait_for("Subscribing to /chatter")
+    client = node.client("/keeper/snapshot", Trigger)
+
+    def saved() -> bool:
+        response = client.call(TriggerRequest(), timeout=TIMEOUT)
+        assert response.success
+        with rosz_bag(network.folder / response.message) as bag:
+            return [one.message.data for one in bag.messages("/chatter")] == ["now"]
+
+    eventually(saved)
+    before = len(list(network.folder.glob("snap_*.mcap")))
+    program.send(signal.SIGUSR1)
+    eventually(lambda: len(list(network.folder.glob("snap_*.mcap"))) > before)
+    program.send(signal.SIGINT)
+    assert program.exit_code() == 0
+    assert not list(network.folder.glob("*.active"))
+
+
+@pytest.mark.ros1
+def test_a_bag_of_ros_1(network: Network) -> None:
+    require("rosbag", package="python3-rosbag")
+    node = network.node("talker")
+    for topic, message in MESSAGES.items():
+        node.publisher(topic, type(message), latch=True).publish(message)
+    with recording(network, "a.bag", *MESSAGES, compression="lz4") as made:
+        made.wait_for_count(len(MESSAGES))
+    script = (
+        "import rosbag, sys\n"
+        "rows = list(rosbag.Bag(sys.argv[1]).read_messages())\n"
+        "print(sorted(row[0] for row in rows if row[0] != '/parameter_events'))"
+    )
+    done = subprocess.run(
+        [PYTHON, "-c", script, str(made.files.done[0])],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == (f"{sorted(MESSAGES)}\n", "")
+
+
+def test_the_node_of_launch_files(network: Network) -> None:
+    talker(network)
+    command = [sys.executable, "-P", "-m", "rosz", "run", "rosbag", "record"]
+    words = ["-O", "x.mcap", "-l", "1", "in", "in:=/chatter", "__name:=rec"]
+    program = Program([*command, *words], network.variables(), network.folder)
+    network._keep(program)
+    assert program.exit_code() == 0, program.output
+    with open_reader(network.folder / "x.mcap") as reader:
+        assert {channel.topic for channel in reader.channels} >= {"/chatter"}
