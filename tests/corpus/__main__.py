@@ -6,6 +6,7 @@ import json
 import sys
 from argparse import ArgumentParser, Namespace
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -36,15 +37,15 @@ def options() -> Namespace:
     parser.add_argument("--beside", type=Path, help="folder with more checkouts, to depend on")
     parser.add_argument("--work", type=Path, required=True, help="folder of builds and results")
     parser.add_argument("--only", nargs="*", default=[], help="parts of the names of nodes")
-    parser.add_argument("--limit", type=int, default=4, help="nodes of a repository")
+    parser.add_argument("--limit", type=int, default=4, help="nodes or files of a repository")
     parser.add_argument("--jobs", type=int, default=4, help="nodes at a time")
     return parser.parse_args()
 
 
-def compared(given: Namespace, corpus: Corpus, own: list[Repository]) -> list[dict[str, Any]]:
+def compared(given: Namespace, corpus: Corpus, own: list[Repository]) -> Iterator[dict[str, Any]]:
     """Compare what the command line names."""
     if given.what == "launch":
-        return launch.compare(corpus, own)
+        return launch.compare(corpus, own, given.limit)
     devel = Devel(corpus, given.work / "devel")
     if given.what == "types":
         return types.compare(corpus, devel, own)
@@ -53,15 +54,18 @@ def compared(given: Namespace, corpus: Corpus, own: list[Repository]) -> list[di
 
 
 def main() -> None:
-    """Compare, print a table of repositories, and write the results as JSON."""
+    """Compare, print a table of repositories, and write a line of JSON for each case."""
     given = options()
     oracle.marked = True
     own = {path.resolve() for path in given.paths}
     beside = sorted(given.beside.resolve().iterdir()) if given.beside else []
     corpus = Corpus([*sorted(own), *(path for path in beside if path not in own)], _INSTALLED)
     (given.work / "devel").mkdir(parents=True, exist_ok=True)
-    rows = compared(given, corpus, [one for one in corpus.repositories if one.path in own])
-    (given.work / f"{given.what}.json").write_text(json.dumps(rows, indent=1))
+    rows = []
+    with (given.work / f"{given.what}.jsonl").open("w") as file:
+        for row in compared(given, corpus, [one for one in corpus.repositories if one.path in own]):
+            rows.append(row)
+            print(json.dumps(row), file=file, flush=True)
     counted = [row for row in rows if not row.get("python2")]
     total = Counter(row["case"].split(":")[0] for row in counted)
     equal = Counter(row["case"].split(":")[0] for row in counted if row["equal"])

@@ -18,15 +18,17 @@ __all__ = ("compare",)
 _ROOT = re.compile(rb"<launch[\s>]")
 
 
-def compare(corpus: Corpus, repositories: list[Repository]) -> list[dict[str, Any]]:
-    """Return a row for each launch file: both errors, the differences, and whether it is equal.
+def compare(corpus: Corpus, repositories: list[Repository], limit: int) -> Iterator[dict[str, Any]]:
+    """Yield a row for each launch file: both errors, the differences, and whether it is equal.
 
-    A file that both refuse, without arguments, is equal.
+    A file that both refuse, without arguments, is equal. Of each repository so many files are
+    read as `limit` says, from all over it.
     """
-    return [row for repository in repositories for row in _rows(corpus, repository)]
+    for repository in repositories:
+        yield from _rows(corpus, repository, limit)
 
 
-def files(repository: Repository) -> Iterator[Path]:
+def _files(repository: Repository) -> Iterator[Path]:
     """Yield the launch files of a repository."""
     for suffix in ("launch", "xml", "test"):
         for path in sorted(repository.path.rglob(f"*.{suffix}")):
@@ -35,10 +37,11 @@ def files(repository: Repository) -> Iterator[Path]:
                 yield path
 
 
-def _rows(corpus: Corpus, repository: Repository) -> Iterator[dict[str, Any]]:
-    found = list(files(repository))
+def _rows(corpus: Corpus, repository: Repository, limit: int) -> Iterator[dict[str, Any]]:
+    found = list(_files(repository))
     if not found:
         return
+    found = found[:: -(-len(found) // limit)]
     with TemporaryDirectory() as home:
         paths = [corpus.path(repository, real=real) for real in (True, False)]
         variables = [environment(Path(), Path(home)) | {"ROS_PACKAGE_PATH": path} for path in paths]

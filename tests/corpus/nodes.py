@@ -11,6 +11,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,22 +68,23 @@ class Nodes:
 
     def compare(
         self, repositories: list[Repository], words: list[str], jobs: int
-    ) -> list[dict[str, Any]]:
-        """Return a row for each node: both outcomes, and the differences.
+    ) -> Iterator[dict[str, Any]]:
+        """Yield a row for each node, both outcomes in it, one of each repository at first.
 
         Args:
             repositories: Those whose nodes are run.
             words: Only nodes whose case contains one of these; all when empty.
             jobs: How many at a time.
         """
+        turns = zip_longest(*map(self._find, repositories))
         found = [
             node
-            for repository in repositories
-            for node in self._find(repository)
-            if not words or any(word in node.case for word in words)
+            for turn in turns
+            for node in turn
+            if node and (not words or any(word in node.case for word in words))
         ]
         with ThreadPoolExecutor(jobs) as pool:
-            return list(pool.map(self._row, found))
+            yield from pool.map(self._row, found)
 
     def _find(self, repository: Repository) -> Iterator[Node]:
         queues = [list(_programs(repository, one)) for one in repository.packages.values()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,14 @@ from .packages import Corpus, Repository
 __all__ = ("compare",)
 
 
-def compare(corpus: Corpus, devel: Devel, repositories: list[Repository]) -> list[dict[str, Any]]:
-    """Return a row for each type: its name, both md5 sums or errors, and whether they are equal.
+def compare(
+    corpus: Corpus, devel: Devel, repositories: list[Repository]
+) -> Iterator[dict[str, Any]]:
+    """Yield a row for each type: its name, both md5 sums or errors, and whether they are equal.
 
     A type that genpy refuses, too, is equal.
     """
     real = devel.build(repositories)
-    rows = []
     with tempfile.TemporaryDirectory() as cache:
         for repository in repositories:
             roots = list(map(Path, corpus.path(repository, real=False).split(":")))
@@ -33,10 +35,8 @@ def compare(corpus: Corpus, devel: Devel, repositories: list[Repository]) -> lis
                 kind, name = key.partition(":")[2].split()
                 ours = _md5(store, kind, name)
                 failed = "error:" in ours and "error:" in wanted
-                rows.append(
-                    {"case": key, "rosz": ours, "ros1": wanted, "equal": failed or ours == wanted}
-                )
-    return rows
+                equal = failed or ours == wanted
+                yield {"case": key, "rosz": ours, "ros1": wanted, "equal": equal}
 
 
 def _md5(store: TypeStore, kind: str, name: str) -> str:
