@@ -63,7 +63,8 @@ class Devel:
             input=json.dumps(jobs),
             text=True,
             check=True,
-            stdout=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
         for job in jobs:
             done[job["mark"]] = json.loads((Path(job["out"]) / ".md5.json").read_text())

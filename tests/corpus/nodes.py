@@ -205,7 +205,6 @@ def _programs(repository: Repository, package: Package) -> Iterator[Node]:
 
 def _normal(report: dict[str, Any], node: Node) -> dict[str, Any]:
     """Return what two runs of a node have in common."""
-    before = report.pop("before")
     code = report["code"]
     outcome = ["ran"] if code is None else _ending(code, report["stderr"], node)
     found: dict[str, Any] = {"outcome": outcome, "stderr": report["stderr"][-3000:]}
@@ -217,7 +216,7 @@ def _normal(report: dict[str, Any], node: Node) -> dict[str, Any]:
             if not _OWN.match(name)
         }
     for kind in ("services", "parameters"):
-        names = {_NUMBERS.sub("_N", name) for name in set(report[kind]) - set(before[kind])}
+        names = {_NUMBERS.sub("_N", name) for name in report[kind]}
         found[kind] = sorted(name for name in names if not _OWN.match(name))
     return found
 

@@ -134,7 +134,6 @@ def main() -> None:
             if core.poll() is not None or time.monotonic() - begin > 90:
                 sys.exit("no core: " + Path(home, "core.log").read_text())
             time.sleep(_LOOK)
-    before = (_ros1 if job["real"] else _rosz)(job)
     out, err = Path(home, "out"), Path(home, "err")
     with out.open("wb") as stdout, err.open("wb") as stderr:
         node = subprocess.Popen(
@@ -150,13 +149,11 @@ def main() -> None:
             start_new_session=True,
         )
         code = _watch(node, job)
-    after = (_ros1 if job["real"] else _rosz)(job)
     found = {
         "code": code,
         "stdout": out.read_bytes()[-4000:].decode("utf-8", "replace"),
         "stderr": err.read_bytes()[-8000:].decode("utf-8", "replace"),
-        "before": before,
-        **after,
+        **(_ros1 if job["real"] else _rosz)(job),
     }
     print(json.dumps(found))
 
