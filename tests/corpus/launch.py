@@ -11,6 +11,8 @@ from typing import Any
 
 from plan.roslaunch_oracle import Roslaunch, Rosz, differences, environment
 
+from rosz.environment import Environment, package_index
+
 from .packages import Corpus, Repository
 
 __all__ = ("compare",)
@@ -43,7 +45,11 @@ def _rows(corpus: Corpus, repository: Repository, limit: int) -> Iterator[dict[s
         return
     found = found[:: -(-len(found) // limit)]
     with TemporaryDirectory() as home:
-        paths = [corpus.path(repository, real=real) for real in (True, False)]
+        shipped = map(str, package_index(Environment()).roots)
+        paths = [
+            corpus.path(repository, real=True),
+            ":".join([corpus.path(repository, real=False), *shipped]),
+        ]
         variables = [environment(Path(), Path(home)) | {"ROS_PACKAGE_PATH": path} for path in paths]
         roslaunch, rosz = Roslaunch(variables[0]), Rosz(variables[1])
         try:
@@ -51,6 +57,8 @@ def _rows(corpus: Corpus, repository: Repository, limit: int) -> Iterator[dict[s
                 print(f"launch {path}", file=sys.stderr, flush=True)
                 real = roslaunch.ask([path.name], path.parent)
                 ours = rosz.ask([path.name], path.parent)
+                if not (real["error"] or ours["error"]):
+                    _drop_programs(ours["args"], real["args"])
                 differing = differences(ours, real)
                 yield {
                     "case": f"{repository.name}:{path.relative_to(repository.path)}",
@@ -61,3 +69,10 @@ def _rows(corpus: Corpus, repository: Repository, limit: int) -> Iterator[dict[s
                 }
         finally:
             roslaunch.close()
+
+
+def _drop_programs(ours: dict[str, Any], real: dict[str, Any]) -> None:
+    """Drop the command lines of programs that only one side has installed."""
+    for name in [name for name in real if (ours.get(name) is None) != (real[name] is None)]:
+        del real[name]
+        ours.pop(name, None)

@@ -14,6 +14,7 @@ __all__ = ("Corpus", "Package", "Repository")
 
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _DEPENDS = re.compile(r"<(?:\w*_)?depend(?:\s[^>]*)?>\s*([^<\s]+)\s*</")
+_ROSBUILD_DEPENDS = re.compile(r"<depend\s+package=[\"']([^\"']+)")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _SYSTEM = Path("/usr/share")
 
@@ -106,6 +107,10 @@ class Corpus:
 
 
 def _package(folder: Path) -> Package:
-    text = _COMMENT.sub("", (folder / "package.xml").read_text("utf-8", "replace"))
+    manifest = folder / "package.xml"
+    if not manifest.is_file():  # a package of rosbuild, which has the name of its folder
+        text = (folder / "manifest.xml").read_text("utf-8", "replace")
+        return Package(folder.name, folder, frozenset(_ROSBUILD_DEPENDS.findall(text)))
+    text = _COMMENT.sub("", manifest.read_text("utf-8", "replace"))
     name = _NAME.search(text)
     return Package(name[1] if name else folder.name, folder, frozenset(_DEPENDS.findall(text)))
