@@ -1,0 +1,81 @@
+"""What publishers and subscribers of a topic share, and topics after the shutdown."""
+
+from __future__ import annotations
+
+from .rospy_programs import Printed
+
+
+def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
+    assert printed("""
+        import threading
+        import rospy
+        from std_msgs.msg import String
+        rospy.init_node("shared")
+        out = rospy.Publisher("x", String, queue_size=3, headers={"a": "b"})
+        print(out.impl.headers, out.impl.queue_size, out.impl.closed, out.impl.resolved_name)
+        came = threading.Event()
+        went = threading.Event()
+        class Listener(rospy.SubscribeListener):
+            def peer_subscribe(self, topic, publish, publish_to_it):
+                publish_to_it(String("welcome"))
+                came.set()
+            def peer_unsubscribe(self, topic, count):
+                went.set()
+        listener = Listener()
+        out.impl.add_subscriber_listener(listener)
+        got = []
+        heard = threading.Event()
+        def take(message, words):
+            got.append((message.data, words))
+            heard.set()
+        subscriber = rospy.Subscriber("x", String)
+        impl = subscriber.impl
+        print(impl.callbacks, impl.ref_count, impl.queue_size)
+        impl.add_callback(take, ["extra"])
+        print(came.wait(10), heard.wait(10), got)
+        print(out.impl.has_connections(), out.impl.has_connection("/shared"),
+              impl.get_num_connections(), listener in out.impl.subscriber_listeners)
+        impl.remove_callback(take, ["extra"])
+        try:
+            impl.remove_callback(take, ["extra"])
+        except KeyError as error:
+            print("KeyError", error)
+        subscriber.unregister()
+        print(went.wait(10), impl.ref_count, impl.closed, subscriber.type, subscriber.name)
+        try:
+            impl.add_callback(take, None)
+        except rospy.ROSException as error:
+            print(error)
+        out.impl.acquire()
+        out.impl.release()
+        out.impl.enable_latch()
+        out.impl.subscriber_listeners.remove(listener)
+        out.publish("kept")
+        print(rospy.wait_for_message("x", String, 10).data, out.impl.latch.data)
+        """) == [
+        "{'a': 'b'} 3 False /x",
+        "[] 1 None",
+        "True True [('welcome', ['extra'])]",
+        "True True 1 True",
+        "KeyError 'no matching cb'",
+        "True 0 True None /x",
+        "subscriber [/x] has been closed",
+        "kept kept",
+    ]
+
+
+def test_what_is_published_after_the_shutdown_is_dropped(printed: Printed) -> None:
+    assert printed("""
+        import rospy
+        from std_msgs.msg import Header, Int8, String
+        rospy.init_node("late")
+        outs = [rospy.Publisher(n, t, queue_size=1, latch=n == "b")
+                for n, t in (("a", String), ("b", String), ("c", Int8), ("d", Header))]
+        rospy.signal_shutdown("over")
+        for out, value in zip(outs, ("text", "text", 1000, 5)):
+            print(out.publish(value) if out.type != "std_msgs/Header" else out.publish(Header()))
+        late = rospy.Publisher("e", String, queue_size=1)
+        print(late.publish("x"), late.get_num_connections())
+        rospy.Subscriber("e", String, print).unregister()
+        late.unregister()
+        """) == ["None", "None", "None", "None", "None 0"]
