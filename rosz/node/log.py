@@ -339,7 +339,7 @@ class NodeLog(NodeLogger):
             self._rosout.publish_to(publish)
 
     def publish_as_ros1(self) -> None:
-        """Publish what child loggers log under the name of the node, as ROS 1 does."""
+        """Publish as ROS 1 does: child loggers have the name of the node, files no folder."""
         if self._rosout is not None:
             self._rosout.names_children = False
 

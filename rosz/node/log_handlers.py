@@ -429,7 +429,7 @@ class RosoutHandler(logging.Handler):
                 severity(record.levelno),
                 self._ros_name + child,
                 self.format(record),
-                record.pathname,
+                record.pathname if self.names_children else record.filename,
                 record.funcName or "",
                 record.lineno,
                 self._clock.now(),

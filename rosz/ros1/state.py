@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from rosz import remap
 from rosz.errors import ClosedError
 from rosz.lifecycle import Lifecycle
-from rosz.node import Context, Node
+from rosz.node import Clock, Context, Node
 from rosz.params.api import Params
 from rosz.ros1.exceptions import ROSInitException
 from rosz.wire import Token
@@ -69,6 +69,7 @@ class State:
         params: Parameters as seen before ``init_node``.
         init_call: Arguments of ``init_node``, which a second call must repeat.
         waiting: Functions to call with the node as soon as it exists, in order.
+        clock: Clock before ``init_node``, if a program has initialized the time by itself.
         publishers: Shared publishers of rospy, by topic and message class.
         subscriptions: Shared subscriptions of rospy, by topic and message class.
         services: Services of this process, by name.
@@ -88,6 +89,7 @@ class State:
         self.arguments: remap.Arguments | None = None
         self.params: Params | None = None
         self.init_call: tuple[Any, ...] | None = None
+        self.clock: Clock | None = None
         self.waiting: list[Callable[[Node], object]] = []
         self.publishers: dict[tuple[str, type[Any]], Any] = {}
         self.subscriptions: dict[tuple[str, type[Any]], Any] = {}

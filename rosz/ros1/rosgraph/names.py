@@ -155,7 +155,7 @@ def myargv(argv: Sequence[str] | None = None) -> list[str]:
     Args:
         argv: Command line with the program name; that of the process when not given.
     """
-    return [word for word in (sys.argv if argv is None else argv) if REMAP not in word]
+    return [word for word in (sys.argv if argv is None else argv) if not is_legal_remap(word)]
 
 
 def load_mappings(argv: Sequence[str]) -> dict[str, str]:

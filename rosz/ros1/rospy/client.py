@@ -14,7 +14,7 @@ from rosz import names
 from rosz.errors import InvalidName, ParamError, ParamNotFound
 from rosz.node import Node, RosoutHandler, serve_loggers
 from rosz.ros1.exceptions import ROSException, ROSInitException
-from rosz.ros1.rosgraph.names import myargv
+from rosz.ros1.rosgraph.names import REMAP, is_legal_remap, myargv
 from rosz.ros1.rospy.core import (
     DEBUG,
     ERROR,
@@ -70,7 +70,12 @@ __all__ = (
     "wait_for_message",
 )
 
-_UNSET: Any = object()
+
+class _Unspecified:
+    """Stands for a default that is not given, as in rospy."""
+
+
+_UNSET: Any = _Unspecified
 
 
 def init_node(  # noqa: PLR0917  # rospy's signature
@@ -208,6 +213,27 @@ def wait_for_message(
     finally:
         subscriber.unregister()
     return found[0]
+
+
+def load_command_line_node_params(argv: Sequence[str]) -> dict[str, Any]:
+    """Return the private parameters of a command line, such as ``_rate:=5``, as YAML values.
+
+    Raises:
+        ROSInitException: An argument cannot be read.
+    """
+    import yaml
+
+    found: dict[str, Any] = {}
+    for word in filter(is_legal_remap, argv):
+        name, *values = (part.strip() for part in word.split(REMAP))
+        if len(values) != 1:
+            raise ROSInitException(f"invalid command-line parameters: expected one := in '{word}'")
+        if len(name) > 1 and name[0] == "_" != name[1] and values[0]:
+            try:
+                found[name[1:]] = yaml.safe_load(values[0])
+            except yaml.YAMLError as error:
+                raise ROSInitException(f"invalid command-line parameters: {error}") from error
+    return found
 
 
 # The master.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+from rosz.ros1.exceptions import ROSException
 from rosz.ros1.rosgraph.names import (
     ANYTYPE,
     GLOBALNS,
@@ -89,10 +90,10 @@ def scoped_name(caller_id: str, name: str) -> str:
     """Return a name relative to the namespace of a node; empty if it lies elsewhere.
 
     Raises:
-        ValueError: The name of the node is not global.
+        ROSException: The name of the node is not global.
     """
     if not is_global(caller_id):
-        raise ValueError(f"caller_id must be a global name, got '{caller_id}'")
+        raise ROSException(f"caller_id must be a global name, got '{caller_id}'")
     if not is_global(name) or not canonicalize_name(name).startswith(namespace(caller_id)):
         return ""
     return canonicalize_name(name).removeprefix(namespace(caller_id))

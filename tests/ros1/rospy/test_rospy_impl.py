@@ -15,9 +15,10 @@ def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
         print(out.impl.headers, out.impl.queue_size, out.impl.closed, out.impl.resolved_name)
         came = threading.Event()
         went = threading.Event()
+        links = []
         class Listener(rospy.SubscribeListener):
             def peer_subscribe(self, topic, publish, publish_to_it):
-                publish_to_it(String("welcome"))
+                links.append(publish_to_it)
                 came.set()
             def peer_unsubscribe(self, topic, count):
                 went.set()
@@ -32,7 +33,9 @@ def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
         impl = subscriber.impl
         print(impl.callbacks, impl.ref_count, impl.queue_size)
         impl.add_callback(take, ["extra"])
-        print(came.wait(10), heard.wait(10), got)
+        print(came.wait(10))
+        links[0](String("welcome"))
+        print(heard.wait(10), got)
         print(out.impl.has_connections(), out.impl.has_connection("/shared"),
               impl.get_num_connections(), listener in out.impl.subscriber_listeners)
         impl.remove_callback(take, ["extra"])
@@ -55,7 +58,8 @@ def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
         """) == [
         "{'a': 'b'} 3 False /x",
         "[] 1 None",
-        "True True [('welcome', ['extra'])]",
+        "True",
+        "True [('welcome', ['extra'])]",
         "True True 1 True",
         "KeyError 'no matching cb'",
         "True 0 True None /x",
@@ -79,3 +83,54 @@ def test_what_is_published_after_the_shutdown_is_dropped(printed: Printed) -> No
         rospy.Subscriber("e", String, print).unregister()
         late.unregister()
         """) == ["None", "None", "None", "None", "None 0"]
+
+
+def test_the_time_can_be_read_without_a_node(printed: Printed) -> None:
+    assert printed("""
+        import time
+        import rospy
+        from rospy.client import _Unspecified, load_command_line_node_params, myargv
+        from rospy.names import scoped_name
+        try:
+            rospy.get_time()
+        except rospy.ROSInitException:
+            print("not yet")
+        rospy.rostime.set_rostime_initialized(True)
+        print(abs(rospy.get_time() - time.time()) < 60, rospy.rostime.is_rostime_initialized())
+        print(rospy.Time.now().to_sec() > 1e9)
+        rospy.rostime.set_rostime_initialized(False)
+        print(rospy.rostime.is_rostime_initialized(), _Unspecified.__name__)
+        print(load_command_line_node_params(["x", "_a:=1", "b:=c", "_d:=[1, 2]"]))
+        print(myargv(["foo", "-bar:=baz", "a:=b"]))
+        for words in (["_a:=b:=c"], ["_a:=["]):
+            try:
+                print(load_command_line_node_params(words))
+            except rospy.ROSInitException as error:
+                print(str(error)[:32])
+        try:
+            scoped_name("name", "/name")
+        except rospy.ROSException:
+            print("not global")
+        """) == [
+        "not yet",
+        "True True",
+        "True",
+        "False _Unspecified",
+        "{'a': 1, 'd': [1, 2]}",
+        "['foo', '-bar:=baz']",
+        "invalid command-line parameters:",
+        "invalid command-line parameters:",
+        "not global",
+    ]
+
+
+def test_log_messages_name_the_file_without_its_folder(printed: Printed) -> None:
+    assert printed("""
+        import os
+        import rospy
+        from rosgraph_msgs.msg import Log
+        rospy.init_node("files")
+        rospy.loginfo("here")
+        found = rospy.wait_for_message("/rosout", Log, 10)
+        print(found.file == os.path.basename(__file__), found.function)
+        """)[-1:] == ["True <module>"]
