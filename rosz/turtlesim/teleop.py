@@ -67,9 +67,13 @@ class Keyboard:
 
     A shell restores the terminal when it stops the program (Ctrl-Z), so the settings are made again
     when the program continues. That needs the main thread, because of the signal handler.
+
+    Args:
+        timeout: Seconds without a key after which an empty text stands for one; never when None.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, timeout: float | None = None) -> None:
+        self._timeout = timeout
         self._fd = sys.stdin.fileno()
         self._settings: list[int | list[bytes | int]] | None = None
         self._wake, self._waker = socket.socketpair()
@@ -103,10 +107,13 @@ class Keyboard:
         decoder = KeyDecoder()
         while True:
             # The signal may reach another thread, and then does not interrupt the wait here.
-            ready, _, _ = select.select([self._fd, self._wake], [], [], _POLL_SECONDS)
+            seconds = _POLL_SECONDS if self._timeout is None else self._timeout
+            ready, _, _ = select.select([self._fd, self._wake], [], [], seconds)
             if self._wake in ready:
                 return
             if not ready:
+                if self._timeout is not None:
+                    yield ""
                 continue
             try:
                 data = os.read(self._fd, 256)
