@@ -144,7 +144,30 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "roslaunch.xmlloader": {
         "ros1.roslaunch.loader": "LoadException Loader XmlLoader XmlParseException"
     },
-    "roslib.launcher": {"ros1.roslib": "load_manifest"},
+    "roslib.launcher": {"ros1.roslib": "get_depends load_manifest"},
+    "roslib.exceptions": {"ros1.roslib": "ROSLibException"},
+    "roslib.manifest": {
+        "ros1.rospkg": "MANIFEST_FILE Manifest InvalidManifest parse_file=read_manifest"
+    },
+    "roslib.network": {
+        "ros1.rosgraph.network": "ROSHandshakeException create_local_xmlrpc_uri"
+        " decode_ros_handshake_header encode_ros_handshake_header get_address_override"
+        " get_bind_address get_host_name get_local_address get_local_addresses is_local_address",
+        "ros1.rosgraph.names": "ROS_HOSTNAME ROS_IP",
+    },
+    "roslib.resources": {"ros1.roslib": "list_package_resources list_package_resources_by_dir"},
+    "roslib.rosenv": {
+        "ros1.roslib": "ROSEnvException",
+        "ros1.rosgraph.names": "ROS_HOSTNAME ROS_IP ROS_MASTER_URI ROS_NAMESPACE get_master_uri",
+        "ros1.rosgraph.roslogging": "makedirs_with_parent_perms",
+        "ros1.rospkg": "get_log_dir get_ros_home get_ros_package_path get_ros_root"
+        " get_test_results_dir",
+    },
+    "roslib.scriptutil": {
+        "ros1.roslib": "get_master get_param_server=get_master",
+        "ros1.rosgraph.names": "script_resolve_name",
+    },
+    "roslib.stacks": {"ros1.roslib": "ROSStackException=ROSPkgException"},
     "roslib.message": {**_MESSAGE, "time": "TVal=StampValue"},
     "roslib.names": {
         "ros1.genmsg": f"PRN_SEPARATOR {_NAMES}",
@@ -160,6 +183,8 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     },
     "roslib.rospack": {"ros1.roslib": "list_pkgs", "ros1.rospkg": "ResourceNotFound RosPack"},
     "rospkg.common": {"ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE ResourceNotFound"},
+    "rospkg.distro": {"ros1.os_detect": "InvalidDistro current_distro_codename"},
+    "rospkg.os_detect": {"ros1.os_detect": "OsDetect OsNotDetected"},
     "rospkg.environment": {
         "ros1.rospkg": "get_etc_ros_dir get_log_dir get_ros_home get_ros_package_path get_ros_paths"
         " get_ros_root get_test_results_dir on_ros_path"

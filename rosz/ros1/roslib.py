@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from rosz.packages import Package
 from rosz.ros1.modules import MODULES
@@ -24,7 +25,15 @@ _PROVIDED = frozenset({*MODULES, "rclpy", "rosbag", "roscpp", "rosconsole", "ros
 """Packages of ROS itself that are not folders here; their modules need no path."""
 
 
-class ROSPkgException(Exception):
+class ROSLibException(Exception):
+    """Base class of roslib's errors."""
+
+
+class ROSEnvException(ROSLibException):
+    """An environment variable is missing or wrong."""
+
+
+class ROSPkgException(ROSLibException):
     """Base class of the errors of packages."""
 
 
@@ -193,3 +202,64 @@ def list_pkgs_by_path(path: str, packages: list[str] | None = None) -> list[str]
     found = [] if packages is None else packages
     found += RosPack([path]).list()
     return found
+
+
+def get_depends(package: str, rospack: RosPack | None = None) -> list[str]:
+    """Return a package and all packages that it depends on, the deepest first.
+
+    Raises:
+        ResourceNotFound: There is no such package.
+    """
+    return [*reversed((rospack or RosPack()).get_depends(package)), package]
+
+
+def list_package_resources_by_dir(
+    package_dir: str,
+    include_depends: bool,  # noqa: ARG001  # ROS 1's
+    subdir: str,
+    rfilter: Callable[[str], bool] = os.path.isfile,
+) -> list[str]:
+    """Return the names of the files in a folder of a package.
+
+    Args:
+        package_dir: Folder of the package.
+        include_depends: Ignored.
+        subdir: Folder in it.
+        rfilter: Function of a path that returns whether to include it.
+    """
+    folder = Path(package_dir, subdir)
+    return sorted(
+        file.name for file in (folder.iterdir() if folder.is_dir() else ()) if rfilter(str(file))
+    )
+
+
+def list_package_resources(
+    package: str,
+    include_depends: bool,
+    subdir: str,
+    rfilter: Callable[[str], bool] = os.path.isfile,
+) -> list[str]:
+    """Return the names of the files in a folder of a package, as resources.
+
+    Args:
+        package: Name of the package.
+        include_depends: Whether to add those of the packages that it depends on.
+        subdir: Folder in it.
+        rfilter: Function of a path that returns whether to include it.
+
+    Raises:
+        ResourceNotFound: There is no such package.
+    """
+    packs = RosPack()
+    found = []
+    for name in (package, *(packs.get_depends(package) if include_depends else ())):
+        own = list_package_resources_by_dir(packs.get_path(name), False, subdir, rfilter)
+        found += own if name == package else [f"{name}/{each}" for each in own]
+    return found
+
+
+def get_master() -> Any:
+    """Return the Master API for this program, as ``rospy.get_master`` does."""
+    from rosz.ros1.rospy import get_master as get
+
+    return get()

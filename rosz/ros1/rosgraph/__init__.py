@@ -28,7 +28,7 @@ from rosz.ros1.rosgraph.names import (
 
 rosenv: ModuleType  # built by the importer
 
-PUBLIC_MODULES = ("masterapi", "names", "network")
+PUBLIC_MODULES = ("masterapi", "names", "network", "roslogging", "xmlrpc")
 
 __all__ = (
     "ROS_HOSTNAME",

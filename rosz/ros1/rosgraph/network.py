@@ -1,18 +1,25 @@
 """rosgraph.network: the addresses of this machine.
 
-The handshake and XML-RPC functions of ROS 1 are missing, since rosz does not use these protocols.
+The handshakes of TCPROS are texts here; rosz itself does not use that protocol.
 """
 
 from __future__ import annotations
 
 import os
 import socket
+import struct
+from collections.abc import Mapping
 from urllib.parse import urlsplit
 
 from rosz.ros1.rosgraph.names import find_option
 
 __all__ = (
+    "ROSHandshakeException",
+    "create_local_xmlrpc_uri",
+    "decode_ros_handshake_header",
+    "encode_ros_handshake_header",
     "get_address_override",
+    "get_bind_address",
     "get_host_name",
     "get_local_address",
     "get_local_addresses",
@@ -23,6 +30,59 @@ __all__ = (
 
 _NOWHERE = ("10.255.255.255", 1)
 """No packet is sent there: connecting a UDP socket only chooses the local address."""
+
+
+class ROSHandshakeException(Exception):
+    """A header of TCPROS is damaged."""
+
+
+def encode_ros_handshake_header(header: Mapping[str, str]) -> bytes:
+    """Return the bytes of a header of TCPROS: lengths, names and values."""
+    fields = [f"{name}={value}".encode() for name, value in header.items()]
+    body = b"".join(struct.pack("<I", len(field)) + field for field in fields)
+    return struct.pack("<I", len(body)) + body
+
+
+def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
+    """Return the fields of a header of TCPROS.
+
+    Raises:
+        ROSHandshakeException: The bytes are damaged.
+    """
+    found: dict[str, str] = {}
+    try:
+        (end,) = struct.unpack_from("<I", header_str)
+        at, end = 4, end + 4
+        if end > len(header_str):
+            raise ROSHandshakeException(f"expected {end} bytes, got {len(header_str)}")
+        while at < end:
+            (size,) = struct.unpack_from("<I", header_str, at)
+            at += 4 + size
+            if at > end:
+                raise ROSHandshakeException("a field is longer than the header")
+            name, equals, value = header_str[at - size : at].decode().partition("=")
+            if not equals:
+                raise ROSHandshakeException(f"field '{name}' has no value")
+            found[name] = value
+    except (struct.error, UnicodeDecodeError) as error:
+        raise ROSHandshakeException(f"the header is damaged: {error}") from error
+    return found
+
+
+def create_local_xmlrpc_uri(port: int) -> str:
+    """Return the URI of an XML-RPC server of this machine."""
+    return f"http://{get_host_name()}:{port}/"
+
+
+def get_bind_address(address: str | None = None) -> str:
+    """Return the address at which a server of this machine should listen.
+
+    Args:
+        address: The address by which others reach it; by the environment when not given.
+    """
+    own = address or get_address_override()
+    loopback = own is not None and (own == "localhost" or own.startswith("127."))
+    return "127.0.0.1" if loopback else "0.0.0.0"  # noqa: S104  # what ROS 1 answers
 
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:
