@@ -119,11 +119,12 @@ class JointStatePublisher:
         if robot.tag.rpartition("}")[2] == "COLLADA":
             self._read_collada(robot)
             return
-        if robot.tag != "robot":
+        found = robot if robot.tag == "robot" else robot.find(".//robot")
+        if found is None:
             raise DescriptionError(
                 f"parameter 'robot_description' has <{robot.tag}>; expected <robot> (URDF)"
             )
-        for element in robot.findall("joint"):
+        for element in found.findall("joint"):
             kind = element.get("type", "")
             if kind not in _RIGID:
                 self._read_joint(element, element.get("name", ""), kind)

@@ -13,7 +13,7 @@ from rosz.programs.joint_state_publisher import DescriptionError, JointStatePubl
 
 from .sides import RealSide, RoszSide, run_script
 
-ROBOT = """<robot name="r">
+ROBOT = """<urdf><robot name="r">
   <joint name="free" type="revolute"><limit lower="-1" upper="2"/></joint>
   <joint name="fixed" type="fixed"/>
   <joint name="above" type="prismatic"><limit lower="1" upper="3"/></joint>
@@ -26,7 +26,7 @@ ROBOT = """<robot name="r">
     <mimic joint="child" multiplier="-1"/></joint>
   <joint name="led" type="revolute"><limit lower="-1" upper="1"/></joint>
   <joint name="a/b" type="revolute"><limit lower="-1" upper="1"/></joint>
-</robot>"""
+</robot></urdf>"""
 
 USER = """
 import rospy
