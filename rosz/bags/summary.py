@@ -1,0 +1,329 @@
+"""What is in a bag, as ``rosbag info`` prints it: as text, and as YAML."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from itertools import pairwise
+from statistics import median
+
+import msgspec
+
+from rosz.bags.bag import BagReader
+from rosz.bags.ros1_reader import Ros1Reader
+from rosz.names import short_type
+
+__all__ = (
+    "CompressionSummary",
+    "Summary",
+    "TopicSummary",
+    "find_frequencies",
+    "format_summary",
+    "format_yaml",
+    "summarize",
+)
+
+_NS = 1_000_000_000
+_BINARY = 1024.0
+_DECIMAL = 1000.0
+_SIZES = ("KB", "MB", "GB", "TB", "PB", "EB", "ZB", "YB")
+_FREQUENCIES = ("Hz", "kHz", "MHz", "GHz", "THz", "PHz", "EHz", "ZHz", "YHz")
+
+
+class CompressionSummary(msgspec.Struct, frozen=True):
+    """The chunks that are compressed in one way.
+
+    Attributes:
+        name: Name of the compression.
+        chunks: Number of chunks.
+        size: Bytes in the file.
+        uncompressed: Bytes of the records in them.
+    """
+
+    name: str
+    chunks: int
+    size: int
+    uncompressed: int
+
+
+class TopicSummary(msgspec.Struct, frozen=True):
+    """One topic.
+
+    Attributes:
+        topic: Full name.
+        type: ``pkg/Name``.
+        messages: Number of messages.
+        connections: Number of channels.
+        frequency: Messages per second, by the median of the times between them; None if unknown.
+    """
+
+    topic: str
+    type: str
+    messages: int
+    connections: int
+    frequency: float | None = None
+
+
+class Summary(msgspec.Struct, frozen=True):
+    """What is in a bag.
+
+    Attributes:
+        path: The bag.
+        format: Name of its format.
+        version: Version of the format.
+        indexed: Whether it has an index.
+        start: Seconds since the Unix epoch.
+        end: The same, of the last message.
+        duration: Seconds between both.
+        size: Size in bytes.
+        messages: Number of messages.
+        compressions: The compressions of chunks, the most frequent one first.
+        types: Hashes of the types in ROS 1 by name, sorted.
+        topics: The topics, sorted.
+    """
+
+    path: str
+    format: str
+    version: str
+    indexed: bool
+    start: float
+    end: float
+    duration: float
+    size: int
+    messages: int
+    compressions: list[CompressionSummary]
+    types: dict[str, str]
+    topics: list[TopicSummary]
+
+
+def summarize(path: str, reader: BagReader, *, frequencies: bool = False) -> Summary:
+    """Return what is in a bag, by its index.
+
+    Args:
+        path: The bag, as it is to be shown.
+        reader: The bag.
+        frequencies: Whether to find how often messages came, which reads all their times.
+
+    Raises:
+        BagError: A part of the bag is damaged.
+    """
+    per_second = find_frequencies(reader) if frequencies else {}
+    types: dict[str, str] = {}
+    counts: Counter[str] = Counter()
+    connections: Counter[str] = Counter()
+    names: dict[str, str] = {}
+    for channel in dict.fromkeys(reader.channels):
+        types.setdefault(short_type(channel.type), channel.md5)
+        names.setdefault(channel.topic, short_type(channel.type))
+        counts[channel.topic] += reader.count(channel)
+    for channel in reader.channels:
+        connections[channel.topic] += 1
+    start, end = _seconds(reader.start), _seconds(reader.end)
+    return Summary(
+        path=path,
+        format=reader.format,
+        version=reader.version,
+        indexed=reader.indexed,
+        start=start,
+        end=end,
+        duration=end - start,
+        size=reader.size,
+        messages=reader.count(),
+        compressions=_compressions(reader),
+        types=dict(sorted(types.items())),
+        topics=[
+            TopicSummary(
+                topic, names[topic], counts[topic], connections[topic], per_second.get(topic)
+            )
+            for topic in sorted(names)
+        ],
+    )
+
+
+def _seconds(stamp: int) -> float:
+    return stamp // _NS + stamp % _NS / 1e9
+
+
+def _compressions(reader: BagReader) -> list[CompressionSummary]:
+    chunks: Counter[str] = Counter()
+    sizes: Counter[str] = Counter()
+    uncompressed: Counter[str] = Counter()
+    for one in reader.chunks:
+        chunks[one.compression] += 1
+        sizes[one.compression] += one.size
+        uncompressed[one.compression] += one.uncompressed
+    order = sorted(chunks, key=lambda name: (chunks[name], name), reverse=True)
+    return [
+        CompressionSummary(name, chunks[name], sizes[name], uncompressed[name]) for name in order
+    ]
+
+
+def find_frequencies(reader: BagReader) -> dict[str, float]:
+    """Return how often messages of each topic came, by the median of the times between them.
+
+    Raises:
+        BagError: A part of the bag is damaged.
+    """
+    stamps: defaultdict[str, list[float]] = defaultdict(list)
+    if isinstance(reader, Ros1Reader):
+        for channel in reader.channels:
+            stamps[channel.topic] += map(_seconds, reader.stamps(channel))
+    else:
+        for entry in reader.messages():
+            stamps[entry.channel.topic].append(_seconds(entry.stamp))
+    found = {}
+    for topic, times in stamps.items():
+        times.sort()
+        period = median(second - first for first, second in pairwise(times)) if times[1:] else 0.0
+        if period > 0:
+            found[topic] = 1 / period
+    return found
+
+
+# As text.
+
+
+def format_summary(summary: Summary) -> str:
+    """Return the text of ``rosbag info``."""
+    rows = [("path", summary.path), ("version", summary.version)]
+    if summary.format != "rosbag":
+        rows[1] = ("format", f"{summary.format} {summary.version}".rstrip())
+    if not summary.messages:
+        rows.append(("size", _size(summary.size)))
+    else:
+        rows += [
+            ("duration", _duration(summary.duration)),
+            ("start", f"{_date(summary.start)} ({summary.start:.2f})"),
+            ("end", f"{_date(summary.end)} ({summary.end:.2f})"),
+            ("size", _size(summary.size)),
+            ("messages", str(summary.messages)),
+            *_compression_rows(summary),
+            *_type_rows(summary),
+            *_topic_rows(summary),
+        ]
+    width = max(len(name) for name, _ in rows) + 1
+    lines = [f"{f'{name}:' if name else '':<{width}} {text}" for name, text in rows]
+    return "\n".join(lines).rstrip()
+
+
+def _duration(seconds: float) -> str:
+    minutes, hours = int(seconds / 60), int(seconds / 3600)
+    if hours:
+        return f"{hours}hr {minutes % 60}:{int(seconds % 60):02d}s ({int(seconds)}s)"
+    if minutes:
+        return f"{minutes}:{int(seconds % 60):02d}s ({int(seconds)}s)"
+    return f"{seconds:.1f}s"
+
+
+def _date(seconds: float) -> str:
+    fraction = f"{seconds - int(seconds):.2f}"[1:]
+    return time.strftime("%b %d %Y %H:%M:%S", time.localtime(seconds)) + fraction
+
+
+def _size(size: float) -> str:
+    for unit in _SIZES:
+        size /= _BINARY
+        if size < _BINARY:
+            return f"{size:.1f} {unit}"
+    return "-"
+
+
+def _frequency(value: float) -> str:
+    for unit in _FREQUENCIES:
+        if value < _DECIMAL:
+            return f"{value:.1f} {unit}"
+        value /= _DECIMAL
+    return "-"
+
+
+def _compression_rows(summary: Summary) -> list[tuple[str, str]]:
+    total = sum(one.chunks for one in summary.compressions)
+    texts = []
+    for one in summary.compressions:
+        percent = (
+            "" if one.name == "none" else f"; {100 * one.size / max(one.uncompressed, 1):.2f}%"
+        )
+        texts.append(f"{one.name} [{one.chunks}/{total} chunks{percent}]")
+    rows = [("compression", ", ".join(texts) or "none")]
+    if all(one.name == "none" for one in summary.compressions):
+        return rows
+    before = sum(one.uncompressed for one in summary.compressions)
+    after = sum(one.size for one in summary.compressions)
+    width = max(len(_size(before)), len(_size(after)))
+    if summary.duration <= 0:
+        return [
+            *rows,
+            ("uncompressed", f"{_size(before):>{width}}"),
+            ("compressed", f"{_size(after):>{width}}"),
+        ]
+    rates = [f"{_size(each / summary.duration)}" for each in (before, after)]
+    wide = max(map(len, rates))
+    share = f"({100 * after / max(before, 1):.2f}%)"
+    return [
+        *rows,
+        ("uncompressed", f"{_size(before):>{width}} @ {rates[0]:>{wide}}/s"),
+        ("compressed", f"{_size(after):>{width}} @ {rates[1]:>{wide}}/s {share}"),
+    ]
+
+
+def _type_rows(summary: Summary) -> list[tuple[str, str]]:
+    width = max(map(len, summary.types))
+    texts = [f"{name:<{width}} [{md5}]" for name, md5 in summary.types.items()]
+    return [("" if number else "types", text) for number, text in enumerate(texts)]
+
+
+def _topic_rows(summary: Summary) -> list[tuple[str, str]]:
+    topics = summary.topics
+    widest = max(len(one.topic) for one in topics)
+    digits = max(len(str(one.messages)) for one in topics)
+    type_width = max(map(len, summary.types))
+    shown = {one.topic: _frequency(one.frequency) for one in topics if one.frequency is not None}
+    wide = max(map(len, shown.values()), default=0)
+    rows = []
+    for number, one in enumerate(topics):
+        word = "msgs" if one.messages > 1 else "msg "
+        mark = "@" if one.topic in shown else " "
+        rate = f" {mark} {shown.get(one.topic, ''):>{wide}}"
+        more = f" ({one.connections} connections)" if one.connections > 1 else ""
+        text = f"{one.topic:<{widest}}   {one.messages:>{digits}} {word}{rate}"
+        rows.append(("" if number else "topics", f"{text} : {one.type:<{type_width}}{more}"))
+    return rows
+
+
+# As YAML.
+
+
+def format_yaml(summary: Summary) -> str:
+    """Return the text of ``rosbag info --yaml``."""
+    lines = [f"path: {summary.path}", f"version: {summary.version}"]
+    if not summary.messages:
+        return "\n".join([*lines, f"size: {summary.size}", "indexed: False", ""])
+    lines += [
+        f"duration: {summary.duration:.6f}",
+        f"start: {summary.start:.6f}",
+        f"end: {summary.end:.6f}",
+        f"size: {summary.size}",
+        f"messages: {summary.messages}",
+        f"indexed: {summary.indexed}",
+        f"compression: {summary.compressions[0].name if summary.compressions else 'none'}",
+    ]
+    if any(one.name != "none" for one in summary.compressions):
+        lines += [
+            f"uncompressed: {sum(one.uncompressed for one in summary.compressions)}",
+            f"compressed: {sum(one.size for one in summary.compressions)}",
+        ]
+    lines.append("types:")
+    for name, md5 in summary.types.items():
+        lines += [f"    - type: {name}", f"      md5: {md5}"]
+    lines.append("topics:")
+    for one in summary.topics:
+        lines += [
+            f"    - topic: {one.topic}",
+            f"      type: {one.type}",
+            f"      messages: {one.messages}",
+        ]
+        if one.connections > 1:
+            lines.append(f"      connections: {one.connections}")
+        if one.frequency is not None:
+            lines.append(f"      frequency: {one.frequency:.4f}")
+    return "\n".join([*lines, ""])
