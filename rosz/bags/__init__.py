@@ -28,7 +28,18 @@ from rosz.bags.messages import Bag, BagMessage, BagOutput, class_of, decoder_of
 from rosz.bags.opening import create_writer, find_format, open, open_reader  # noqa: A004
 from rosz.bags.qos_text import format_profiles, parse_profiles
 
-PUBLIC_MODULES = ("opening", "parameters", "player", "recorder", "recording", "repair")
+PUBLIC_MODULES = (
+    "editing",
+    "opening",
+    "parameters",
+    "player",
+    "recorder",
+    "recording",
+    "repair",
+    "ros1_form",
+    "ros1_reader",
+    "summary",
+)
 
 __all__ = (
     "Attachment",

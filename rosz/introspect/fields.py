@@ -221,14 +221,28 @@ class Filter:
     def _refused(self, reason: str) -> UsageError:
         return UsageError(f"filter '{self.text:.{_FEW}}' is not a Python expression: {reason}")
 
-    def accepts(self, message: Any, topic: str = "") -> bool:
+    def accepts(self, message: Any, topic: str = "", time: Any = None) -> bool:
         """Return whether a message passes.
 
         Raises:
             RoszError: The expression fails on this message.
         """
+        return bool(self.value(message, topic, time))
+
+    def value(self, message: Any, topic: str = "", time: Any = None) -> Any:
+        """Return the value of the expression.
+
+        Args:
+            message: Value of ``m``.
+            topic: Value of ``topic``.
+            time: Value of ``t``, which only messages of bags have.
+
+        Raises:
+            RoszError: The expression fails on this message.
+        """
+        known = {"m": message, "topic": topic}
         try:
-            return bool(eval(self._code, {"m": message, "topic": topic}))  # noqa: S307  # the user's
+            return eval(self._code, known if time is None else {**known, "t": time})  # noqa: S307  # the user's
         except Exception as error:
             raise RoszError(
                 f"filter '{self.text}' failed: {type(error).__name__}: {error}"

@@ -38,6 +38,7 @@ MODULES = (
     "laser_geometry",
     "message_filters",
     "ros_numpy",
+    "rosbag",
     "rosgraph",
     "roslaunch",
     "roslib",
@@ -129,6 +130,10 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "rclpy.utilities": {
         "ros2.rclpy.program": "get_default_context get_rmw_implementation_identifier ok"
         " remove_ros_args shutdown try_shutdown"
+    },
+    "rosbag.bag": {
+        "ros1.rosbag": "Bag BagMessage BagMessageWithConnectionHeader Compression ROSBagException"
+        " ROSBagFormatException ROSBagUnindexedException"
     },
     "rosgraph.rosenv": {
         "ros1.rosgraph.names": "DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP ROS_IPV6"
@@ -235,6 +240,7 @@ _NEEDS_TCPROS = (
     " set_topic_manager TCPROSHandler TCPROSTransport"
 )
 _REASONS = {
+    "rosbagmain": "run 'rosz bag'",
     "rosmsgmain": "run 'rosz msg'",
     "rosnodemain": "run 'rosz node'",
     "rosservicemain": "run 'rosz service'",

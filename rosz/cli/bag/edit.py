@@ -1,0 +1,302 @@
+"""``rosz bag filter``, ``convert``, ``merge``, ``split`` and ``cat``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from rosz.cli import suggest
+from rosz.cli.bag.group import app
+from rosz.cli.bag.play import list_topics
+from rosz.cli.call import Call
+from rosz.cli.console import count, print_error, print_lines, warn
+from rosz.cli.declare import Argument, Json, Option, at_least
+from rosz.errors import NotFoundError, UsageError, near_miss
+
+if TYPE_CHECKING:
+    from rosz.bags import BagReader, Channel, Compression, Entry, Payload
+    from rosz.errors import BagError
+    from rosz.introspect.echo import Echo, EchoOptions
+
+__all__ = ()
+
+_NS = 1_000_000_000
+_COMPRESSIONS = ("none", "bz2", "lz4", "zstd")
+
+_Bag = Annotated[str, Argument("BAG", source=suggest.files)]
+_Output = Annotated[str, Argument("OUTPUT", "The suffix tells the format: .mcap or .bag.")]
+_Topics = Annotated[
+    list[str] | None, Option("--topics TOPIC", "Take these topics only; several may follow.")
+]
+_Start = Annotated[float, Option("-s --start SECONDS", "Leave out the beginning.")]
+_End = Annotated[float | None, Option("--end SECONDS", "Leave out what is later in the bag.")]
+_Compression = Annotated[
+    str, Option("--compression NAME", "none, lz4, or bz2 (.bag) or zstd (.mcap).")
+]
+
+
+class _Problems:
+    """Prints problems, and counts them."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def report(self, problem: BagError | str) -> None:
+        self.count += 1
+        print_error(f"ERROR: {problem}")
+
+
+class _Input:
+    """Bags that are read, and what is chosen of them."""
+
+    def __init__(self, readers: Sequence[BagReader], problems: _Problems) -> None:
+        self.readers = readers
+        self.problems = problems
+
+    def entries(
+        self, topics: Sequence[str] | None = None, start: float = 0.0, end: float | None = None
+    ) -> Iterator[Entry]:
+        from rosz.bags.editing import merged
+
+        known = {channel.topic for one in self.readers for channel in one.channels}
+        wanted = {one if one.startswith("/") else f"/{one}" for one in topics or ()}
+        for one in sorted(wanted - known):
+            raise NotFoundError(f"no topic '{one}' in the bag{near_miss(one, known)}")
+        first = min((one.start for one in self.readers if one.count()), default=0)
+        return merged(
+            self.readers,
+            self.problems.report,
+            topics=wanted or None,
+            start=first + int(start * _NS) if start else None,
+            end=None if end is None else first + int(end * _NS),
+        )
+
+
+@contextmanager
+def _open(bags: Sequence[str]) -> Iterator[_Input]:
+    from rosz.bags import open_reader
+
+    with ExitStack() as stack:
+        readers = [stack.enter_context(open_reader(bag)) for bag in bags]
+        problems = _Problems()
+        for reader in readers:
+            for problem in reader.problems:
+                problems.report(problem)
+        yield _Input(readers, problems)
+
+
+def _compression(name: str) -> Compression:
+    if name not in _COMPRESSIONS:
+        raise UsageError(f"--compression is '{name}'; expected {', '.join(_COMPRESSIONS)}")
+    return name  # type: ignore[return-value]
+
+
+def _check_output(output: str, bags: Sequence[str]) -> None:
+    if any(Path(output).resolve() == Path(bag).resolve() for bag in bags):
+        raise UsageError(f"'{output}' is both read and written")
+
+
+@app.command("filter", arrange=list_topics)
+def filter_command(
+    call: Call,
+    bag: _Bag,
+    output: _Output,
+    expression: Annotated[
+        str, Argument("EXPRESSION", "Python; topic, m (the message) and t (its time) are known.")
+    ] = "",
+    *,
+    show: Annotated[
+        str, Option("-p --print EXPRESSION", "Print the value of this for each message.")
+    ] = "",
+    topics: _Topics = None,
+    start: _Start = 0.0,
+    end: _End = None,
+    compression: _Compression = "none",
+) -> int:
+    """Write some of the messages of a bag into another one."""
+    from rosz.bags import Bag, create_writer
+    from rosz.bags.editing import Transfer
+    from rosz.introspect.fields import Filter
+    from rosz.msgs.builtin_interfaces.msg import Time
+
+    _check_output(output, [bag])
+    condition = Filter(expression) if expression else None
+    shown = Filter(show) if show else None
+    types = call.types
+    with _open([bag]) as source:
+        decode = Bag(source.readers[0], types).decoder
+        entries = source.entries(topics, start, end)
+        with create_writer(output, compression=_compression(compression), replace=True) as writer:
+            transfer = Transfer(writer, types, source.problems.report)
+            for entry in entries:
+                if condition is not None or shown is not None:
+                    topic = entry.channel.topic
+                    message: Any = decode(entry.channel)(entry.data)
+                    stamp = Time.from_nsec(entry.stamp)
+                    taken = condition is None or condition.accepts(message, topic, stamp)
+                    if shown is not None:
+                        value = shown.value(message, topic, stamp)
+                        print_lines([f"{'MATCH' if taken else 'NO MATCH'} {value}"])
+                    if not taken:
+                        continue
+                transfer.write(entry)
+    print_lines([f"{output}: {count(transfer.count, 'message')}"])
+    return int(bool(source.problems.count))
+
+
+@app.command("convert")
+def convert_command(
+    call: Call, bag: _Bag, output: _Output, *, compression: _Compression = "none"
+) -> int:
+    """Write a bag in another format: MCAP, or that of ROS 1."""
+    return _write(call, [bag], output, compression)
+
+
+@app.command("merge")
+def merge_command(
+    call: Call,
+    bags: Annotated[list[str], Argument("BAG", source=suggest.files)],
+    *,
+    output: Annotated[str, Option("-o --output OUTPUT", "The new bag: NAME.mcap or NAME.bag.")],
+    compression: _Compression = "none",
+) -> int:
+    """Write several bags into one, merged by time."""
+    return _write(call, bags, output, compression)
+
+
+def _write(call: Call, bags: Sequence[str], output: str, compression: str) -> int:
+    from rosz.bags import create_writer
+    from rosz.bags.editing import Transfer
+
+    _check_output(output, bags)
+    with (
+        _open(bags) as source,
+        create_writer(output, compression=_compression(compression)) as writer,
+    ):
+        for reader in source.readers:
+            for name, texts in reader.metadata.items():
+                writer.add_metadata(name, texts)
+        transfer = Transfer(writer, call.types, source.problems.report)
+        for entry in source.entries():
+            transfer.write(entry)
+    print_lines([f"{output}: {count(transfer.count, 'message')}"])
+    return int(bool(source.problems.count))
+
+
+@app.command("split")
+def split_command(
+    call: Call,
+    bag: _Bag,
+    *,
+    duration: Annotated[float, Option("-u --duration SECONDS", "Longest time of a part.")] = 0.0,
+    size: Annotated[int, Option("--size MB", "Largest size of the messages in a part.")] = 0,
+    output: Annotated[
+        str, Option("-o --output OUTPUT", "NAME.mcap makes NAME_0.mcap; the bag if omitted.")
+    ] = "",
+    compression: _Compression = "none",
+) -> int:
+    """Write a bag as several ones, by time or size."""
+    from rosz.bags.editing import divide
+
+    at_least("--size", size, 0, "MB")
+    with _open([bag]) as source:
+        parts = divide(
+            source.entries(),
+            Path(output or bag),
+            call.types,
+            source.problems.report,
+            seconds=duration,
+            size=size << 20,
+            compression=_compression(compression),
+        )
+        for file, number in parts:
+            print_lines([f"{file}: {count(number, 'message')}"])
+    return int(bool(source.problems.count))
+
+
+@app.command("cat", arrange=list_topics)
+def cat_command(
+    call: Call,
+    bag: _Bag,
+    topic: Annotated[str, Argument("TOPIC_OR_FIELD", "All topics if omitted.")] = "",
+    *,
+    limit: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
+    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False,
+    condition: Annotated[
+        str, Option("--filter EXPRESSION", "Use only messages for which this is true.")
+    ] = "",
+    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False,
+    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False,
+    start: _Start = 0.0,
+    end: _End = None,
+    json: Json = False,
+) -> int:
+    """Print the messages of a bag, as topic echo prints them."""
+    from rosz.introspect.echo import EchoOptions
+    from rosz.introspect.fields import Filter
+
+    at_least("-n", limit, 1, "messages")
+    options = EchoOptions(
+        plot=plot,
+        as_json=json,
+        no_arrays=noarr,
+        no_strings=nostr,
+        condition=Filter(condition) if condition else None,
+    )
+    with _open([bag]) as source:
+        echoes = _Echoes(source.readers[0], topic, options, call)
+        for entry in source.entries(echoes.topics, start, end):
+            text = echoes.text(entry)
+            if text is None:
+                continue
+            sys.stdout.write(text)
+            if limit is not None:
+                limit -= 1
+                if not limit:
+                    break
+    return int(bool(source.problems.count))
+
+
+class _Echoes:
+    """The text of messages of a bag, each by the definition of its channel."""
+
+    def __init__(self, reader: BagReader, topic: str, options: EchoOptions, call: Call) -> None:
+        from rosz.bags import class_of
+        from rosz.introspect.fields import FieldPath, find_target
+
+        self._types = call.types
+        self._options = options
+        self._now = reader.start
+        self._echoes: dict[int, tuple[Channel, Echo, Callable[[Payload], Any]]] = {}
+        self._path = FieldPath("")
+        self.topics: list[str] = []
+        if topic:
+            by_type = {one.type: one for one in reader.channels}
+            known = {one.topic: [one.type] for one in reader.channels}
+            name = topic if topic.startswith("/") else f"/{topic}"
+            target = find_target(name, known, lambda each: class_of(by_type[each], self._types))
+            self._path, self.topics = target.path, [target.topic]
+
+    def text(self, entry: Entry) -> str | None:
+        """Return the text of a message; None if it is left out."""
+        self._now = entry.stamp
+        channel = entry.channel
+        if id(channel) not in self._echoes:
+            self._echoes[id(channel)] = (channel, *self._make(channel))
+        _, echo, decode = self._echoes[id(channel)]
+        try:
+            return echo.text(decode(entry.data))
+        except LookupError as error:
+            warn(f"a message is left out: {error}")
+            return None
+
+    def _make(self, channel: Channel) -> tuple[Echo, Callable[[Payload], Any]]:
+        from rosz.bags import class_of, decoder_of
+        from rosz.introspect.echo import Echo
+
+        kind = self._path.type_in(class_of(channel, self._types))
+        echo = Echo(channel.topic, kind, self._path, self._options, lambda: self._now)
+        return echo, decoder_of(channel, self._types)
