@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
+import struct
 from typing import Any
 
 import oracle
 import pytest
 
+from rosz.msgs.sensor_msgs.msg import PointField
 from rosz.ros1 import point_cloud2
 from rosz.ros1.importer import install, uninstall
 
@@ -69,11 +71,25 @@ def test_points_are_those_of_ros_1() -> None:
     oracle.same(SNIPPET, "sensor_msgs.point_cloud2", "python3-sensor-msgs")
 
 
-def test_arrays_make_clouds() -> None:
+@pytest.mark.parametrize("kind", ["<f4", ">f4", "<f8", "<i4", "<u2"])
+def test_arrays_make_the_clouds_of_their_lists(kind: str) -> None:
     np = pytest.importorskip("numpy")
-    points = np.arange(12, dtype=np.float32).reshape(4, 3)
+    points = np.arange(12).reshape(4, 3)[:, ::-1].astype(kind)
+    for number in PointField.FLOAT32, PointField.FLOAT64:
+        fields = [PointField(name, 8 * at, number, 1) for at, name in enumerate("xyz")]
+        cloud = point_cloud2.create_cloud(None, fields, points)
+        assert cloud == point_cloud2.create_cloud(None, fields, points.tolist())
+        assert list(point_cloud2.read_points(cloud)) == [tuple(row) for row in points.tolist()]
     cloud = point_cloud2.create_cloud_xyz32(None, points)
-    assert list(point_cloud2.read_points(cloud)) == [tuple(row) for row in points.tolist()]
+    assert cloud == point_cloud2.create_cloud_xyz32(None, points.tolist())
+
+
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    np = pytest.importorskip("numpy")
+    with pytest.raises(struct.error):
+        point_cloud2.create_cloud_xyz32(None, np.zeros((2, 4)))
+    with pytest.raises(OverflowError):
+        point_cloud2.create_cloud_xyz32(None, np.full((2, 3), 1e300))
 
 
 def test_a_field_of_unknown_type_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
