@@ -73,6 +73,7 @@ class ChunkWriter:
         chunk_size: Bytes of messages that are written, and compressed, together.
         replace: Whether a file that exists is replaced; otherwise it is an error.
         capacity: Bytes that may wait for the disk; `write` waits while there are more.
+        checksums: Whether chunks have checksums, in a format that has them.
 
     Attributes:
         path: As given.
@@ -92,7 +93,9 @@ class ChunkWriter:
         chunk_size: int = 768 << 10,
         replace: bool = False,
         capacity: int = _MOST_WAITING,
+        checksums: bool = True,
     ) -> None:
+        self._checksums = checksums
         self._check_compression(compression)
         self.path = Path(path)
         self._compression = compression

@@ -32,6 +32,7 @@ class McapWriter(ChunkWriter):
         chunk_size: Bytes of messages that are written, and compressed, together.
         replace: Whether a file that exists is replaced; otherwise it is an error.
         capacity: Bytes that may wait for the disk; `write` waits while there are more.
+        checksums: Whether chunks have checksums.
 
     Raises:
         BagError: The file cannot be created.
@@ -48,6 +49,7 @@ class McapWriter(ChunkWriter):
         chunk_size: int = 768 << 10,
         replace: bool = False,
         capacity: int = 64 << 20,
+        checksums: bool = True,
     ) -> None:
         super().__init__(
             path,
@@ -55,6 +57,7 @@ class McapWriter(ChunkWriter):
             chunk_size=chunk_size,
             replace=replace,
             capacity=capacity,
+            checksums=checksums,
         )
         self._schemas: dict[bytes, int] = {}
         self._definitions: list[bytes] = []
@@ -116,7 +119,7 @@ class McapWriter(ChunkWriter):
 
     def _write_chunk(self, chunk: FilledChunk) -> None:
         checksum = 0
-        for part in chunk.parts:
+        for part in chunk.parts if self._checksums else ():
             checksum = zlib.crc32(part, checksum)
         parts, size = chunk.parts, chunk.size
         name = "" if self._compression == "none" else self._compression

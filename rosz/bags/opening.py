@@ -81,6 +81,7 @@ def create_writer(
     replace: bool = False,
     chunk_size: int = 768 << 10,
     capacity: int = 64 << 20,
+    checksums: bool = True,
 ) -> ChunkWriter:
     """Create a bag; the suffix of the path tells the format.
 
@@ -90,6 +91,7 @@ def create_writer(
         replace: Whether a file that exists is replaced; otherwise it is an error.
         chunk_size: Bytes of messages that are written, and compressed, together.
         capacity: Bytes that may wait for the disk.
+        checksums: Whether chunks have checksums, in a format that has them.
 
     Raises:
         BagError: The file cannot be created.
@@ -106,6 +108,7 @@ def create_writer(
         replace=replace,
         chunk_size=chunk_size,
         capacity=capacity,
+        checksums=checksums,
     )
 
 
