@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 from rosz.cli import suggest
 from rosz.cli.bag.group import app
 from rosz.cli.call import Call
-from rosz.cli.console import print_error, takes_escapes
+from rosz.cli.console import print_error, takes_escapes, until_stopped
 from rosz.cli.declare import Argument, Option, at_least
 from rosz.errors import BagError, UsageError
 
@@ -131,12 +131,26 @@ def record_command(
         services=services,
     )
     report = _ignore if quiet else print_error
-    with call.lasting_node(_TOOL) as node:
+    with _node(call) as node:
         if snapshot:
             _keep_last(node, selection, options, round(snapshot * _SECOND), report, limit)
         else:
             _record(node, selection, options, report, limit, publish=publish)
     return 0
+
+
+@contextmanager
+def _node(call: Call) -> Iterator[Node]:
+    """Open the node of the recorder, which waits for others as any node does."""
+    from rosz.node import Context, Node
+
+    with (
+        until_stopped() as ready,
+        Context(call.environment, call.argv) as context,
+        Node(_TOOL, anonymous=True, context=context) as node,
+    ):
+        ready()
+        yield node
 
 
 def _ignore(_: str) -> None: ...
