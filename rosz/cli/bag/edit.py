@@ -1,4 +1,4 @@
-"""``rosz bag filter``, ``convert``, ``merge``, ``split`` and ``cat``."""
+"""``rosz bag filter``, ``convert``, ``merge``, ``split``, ``cat`` and ``export``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 from rosz.cli import suggest
 from rosz.cli.bag.group import app
@@ -257,6 +257,41 @@ def cat_command(
                 limit -= 1
                 if not limit:
                     break
+    return int(bool(source.problems.count))
+
+
+@app.command("export", arrange=list_topics)
+def export_command(
+    call: Call,
+    bag: _Bag,
+    folder: Annotated[str, Argument("DIR", "The folder of the files; made if it is missing.")],
+    *,
+    topics: _Topics = None,
+    start: _Start = 0.0,
+    end: _End = None,
+    json: Annotated[bool, Option("--json", "Write lines of JSON, with all fields.")] = False,
+) -> int:
+    """Write each topic of a bag into a file of comma-separated numbers, one row per message."""
+    from rosz.introspect.echo import EchoOptions
+
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    suffix = "jsonl" if json else "csv"
+    rows: dict[str, int] = {}
+    with _open([bag]) as source, ExitStack() as files:
+        echoes = _Echoes(source.readers[0], "", EchoOptions(plot=not json, as_json=json), call)
+        opened: dict[str, TextIO] = {}
+        for entry in source.entries(topics, start, end):
+            topic = entry.channel.topic
+            text = echoes.text(entry)
+            if text is None:
+                continue
+            if topic not in opened:
+                file = target / f"{topic.strip('/').replace('/', '_')}.{suffix}"
+                opened[topic] = files.enter_context(file.open("w", encoding="utf-8"))
+            opened[topic].write(text)
+            rows[topic] = rows.get(topic, 0) + 1
+    print_lines(f"{topic}: {count(number, 'row')}" for topic, number in sorted(rows.items()))
     return int(bool(source.problems.count))
 
 
