@@ -100,7 +100,7 @@ _MODULES = {
     "catkin": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
     "launch": _LAUNCH,
     "launch_ros": _LAUNCH,
-    "tf2_py": _TRANSFORMS,
+    "tf2_kdl": "it needs PyKDL, which pip cannot install; tf2_geometry_msgs transforms messages",
     "xacro": "run: pip install 'rosz[xacro]'",
 }
 

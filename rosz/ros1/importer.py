@@ -208,7 +208,9 @@ class _FrontFinder(MetaPathFinder):
         """Find a module that rosz ships or compiles."""
         root, _, rest = fullname.partition(".")
         if root == "rosz":
-            return self._compiled(fullname)
+            # ``from sensor_msgs import point_cloud2`` looks below the module's own name.
+            alias = fullname.removeprefix("rosz.msgs.")
+            return self._of_rosz(alias, alias) if alias in ELSEWHERE else self._compiled(fullname)
         first, _, inner = rest.partition(".")
         if first in _KINDS:
             return self._of_package(fullname, root, _KINDS[first], inner, path)

@@ -265,6 +265,10 @@ class Cache(SimpleFilter):
         """Return the stamp of the message that came last; None if the cache is empty."""
         return self.cache_times[-1] if self.cache_times else None
 
+    def getLastestTime(self) -> Any:  # noqa: N802  # ROS 1's
+        """Return the same as `getLatestTime`."""
+        return self.getLatestTime()
+
     def getOldestTime(self) -> Any:  # noqa: N802  # ROS 1's
         """Return the stamp of the message that came first; None if the cache is empty."""
         return self.cache_times[0] if self.cache_times else None

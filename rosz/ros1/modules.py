@@ -56,7 +56,9 @@ MODULES = (
     "smclib",
     "tf",
     "tf2_geometry_msgs",
+    "tf2_py",
     "tf2_ros",
+    "tf2_sensor_msgs",
     "tf_conversions",
 )
 """ROS 1's Python modules, which lie beside this one."""
@@ -215,11 +217,6 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "tf.listener": {
         "ros1.tf.frames": "ConnectivityException Exception ExtrapolationException LookupException"
         " TransformListener Transformer TransformerROS"
-    },
-    "tf2_ros.buffer": {
-        "ros1.tf2_ros": "Buffer BufferInterface ConnectivityException ExtrapolationException"
-        " InvalidArgumentException LookupException StaticTransformBroadcaster TimeoutException"
-        " TransformBroadcaster TransformException TransformListener TypeException"
     },
 }
 """Submodules of ROS 1 and rclpy: the modules below ``rosz`` that define their names, and the names.

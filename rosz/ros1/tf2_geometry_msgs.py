@@ -23,11 +23,11 @@ from rosz.transforms import Pose as Plain
 from rosz.transforms import compose, pose_of, rotate
 
 __all__ = (
+    "TRANSFORMATIONS",
     "do_transform_point",
     "do_transform_pose",
     "do_transform_vector3",
     "do_transform_wrench",
-    "transformation_of",
 )
 
 
@@ -64,14 +64,10 @@ def _rotate(vector: Vector3, transform: Any) -> Vector3:
     return Vector3(*rotate(rotation, (vector.x, vector.y, vector.z)))
 
 
-_KINDS: dict[type[Any], Callable[..., Any]] = {
+TRANSFORMATIONS: dict[type[Any], Callable[..., Any]] = {
     PointStamped: do_transform_point,
     PoseStamped: do_transform_pose,
     Vector3Stamped: do_transform_vector3,
     WrenchStamped: do_transform_wrench,
 }
-
-
-def transformation_of(message: Any) -> Callable[..., Any] | None:
-    """Return the function that transforms a message; None for other types."""
-    return _KINDS.get(type(message))
+"""The functions by the class of the message."""

@@ -285,6 +285,21 @@ class Buffer:
             return str(error)
         return ""
 
+    def chain(self, target: str, source: str) -> list[str]:
+        """Return the frames between two frames, from the source to the target.
+
+        Raises:
+            FramesNotConnected: The frames belong to separate trees.
+        """
+        with self._changed:
+            up = [frame for frame, _ in self._upwards(source)]
+            down: list[str] = []
+            for frame, _ in self._upwards(target):
+                if frame in up:
+                    return [*up[: up.index(frame) + 1], *reversed(down)]
+                down.append(frame)
+            raise _unconnected(target, source)
+
     def wait(self, known: Callable[[], bool], timeout_ns: int, now: Callable[[], int]) -> bool:
         """Wait for a condition, which is checked whenever a transform is added.
 

@@ -39,8 +39,11 @@ _TABLE = {
     "service_state simple_action_state util",
     "tf": "broadcaster listener transformations",
     "tf_transformations": "",
-    "tf2_ros": "buffer",
+    "tf2_ros": "buffer buffer_client buffer_interface buffer_server static_transform_broadcaster "
+    "transform_broadcaster transform_listener",
+    "tf2_py": "",
     "tf2_geometry_msgs": "",
+    "tf2_sensor_msgs": "",
     "tf_conversions": "",
     "dynamic_reconfigure": "client encoding exceptions parameter_generator "
     "parameter_generator_catkin server",

@@ -9,7 +9,9 @@ from rosz.errors import ExtrapolationNeeded as ExtrapolationException
 from rosz.errors import FrameNotFound as LookupException
 from rosz.errors import FramesNotConnected as ConnectivityException
 from rosz.errors import TransformError as Exception  # noqa: A004  # ROS 1's
+from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import (
+    Point32,
     Pose,
     PoseStamped,
     Quaternion,
@@ -18,9 +20,17 @@ from rosz.msgs.geometry_msgs.msg import (
     TransformStamped,
     Vector3,
 )
+from rosz.msgs.sensor_msgs.msg import PointCloud
 from rosz.msgs.std_msgs.msg import Header
 from rosz.ros1 import tf2_geometry_msgs, tf2_ros
-from rosz.ros1.tf.transformations import quaternion_matrix
+from rosz.ros1.tf.transformations import (
+    quaternion_inverse,
+    quaternion_matrix,
+    rotation_from_matrix,
+    translation_matrix,
+)
+from rosz.transforms import IDENTITY, compose, pose_of
+from rosz.transforms import Pose as Plain
 
 __all__ = (
     "ConnectivityException",
@@ -36,9 +46,23 @@ __all__ = (
 Parts = tuple[list[float], list[float]]
 """Translation ``x, y, z`` and rotation ``x, y, z, w``."""
 
+Twist = tuple[tuple[float, ...], tuple[float, ...]]
+"""Velocity in m/s and angular velocity in rad/s, each ``x, y, z``."""
+
+_EARLIEST = 100_000
+"""Nanoseconds; a stamp of 0 would mean the latest time."""
+
 
 def _strip(frame: str) -> str:
     return frame.removeprefix("/")
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
 
 
 def _parts(found: TransformStamped) -> Parts:
@@ -55,7 +79,7 @@ class Transformer:
     """
 
     def __init__(self, interpolate: bool = True, cache_time: Any = None) -> None:  # noqa: ARG002
-        self._buffer = tf2_ros.Buffer(cache_time)
+        self._buffer = tf2_ros.Buffer(cache_time, debug=False)
 
     def setTransform(self, transform: Any, authority: str = "default_authority") -> None:  # noqa: N802
         """Add a TransformStamped."""
@@ -125,6 +149,129 @@ class Transformer:
         """Return the latest time at which a transform is known."""
         return self._buffer.get_latest_common_time(_strip(source_frame), _strip(dest_frame))
 
+    def canTransformFull(  # noqa: N802  # ROS 1's
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+    ) -> bool:
+        """Return whether a transform between two times is known; see `lookupTransformFull`."""
+        target, source, fixed = map(_strip, (target_frame, source_frame, fixed_frame))
+        return bool(
+            self._buffer.can_transform_full(target, target_time, source, source_time, fixed)
+        )
+
+    def waitForTransformFull(  # noqa: N802, PLR0917  # ROS 1's
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        timeout: Any,
+        polling_sleep_duration: Any = None,  # noqa: ARG002  # ROS 1's
+    ) -> None:
+        """Wait until a transform between two times is known; see `lookupTransformFull`.
+
+        Raises:
+            Exception: The transform is not known in time; the text tells the reason.
+        """
+        target, source, fixed = map(_strip, (target_frame, source_frame, fixed_frame))
+        known, reason = self._buffer.can_transform_full(
+            target, target_time, source, source_time, fixed, timeout, return_debug_tuple=True
+        )
+        if not known:
+            raise Exception(reason)  # tf's own
+
+    def chain(
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+    ) -> list[str]:
+        """Return the frames between two frames, from the source to the target.
+
+        Raises:
+            Exception: The transform is not known; the subclass tells the reason.
+        """
+        call = target_frame, target_time, source_frame, source_time, fixed_frame
+        return self._buffer._chain(*call)  # noqa: SLF001  # tf2's own name
+
+    def lookupTwist(  # noqa: N802  # ROS 1's
+        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any
+    ) -> Twist:
+        """Return how fast a frame moves and turns, as seen from another frame.
+
+        Args:
+            tracking_frame: Frame that moves.
+            observation_frame: Frame that it is seen from.
+            time: Middle of the interval; 0 for the latest.
+            averaging_interval: Duration to average over.
+
+        Raises:
+            Exception: The transform is not known; the subclass tells the reason.
+        """
+        return self.lookupTwistFull(
+            tracking_frame,
+            observation_frame,
+            observation_frame,
+            (0.0, 0.0, 0.0),
+            tracking_frame,
+            time,
+            averaging_interval,
+        )
+
+    def lookupTwistFull(  # noqa: N802, PLR0917  # ROS 1's
+        self,
+        tracking_frame: str,
+        observation_frame: str,
+        reference_frame: str,
+        ref_point: Sequence[float],  # noqa: ARG002  # ROS 1 does not use it, either
+        reference_point_frame: str,
+        time: Any,
+        averaging_interval: Any,
+    ) -> Twist:
+        """Return how fast a frame moves and turns, in the coordinates of another frame.
+
+        Args:
+            tracking_frame: Frame that moves.
+            observation_frame: Frame that it is seen from.
+            reference_frame: Frame of the result.
+            ref_point: Not used.
+            reference_point_frame: Frame whose origin moves so fast.
+            time: Middle of the interval; 0 for the latest.
+            averaging_interval: Duration to average over.
+
+        Raises:
+            Exception: The transform is not known; the subclass tells the reason.
+        """
+        latest = self.getLatestCommonTime(observation_frame, tracking_frame).to_nsec()
+        middle = time.to_nsec() or latest
+        width = averaging_interval.to_nsec()
+        end = min(middle + width // 2, latest)
+        start = max(_EARLIEST + width, end) - width
+        seconds = (end - start) / 1e9
+        stamps = [Time.from_nsec(one) for one in (start, end, middle)]
+        before, turned_before = self.lookupTransform(observation_frame, tracking_frame, stamps[0])
+        after, turned_after = self.lookupTransform(observation_frame, tracking_frame, stamps[1])
+        turn = quaternion_matrix(quaternion_inverse(turned_before)) @ quaternion_matrix(
+            turned_after
+        )
+        angle, axis, _ = rotation_from_matrix(turn)
+        place, orientation = self.lookupTransform(reference_frame, tracking_frame, stamps[2])
+        rotation = quaternion_matrix(orientation)[:3, :3]
+        angular = rotation @ [part * angle / seconds for part in axis]
+        linear = rotation @ [(b - a) / seconds for a, b in zip(before, after, strict=True)]
+        linear += _cross(place, angular)
+        point = self.lookupTransform(reference_frame, reference_point_frame, stamps[2])
+        moved = translation_matrix(point[0]) @ quaternion_matrix(point[1]) @ [*place, 1.0]
+        linear += angular @ (moved[:3] - place)
+        return tuple(linear.tolist()), tuple(angular.tolist())
+
     def frameExists(self, frame_id: str) -> bool:  # noqa: N802  # ROS 1's
         """Return whether there is a frame of a name."""
         return self._buffer.frames.has(_strip(frame_id))
@@ -136,6 +283,17 @@ class Transformer:
     def allFramesAsString(self) -> str:  # noqa: N802  # ROS 1's
         """Return the parent of each frame, one per line."""
         return self._buffer.all_frames_as_string()
+
+    def allFramesAsDot(self, current_time: Any = None) -> str:  # noqa: N802  # ROS 1's
+        """Return the tree of frames in the language of Graphviz."""
+        return self._buffer._allFramesAsDot(current_time)  # noqa: SLF001  # tf2's own name
+
+    def getTFPrefix(self) -> str:  # noqa: N802  # ROS 1's
+        """Return the prefix of frame names: none, as in tf2."""
+        return ""
+
+    def setUsingDedicatedThread(self, value: bool) -> None:  # noqa: N802  # ROS 1's
+        """Do nothing: transforms always arrive on a thread of their own."""
 
     def clear(self) -> None:
         """Remove all transforms but the static ones."""
@@ -161,21 +319,38 @@ class TransformerROS(Transformer):
 
     def transformPoint(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
         """Transform a PointStamped to another frame."""
-        return tf2_geometry_msgs.do_transform_point(ps, self._lookup(target_frame, ps.header))
+        moved = tf2_geometry_msgs.do_transform_point(ps, self._lookup(target_frame, ps.header))
+        return _restamped(moved, target_frame, ps)
 
     def transformVector3(self, target_frame: str, v3s: Any) -> Any:  # noqa: N802  # ROS 1's
         """Rotate a Vector3Stamped to another frame."""
-        return tf2_geometry_msgs.do_transform_vector3(v3s, self._lookup(target_frame, v3s.header))
+        moved = tf2_geometry_msgs.do_transform_vector3(v3s, self._lookup(target_frame, v3s.header))
+        return _restamped(moved, target_frame, v3s)
 
     def transformPose(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
         """Transform a PoseStamped to another frame."""
-        return tf2_geometry_msgs.do_transform_pose(ps, self._lookup(target_frame, ps.header))
+        moved = tf2_geometry_msgs.do_transform_pose(ps, self._lookup(target_frame, ps.header))
+        return _restamped(moved, target_frame, ps)
 
     def transformQuaternion(self, target_frame: str, ps: Any) -> Any:  # noqa: N802  # ROS 1's
         """Transform a QuaternionStamped to another frame."""
         pose = PoseStamped(ps.header, Pose(orientation=ps.quaternion))
         moved = self.transformPose(target_frame, pose)
         return QuaternionStamped(moved.header, moved.pose.orientation)
+
+    def transformPointCloud(self, target_frame: str, point_cloud: Any) -> Any:  # noqa: N802
+        """Transform a PointCloud to another frame."""
+        found = pose_of(self._lookup(target_frame, point_cloud.header).transform)
+        plain = (Plain((p.x, p.y, p.z), IDENTITY.rotation) for p in point_cloud.points)
+        points = [Point32(*compose(found, one).translation) for one in plain]
+        moved = PointCloud(Header(), points, point_cloud.channels)
+        return _restamped(moved, target_frame, point_cloud)
+
+
+def _restamped(moved: Any, frame: str, message: Any) -> Any:
+    """Give a transformed message the frame, and the time that it had."""
+    moved.header = Header(stamp=message.header.stamp, frame_id=frame)
+    return moved
 
 
 class TransformListener(TransformerROS):

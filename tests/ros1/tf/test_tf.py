@@ -75,8 +75,7 @@ def test_tf_and_tf2(network: Network) -> None:
         "map laser 0.5",
         "3.0",
         "True",
-        "cannot transform int; expected PointStamped, PoseStamped, Vector3Stamped or WrenchStamped"
-        " of geometry_msgs",
+        "cannot transform int; known: PointStamped, PoseStamped, Vector3Stamped, WrenchStamped",
     ]
 
 
@@ -121,3 +120,69 @@ def test_nodes_of_rclpy(network: Network) -> None:
     )
     assert program.exit_code() == 0, program.output
     assert program.lines[-2:] == ["yaw 1.0", "True"]
+
+
+def test_buffers_of_other_nodes(network: Network) -> None:
+    """A buffer serves its frames, and a buffer server looks transforms up for clients."""
+    network.program(
+        """
+        import rosz.ros1
+        import rospy, tf2_ros
+        from geometry_msgs.msg import TransformStamped
+        rospy.init_node("server")
+        buffer = tf2_ros.Buffer()
+        again = tf2_ros.Buffer()
+        fixed = TransformStamped()
+        fixed.header.frame_id, fixed.child_frame_id = "base", "laser"
+        fixed.transform.translation.x, fixed.transform.rotation.w = 0.5, 1.0
+        buffer.set_transform_static(fixed, "test")
+        server = tf2_ros.BufferServer(buffer, "lookups")
+        print("ready")
+        rospy.spin()
+        """
+    ).wait_for("ready")
+    client = network.program(
+        """
+        import rosz.ros1
+        import rospy, tf2_ros, tf2_sensor_msgs
+        from sensor_msgs import point_cloud2
+        from std_msgs.msg import Header
+        from tf2_msgs.srv import FrameGraph
+        rospy.init_node("client")
+        rospy.wait_for_service("/server/tf2_frames", 15)
+        print(rospy.ServiceProxy("/server/tf2_frames", FrameGraph)().frame_yaml.splitlines()[:2])
+        buffer = tf2_ros.BufferClient("lookups")
+        print(buffer.wait_for_server(rospy.Duration(15)))
+        none = rospy.Duration(0)
+        print(buffer.lookup_transform("base", "laser", rospy.Time(0)).transform.translation.x)
+        zero = rospy.Time(0)
+        found = buffer.lookup_transform_full("laser", zero, "base", zero, "base", none)
+        print(found.transform.translation.x)
+        print(buffer.can_transform("base", "nothing", zero, rospy.Duration.from_sec(0.05)))
+        for frame in "nothing", "":
+            try:
+                buffer.lookup_transform("base", frame, zero)
+            except tf2_ros.TransformException as error:
+                print(isinstance(error, tf2_ros.LookupException), error)
+        cloud = point_cloud2.create_cloud_xyz32(Header(frame_id="laser"), [(1, 2, 3)])
+        print(list(point_cloud2.read_points(buffer.transform(cloud, "base"))))
+        try:
+            buffer.transform(cloud, "base", new_type=int)
+        except tf2_ros.TypeException as error:
+            print(error)
+        """
+    )
+    assert client.exit_code() == 0, client.output
+    assert client.lines == [
+        '["laser: ", "  parent: \'base\'"]',
+        "True",
+        "0.5",
+        "-0.5",
+        "False",
+        'True "nothing" passed to lookupTransform argument source_frame does not exist. ',
+        "False Invalid argument passed to lookupTransform argument source_frame in tf2 frame_ids"
+        " cannot be empty",
+        "[(1.5, 2.0, 3.0)]",
+        "cannot make of a message int; known: PointStamped, PoseStamped, Vector3Stamped,"
+        " PointCloud2",
+    ]

@@ -1,0 +1,277 @@
+"""tf2_ros.buffer_interface: what looks up transforms, and which types can be transformed."""
+
+# ruff: noqa: ARG002  # of methods that subclasses override
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any
+
+from rosz.msgs.geometry_msgs.msg import PointStamped, PoseStamped, TransformStamped, Vector3Stamped
+from rosz.msgs.std_msgs.msg import Header
+from rosz.ros1.tf2_geometry_msgs import TRANSFORMATIONS
+
+__all__ = (
+    "BufferInterface",
+    "ConvertRegistration",
+    "NotImplementedException",
+    "Stamped",
+    "TransformRegistration",
+    "TypeException",
+    "convert",
+)
+
+
+class TypeException(Exception):
+    """Messages of the type cannot be transformed or converted."""
+
+    def __init__(self, errstr: str) -> None:
+        super().__init__(errstr)
+        self.errstr: str = errstr
+
+
+class NotImplementedException(Exception):
+    """A class does not look up transforms."""
+
+    def __init__(self) -> None:
+        self.errstr: str = "CanTransform or LookupTransform not implemented"
+        super().__init__(self.errstr)
+
+
+def Stamped(obj: Any, stamp: Any, frame_id: str) -> Any:  # noqa: N802  # ROS 1's
+    """Give an object a header, and return it."""
+    obj.header = Header(stamp=stamp, frame_id=frame_id)
+    return obj
+
+
+Function = Callable[..., Any]
+
+
+class _Table:
+    """Functions by type; all objects of a class share one table."""
+
+    def __init__(self, doing: str) -> None:
+        self._doing = doing
+        self._functions: dict[Any, Function] = {}
+
+    def add(self, key: Any, callback: Function) -> None:
+        self._functions[key] = callback
+
+    def get(self, key: Any) -> Function:
+        try:
+            return self._functions[key]
+        except KeyError:
+            known = ", ".join(map(_name, self._functions)) or "none"
+            raise TypeException(f"cannot {self._doing} {_name(key)}; known: {known}") from None
+
+
+def _name(key: Any) -> str:
+    return " to ".join(map(_name, key)) if isinstance(key, tuple) else str(key.__name__)
+
+
+_transforms, _converts = _Table("transform"), _Table("convert")
+_to_msg, _from_msg = _Table("make a message of"), _Table("make of a message")
+
+
+class TransformRegistration:
+    """The functions that transform messages, by the class of the message."""
+
+    def add(self, key: type[Any], callback: Function) -> None:
+        """Add a function of a message and a TransformStamped."""
+        _transforms.add(key, callback)
+
+    def get(self, key: type[Any]) -> Function:
+        """Return the function of a class.
+
+        Raises:
+            TypeException: There is none.
+        """
+        return _transforms.get(key)
+
+
+class ConvertRegistration:
+    """The functions that convert between types and messages."""
+
+    def add_from_msg(self, key: type[Any], callback: Function) -> None:
+        """Add a function that makes an object of a class of a message."""
+        _from_msg.add(key, callback)
+
+    def add_to_msg(self, key: type[Any], callback: Function) -> None:
+        """Add a function that makes a message of an object of a class."""
+        _to_msg.add(key, callback)
+
+    def add_convert(self, key: tuple[type[Any], type[Any]], callback: Function) -> None:
+        """Add a function that makes an object of the second class of one of the first."""
+        _converts.add(key, callback)
+
+    def get_from_msg(self, key: type[Any]) -> Function:
+        """Return the function that makes an object of a class of a message.
+
+        Raises:
+            TypeException: There is none.
+        """
+        return _from_msg.get(key)
+
+    def get_to_msg(self, key: type[Any]) -> Function:
+        """Return the function that makes a message of an object of a class.
+
+        Raises:
+            TypeException: There is none.
+        """
+        return _to_msg.get(key)
+
+    def get_convert(self, key: tuple[type[Any], type[Any]]) -> Function:
+        """Return the function that converts between two classes.
+
+        Raises:
+            TypeException: There is none.
+        """
+        return _converts.get(key)
+
+
+def convert(a: Any, b_type: type[Any]) -> Any:
+    """Return an object as one of another class.
+
+    Raises:
+        TypeException: No function was registered for it.
+    """
+    try:
+        direct = _converts.get((type(a), b_type))
+    except TypeException:
+        if type(a) is b_type:
+            return deepcopy(a)
+        to_msg, from_msg = _to_msg.get(type(a)), _from_msg.get(b_type)
+        return from_msg(to_msg(a))
+    return direct(a)
+
+
+for _kind, _function in TRANSFORMATIONS.items():
+    _transforms.add(_kind, _function)
+for _message in PointStamped, PoseStamped, Vector3Stamped:
+    _to_msg.add(_message, lambda message: message)
+    _from_msg.add(_message, lambda message: message)
+
+
+class BufferInterface:
+    """Base class of objects that look up transforms.
+
+    Attributes:
+        registration: The functions that transform messages.
+    """
+
+    registration = TransformRegistration()
+
+    def transform(
+        self, object_stamped: Any, target_frame: str, timeout: Any = None, new_type: Any = None
+    ) -> Any:
+        """Transform a stamped point, pose, vector or wrench to another frame.
+
+        Args:
+            object_stamped: Message to transform.
+            target_frame: Frame to transform the message to.
+            timeout: Longest time to wait for the transform.
+            new_type: Class to convert the result to.
+
+        Raises:
+            TypeException: Messages of the type cannot be transformed or converted.
+            TransformException: The transform is not known.
+        """
+        act = self.registration.get(type(object_stamped))
+        header = object_stamped.header
+        found = self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout)
+        moved = act(object_stamped, found)
+        return convert(moved, new_type) if new_type else moved
+
+    def transform_full(
+        self,
+        object_stamped: Any,
+        target_frame: str,
+        target_time: Any,
+        fixed_frame: str,
+        timeout: Any = None,
+        new_type: Any = None,
+    ) -> Any:
+        """Transform a message to another frame at another time.
+
+        Args:
+            object_stamped: Message to transform.
+            target_frame: Frame to transform the message to.
+            target_time: Time of that frame.
+            fixed_frame: Frame that does not move meanwhile.
+            timeout: Longest time to wait for the transform.
+            new_type: Class to convert the result to.
+
+        Raises:
+            TypeException: Messages of the type cannot be transformed or converted.
+            TransformException: The transform is not known.
+        """
+        act = self.registration.get(type(object_stamped))
+        header = object_stamped.header
+        found = self.lookup_transform_full(
+            target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout
+        )
+        moved = act(object_stamped, found)
+        return convert(moved, new_type) if new_type else moved
+
+    def lookup_transform(
+        self,
+        target_frame: str,
+        source_frame: str,
+        time: Any,
+        timeout: Any = None,
+    ) -> TransformStamped:
+        """Return the transform from the source frame to the target frame.
+
+        Args:
+            target_frame: Frame to transform coordinates to.
+            source_frame: Frame of the coordinates.
+            time: Time of the transform; 0 for the latest.
+            timeout: Longest time to wait for the transform; no wait when not given.
+
+        Raises:
+            TransformException: The transform is not known; the subclass tells the reason.
+        """
+        raise NotImplementedException
+
+    def lookup_transform_full(
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        timeout: Any = None,
+    ) -> TransformStamped:
+        """Return the transform from a frame at one time to a frame at another time.
+
+        Args:
+            target_frame: Frame to transform coordinates to.
+            target_time: Time of the target frame.
+            source_frame: Frame of the coordinates.
+            source_time: Time of the source frame.
+            fixed_frame: Frame that does not move meanwhile.
+            timeout: Longest time to wait for the transform.
+
+        Raises:
+            TransformException: The transform is not known; the subclass tells the reason.
+        """
+        raise NotImplementedException
+
+    def can_transform(
+        self, target_frame: str, source_frame: str, time: Any, timeout: Any = None
+    ) -> Any:
+        """Return whether a transform is known; see `lookup_transform`."""
+        raise NotImplementedException
+
+    def can_transform_full(
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        timeout: Any = None,
+    ) -> Any:
+        """Return whether a transform between two times is known; see `lookup_transform_full`."""
+        raise NotImplementedException
