@@ -174,7 +174,7 @@ def test_buffers_of_other_nodes(network: Network) -> None:
     )
     assert client.exit_code() == 0, client.output
     assert client.lines == [
-        '["laser: ", "  parent: \'base\'"]',
+        """['laser: ', "  parent: 'base'"]""",
         "True",
         "0.5",
         "-0.5",
