@@ -273,12 +273,12 @@ class Transformer:
         return tuple(linear.tolist()), tuple(angular.tolist())
 
     def frameExists(self, frame_id: str) -> bool:  # noqa: N802  # ROS 1's
-        """Return whether there is a frame of a name."""
-        return self._buffer.frames.has(_strip(frame_id))
+        """Return whether there is a frame of a name that has a parent."""
+        return _strip(frame_id) in self.getFrameStrings()
 
     def getFrameStrings(self) -> list[str]:  # noqa: N802  # ROS 1's
-        """Return the names of all frames."""
-        return self._buffer.frames.frames()
+        """Return the names of all frames that have a parent, in the order of arrival."""
+        return list(self._buffer.frames.histories())
 
     def allFramesAsString(self) -> str:  # noqa: N802  # ROS 1's
         """Return the parent of each frame, one per line."""

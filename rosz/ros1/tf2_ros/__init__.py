@@ -1,5 +1,7 @@
 """tf2_ros: transforms between coordinate frames (ROS wiki, tf2_ros)."""
 
+from rosz.msgs.geometry_msgs.msg import TransformStamped
+from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.ros1.tf2_py import (
     BufferCore,
     ConnectivityException,
@@ -39,11 +41,13 @@ __all__ = (
     "NotImplementedException",
     "Stamped",
     "StaticTransformBroadcaster",
+    "TFMessage",
     "TimeoutException",
     "TransformBroadcaster",
     "TransformException",
     "TransformListener",
     "TransformRegistration",
+    "TransformStamped",
     "TypeException",
     "convert",
 )

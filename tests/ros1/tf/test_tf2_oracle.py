@@ -67,12 +67,14 @@ for second, (x, turn) in enumerate([(1.0, 0.0), (3.0, 0.3), (4.0, 0.5)], 1):
     put(t.setTransform, "a", "b", second, x, turn)
     put(t.setTransform, "b", "c", second, 0.5)
 result = [t.allFramesAsString(), t.allFramesAsDot(), t.getTFPrefix()]
+result.append(t.getFrameStrings())
 half = genpy.Duration.from_sec(0.5)
 for time in 0, 1.5, 2.5:
     result.append(t.lookupTwist("b", "a", at(time), half))
     result.append(t.lookupTwistFull("c", "a", "b", (0, 0, 0), "c", at(time), half))
 result.append(t.chain("a", at(0), "c", at(0), "a"))
-result.append([bool(t.canTransformFull("a", at(1), "c", at(2), "a")), t.frameExists("c")])
+result.append(bool(t.canTransformFull("a", at(1), "c", at(2), "a")))
+result.append([t.frameExists("c"), t.frameExists("a")])
 result.append(t.lookupTransformFull("a", at(1), "c", at(2), "a"))
 for kind, act in (
     (PointStamped, t.transformPoint), (QuaternionStamped, t.transformQuaternion),
