@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 from rosz import actions
@@ -117,20 +118,22 @@ class GoalManager:
         feedback_cb: Callable[[ClientGoalHandle, Any], object] | None = None,
     ) -> ClientGoalHandle:
         """Send a goal; see `ActionClient.send_goal`."""
+        sent: Future[ClientGoal] = Future()  # feedback may arrive before `send` returns
 
         def on_feedback(feedback: Any) -> None:
             if feedback_cb is not None:
-                feedback_cb(ClientGoalHandle(sent), feedback)
+                feedback_cb(ClientGoalHandle(sent.result()), feedback)
 
         def on_transition(one: ClientGoal) -> None:
             if transition_cb is not None:
                 transition_cb(ClientGoalHandle(one))
 
         try:
-            sent = self._client.send(goal, on_feedback=on_feedback, on_transition=on_transition)
+            new = self._client.send(goal, on_feedback=on_feedback, on_transition=on_transition)
         except EncodeError as error:
             raise ROSSerializationException(str(error)) from error
-        return ClientGoalHandle(sent)
+        sent.set_result(new)
+        return ClientGoalHandle(new)
 
 
 class ActionClient:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from network import Network
 from oracle import real
@@ -9,6 +11,7 @@ from oracle import real
 from rosz.environment import Environment, package_index
 from rosz.typestore import TypeStore
 
+PROGRAMS = Path(__file__).parent / "programs"
 ACTION = "# what to count to\nint32 top\n---\nint32 sum\n---\nint32 now\n"
 
 SERVER = """
@@ -148,6 +151,15 @@ def test_goal_callbacks(network: Network, path: str) -> None:
     )
     assert program.exit_code() == 0, program.output
     assert program.lines == ["9 True", "goal 7", "preempt True", "True 2 False", "False"]
+
+
+@pytest.mark.system
+def test_handles_of_goals(network: Network) -> None:
+    """The file beside the program was written with ROS 1's actionlib and roscore."""
+    program = network.run("-m", "rosz.ros1", str(PROGRAMS / "goals.py"))
+    assert program.exit_code(50) == 0, program.output
+    lines = [line for line in program.lines if line.startswith("= ")]
+    assert lines == (PROGRAMS / "goals.txt").read_text().splitlines()
 
 
 @pytest.mark.ros1
