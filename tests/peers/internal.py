@@ -15,6 +15,10 @@ _XMLRPC = "XML-RPC servers and the node's registration with a master; rosz has n
 
 _LAUNCH = "roslaunch's XML-RPC between launches, and its threads; a launch here has one loop"
 
+_BUILD = "the generators that catkin calls in builds; rosz compiles definitions with rosz.idl"
+_PRIVATE = "sets or calls private names of rospy's modules"
+_SLAVE = "the slave API of nodes, which belongs to bridges to ROS 1"
+
 INTERNAL = {
     ("test_nodeprocess.py", "*"): _LAUNCH,
     ("test_roslaunch_child.py", "*"): _LAUNCH,
@@ -32,6 +36,38 @@ INTERNAL = {
     ("test_rospy_validators.py", "*"): "validators of XML-RPC arguments",
     ("test_node_api.py", "*"): _XMLRPC,
     ("test_xmlrpc.py", "*"): _XMLRPC,
+    ("test_rosgraph_masterapi_offline.py", "*"): "puts a mock in the place of the XML-RPC proxy",
+    ("test_network.py", "*xmlrpc_uri"): _XMLRPC,
+    ("test_network.py", "*handshake_header*"): _TCPROS,
+    ("test_network.py", "*bind_address"): _TCPROS,
+    ("test_genpy_base.py", "*"): _BUILD,
+    ("test_genpy_gen*.py", "*"): _BUILD,
+    ("test_genmsg_base.py", "*"): _BUILD,
+    ("test_genmsg_command_line.py", "*"): _BUILD,
+    ("test_genmsg_gentools.py", "*"): _BUILD,
+    ("test_genmsg_msg*.py", "*"): _BUILD,
+    ("test_genmsg_srvs.py", "*"): _BUILD,
+    ("test_rospy_topics.py", "*"): "TCPROS connections that the test makes up, and rospy.impl",
+    ("test_rospy_names.py", "*test_mappings"): _PRIVATE,
+    ("test_rospy_names.py", "*test_caller_id"): _PRIVATE,
+    ("test_rospy_names.py", "*test_valid_name"): "validators of XML-RPC arguments",
+    ("test_rospy_names.py", "*test_global_name"): "validators of XML-RPC arguments",
+    ("test_rospy_core.py", "*test_loggers"): _PRIVATE,
+    ("test_rospy_core.py", "*test_add_preshutdown_hook"): _PRIVATE,
+    ("test_rospy_core.py", "*test_node_uri"): _PRIVATE,
+    ("test_rospy_core.py", "*test_initialized"): _PRIVATE,
+    ("test_rospy_core.py", "*test_shutdown*"): _PRIVATE,
+    ("test_rospy_core.py", "*test_valid_name"): "validators of XML-RPC arguments",
+    ("test_rospy_core.py", "*test_is_topic"): "validators of XML-RPC arguments",
+    ("test_rospy_core.py", "*test_xmlrpcapi"): _XMLRPC,
+    ("test_rospy_service.py", "*test_ServiceManager"): _PRIVATE,
+    ("test_rospy_rostime.py", "*test_import_simtime"): _PRIVATE,
+    ("test_rospy_rostime.py", "*test_set_rostime"): _PRIVATE,
+    ("test_rospy_rostime.py", "*test_sleep"): _PRIVATE,
+    ("test_publisher_consistency_listener.py", "*fails_without"): "expects lost first messages",
+    ("client-param-server.test", "*test_search_param"): _PRIVATE,
+    ("node.test", "*"): _SLAVE,
+    ("deregister.test", "*"): _SLAVE,
 }
 """Reasons, by patterns of file names and of test names."""
 

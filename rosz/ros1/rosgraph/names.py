@@ -9,7 +9,6 @@ import os
 import re
 import socket
 import sys
-import time
 from collections.abc import Mapping, Sequence
 
 from rosz import names
@@ -155,7 +154,7 @@ def myargv(argv: Sequence[str] | None = None) -> list[str]:
     Args:
         argv: Command line with the program name; that of the process when not given.
     """
-    return [word for word in (sys.argv if argv is None else argv) if not is_legal_remap(word)]
+    return [word for word in (sys.argv if argv is None else argv) if REMAP not in word]
 
 
 def load_mappings(argv: Sequence[str]) -> dict[str, str]:
@@ -225,5 +224,5 @@ def script_resolve_name(script_name: str, name: str) -> str:
 
 
 def anonymous_name(id: str) -> str:  # noqa: A002  # ROS 1's name
-    """Return a name with the host, process id and time appended."""
-    return names.anonymous(id, socket.gethostname(), os.getpid(), time.time_ns() // 1_000_000)
+    """Return a name with the host, process id and a random number appended; no two are equal."""
+    return names.anonymous(id, socket.gethostname(), os.getpid(), int.from_bytes(os.urandom(7)))

@@ -14,7 +14,7 @@ from rosz import names
 from rosz.errors import InvalidName, ParamError, ParamNotFound
 from rosz.node import Node, RosoutHandler, serve_loggers
 from rosz.ros1.exceptions import ROSException, ROSInitException
-from rosz.ros1.rosgraph.names import REMAP, is_legal_remap, myargv
+from rosz.ros1.rosgraph.names import REMAP, is_legal_remap
 from rosz.ros1.rospy.core import (
     DEBUG,
     ERROR,
@@ -213,6 +213,17 @@ def wait_for_message(
     finally:
         subscriber.unregister()
     return found[0]
+
+
+def myargv(argv: Sequence[str] | None = None) -> list[str]:
+    """Return a command line without remappings, for the option parser of the program.
+
+    Unlike rosgraph's function it keeps words that only look like one, such as ``-a:=b``.
+
+    Args:
+        argv: Command line with the program name; that of the process when not given.
+    """
+    return [word for word in (sys.argv if argv is None else argv) if not is_legal_remap(word)]
 
 
 def load_command_line_node_params(argv: Sequence[str]) -> dict[str, Any]:

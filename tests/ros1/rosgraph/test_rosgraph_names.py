@@ -74,6 +74,7 @@ def test_command_lines() -> None:
 
 def test_anonymous_names_are_legal() -> None:
     name = names.anonymous_name("talker")
+    assert name != names.anonymous_name("talker")
     assert name.startswith("talker_")
     assert names.is_legal_base_name(name)
 
