@@ -231,7 +231,7 @@ def _ending(code: int, stderr: str, node: Node) -> list[Any]:
     for line in lines[marks[-1] + 1 :]:
         place = _FRAME.search(line)
         if place:
-            if "/src/" in place[1] and str(node.repository.path) in place[1]:
+            if place[1].startswith(str(node.repository.path)):
                 frame = f"{Path(place[1]).name}:{place[2]}"
         elif not line.startswith(" ") and (match := _RAISED.match(line)) and not raised:
             raised = match[1]

@@ -33,6 +33,8 @@ __all__ = (
     "identity_matrix",
     "inverse_matrix",
     "is_same_transform",
+    "math",
+    "numpy",
     "orthogonalization_matrix",
     "projection_matrix",
     "quaternion_about_axis",
@@ -80,6 +82,7 @@ class _Numpy:
 
 
 np: Any = _Numpy()
+numpy = np  # ROS 1's module has no __all__: `import *` gives its users math and numpy, too
 
 
 def vector_norm(data: Numbers, axis: int | None = None, out: Array = None) -> Any:
