@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,8 +21,9 @@ from rosz.cli.declare import App, Argument, Json, Option
 from rosz.errors import NotFoundError
 
 if TYPE_CHECKING:
+    from rosz.environment import Environment
     from rosz.packages import Package, PackageIndex
-    from rosz.workspace import Checked, Problem
+    from rosz.workspace import Checked, Migration, Problem
 
 __all__ = ("app",)
 
@@ -34,6 +35,9 @@ _BUILT_IN = frozenset(
 )
 """Dependencies of ROS 1 packages that rosz provides, though not as packages."""
 _CATKIN_TARGETS = frozenset({"all", "clean", "install", "run_tests", "tests", "test"})
+
+_SHOWN = 6
+"""Names in a line that lists who needs something."""
 
 
 @app.command("list")
@@ -142,11 +146,15 @@ def check_command(
     setup: Annotated[
         bool, Option("--setup", "Write devel/setup.bash and the like, as catkin_make does.")
     ] = False,
+    migrate: Annotated[
+        bool, Option("--migrate", "Tell on one page what runs here, and what else is needed.")
+    ] = False,
     json: Json = False,
 ) -> int:
     """Check packages: manifest, definitions, launch files, .cfg files and scripts.
 
-    The exit code is 1 if there is an error. Options and targets of catkin_make are ignored.
+    The exit code is 1 if there is an error; with --migrate, if something does not run here.
+    Options and targets of catkin_make are ignored.
     """
     import os
 
@@ -157,6 +165,8 @@ def check_command(
     environment = Environment.read()
     folders = find_packages(_without_options(words or (), cwd), cwd, package_index(environment))
     done = check(folders, environment, os.environ)
+    if migrate:
+        return _print_migration(folders, environment, _follow(done, len(folders)), as_json=json)
     if json:
         checked = list(done)
         print_json(checked)
@@ -180,36 +190,137 @@ def _without_options(words: Sequence[str], cwd: Path) -> list[str]:
     return found
 
 
-def _print_checked(
-    done: Iterable[Checked], total: int, cwd: Path, *, colored: bool
-) -> list[Checked]:
-    """Print the problems of each package as they are found, and a summary."""
+def _follow(done: Iterable[Checked], total: int) -> list[Checked]:
+    """Return what was checked; a terminal shows how far it is."""
     terminal = takes_escapes(sys.stderr)
-    colored = colored and takes_escapes(sys.stdout)
     checked: list[Checked] = []
     for each in done:
         checked.append(each)
         if terminal:
             sys.stderr.write(f"\r\033[K[{100 * len(checked) // total:3d}%] {each.name}")
             sys.stderr.flush()
-        if each.problems and terminal:
-            sys.stderr.write("\r\033[K")
-        for problem in each.problems:
-            sys.stdout.write(_format_problem(problem, cwd, colored=colored))
-        sys.stdout.flush()
     if terminal:
         sys.stderr.write("\r\033[K")
-    problems = [one for each in checked for one in each.problems]
-    errors = sum(one.level == "error" for one in problems)
-    counts = f"{count(errors, 'error')}, {count(len(problems) - errors, 'warning')}"
-    verdict = "" if errors else "; nothing needs building"
-    sys.stdout.write(f"checked {count(len(checked), 'package')}: {counts}{verdict}\n")
     return checked
 
 
-def _format_problem(problem: Problem, cwd: Path, *, colored: bool) -> str:
+def _print_checked(
+    done: Iterable[Checked], total: int, cwd: Path, *, colored: bool
+) -> list[Checked]:
+    """Print errors, warnings, packages that are not there, and a summary.
+
+    A text of several places is printed once.
+    """
+    checked = _follow(done, total)
+    colored = colored and takes_escapes(sys.stdout)
+    problems = [one for each in checked for one in each.problems]
+    plain = [one for one in problems if not one.missing]
+    places: dict[tuple[str, str], list[Problem]] = {}
+    for one in sorted(plain, key=lambda one: one.level):
+        places.setdefault((one.level, one.text), []).append(one)
+    for same in places.values():
+        sys.stdout.write(_format_problem(same, cwd, colored=colored))
+    absent = _absent(checked)
+    print_lines(absent)
+    errors = sum(one.level == "error" for one in problems)
+    counts = f"{count(errors, 'error')}, {count(len(plain) - errors, 'warning')}"
+    more = f", {count(len(absent), 'package')} not there" if absent else ""
+    verdict = "" if errors or absent else "; nothing needs building"
+    sys.stdout.write(f"checked {count(len(checked), 'package')}: {counts}{more}{verdict}\n")
+    return checked
+
+
+def _absent(checked: Iterable[Checked]) -> list[str]:
+    """Return a line for each package that is not there, with those that need it."""
+    from rosz.replacements import instead_of
+
+    needed: dict[str, dict[str, None]] = {}
+    for each in checked:
+        for one in each.problems:
+            if one.missing:
+                needed.setdefault(one.missing, {})[each.name] = None
+    lines: list[str] = []
+    for name, users in sorted(needed.items()):
+        instead = instead_of(name)
+        lines.append(
+            f"package '{name}' is not there; needed by {_listed(list(users))}"
+            + (f": {instead}" if instead else "")
+        )
+    return lines
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return the first names, and how many there are more."""
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
+
+
+def _print_migration(
+    folders: Sequence[Path], environment: Environment, checked: Sequence[Checked], *, as_json: bool
+) -> int:
+    """Print what of the packages runs here; return 0 if all of it does."""
+    from rosz.workspace import migrate
+
+    errors = {
+        each.name: found
+        for each in checked
+        if (
+            found := sum(
+                one.level == "error" and "Python 2" not in one.text for one in each.problems
+            )
+        )
+    }
+    page = migrate(folders, environment, errors)
+    if as_json:
+        print_json(page)
+    else:
+        print_lines([*_page(page, Path.cwd()), *_absent(checked)])
+    return int(not page.runs)
+
+
+def _page(page: Migration, cwd: Path) -> Iterator[str]:
+    programs = page.programs
+    good = sum(one.runs for one in programs)
+    yield f"{count(page.packages, 'package')}, {count(len(programs), 'Python program')}"
+    yield f"runs here as it is: {good} of {len(programs)}"
+    for title, attribute in (
+        ("needs pip install", "install"),
+        ("needs a module that is not there", "missing"),
+    ):
+        needs: dict[str, dict[str, None]] = {}
+        for one in programs:
+            for need in getattr(one, attribute):
+                needs.setdefault(need, {})[f"{one.package}/{Path(one.path).name}"] = None
+        users = {name for found in needs.values() for name in found}
+        yield f"{title}: {len(users)}"
+        for need, found in sorted(needs.items(), key=lambda item: (-len(item[1]), item[0])):
+            yield f"    {need}: {_listed(list(found))}"
+    old: dict[str, dict[str, str]] = {}
+    for place in (place for one in programs for place in one.python2):
+        file, line, what = place.split(":", 2)
+        old.setdefault(_shorten(file, cwd), {})[line] = what.strip()
+    count_old = sum(bool(one.python2) for one in programs)
+    yield f"is Python 2: {count_old}" + ("; convert with: 2to3 -w FILE" if old else "")
+    for file, lines in old.items():
+        yield f"    {file}: line {', '.join(sorted(lines, key=int))}: {'; '.join(dict.fromkeys(lines.values()))}"
+    compiled = sum(map(len, page.compiled.values()))
+    yield f"is C++: {compiled}" + (
+        "; rosz builds and runs no C++: it stays with ROS 1, or becomes a node of ROS 2 beside rosz"
+        if compiled
+        else ""
+    )
+    yield from (f"    {name}: {_listed(names)}" for name, names in sorted(page.compiled.items()))
+    mistakes = sum(page.errors.values())
+    yield f"other mistakes: {mistakes}" + ("; 'rosz pkg check' lists them" if mistakes else "")
+    yield from (f"    {name}: {number}" for name, number in sorted(page.errors.items()))
+
+
+def _format_problem(same: Sequence[Problem], cwd: Path, *, colored: bool) -> str:
+    """Return a line for problems of one text."""
+    problem = same[0]
     level = paint(problem.level, problem.level) if colored else problem.level
-    return f"{_shorten(problem.place, cwd)}: {level}: {problem.text}\n"
+    more = f" ({count(len(same), 'place')} like this)" if len(same) > 1 else ""
+    return f"{_shorten(problem.place, cwd)}: {level}: {problem.text}{more}\n"
 
 
 def _shorten(place: str, cwd: Path) -> str:

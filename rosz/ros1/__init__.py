@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from rosz.ros1.importer import install
 
-PUBLIC_MODULES = ("__main__", "importer", "python2")
+PUBLIC_MODULES = ("__main__", "importer", "modules", "python2", "python_setup")
 
 __all__ = ("install",)
 

@@ -6,14 +6,18 @@ to ``rosz.ros1``.
 
 from rosz.workspace.check import Checked, check, find_packages
 from rosz.workspace.create import create, write_setup
+from rosz.workspace.migrate import Migration, Program, migrate
 from rosz.workspace.problem import Problem
 
 __all__ = (
     "Checked",
+    "Migration",
     "Problem",
+    "Program",
     "check",
     "create",
     "find_packages",
+    "migrate",
     "write_setup",
 )
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
-from rosz.errors import SourceError
+from rosz.errors import PackageNotFound, SourceError
 
-__all__ = ("REMEDY", "Problem", "error", "from_error", "warning")
+__all__ = ("REMEDY", "Problem", "error", "from_absence", "from_error", "warning")
 
+_ABSENT = re.compile(r"package '([^']+)' not found")
+_MISTYPED = "did you mean"
 REMEDY = "; run: "
 """Text before the command that fixes a problem."""
 
@@ -24,6 +27,7 @@ class Problem(msgspec.Struct, frozen=True, order=True):
         column: 1-based column, or 0 if unknown.
         level: ``error``, or ``warning`` for what still works with rosz.
         text: Description of the problem, and what to do.
+        missing: Name of the package that is not there, which is all that is wrong; or empty.
     """
 
     path: str
@@ -31,6 +35,7 @@ class Problem(msgspec.Struct, frozen=True, order=True):
     column: int
     level: Literal["error", "warning"]
     text: str
+    missing: str = ""
 
     @property
     def place(self) -> str:
@@ -49,7 +54,19 @@ def warning(path: Path, text: str, line: int = 0, column: int = 0) -> Problem:
 
 
 def from_error(fault: Exception, path: Path) -> Problem:
-    """Return the problem that an exception describes, at its own place if it has one."""
-    if isinstance(fault, SourceError):
+    """Return the problem that an exception describes, at its own place if it has one.
+
+    A package that is not there is a warning, unless its name may be mistyped.
+    """
+    if not isinstance(fault, SourceError):
+        return error(path, str(fault))
+    absent = _ABSENT.match(fault.reason)
+    if absent is None or _MISTYPED in fault.reason:
         return Problem(fault.path, fault.line, fault.column, "error", fault.reason)
-    return error(path, str(fault))
+    return Problem(fault.path, fault.line, fault.column, "warning", fault.reason, absent[1])
+
+
+def from_absence(fault: PackageNotFound, path: Path, node: str, place: tuple[int, int]) -> Problem:
+    """Return the problem of a node whose package is not there."""
+    missing = "" if _MISTYPED in str(fault) else fault.package
+    return Problem(str(path), *place, "warning", f"node '{node}': {fault}", missing)

@@ -18,12 +18,12 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from rosz.errors import LaunchFileError, NotFoundError, RoszError
+from rosz.errors import LaunchFileError, NotFoundError, PackageNotFound, RoszError
 from rosz.launch.plan import NodePlan, SystemContext, describe_args, plan
 from rosz.launch.run.command import locate
 from rosz.packages import Package, PackageIndex, is_python
 from rosz.ros1.python2 import explain
-from rosz.workspace.problem import Problem, error, from_error, warning
+from rosz.workspace.problem import Problem, error, from_absence, from_error, warning
 
 __all__ = (
     "check_cmake",
@@ -31,13 +31,17 @@ __all__ = (
     "check_entry_points",
     "check_launches",
     "check_scripts",
+    "compiled_programs",
 )
 
 _SCRIPT_FOLDERS = frozenset({"scripts", "script", "nodes", "node", "bin", "test", "tests"})
 _SKIPPED_FOLDERS = frozenset({"__pycache__", "node_modules", "build", "devel", "install"})
 _HEAD_BYTES = 4096
 _BINARY = b"\x7fELF"
-_EXECUTABLE = re.compile(rb"^\s*(?:catkin_|cuda_)?add_executable\s*\(\s*([^\s)]+)", re.MULTILINE)
+_EXECUTABLE = re.compile(
+    rb"^\s*(?:catkin_|cuda_|rosbuild_)?add_executable\s*\(\s*([^\s)]+)", re.MULTILINE
+)
+_PROJECT = re.compile(rb"^\s*project\s*\(\s*([^\s)]+)", re.MULTILINE)
 _CFG_TIMEOUT = 20.0
 _GENERATOR = b"ParameterGenerator"
 _FRAME = re.compile(r'^\s*File "(.+)", line (\d+)', re.MULTILINE)
@@ -134,16 +138,27 @@ def check_entry_points(package: Package) -> Iterator[Problem]:
             yield error(package.path / "setup.py", str(fault))
 
 
+def compiled_programs(folder: Path) -> dict[str, int]:
+    """Return the C++ programs of a package, and the lines of CMakeLists.txt that name them."""
+    try:
+        data = (folder / "CMakeLists.txt").read_bytes()
+    except OSError:
+        return {}
+    project = _PROJECT.search(data)
+    own = project[1] if project is not None else folder.name.encode()
+    return {
+        match[1].replace(b"${PROJECT_NAME}", own).decode(errors="replace"): data.count(
+            b"\n", 0, match.start(1)
+        )
+        + 1
+        for match in _EXECUTABLE.finditer(data)
+    }
+
+
 def check_cmake(folder: Path) -> Iterator[Problem]:
     """Yield the C++ programs of a package, which rosz does not build."""
     file = folder / "CMakeLists.txt"
-    try:
-        data = file.read_bytes()
-    except OSError:
-        return
-    for match in _EXECUTABLE.finditer(data):
-        line = data.count(b"\n", 0, match.start(1)) + 1
-        name = match[1].decode(errors="replace")
+    for name, line in compiled_programs(folder).items():
         yield warning(file, f"'{name}' is C++: rosz does not build it, and has no C++ API", line)
 
 
@@ -242,6 +257,9 @@ def _check_node(
     place = Path(node.place.file), node.place.line, node.place.column
     try:
         package = index.find(node.package)
+    except PackageNotFound as fault:
+        yield from_absence(fault, place[0], node.name, place[1:])
+        return
     except RoszError as fault:
         yield warning(place[0], f"node '{node.name}': {fault}", *place[1:])
         return

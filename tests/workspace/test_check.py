@@ -98,7 +98,12 @@ def test_manifests(workspace: Path, text: str, expected: str) -> None:
         (
             "launch/a.launch",
             '<launch><include file="$(find nowhere)/a.launch"/></launch>',
-            "demo/launch/a.launch:1:24: error: package 'nowhere' not found",
+            "demo/launch/a.launch:1:24: warning: package 'nowhere' not found",
+        ),
+        (
+            "launch/a.launch",
+            '<launch><include file="$(find dem)/a.launch"/></launch>',
+            "demo/launch/a.launch:1:24: error: package 'dem' not found",
         ),
         (
             "launch/a.launch",
