@@ -302,7 +302,8 @@ def _page(page: Migration, cwd: Path) -> Iterator[str]:
     count_old = sum(bool(one.python2) for one in programs)
     yield f"is Python 2: {count_old}" + ("; convert with: 2to3 -w FILE" if old else "")
     for file, lines in old.items():
-        yield f"    {file}: line {', '.join(sorted(lines, key=int))}: {'; '.join(dict.fromkeys(lines.values()))}"
+        numbers = ", ".join(sorted(lines, key=int))
+        yield f"    {file}: line {numbers}: {'; '.join(dict.fromkeys(lines.values()))}"
     compiled = sum(map(len, page.compiled.values()))
     yield f"is C++: {compiled}" + (
         "; rosz builds and runs no C++: it stays with ROS 1, or becomes a node of ROS 2 beside rosz"
