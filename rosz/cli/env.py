@@ -16,7 +16,7 @@ import sys
 from pathlib import Path, PurePath
 from typing import Annotated
 
-from rosz.cli.console import print_json
+from rosz.cli.console import print_json, print_result, warn
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import UsageError, near_miss
 
@@ -115,12 +115,18 @@ def env_command(
     private: Annotated[
         bool, Option("--private", "Also keep other users of this machine out.")
     ] = False,
+    editor: Annotated[
+        bool, Option("--editor", "Write what editors need to know rospy and all messages.")
+    ] = False,
     json: Annotated[bool, Option("--json", "Print the settings of rosz as JSON.")] = False,
 ) -> None:
     """Print shell code that makes rostopic, roslaunch and the like run rosz.
 
     Use it as: eval "$(rosz env)". In fish: rosz env fish | source
     """
+    if editor:
+        _write_editor(as_json=json)
+        return
     if json:
         from rosz.environment import Environment
 
@@ -137,6 +143,31 @@ def env_command(
         setting = "set -gx ROSZ_RENDEZVOUS" if name == "fish" else "export ROSZ_RENDEZVOUS="
         sys.stdout.write(f"{setting}{' ' * (name == 'fish')}private\n")
     sys.stdout.write(_script(name if name in SHELLS else "bash", home, sys.executable))
+
+
+def _write_editor(*, as_json: bool) -> None:
+    """Write stubs to the user's cache, and print what tells editors of them."""
+    from rosz.environment import Environment
+    from rosz.workspace.editor import write_stubs
+
+    made = write_stubs(Environment.read())
+    for package, fault in made.faults.items():
+        warn(f"no stubs for package '{package}': {fault}")
+    lines = (
+        f"{made.modules} modules are in {made.folder}; 'rosz pkg check' keeps them fresh",
+        f"pyright     pyrightconfig.json        {_setting('extraPaths', [made.folder])}",
+        f"VS Code     .vscode/settings.json     "
+        f"{_setting('python.analysis.extraPaths', [made.folder])}",
+        f'mypy        [tool.mypy] in pyproject.toml   mypy_path = "{made.folder}"',
+        f"the interpreter of the editor is the one that has rosz: {sys.executable}",
+    )
+    print_result(lines, made, as_json=as_json)
+
+
+def _setting(name: str, value: object) -> str:
+    import json
+
+    return json.dumps({name: value})
 
 
 def _script(shell: str, home: str, python: str) -> str:

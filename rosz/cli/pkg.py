@@ -172,9 +172,18 @@ def check_command(
         print_json(checked)
     else:
         checked = _print_checked(done, len(folders), cwd, colored=environment.color)
+    _refresh_editor(environment)
     if setup:
         _write_setup(cwd)
     return int(any(one.level == "error" for each in checked for one in each.problems))
+
+
+def _refresh_editor(environment: Environment) -> None:
+    """Write what editors need anew, if ``rosz env --editor`` has written it once."""
+    from rosz.workspace.editor import editor_folder, write_stubs
+
+    if editor_folder(environment).is_dir():
+        write_stubs(environment)
 
 
 def _without_options(words: Sequence[str], cwd: Path) -> list[str]:

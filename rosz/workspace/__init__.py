@@ -21,4 +21,4 @@ __all__ = (
     "write_setup",
 )
 
-PUBLIC_MODULES = ("generate",)
+PUBLIC_MODULES = ("editor", "generate")
