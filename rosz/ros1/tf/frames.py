@@ -80,6 +80,7 @@ class Transformer:
 
     def __init__(self, interpolate: bool = True, cache_time: Any = None) -> None:  # noqa: ARG002
         self._buffer = tf2_ros.Buffer(cache_time, debug=False)
+        self._using_dedicated_thread = False
 
     def setTransform(self, transform: Any, authority: str = "default_authority") -> None:  # noqa: N802
         """Add a TransformStamped."""
@@ -109,11 +110,16 @@ class Transformer:
         Raises:
             Exception: The transform is not known in time; the text tells the reason.
         """
+        self._check_thread()
         known, reason = self._buffer.can_transform(
             _strip(target_frame), _strip(source_frame), time, timeout, return_debug_tuple=True
         )
         if not known:
             raise Exception(reason)  # tf's own
+
+    def _check_thread(self) -> None:
+        if not self._using_dedicated_thread:
+            raise Exception("cannot wait for a transform: no listener receives any")  # tf's own
 
     def lookupTransform(self, target_frame: str, source_frame: str, time: Any) -> Parts:  # noqa: N802
         """Return the transform from the source frame to the target frame.
@@ -179,6 +185,7 @@ class Transformer:
             Exception: The transform is not known in time; the text tells the reason.
         """
         target, source, fixed = map(_strip, (target_frame, source_frame, fixed_frame))
+        self._check_thread()
         known, reason = self._buffer.can_transform_full(
             target, target_time, source, source_time, fixed, timeout, return_debug_tuple=True
         )
@@ -293,7 +300,8 @@ class Transformer:
         return ""
 
     def setUsingDedicatedThread(self, value: bool) -> None:  # noqa: N802  # ROS 1's
-        """Do nothing: transforms always arrive on a thread of their own."""
+        """Set whether transforms arrive on a thread, so that it makes sense to wait for them."""
+        self._using_dedicated_thread = value
 
     def clear(self) -> None:
         """Remove all transforms but the static ones."""
@@ -364,6 +372,7 @@ class TransformListener(TransformerROS):
     def __init__(self, *options: Any, **named: Any) -> None:
         super().__init__(*options, **named)
         self._listener = tf2_ros.TransformListener(self._buffer)
+        self.setUsingDedicatedThread(True)
 
 
 class TransformBroadcaster:

@@ -62,12 +62,19 @@ _TRANSFORMER = (
 import rospy, tf
 from geometry_msgs.msg import Point32, PointStamped, QuaternionStamped, Vector3Stamped
 from sensor_msgs.msg import PointCloud
+rospy.rostime.set_rostime_initialized(True)
 t = tf.TransformerROS(True, genpy.Duration(10))
 for second, (x, turn) in enumerate([(1.0, 0.0), (3.0, 0.3), (4.0, 0.5)], 1):
     put(t.setTransform, "a", "b", second, x, turn)
     put(t.setTransform, "b", "c", second, 0.5)
 result = [t.allFramesAsString(), t.allFramesAsDot(), t.getTFPrefix()]
 result.append(t.getFrameStrings())
+for _ in range(2):
+    try:
+        result.append(t.waitForTransform("a", "c", at(0), genpy.Duration(1)))
+    except tf.Exception:
+        result.append("no listener")
+    t.setUsingDedicatedThread(True)
 half = genpy.Duration.from_sec(0.5)
 for time in 0, 1.5, 2.5:
     result.append(t.lookupTwist("b", "a", at(time), half))
