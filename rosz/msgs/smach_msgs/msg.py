@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from msgspec import field as _field
 from rosz.message import Message as _Message
+from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
@@ -99,7 +100,7 @@ _t4 = _Template("|4", None)
 _u3 = _Struct("<Ii2I").unpack_from
 
 
-class SmachContainerStatus(_Message):
+class SmachContainerStatus(_Stamped):
     """What a running container does: sent at each transition, and every two seconds."""
 
     header: Header = _field(default_factory=Header)
@@ -203,7 +204,7 @@ _s7 = _StringList()
 _s8 = _StringList()
 
 
-class SmachContainerStructure(_Message):
+class SmachContainerStructure(_Stamped):
     """How a container is built."""
 
     header: Header = _field(default_factory=Header)
