@@ -15,13 +15,13 @@ import msgspec
 
 from rosz.bags.bag import Channel, Payload
 from rosz.bags.messages import class_of
+from rosz.bags.transcode import compile_transcoder
 from rosz.errors import DefinitionError, RoszError, TypeNotFound
 from rosz.message import ARRAY_CODES, INTEGER_RANGES, OCTETS, Message, Slot, slot_type, slots
 from rosz.typestore import TypeStore
 
 __all__ = ("Conversion", "MigrationError", "find_conversion", "find_migration")
 
-_CDR_HEADER = b"\0\1\0\0"
 _FLOATS = ("float32", "float64")
 
 
@@ -73,10 +73,9 @@ def find_conversion(channel: Channel, types: TypeStore) -> Conversion:
         return Conversion(known, lambda data: migrate(decode(bytes(data))).to_cdr(), added)
     if channel.encoding == "cdr":
         return Conversion(recorded, None)
-    if _is_same_layout(recorded):
-        return Conversion(recorded, lambda data: _CDR_HEADER + bytes(data))
     pack = recorded._encode
-    return Conversion(recorded, lambda data: pack(decode(bytes(data))))
+    convert = compile_transcoder(recorded, lambda data: pack(decode(bytes(data))))
+    return Conversion(recorded, convert)
 
 
 def _recorded(channel: Channel, types: TypeStore) -> type[Message]:
@@ -93,23 +92,6 @@ def _recorded(channel: Channel, types: TypeStore) -> type[Message]:
     }
     made: type[Message] = type(name, (Message,), names)
     return made
-
-
-def _is_same_layout(cls: type[Message]) -> bool:
-    """Return whether CDR of a type is its ROS 1 layout: of fixed size, and without padding."""
-    return _is_fixed(cls) and len(cls().to_ros1()) == len(cls().to_cdr()) - len(_CDR_HEADER)
-
-
-def _is_fixed(cls: type[Message]) -> bool:
-    return all(
-        not slot.counted
-        and (
-            slot.kind not in {"string", "wstring"}
-            if isinstance(slot.kind, str)
-            else _is_fixed(slot.kind)
-        )
-        for slot in slots(cls)
-    )
 
 
 def find_migration(

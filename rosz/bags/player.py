@@ -5,7 +5,8 @@ from __future__ import annotations
 import heapq
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
@@ -28,6 +29,8 @@ _LOOK_SECONDS = 0.1
 """Time between two reports of progress."""
 _RECENT = _NS
 """A latched message this early in a bag is one that was published before the bag began."""
+_BATCH = 256
+"""Messages that are published at once, before keys and new subscriptions are looked for."""
 _CLOCK = "/clock"
 
 _Item: TypeAlias = "tuple[int, Publisher[Any], bytes]"
@@ -284,24 +287,46 @@ class Player:
             withdraw()
 
     def _play(self) -> None:
-        items = self._items()
+        parts = [self._entries(one, self._start, self._end) for one in self._readers]
+        entries = parts[0] if len(parts) == 1 else heapq.merge(*parts, key=lambda one: one.stamp)
         if self._options.immediate:
-            self._publish(item for _, item in items)
+            self._play_at_once(entries)
             return
+        items = ((len(item[2]), item) for item in map(self._convert, entries) if item)
         with ReadAhead(items) as ahead:
             for batch in ahead:
-                if not self._publish(iter(batch)):
+                if not self._publish(batch):
                     return
         self._look()
 
-    def _items(self) -> Iterator[tuple[int, _Item]]:
-        """Yield the messages in order, converted, behind their sizes."""
-        parts = [self._entries(one, self._start, self._end) for one in self._readers]
-        merged = parts[0] if len(parts) == 1 else heapq.merge(*parts, key=lambda one: one.stamp)
-        for entry in merged:
+    def _play_at_once(self, entries: Iterator[Entry]) -> None:
+        """Publish messages without waiting, but in a pause and for ``/clock``."""
+        for first in entries:
+            some = chain((first,), islice(entries, _BATCH - 1))
+            if self._pausing or self._tick or self._pace.paused:
+                self._publish(item for item in map(self._convert, some) if item)
+            else:
+                self._rush(some)
+            if self._closed:
+                return
+            if time.monotonic() >= self._next_report:
+                self._look()
+
+    def _rush(self, entries: Iterable[Entry]) -> None:
+        """Publish messages at once; those that nobody would receive are only counted."""
+        heard: dict[int, bool] = {}
+        for entry in entries:
+            key = id(entry.channel)
+            if key not in heard:
+                output = self._output(entry.channel)
+                heard[key] = output is None or output[1].heard
+            if not heard[key]:
+                self.published += 1
+                continue
             item = self._convert(entry)
             if item is not None:
-                yield len(item[2]), item
+                self._send(item)
+            self._last = entry.stamp
 
     def _entries(
         self, reader: BagReader, start: int, end: int, topics: Collection[str] | None = None
@@ -331,24 +356,23 @@ class Player:
                 return None
         return entry.stamp, publisher, bytes(data)
 
-    def _publish(self, items: Iterator[_Item]) -> bool:
+    def _publish(self, items: Iterable[_Item]) -> bool:
         """Publish messages when they are due; return False at the end of the node."""
-        free = self._options.immediate and not self._pausing and not self._tick
-        for stamp, publisher, data in items:
-            if not (free and not self._pace.paused) and not self._await(stamp, publisher.name):
+        for item in items:
+            if not self._await(item[0], item[1].name) or self._closed:
                 return False
-            if self._closed:
-                return False
-            try:
-                publisher.publish_raw(data)
-            except MessageError as error:  # a payload that is not even CDR
-                self._problem(f"a message of '{publisher.name}' is left out: {error}")
-                continue
-            self.published += 1
-            self._last = stamp
+            self._send(item)
+            self._last = item[0]
             if not self.published & 255 and time.monotonic() >= self._next_report:
                 self._look()
         return not self._closed
+
+    def _send(self, item: _Item) -> None:
+        try:
+            item[1].publish_raw(item[2])
+            self.published += 1
+        except MessageError as error:  # a payload that is not even CDR
+            self._problem(f"a message of '{item[1].name}' is left out: {error}")
 
     def _await(self, stamp: int, topic: str) -> bool:
         """Wait until a message is due; return False at the end of the node."""

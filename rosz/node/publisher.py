@@ -132,16 +132,19 @@ class Publisher(Entity, Generic[M]):
             EncodeError: The payload is not bytes, or shorter than the header.
             ClosedError: The publisher is closed.
         """
-        if not isinstance(payload, bytes | bytearray | memoryview):
-            given = type(payload).__name__
-            raise EncodeError(self.message_type._type, "", f"expected bytes, got {given}")
-        # A copy, because the caller could change a mutable buffer while it waits.
-        data = bytes(payload)
-        if len(data) < _HEADER:
+        if type(payload) is not bytes:
+            if not isinstance(payload, bytes | bytearray | memoryview):
+                given = type(payload).__name__
+                raise EncodeError(self.message_type._type, "", f"expected bytes, got {given}")
+            # A copy, because the caller could change a mutable buffer while it waits.
+            payload = bytes(payload)
+        if len(payload) < _HEADER:
             raise EncodeError(
-                self.message_type._type, "", f"expected CDR with its header, got {len(data)} bytes"
+                self.message_type._type,
+                "",
+                f"expected CDR with its header, got {len(payload)} bytes",
             )
-        self._send(data)
+        self._send(payload)
 
     def _send(self, payload: bytes) -> None:
         with self._ordered:
@@ -276,6 +279,18 @@ class Publisher(Entity, Generic[M]):
         """Return the subscriptions that this publisher reaches: same topic, type and hash."""
         view = self.node.context.graph.view()
         return [token for token in view.subscriptions(self.name) if self.matches(token)]
+
+    @property
+    def heard(self) -> bool:
+        """Whether anybody may receive what is published now, nodes or other programs of Zenoh.
+
+        Raises:
+            ClosedError: The publisher is closed.
+        """
+        if self._held is not None or self.qos.latched:
+            return True
+        far = self._fetchable is not None and self._fetchable.needed
+        return far or self._raw.matched
 
     def wait_for_subscribers(self, count: int = 1, timeout: float = 10.0) -> None:
         """Wait until this publisher reaches a number of subscriptions.

@@ -188,6 +188,20 @@ def test_bags_of_ros1_play_as_our_types(network: Network, tmp_path: Path) -> Non
     assert heard.values == [f"hé {n}" for n in range(300)]
 
 
+def test_without_waiting_only_what_is_heard_is_published(network: Network, tmp_path: Path) -> None:
+    bag = _bag(tmp_path / "a.mcap", [(f"/{n % 2}", n, Int32(data=n)) for n in range(2000)])
+    heard = _Listener(network, "/1")
+    player = _player(network, bag, immediate=True, wait_for_subscribers=False)
+    one, other = (player._made[key] for key in sorted(player._made, key=lambda key: str(key[0])))
+    other.wait_for_subscribers(1)
+    eventually(lambda: other.heard)
+    assert not one.heard
+    player.run()
+    heard.wait(1000)
+    assert heard.values == list(range(1, 2000, 2))
+    assert (player.published, one._sequence, other._sequence) == (2000, 0, 1000)
+
+
 def test_a_loop_begins_again(network: Network, tmp_path: Path) -> None:
     bag = _bag(tmp_path / "a.mcap", [("/a", n / 100, Int32(data=n)) for n in range(3)])
     heard = _Listener(network, "/a")
