@@ -81,6 +81,8 @@ def parse_message(name: str, text: str, path: str = "<string>") -> MessageSpec:
 def parse_service(name: str, text: str, path: str = "<string>") -> ServiceSpec:
     """Read a .srv text: a request, ``---``, a response.
 
+    Without a ``---`` the response is empty, as genpy has it.
+
     Args:
         name: Full name of the type, ``std_srvs/srv/SetBool``.
         text: The definition.
@@ -90,6 +92,10 @@ def parse_service(name: str, text: str, path: str = "<string>") -> ServiceSpec:
         DefinitionError: The text does not follow the grammar.
     """
     what = "a service has a request and a response"
+    if not any(line.startswith(_SEPARATOR) for line in _lines(text)):
+        request = _split(name, ("Request",), text, path, what)[0]
+        response = MessageSpec(f"{name}_Response", (), path=path)
+        return ServiceSpec(name, request, response, text, path)
     request, response = _split(name, ("Request", "Response"), text, path, what)
     return ServiceSpec(name, request, response, text, path)
 

@@ -282,8 +282,6 @@ MESSAGES: list[tuple[str, str]] = [
 ]
 
 SERVICES: list[tuple[str, str]] = [
-    ("", "bad.srv:1:1: expected '---': a service has a request and a response"),
-    ("int32 a", "bad.srv:1:1: expected '---': a service has a request and a response"),
     (
         "int32 a\n---\nint32 b\n---\nint32 c",
         "bad.srv:4:1: one '---' too many: a service has a request and a response",

@@ -136,3 +136,11 @@ def test_services_hash_both_halves() -> None:
     catalog = catalog_of({})
     spec = parse_service("p/srv/S", "int64 a\nint64 b\n---\nint64 sum")
     assert service_md5(spec, catalog) == "6a2e34150c00229791cc89ff309fff21"
+
+
+def test_a_service_without_a_separator_has_an_empty_response() -> None:
+    """As genmsg reads it, whose hash this is."""
+    spec = parse_service("p/srv/S", "int32 a\nstring b\n")
+    assert [field.name for field in spec.request.fields] == ["a", "b"]
+    assert spec.response.fields == ()
+    assert service_md5(spec, catalog_of({})) == "7675b1fd535f3a60bfd29044eacbc355"
