@@ -212,7 +212,7 @@ class _FrontFinder(MetaPathFinder):
             alias = fullname.removeprefix("rosz.msgs.")
             return self._of_rosz(alias, alias) if alias in ELSEWHERE else self._compiled(fullname)
         first, _, inner = rest.partition(".")
-        if first in _KINDS:
+        if first in _KINDS and fullname not in SUBMODULES:
             return self._of_package(fullname, root, _KINDS[first], inner, path)
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)

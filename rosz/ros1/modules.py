@@ -218,6 +218,8 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.tf.frames": "ConnectivityException Exception ExtrapolationException LookupException"
         " TransformListener Transformer TransformerROS"
     },
+    # ROS 1 connects the two types of /tf, which are equal but for their names.
+    "tf.msg": {"msgs.tf2_msgs.msg": "tfMessage=TFMessage"},
 }
 """Submodules of ROS 1 and rclpy: the modules below ``rosz`` that define their names, and the names.
 

@@ -115,6 +115,9 @@ def test_modules_by_all_their_names(tmp_path: Path) -> None:
         from tf_transformations import quaternion_from_euler
         assert tf_transformations is tf.transformations
         assert tf_transformations.__spec__.name == "rosz.ros1.tf.transformations"
+        import tf2_msgs.msg, tf.msg
+        from tf.msg import *
+        assert tfMessage is tf.msg.tfMessage is tf2_msgs.msg.TFMessage
         """
     assert run(code, tmp_path) == ""
 
