@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rosz.bags.bag import Attachment, BagReader, BagWriter, Channel, Entry, Payload
 from rosz.errors import DefinitionError, TypeNotFound
 from rosz.message import Message
-from rosz.typestore import TypeStore
+
+if TYPE_CHECKING:
+    from rosz.typestore import TypeStore  # slow to import: see `rosz.bags.opening.open`
 
 __all__ = ("Bag", "BagMessage", "BagOutput", "class_of", "decoder_of")
 

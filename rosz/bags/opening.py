@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import Literal, overload
+from typing import TYPE_CHECKING, Literal, overload
 
 from rosz.bags.bag import BagReader, Compression
 from rosz.bags.chunk_writer import ChunkWriter
@@ -18,7 +18,9 @@ from rosz.bags.ros1_records import describe_begin
 from rosz.bags.ros1_writer import Ros1Writer
 from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
 from rosz.errors import BagError, UsageError
-from rosz.typestore import TypeStore
+
+if TYPE_CHECKING:
+    from rosz.typestore import TypeStore
 
 __all__ = ("ACTIVE", "create_writer", "find_format", "open", "open_reader")
 
@@ -144,6 +146,8 @@ def open(  # noqa: A001
         UsageError: The suffix or the compression is not known.
     """
     if mode == "r":
+        from rosz.typestore import TypeStore  # slow to import, and what is in a bag needs no types
+
         return Bag(open_reader(path), types or TypeStore())
     writer = create_writer(path, compression=compression, replace=mode == "w")
     return BagOutput(writer, time.time_ns)

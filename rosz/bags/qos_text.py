@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import msgspec
-import yaml
 
 from rosz.qos import FOREVER, QoS
 
@@ -28,6 +27,8 @@ _DURATIONS = {"deadline": "deadline", "lifespan": "lifespan", "lease": "liveline
 
 def format_profiles(profiles: Iterable[QoS]) -> str:
     """Return the text of the QoS of some publishers."""
+    import yaml  # slow to import, and most bags do without
+
     rows = []
     for qos in profiles:
         given = msgspec.structs.asdict(qos)
@@ -51,6 +52,8 @@ def parse_profiles(text: str) -> tuple[QoS, ...]:
 
     A bag whose QoS is damaged has its messages all the same, so nothing is raised.
     """
+    import yaml
+
     try:
         rows = yaml.safe_load(text)
     except yaml.YAMLError:

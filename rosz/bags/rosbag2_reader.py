@@ -16,8 +16,6 @@ from pathlib import Path
 from typing import Any, Protocol, Self
 from urllib.parse import quote
 
-import yaml
-
 from rosz.bags.bag import Attachment, Channel, Chunk, DamageReport, Entry, Payload
 from rosz.bags.mcap_reader import McapReader
 from rosz.bags.qos_text import parse_profiles
@@ -221,6 +219,8 @@ class Rosbag2Reader:
         self.end: int = max((one.end for one in counted), default=0)
 
     def _read_metadata(self) -> dict[str, Any]:
+        import yaml  # slow to import, and most bags do without
+
         file = self.path / METADATA
         try:
             found = yaml.safe_load(file.read_text("utf-8", "replace"))

@@ -10,7 +10,6 @@ from rosz import names, remap
 from rosz.cli.console import until_stopped, warn
 from rosz.cli.declare import App
 from rosz.environment import Environment
-from rosz.introspect.connect import find_unreached, open_context, open_session
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
@@ -67,18 +66,24 @@ class Call:
 
     def session(self) -> Session:
         """Open a session for a short query; warn of machines that it does not reach."""
+        from rosz.introspect.connect import open_session
+
         session = open_session(self.environment)
         self._check_reached(session)
         return session
 
     def context(self, *, lasting: bool = False) -> Context:
         """Open the context of a node, which may belong to a command that runs until stopped."""
+        from rosz.introspect.connect import open_context
+
         context = open_context(self.environment, self.argv, lasting=lasting)
         if not lasting or self.environment.mode == "client":
             self._check_reached(context.session)
         return context
 
     def _check_reached(self, session: Session) -> None:
+        from rosz.introspect.connect import find_unreached
+
         for endpoint, dialler in find_unreached(session, self.environment).items():
             self.incomplete = True
             warn(
