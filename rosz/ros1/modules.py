@@ -200,7 +200,7 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE Depend Export InvalidManifest Manifest"
         " ResourceNotFound RosDep read_manifest"
     },
-    "rospkg.rospack": {"ros1.rospkg": "RosPack RosStack get_package_name"},
+    "rospkg.rospack": {"ros1.rospkg": "ManifestManager RosPack RosStack get_package_name"},
     "rospy.exceptions": {
         "ros1.exceptions": "ROSException ROSInitException ROSInternalException"
         " ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException"

@@ -21,6 +21,7 @@ __all__ = (
     "PACKAGE_FILE",
     "InvalidManifest",
     "Manifest",
+    "ManifestManager",
     "ResourceNotFound",
     "RosPack",
     "RosStack",
@@ -281,22 +282,22 @@ def _person(element: ET.Element) -> str:
 # Packages.
 
 
-class RosPack:
+class ManifestManager:
     """Finds packages and reads their manifests.
 
     Args:
+        manifest_name: Name of the manifests: ``package.xml`` or ``manifest.xml``; both are read.
         ros_paths: Folders to search; those of the process when not given.
     """
 
-    def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
+    def __init__(
+        self,
+        manifest_name: str,  # noqa: ARG002
+        ros_paths: Sequence[str] | None = None,
+    ) -> None:
         self._paths = None if ros_paths is None else tuple(map(Path, ros_paths))
         self._manifests: dict[str, Manifest] = {}
         self._caches: dict[str, Any] = {}
-
-    @classmethod
-    def get_instance(cls, ros_paths: Sequence[str] | None = None) -> Self:
-        """Return an instance that searches these folders."""
-        return cls(ros_paths)
 
     @cached_property
     def _index(self) -> PackageIndex:
@@ -377,6 +378,30 @@ class RosPack:
             if other != name and name in self.get_depends(other, implicit)
         ]
 
+    def get_custom_cache(self, key: str, default: Any = None) -> Any:
+        """Return a value that the program stored with `set_custom_cache`."""
+        return self._caches.get(key, default)
+
+    def set_custom_cache(self, key: str, value: Any) -> None:
+        """Store a value for the program."""
+        self._caches[key] = value
+
+
+class RosPack(ManifestManager):
+    """The packages on the package path.
+
+    Args:
+        ros_paths: Folders to search; those of the process when not given.
+    """
+
+    def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
+        super().__init__(MANIFEST_FILE, ros_paths)
+
+    @classmethod
+    def get_instance(cls, ros_paths: Sequence[str] | None = None) -> Self:
+        """Return an instance that searches these folders."""
+        return cls(ros_paths)
+
     def get_rosdeps(self, package: str, implicit: bool = True) -> Sequence[str]:
         """Return the dependencies of a package that are not on the path; see `get_depends`."""
         names = [package, *(self.get_depends(package) if implicit else ())]
@@ -390,14 +415,6 @@ class RosPack:
             ResourceNotFound: There is no such package.
         """
         self.get_path(name)
-
-    def get_custom_cache(self, key: str, default: Any = None) -> Any:
-        """Return a value that the program stored with `set_custom_cache`."""
-        return self._caches.get(key, default)
-
-    def set_custom_cache(self, key: str, value: Any) -> None:
-        """Store a value for the program."""
-        self._caches[key] = value
 
 
 class RosStack:

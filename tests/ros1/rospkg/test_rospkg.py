@@ -183,3 +183,10 @@ def test_load_manifest_extends_the_module_path(
     roslib.load_manifest("arm")
     roslib.load_manifest("arm")
     assert sys.path == [str(code), *before]
+
+
+def test_a_manager_finds_what_rospack_finds() -> None:
+    manager = rospkg.ManifestManager(rospkg.PACKAGE_FILE)
+    assert isinstance(rospkg.RosPack(), rospkg.ManifestManager)
+    assert manager.get_path("turtlesim") == rospkg.RosPack().get_path("turtlesim")
+    assert not hasattr(manager, "get_rosdeps")
