@@ -47,6 +47,7 @@ MODULES = (
     "rosparam",
     "rospkg",
     "rospy",
+    "rosserial_python",
     "rosservice",
     "rostest",
     "rostopic",

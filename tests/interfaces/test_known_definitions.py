@@ -19,6 +19,7 @@ UNKNOWN = {
     "example_interfaces",
     "geographic_msgs",
     "rospy_tutorials",
+    "rosserial_msgs",
     "smach_msgs",
     "tf",
     "turtlesim",
