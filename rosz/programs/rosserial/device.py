@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import msgspec
 
 from rosz.errors import ClosedError, DecodeError, EncodeError, ParamError, RoszError, ServiceError
-from rosz.message import Message
+from rosz.message import Message, Service
 from rosz.msgs.rosserial_msgs.msg import Log, TopicInfo
 from rosz.msgs.rosserial_msgs.srv import RequestParam
 from rosz.node import Client, Node, Publisher, Subscription
@@ -94,6 +94,8 @@ class _Served:
         self._responses: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
         self.request: _Half | None = None
         self.response: _Half | None = None
+        self.offered = False
+        self._closed = False
 
     def call(self, request: Message) -> Message:
         """Send a request to the device, and return its response.
@@ -102,10 +104,10 @@ class _Served:
             ServiceError: The device did not respond in time, or is gone.
         """
         with self._lock:
-            if self.request is None:
-                raise ServiceError("the device has not announced the service completely")
             while not self._responses.empty():  # of a call that was given up
                 self._responses.get()
+            if self._closed or self.request is None:
+                raise ServiceError("the device is disconnected")
             self._send(self.request.info, request)
             name = self.request.info.topic_name
             try:
@@ -123,7 +125,8 @@ class _Served:
             self._responses.put(self.response.kind.from_ros1(payload))
 
     def close(self) -> None:
-        """End the call that waits."""
+        """End the call that waits, and those that wait for it."""
+        self._closed = True
         self._responses.put(None)
 
 
@@ -239,26 +242,24 @@ class Device:
 
     def _serve_request(self, info: TopicInfo) -> None:
         service = self._node.context.types.service(info.message_type)
-        half = _Half(info, _checked(info, service.Request))
-        self._server(info).request = half
+        served = self._servers.setdefault(info.topic_name, _Served(self._send))
+        served.request = _Half(info, _checked(info, service.Request))
+        self._serve(served, info.topic_name, service)
 
     def _serve_response(self, info: TopicInfo) -> None:
         service = self._node.context.types.service(info.message_type)
-        half = _Half(info, _checked(info, service.Response))
-        served = self._server(info)
-        served.response = half
+        served = self._servers.setdefault(info.topic_name, _Served(self._send))
+        served.response = _Half(info, _checked(info, service.Response))
         self._handlers[info.topic_id] = served.receive
+        self._serve(served, info.topic_name, service)
 
-    def _server(self, info: TopicInfo) -> _Served:
-        name = info.topic_name
-        served = self._servers.get(name)
-        if served is None:
-            kind = self._node.context.types.service(info.message_type)
-            served = _Served(self._send)
-            self._keep(self._node.service(name, kind, served.call))
-            self._servers[name] = served
-            self._node.log.info("Setup service server on %s [%s]", name, info.message_type)
-        return served
+    def _serve(self, served: _Served, name: str, kind: type[Service]) -> None:
+        """Offer a service of the device once both ways are announced."""
+        if served.offered or served.request is None or served.response is None:
+            return
+        self._keep(self._node.service(name, kind, served.call))
+        served.offered = True
+        self._node.log.info("Setup service server on %s [%s]", name, kind._type)
 
     def _call_request(self, info: TopicInfo) -> None:
         service = self._node.context.types.service(info.message_type)
