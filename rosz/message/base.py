@@ -93,7 +93,8 @@ class _Ros1Codec:
 
         described = next(cls for cls in owner.__mro__ if "_schema" in vars(cls))
         made: Callable[[Any], Any] = getattr(ros1_codec, self._maker)(described)
-        setattr(described, self._name, staticmethod(made))
+        if described is not Message:  # its subclasses would inherit it
+            setattr(described, self._name, staticmethod(made))
         return made
 
 
@@ -362,13 +363,20 @@ def ros1_slots(cls: Any) -> dict[str, Slot]:
 
 
 class Stamped(Message):
-    """A message that begins with a header; None in its place is the default, as in genpy."""
+    """A message that begins with a header; None in its place is the default, as in genpy.
+
+    So is None in other fields then. Other messages do not check this, which would double the time
+    that they take to make.
+    """
 
     def __post_init__(self) -> None:
-        """Set a header that is None to the default."""
+        """Set what is None to the default if the header is."""
         message: Any = self
         if message.header is None:
-            message.header = message._schema[0][1]()
+            default = msgspec.StructMeta.__call__(type(self))
+            for name in self.__struct_fields__:
+                if getattr(self, name) is None:
+                    setattr(self, name, getattr(default, name))
 
 
 class Renamed(Stamped, metaclass=_TakesRos1Names):

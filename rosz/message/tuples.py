@@ -2,7 +2,7 @@
 
 `decoder` and `ros1_decoder` return generated decoders that make tuples where the native ones make
 arrays. A tuple needs an object for each number, so a long sequence becomes a `LongTuple`: an array
-that behaves as a tuple.
+that behaves as a tuple. A ``byte`` becomes what it is in ROS 1, a signed number.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from struct import Struct, calcsize
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
-from rosz.message.schema import ARRAY_CODES, slots
+from rosz.message.schema import ARRAY_CODES, Slot, slots
 
 __all__ = ("LONGEST_TUPLE", "LongTuple", "decoder", "ros1_decoder")
 
@@ -160,13 +160,14 @@ _EXPLAIN = "_explain", "plain"
 @cache
 def decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
     """Return the decoder of CDR of a message class that makes tuples."""
-    return _with_tuples(message_type._decode)
+    return _with_signs(message_type, _with_tuples(message_type._decode))
 
 
 @cache
 def ros1_decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
     """Return the decoder of ROS 1's byte layout of a message class that makes tuples."""
-    return _with_tuples(message_type._decode_ros1)  # noqa: SLF001  # rosz's
+    decode = _with_tuples(message_type._decode_ros1)  # noqa: SLF001  # rosz's
+    return _with_signs(message_type, decode)
 
 
 def _with_tuples(plain: Any) -> Callable[[bytes], Any]:
@@ -187,6 +188,62 @@ def _with_tuples(plain: Any) -> Callable[[bytes], Any]:
 
     instead = {**_INSTEAD, **dict.fromkeys(_EXPLAIN, decode_plainly)}
     return FunctionType(plain.__code__, {**names, **instead}, plain.__name__)
+
+
+def _with_signs(cls: Any, decode: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
+    """Return a decoder that also gives the bytes of a message their signs."""
+    sign = _signer(cls)
+    if sign is None:
+        return decode
+
+    def decode_signed(data: bytes) -> Any:
+        message = decode(data)
+        sign(message)
+        return message
+
+    return decode_signed
+
+
+@cache
+def _signer(cls: Any) -> Callable[[Any], None] | None:
+    """Return a function that sets each ``byte`` of a message to what it is in ROS 1, an int8.
+
+    None for a class that has none.
+    """
+    changes = [(slot.name, change) for slot in slots(cls) if (change := _signed(slot)) is not None]
+    if not changes:
+        return None
+
+    def sign(message: Any) -> None:
+        for name, change in changes:
+            setattr(message, name, change(getattr(message, name)))
+
+    return sign
+
+
+def _signed(slot: Slot) -> Callable[[Any], Any] | None:
+    """Return what makes the signed value of a field, or None if the value has no ``byte``."""
+    if slot.kind == "byte":
+        return _sign_one if slot.shape == "one" else _sign_many
+    kind: Any = slot.kind
+    sign = None if isinstance(kind, str) else _signer(kind)
+    if sign is None:
+        return None
+
+    def change(value: Any) -> Any:
+        for one in _messages(value):
+            sign(one)
+        return value
+
+    return change
+
+
+def _sign_one(value: int) -> int:
+    return value - 0x100 if value > 0x7F else value  # noqa: PLR2004  # the largest int8
+
+
+def _sign_many(values: bytes) -> Any:
+    return _make("b", values)
 
 
 def _convert(message: Any) -> None:

@@ -1,7 +1,4 @@
-"""genpy: messages, times and durations as generated ROS 1 code uses them (ROS wiki, genpy).
-
-``genpy.dynamic`` is missing: rosz compiles definitions with ``rosz.typestore``.
-"""
+"""genpy: messages, times and durations as generated ROS 1 code uses them (ROS wiki, genpy)."""
 
 from __future__ import annotations
 
@@ -14,11 +11,13 @@ from rosz.errors import DecodeError as DeserializationError
 from rosz.errors import DefinitionError, TypeNotFound
 from rosz.errors import EncodeError as SerializationError
 from rosz.errors import MessageError as MessageException
+from rosz.idl import full_name, split_definitions
 from rosz.message import Message
-from rosz.msgs.builtin_interfaces.msg import Duration, Time
+from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
+from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
+from rosz.names import short_type
 from rosz.ros1.importer import type_store
-from rosz.time import DurationValue, StampValue, TimeValue
-from rosz.time import StampValue as TVal
+from rosz.time import ClassicConstructor, DurationValue, StampValue, TimeValue
 
 __all__ = (
     "DeserializationError",
@@ -28,17 +27,69 @@ __all__ = (
     "SerializationError",
     "TVal",
     "Time",
+    "dynamic",
     "message",
     "rostime",
 )
 
-message: ModuleType  # built by the importer, as the next one
+dynamic: ModuleType  # built by the importer, as the next two
+message: ModuleType
 rostime: ModuleType
 
 _SIGNED = {"byte": 8, "int8": 8, "int16": 16, "int32": 32, "int64": 64}
 _UNSIGNED = {"char": 8, "uint8": 8, "uint16": 16, "uint32": 32, "uint64": 64}
 _FLOATS = frozenset({"float32", "float64"})
 _HEADERS = frozenset({"Header", "std_msgs/Header", "roslib/Header"})
+
+
+class _Stamps(ClassicConstructor):
+    """Metaclass of classes whose instances are all times, or durations, of messages too."""
+
+    def __instancecheck__(self, instance: object) -> bool:
+        return isinstance(instance, self.__mro__[1])
+
+
+class TVal(StampValue, Message, metaclass=_Stamps):
+    """Seconds and nanoseconds: the base of times and durations."""
+
+    sec: int = 0
+    nanosec: int = 0
+
+    def _comparable(self, other: object) -> int | None:
+        return other.to_nsec() if type(other) is type(self) else None
+
+    def __repr__(self) -> str:
+        return f"genpy.TVal[{self.to_nsec()}]"
+
+
+class Time(TimeMessage, metaclass=_Stamps):
+    """A point in time: ``Time(1.5)``, ``Time(1, 500000000)``."""
+
+    def __repr__(self) -> str:
+        return f"genpy.Time[{self.to_nsec()}]"
+
+
+class Duration(DurationMessage, metaclass=_Stamps):
+    """A duration: ``Duration(1.5)``, ``Duration(1, 500000000)``."""
+
+    def __repr__(self) -> str:
+        return f"genpy.Duration[{self.to_nsec()}]"
+
+
+def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
+    """Return the classes of the message types in a text, by name.
+
+    Args:
+        core_type: Name of the first type, such as ``std_msgs/String``.
+        msg_cat: Its definition. Those of the types in it follow, each behind a line of ``=`` and a
+            line ``MSG: package/Name``, as in a connection header.
+
+    Raises:
+        DefinitionError: A definition is not well-formed, or a type in it does not exist.
+    """
+    texts = split_definitions(full_name(core_type, "msg"), msg_cat)
+    find = type_store().message_from_text
+    return {short_type(name): find(name, text, texts) for name, text in texts.items()}
 
 
 class _FieldError(SerializationError):

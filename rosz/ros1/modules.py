@@ -89,8 +89,8 @@ _MESSAGE = {
     "errors": "DeserializationError=DecodeError SerializationError=EncodeError",
     "message": "Message",
     "message.convert": "fill_message_args strify_message",
-    "msgs.builtin_interfaces.msg": "Duration Time",
-    "ros1.genpy": "check_type get_message_class get_printable_message_args get_service_class",
+    "ros1.genpy": "Duration Time check_type get_message_class get_printable_message_args"
+    " get_service_class",
 }
 
 SUBMODULES: Mapping[str, Mapping[str, str]] = {
@@ -104,6 +104,7 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         " DynamicReconfigureException DynamicReconfigureParameterException"
     },
     "genmsg.names": {"ros1.genmsg": f"PRN_SEPARATOR normalize_package_context {_NAMES}"},
+    "genpy.dynamic": {"ros1.genpy": "generate_dynamic"},
     "genpy.message": {
         **_MESSAGE,
         "ros1.genpy": f"MessageException is_simple {_MESSAGE['ros1.genpy']}",

@@ -78,12 +78,17 @@ def get_master_uri(
     Args:
         env: Environment variables; those of the process when not given.
         argv: Command line; that of the process when not given.
+
+    Raises:
+        ValueError: ``__master:=`` has no value.
     """
     given = find_option("__master:=", argv)
     if given is not None:
-        return given or None
+        if not given:
+            raise ValueError("'__master:=' has no value: expected a URI behind it")
+        return given
     variables = os.environ if env is None else env
-    return variables.get(ROS_MASTER_URI) or DEFAULT_MASTER_URI
+    return variables.get(ROS_MASTER_URI, DEFAULT_MASTER_URI)
 
 
 def get_ros_namespace(

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 
 from rosz.errors import EncodeError
 from rosz.message import Message, Writable
+from rosz.ros1.exceptions import ROSException
 from rosz.time import DurationValue, TimeValue
 
 __all__ = ("AnyMsg", "args_kwds_to_message", "encode", "in_words_of_genpy", "to_ros1_log")
@@ -18,8 +19,8 @@ class AnyMsg:
     """A message of any type, not decoded.
 
     Attributes:
-        _buff: Bytes of the message in ROS 1's layout. A received message is converted when they are
-            asked for; reading them raises TypeNotFound where the type is not known here.
+        _buff: Bytes of the message in ROS 1's layout, or None. A received message is converted when
+            they are asked for; reading them raises TypeNotFound where the type is not known here.
         _connection_header: ``type``, ``md5sum``, ``message_definition``, ``topic``, ``callerid``.
     """
 
@@ -31,8 +32,8 @@ class AnyMsg:
 
     def __init__(self, *args: object) -> None:
         if args:
-            raise TypeError(f"AnyMsg takes no values, got {len(args)}")
-        self._bytes: bytes | None = b""
+            raise ROSException("AnyMsg does not accept arguments")
+        self._bytes: bytes | None = None
         self._payload: Any = None
         self._find_type: Any = None
         self._connection_header: dict[str, str] = {}
@@ -54,8 +55,8 @@ class AnyMsg:
         return message
 
     @property
-    def _buff(self) -> bytes:
-        if self._bytes is None:
+    def _buff(self) -> bytes | None:
+        if self._bytes is None and self._payload is not None:
             kind = self._find_type(self._connection_header["type"])
             self._bytes = kind.from_cdr(self._payload).to_ros1()
         return self._bytes
@@ -69,12 +70,23 @@ class AnyMsg:
 
         Raises:
             DecodeError: The bytes are not a message of this type.
+            ROSException: There are no bytes.
         """
-        return self._payload if self._payload is not None else kind.from_ros1(self._buff).to_cdr()
+        return self._payload if self._payload is not None else kind.from_ros1(self._ros1()).to_cdr()
+
+    def _ros1(self) -> bytes:
+        data = self._buff
+        if data is None:
+            raise ROSException("AnyMsg is not initialized")
+        return data
 
     def serialize(self, buff: Writable) -> None:
-        """Write the bytes to a file-like object."""
-        buff.write(self._buff)
+        """Write the bytes to a file-like object.
+
+        Raises:
+            ROSException: There are no bytes.
+        """
+        buff.write(self._ros1())
 
     def deserialize(self, data: bytes) -> Self:
         """Set the bytes."""

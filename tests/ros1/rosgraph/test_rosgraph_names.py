@@ -67,7 +67,9 @@ def test_command_lines() -> None:
             names.get_ros_namespace({{}}, []),
             rosgraph.get_master_uri({{}}, ["__master:=http://x:1"]),
             rosgraph.get_master_uri({{"ROS_MASTER_URI": "http://y:2"}}, []),
+            rosgraph.get_master_uri({{"ROS_MASTER_URI": ""}}, []),
             rosgraph.get_master_uri({{}}, []),
+            tried(rosgraph.get_master_uri, {{}}, ["__master:="]),
         ]
         """)
 

@@ -48,3 +48,46 @@ def test_programs_derive_classes(printed: Printed) -> None:
         "expected at most 5 values, got 6",
         "hot",
     ]
+
+
+def test_empty_messages_are_those_of_rospy(printed: Printed) -> None:
+    assert printed("""
+        import io
+        import rospy
+        from geometry_msgs.msg import PoseStamped
+        from std_msgs.msg import String
+
+        rospy.Message().serialize(io.BytesIO())
+        out = io.BytesIO()
+        String("kept").serialize(out)
+        print(String().deserialize(out.getvalue()).data)
+        print(PoseStamped(None, None).pose.position.x)
+        for use in (lambda: rospy.AnyMsg().serialize(out), lambda: rospy.AnyMsg(1)):
+            try:
+                use()
+            except rospy.ROSException as error:
+                print(error)
+        print(rospy.AnyMsg()._buff)
+        """) == [
+        "kept",
+        "0.0",
+        "AnyMsg is not initialized",
+        "AnyMsg does not accept arguments",
+        "None",
+    ]
+
+
+def test_bytes_are_signed(printed: Printed) -> None:
+    assert printed("""
+        import rospy
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+        from std_msgs.msg import ByteMultiArray
+
+        rospy.init_node("signed")
+        out = rospy.Publisher("levels", DiagnosticArray, queue_size=1, latch=True)
+        out.publish(DiagnosticArray(status=[DiagnosticStatus(level=-127)]))
+        print(rospy.wait_for_message("levels", DiagnosticArray, 10).status[0].level)
+        out = rospy.Publisher("many", ByteMultiArray, queue_size=1, latch=True)
+        out.publish(ByteMultiArray(data=[-1, 2]))
+        print(rospy.wait_for_message("many", ByteMultiArray, 10).data)
+        """) == ["-127", "(-1, 2)"]
