@@ -5,9 +5,10 @@ tuples, sets, dicts, f-strings, and call the functions and methods listed here; 
 refused by name. Names are looked up in roslaunch's order: the functions of launch files and of
 `math`, the args of the file, then those functions of Python that only compute.
 
-An expression may be untrusted. It has no loops, so the number of its operations is limited
-by its length. The total size of all values is limited too: each value is charged when it is
-computed, and the operations whose result may be huge are charged before they run.
+An expression may be untrusted. Its only loops are those of functions that call another one, such
+as `map`, and each of their steps is charged, so the number of its operations is limited. The total
+size of all values is limited too: each value is charged when it is computed, and the operations
+whose result may be huge are charged before they run.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ _WIDE = re.compile(r"\d{5,}")
 _WIDE_PERCENT = re.compile(r"%(\([^)]*\))?[^a-zA-Z%]*?(\d{5,}|\*)")
 
 _VALUES = (bool, int, float, complex, str, list, tuple, dict, set, range, type(None))
-_ITERATORS = (enumerate, reversed, zip, KeysView, ValuesView, ItemsView)
+_ITERATORS = (enumerate, filter, map, reversed, zip, KeysView, ValuesView, ItemsView)
 
 _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -94,9 +95,9 @@ _MATH: Mapping[str, Any] = {
 _BUILTINS: Mapping[str, Callable[..., Any]] = {
     function.__name__: function
     for function in (
-        *(abs, all, any, bin, bool, chr, dict, divmod, enumerate, float, format, hex, int, len),
-        *(list, max, min, oct, ord, range, repr, reversed, round, set, sorted, str, sum, tuple),
-        zip,
+        *(abs, all, any, bin, bool, chr, dict, divmod, enumerate, filter, float, format, hex, int),
+        *(len, list, map, max, min, oct, ord, range, repr, reversed, round, set, sorted, str, sum),
+        *(tuple, zip),
     )
 }
 
@@ -316,11 +317,34 @@ class _Evaluation:
     def _call(self, node: ast.Call, name: str, function: Any, *owner: Any) -> Any:
         if not callable(function):
             raise _Refused(f"{function!r} is not a function")
-        args = [*owner, *(self.value(arg) for arg in node.args)]
+        taken = node.args[:1] if function in (filter, map) else ()
+        args = [
+            *owner,
+            *(self._function(arg) if arg in taken else self.value(arg) for arg in node.args),
+        ]
         if any(keyword.arg is None for keyword in node.keywords):
             raise _Refused("'**' is not available in expressions")
-        kwargs = {str(keyword.arg): self.value(keyword.value) for keyword in node.keywords}
+        kwargs = {
+            str(one.arg): self._function(one.value)
+            if one.arg == "key" and function in (max, min, sorted)
+            else self.value(one.value)
+            for one in node.keywords
+        }
         return self._run(name, function, *args, **kwargs)
+
+    def _function(self, node: ast.expr) -> Any:
+        """Return the function that another one gets as an argument, within the limits."""
+        if not isinstance(node, ast.Name):
+            return self.value(node)
+        name = node.id
+        try:
+            function = self._name(name)
+        except _Refused:
+            self.column = node.col_offset
+            raise
+        if not callable(function):
+            return self.value(node)
+        return lambda *args: self._charged(self._run(name, function, *args))
 
     def _run(self, name: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
         """Run an operation, a function or a method within the limits."""

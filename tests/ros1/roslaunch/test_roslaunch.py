@@ -72,6 +72,7 @@ from roslaunch.loader import convert_value
 from roslaunch.substitution_args import resolve_args
 context = {"arg": {"a": "1"}}
 texts = ["$(arg a)/x", "$(optenv NO_SUCH b c)", "$(eval 1 + arg('a'))", "$(arg b)", "$(find)", "x",
+         "$(eval ''.join(map(str, [4,2])))", "$(eval sorted(['bb', arg('a')], key=str))",
          "$(dirname)", "$(env NO_SUCH)", ""]
 pairs = [("1", "auto"), ("1.5", "auto"), ("true", "auto"), ("1", "bool"), ("x", "int"),
          ("1", "double"), ("[1, a]", "yaml"), ("2", "str"), ("maybe", "bool"), ("1", "odd")]
