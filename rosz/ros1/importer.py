@@ -38,6 +38,7 @@ from rosz.ros1.modules import (
     explain_missing,
     submodule,
 )
+from rosz.ros1.star_import import add_names
 from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
 
 if TYPE_CHECKING:
@@ -255,11 +256,11 @@ class _FrontFinder(MetaPathFinder):
             return None
         if not inner:
             if package in self._shipped:
-                return _alias(name, lambda: self.types.shipped(package, kind))
+                return _alias(name, lambda: add_names(self.types.shipped(package, kind)))
             generated = PathFinder.find_spec(name, path)
             if generated is not None and generated.origin and is_generated(generated.origin):
                 return generated
-            return _alias(name, lambda: self.types.store.module(package, kind))
+            return _alias(name, lambda: add_names(self.types.store.module(package, kind)))
         module = import_module(f"{package}.{kind}")
         if not inner.startswith("_") or not hasattr(module, inner[1:]):
             return None

@@ -98,6 +98,33 @@ def test_shipped_packages(tmp_path: Path) -> None:
     ]
 
 
+def test_all_names_of_a_package(tmp_path: Path, workspace: Path) -> None:
+    code = """
+        import rosz.ros1
+        def names(module):
+            bound = {}
+            exec(f"from {module} import *", bound)
+            return [name for name in sorted(bound) if not name.startswith("_")]
+        print(*names("std_srvs.srv"))
+        print(*names("sensor_msgs.srv"))
+        print(*[name for name in names("trajectory_msgs.msg") if name.islower()])
+        print(*names("gripper.srv"))
+        from nav_msgs.msg import *
+        assert geometry_msgs.msg.Point().x == 0.0
+        assert genpy.Time(1.5).nsecs == 500000000
+        assert sys.argv and struct.calcsize("<d") == 8
+        """
+    ours = "codecs genpy"
+    assert run(code, tmp_path, ROSZ_PACKAGE_PATH=str(workspace)).splitlines() == [
+        "Empty EmptyRequest EmptyResponse SetBool SetBoolRequest SetBoolResponse"
+        f" Trigger TriggerRequest TriggerResponse {ours} python3 struct sys",
+        "SetCameraInfo SetCameraInfoRequest SetCameraInfoResponse"
+        f" {ours} python3 sensor_msgs std_msgs struct sys",
+        f"{ours} geometry_msgs python3 std_msgs struct sys trajectory_msgs",
+        f"Do DoRequest DoResponse {ours} python3 struct sys",
+    ]
+
+
 def test_modules_by_all_their_names(tmp_path: Path) -> None:
     code = """
         from importlib import import_module
