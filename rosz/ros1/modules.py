@@ -158,6 +158,12 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "roslib.manifest": {
         "ros1.rospkg": "MANIFEST_FILE Manifest InvalidManifest parse_file=read_manifest"
     },
+    "roslib.msgs": {
+        "ros1.msg_types": "BUILTIN_TYPES COMMENTCHAR CONSTCHAR DURATION EXT MsgSpecException"
+        " PRIMITIVE_TYPES RESERVED_TYPES TIME base_msg_type is_builtin is_header_type"
+        " is_valid_constant_type is_valid_msg_field_name is_valid_msg_type parse_type resolve_type",
+        "ros1.genmsg": "HEADER SEP",
+    },
     "roslib.network": {
         "ros1.rosgraph.network": "ROSHandshakeException create_local_xmlrpc_uri"
         " decode_ros_handshake_header encode_ros_handshake_header get_address_override"

@@ -57,7 +57,24 @@ result = [
 ]
 """
 
+ROSLIB_MSGS = """
+from roslib import msgs
+types = ["String", "String[]", "a/B", "a/B[3]", "Header", "std_msgs/Header", "roslib/Header[]", "",
+         "uint8[]", "time", "int32[x]", "int32[3", "int32[1][2]", "int32[][]", "int32]", " int32",
+         "1a", "a/b/c", "_x", "char", "a[", "a[-1]", "duration[]"]
+result = [
+    [[tried(one, type_) for type_ in types] for one in (
+        msgs.base_msg_type, msgs.parse_type, msgs.is_valid_msg_type, msgs.is_valid_constant_type,
+        msgs.is_valid_msg_field_name, msgs.is_builtin, msgs.is_header_type)],
+    [msgs.resolve_type(type_, "p") for type_ in types], msgs.base_msg_type(None),
+    msgs.PRIMITIVE_TYPES, msgs.BUILTIN_TYPES, msgs.RESERVED_TYPES, msgs.EXT, msgs.SEP,
+    msgs.CONSTCHAR, msgs.COMMENTCHAR, msgs.HEADER, msgs.TIME, msgs.DURATION,
+]
+"""
 
-@pytest.mark.parametrize("snippet", [ROSGRAPH, ROSLIB], ids=["rosgraph", "roslib"])
+
+@pytest.mark.parametrize(
+    "snippet", [ROSGRAPH, ROSLIB, ROSLIB_MSGS], ids=["rosgraph", "roslib", "msgs"]
+)
 def test_they_are_as_in_ros_1(snippet: str) -> None:
     same(snippet, "roslib", "python3-roslib, python3-rosgraph")
