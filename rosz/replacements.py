@@ -96,11 +96,9 @@ _ALIASES = {
 
 _MODULES = {
     "moveit_commander": "it needs MoveIt, which is C++; " + _of_ros2("moveit_py"),
-    "PyKDL": "use tf.transformations: pip install 'rosz[numpy]'",
     "catkin": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
     "launch": _LAUNCH,
     "launch_ros": _LAUNCH,
-    "tf2_kdl": "it needs PyKDL, which pip cannot install; tf2_geometry_msgs transforms messages",
     "xacro": "run: pip install 'rosz[xacro]'",
 }
 

@@ -25,6 +25,7 @@ __all__ = (
 )
 
 MODULES = (
+    "PyKDL",
     "actionlib",
     "bondpy",
     "cv_bridge",
@@ -57,6 +58,7 @@ MODULES = (
     "smclib",
     "tf",
     "tf2_geometry_msgs",
+    "tf2_kdl",
     "tf2_py",
     "tf2_ros",
     "tf2_sensor_msgs",

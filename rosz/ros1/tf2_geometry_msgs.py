@@ -1,7 +1,4 @@
-"""tf2_geometry_msgs: transformed points, poses, vectors and wrenches (ROS wiki).
-
-The types of PyKDL are missing.
-"""
+"""tf2_geometry_msgs: transformed points, poses, vectors and wrenches (ROS wiki)."""
 
 from __future__ import annotations
 
@@ -19,6 +16,7 @@ from rosz.msgs.geometry_msgs.msg import (
     Wrench,
     WrenchStamped,
 )
+from rosz.ros1.PyKDL import Frame, Rotation, Vector
 from rosz.transforms import Pose as Plain
 from rosz.transforms import compose, pose_of, rotate
 
@@ -28,7 +26,26 @@ __all__ = (
     "do_transform_pose",
     "do_transform_vector3",
     "do_transform_wrench",
+    "from_msg_msg",
+    "to_msg_msg",
+    "transform_to_kdl",
 )
+
+
+def to_msg_msg(msg: Any) -> Any:
+    """Return a message, which needs no conversion."""
+    return msg
+
+
+def from_msg_msg(msg: Any) -> Any:
+    """Return a message, which needs no conversion."""
+    return msg
+
+
+def transform_to_kdl(t: Any) -> Frame:
+    """Return a TransformStamped as a frame of PyKDL."""
+    p, q = t.transform.translation, t.transform.rotation
+    return Frame(Rotation.Quaternion(q.x, q.y, q.z, q.w), Vector(p.x, p.y, p.z))
 
 
 def do_transform_point(point: PointStamped, transform: Any) -> PointStamped:

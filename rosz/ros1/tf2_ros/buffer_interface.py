@@ -10,7 +10,7 @@ from typing import Any
 
 from rosz.msgs.geometry_msgs.msg import PointStamped, PoseStamped, TransformStamped, Vector3Stamped
 from rosz.msgs.std_msgs.msg import Header
-from rosz.ros1.tf2_geometry_msgs import TRANSFORMATIONS
+from rosz.ros1.tf2_geometry_msgs import TRANSFORMATIONS, from_msg_msg, to_msg_msg
 
 __all__ = (
     "BufferInterface",
@@ -149,8 +149,8 @@ def convert(a: Any, b_type: type[Any]) -> Any:
 for _kind, _function in TRANSFORMATIONS.items():
     _transforms.add(_kind, _function)
 for _message in PointStamped, PoseStamped, Vector3Stamped:
-    _to_msg.add(_message, lambda message: message)
-    _from_msg.add(_message, lambda message: message)
+    _to_msg.add(_message, to_msg_msg)
+    _from_msg.add(_message, from_msg_msg)
 
 
 class BufferInterface:
