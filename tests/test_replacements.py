@@ -99,14 +99,16 @@ def test_a_module(network: Network, name: str) -> None:
 
 
 def test_a_package_of_the_user_with_such_a_name_is_imported(network: Network) -> None:
-    folder = network.folder / "src" / "PyKDL" / "src" / "PyKDL"
+    folder = network.folder / "src" / "moveit_commander" / "src" / "moveit_commander"
     folder.mkdir(parents=True)
-    (folder.parents[1] / "package.xml").write_text("<package><name>PyKDL</name></package>")
+    (folder.parents[1] / "package.xml").write_text(
+        "<package><name>moveit_commander</name></package>"
+    )
     (folder / "__init__.py").write_text("OWN = True\n")
     (folder.parents[1] / "msg").mkdir()
     (folder.parents[1] / "msg" / "A.msg").write_text("int8 a\n")
     program = network.program(
-        "import rosz.ros1; import PyKDL; print(PyKDL.OWN)",
+        "import rosz.ros1; import moveit_commander; print(moveit_commander.OWN)",
         ROSZ_PACKAGE_PATH=str(network.folder / "src"),
     )
     assert (program.exit_code(), program.lines) == (0, ["True"])

@@ -44,7 +44,9 @@ _TABLE = {
     "tf2_py": "",
     "tf2_geometry_msgs": "",
     "tf2_sensor_msgs": "",
-    "tf_conversions": "",
+    "PyKDL": "",
+    "tf_conversions": "posemath",
+    "tf2_kdl": "",
     "dynamic_reconfigure": "client encoding exceptions parameter_generator "
     "parameter_generator_catkin server",
     "rostest": "",

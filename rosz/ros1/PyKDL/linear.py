@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Self
 
-from rosz.ros1.PyKDL.values import EPSILON, Linear, checked, number
+from rosz.ros1.PyKDL.values import EPSILON, Linear, checked, number, over
 
 __all__ = ("Twist", "Vector", "Wrench")
 
@@ -72,9 +72,14 @@ class Vector(Linear):
     def Norm(self, eps: float = EPSILON) -> float:
         """Return the length; 0 if the largest number is the first one and below ``eps``."""
         x, y, z = map(abs, self.numbers)
-        if x >= y and x >= z and x < eps:
-            return 0.0
-        return math.hypot(x, y, z)
+        if x >= y and x >= z:
+            if x < eps:
+                return 0.0
+            largest, others = x, (y, z)
+        else:
+            largest, others = (y, (x, z)) if y > z else (z, (x, y))
+        a, b = (over(one, largest) for one in others)
+        return largest * math.sqrt(1 + a * a + b * b)
 
     def Normalize(self, eps: float = EPSILON) -> float:
         """Give the vector the length 1, and return what it was.

@@ -188,7 +188,7 @@ class Rotation(Value):
     def GetRPY(self) -> tuple[float, float, float]:
         """Return roll, pitch and yaw, as `RPY` takes them."""
         m = self.numbers
-        pitch = math.atan2(-m[6], math.hypot(m[0], m[3]))
+        pitch = math.atan2(-m[6], math.sqrt(m[0] * m[0] + m[3] * m[3]))
         if abs(pitch) > math.pi / 2 - NEARLY_ZERO:
             return 0.0, pitch, math.atan2(-m[1], m[4])
         return math.atan2(m[7], m[8]), pitch, math.atan2(m[3], m[0])
@@ -202,7 +202,7 @@ class Rotation(Value):
         """Return the angles about z, y and z, as `EulerZYZ` takes them."""
         m = self.numbers
         if abs(m[8]) <= 1 - NEARLY_ZERO:
-            beta = math.atan2(math.hypot(m[6], m[7]), m[8])
+            beta = math.atan2(math.sqrt(m[6] * m[6] + m[7] * m[7]), m[8])
             return math.atan2(m[5], m[2]), beta, math.atan2(m[7], -m[6])
         if m[8] > 0:
             return math.atan2(m[3], m[0]), 0.0, 0.0
@@ -214,9 +214,9 @@ class Rotation(Value):
         trace = m[0] + m[4] + m[8]
         turned = (m[7] - m[5], m[2] - m[6], m[3] - m[1])
         if trace > NEARLY_ZERO:
-            double = 2 * math.sqrt(trace + 1)
-            x, y, z = (over(one, double) for one in turned)
-            return x, y, z, double / 4
+            scale = 0.5 / math.sqrt(trace + 1)
+            x, y, z = (one * scale for one in turned)
+            return x, y, z, 0.25 / scale
         # The largest of x, y and z comes first, as the others are divided by it.
         if m[0] > m[4] and m[0] > m[8]:
             i, j, k = 0, 1, 2

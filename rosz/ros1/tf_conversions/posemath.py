@@ -40,11 +40,14 @@ __all__ = (
     "fromMatrix",
     "fromMsg",
     "fromTf",
+    "numpy",
     "toMatrix",
     "toMsg",
     "toTf",
     "transformations",
 )
+
+numpy = transformations.numpy
 
 
 def fromTf(tf: tuple[Sequence[float], Sequence[float]]) -> Frame:
@@ -84,7 +87,7 @@ def toMatrix(f: Frame) -> Any:
         UsageError: numpy is not installed.
     """
     rows = [[f[row, column] for column in range(4)] for row in range(3)]
-    return transformations.numpy.array([*rows, [0, 0, 0, 1]])
+    return numpy.array([*rows, [0, 0, 0, 1]])
 
 
 def fromCameraParams(cv: Any, rvec: Any, tvec: Any) -> Frame:
@@ -98,7 +101,6 @@ def fromCameraParams(cv: Any, rvec: Any, tvec: Any) -> Frame:
     Raises:
         UsageError: numpy is not installed.
     """
-    numpy = transformations.numpy
     m = numpy.zeros((4, 4), dtype=numpy.float32)
     m[3, 3] = 1.0
     for row in range(3):
