@@ -358,3 +358,15 @@ def test_a_script_with_a_client_of_its_own(network: Network, line: Line, tmp_pat
     assert line.board.receive(TopicInfo.ID_TX_STOP) == b""
     program.exit_code()
     assert "Traceback" not in program.output
+
+
+@pytest.mark.parametrize(
+    ("word", "reason"),
+    [("_baud:=fast", "invalid literal"), ("_tcp_port:=70000", "cannot listen at TCP port 70000")],
+)
+def test_wrong_parameters(network: Network, word: str, reason: str) -> None:
+    port = "_port:=tcp" if "tcp" in word else "_port:=/dev/nowhere"
+    program = start(network, "rosz", "run", "rosserial_python", "serial_node.py", port, word)
+    assert program.exit_code() == 1
+    assert reason in program.output
+    assert "Traceback" not in program.output

@@ -118,7 +118,7 @@ def _serve(node: Node, words: list[str]) -> None:
         port = int(words[1] if words[1:] else get("~tcp_port", everywhere))
         try:
             server = TcpServer(node, port)
-        except OSError as error:
+        except (OSError, OverflowError) as error:
             sys.exit(f"serial_node: cannot listen at TCP port {port}: {error}")
         server.listen()
         return
