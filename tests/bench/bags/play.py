@@ -1,0 +1,124 @@
+"""How fast ``rosz bag play -i`` plays, beside Debian's rosbag: ``python -m tests.bench.bags.play``.
+
+Both play one bag of 100 000 messages in turn, to nobody and to an unmodified node of rospy. Each
+line is one run: seconds from the start of the program to its end, CPU time, messages received.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from network import Network, Program
+from programs.sides import RealSide, RoszSide
+from ros1.programs.runners import Ros
+
+from rosz.bags import Channel
+from rosz.bags.ros1_form import to_ros1
+from rosz.bags.ros1_writer import Ros1Writer
+from rosz.msgs.geometry_msgs.msg import TransformStamped, Twist
+from rosz.msgs.sensor_msgs.msg import Imu
+from rosz.msgs.tf2_msgs.msg import TFMessage
+from rosz.typestore import TypeStore
+
+COUNT = 33_334
+ROUNDS = 5
+LISTEN = """
+import rospy, sys, time
+from geometry_msgs.msg import Twist
+from sensor_msgs.msg import Imu
+from tf2_msgs.msg import TFMessage
+rospy.init_node("listener")
+found = []
+for name, kind in (("/cmd_vel", Twist), ("/imu", Imu), ("/tf", TFMessage)):
+    rospy.Subscriber(name, kind, lambda message: found.append(1))
+print("ready", flush=True)
+sys.stdin.readline()
+last = -1
+while last != len(found):
+    last = len(found)
+    time.sleep(1)
+print(len(found), flush=True)
+"""
+
+
+def make(path: Path) -> None:
+    """Write the bag."""
+    imu = Imu()
+    imu.header.frame_id = "base_link"
+    frame = TransformStamped(child_frame_id="base_link")
+    frame.header.frame_id = "odom"
+    messages = {"/cmd_vel": Twist(), "/imu": imu, "/tf": TFMessage([frame])}
+    with Ros1Writer(path) as writer:
+        rows = []
+        for topic, message in messages.items():
+            channel, translate = to_ros1(Channel(topic, message._type_name), TypeStore())
+            rows.append((writer.add(channel), translate(message.to_cdr(), 0)))
+        for number in range(COUNT):
+            for handle, data in rows:
+                writer.write(handle, 10**18 + number * 1_000_000, data)
+
+
+def play(side: RealSide | RoszSide, bag: Path, *, heard: bool) -> dict[str, Any]:
+    """Play the bag once."""
+    script = bag.with_name("listen.py")
+    script.write_text(LISTEN)
+    listener = Program([*side.script(), str(script)], side.variables) if heard else None
+    if isinstance(side, RealSide):
+        command = ["/usr/lib/rosbag/play"]
+    else:
+        command = [sys.executable, "-m", "rosz", "bag", "play"]
+    try:
+        if listener is not None:
+            listener.wait_for("ready")
+            time.sleep(1)
+        before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+        words = [*command, "-q", "-i", str(bag)]
+        subprocess.run(words, env=side.variables, check=True, stdout=subprocess.DEVNULL)
+        elapsed, after = time.monotonic() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
+        received = 0
+        if listener is not None:
+            listener.say("")
+            listener.exit_code()
+            received = int(listener.lines[-1])
+    finally:
+        if listener is not None:
+            listener.close()
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {
+        "system": type(side).__name__,
+        "subscriber": heard,
+        "seconds": round(elapsed, 2),
+        "CPU seconds": round(used, 2),
+        "received": received,
+        "of": 3 * COUNT,
+        "load": round(os.getloadavg()[0], 1),
+    }
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory(prefix="rosz-bench-") as folder:
+        bag = Path(folder) / "x.bag"
+        make(bag)
+        network, ros = Network(173), Ros(Path(folder))
+        try:
+            for heard in (False, True):
+                for _ in range(ROUNDS):
+                    for side in (RoszSide(network), RealSide(ros)):
+                        print(json.dumps(play(side, bag, heard=heard)), flush=True)
+        finally:
+            ros.close()
+            network.close()
+
+
+if __name__ == "__main__":
+    main()
