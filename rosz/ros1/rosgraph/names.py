@@ -80,12 +80,12 @@ def get_master_uri(
         argv: Command line; that of the process when not given.
 
     Raises:
-        ValueError: ``__master:=`` has no value.
+        ValueError: ``__master:=`` has no value, or more than one.
     """
     given = find_option("__master:=", argv)
     if given is not None:
-        if not given:
-            raise ValueError("'__master:=' has no value: expected a URI behind it")
+        if not given or ":=" in given:
+            raise ValueError(f"expected one URI behind '__master:=', got '{given}'")
         return given
     variables = os.environ if env is None else env
     return variables.get(ROS_MASTER_URI, DEFAULT_MASTER_URI)

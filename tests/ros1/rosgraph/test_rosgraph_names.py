@@ -70,6 +70,7 @@ def test_command_lines() -> None:
             rosgraph.get_master_uri({{"ROS_MASTER_URI": ""}}, []),
             rosgraph.get_master_uri({{}}, []),
             tried(rosgraph.get_master_uri, {{}}, ["__master:="]),
+            tried(rosgraph.get_master_uri, {{}}, ["__master:=http://x:=1"]),
         ]
         """)
 
