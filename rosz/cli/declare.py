@@ -36,6 +36,7 @@ __all__ = (
     "Option",
     "Parameter",
     "at_least",
+    "no_less_than_zero",
     "per_second",
     "seconds",
     "values_last",
@@ -44,6 +45,7 @@ __all__ = (
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _MOST = 1_000_000_000
 _LONGEST = 1e9
+_LATEST = 1e10
 """Thirty years. A longer time is a mistake, and more than some system clocks can hold."""
 
 
@@ -234,6 +236,12 @@ def seconds(option: str, value: float) -> float:
     if not 0 < value <= _LONGEST:
         raise UsageError(f"{option} is {value:g}; expected seconds above 0, at most {_LONGEST:g}")
     return value
+
+
+def no_less_than_zero(option: str, value: float | None) -> None:
+    """Check that a time in seconds, if one is given, is in its bounds."""
+    if value is not None and not 0 <= value <= _LATEST:
+        raise UsageError(f"{option} is {value:g}; expected 0 or more seconds, at most {_LATEST:g}")
 
 
 def per_second(option: str, value: float | None) -> None:

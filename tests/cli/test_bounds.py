@@ -12,6 +12,8 @@ from rosz.cli.typer_app import run as run_typer
 from rosz.errors import UsageError
 
 COUNTS = ["0", "-1", "2000000000"]
+LIMITS = ["-1", "2000000000"]
+"""Of numbers whose zero means that there is no limit."""
 TIMES = ["0", "-1", "nan", "inf", "1e300"]
 LINES = {
     "core --owner {}": ["-1", "2000000000"],
@@ -39,6 +41,28 @@ LINES = {
     "keys init --days {} keys": COUNTS,
     "keys add --days {} robot": COUNTS,
     "doctor --wait {}": TIMES[1:],
+    "bag record --size {} /a": LIMITS,
+    "bag record --max-splits {} /a": LIMITS,
+    "bag record --buffsize {} /a": LIMITS,
+    "bag record --chunksize {} /a": COUNTS,
+    "bag record --limit {} /a": LIMITS,
+    "bag record --snapshot {} /a": TIMES[1:],
+    "bag play --queue {} a.bag": LIMITS,
+    "bag play --hz {} a.bag": TIMES,
+    "bag play --rate {} a.bag": TIMES,
+    "bag play --start {} a.bag": TIMES[1:],
+    "bag play --delay {} a.bag": TIMES[1:],
+    "bag play --duration {} a.bag": TIMES[1:],
+    "bag play --skip-empty {} a.bag": TIMES[1:],
+    "bag filter --start {} a.bag b.bag": TIMES[1:],
+    "bag filter --end {} a.bag b.bag": TIMES[1:],
+    "bag cat --start {} a.bag": TIMES[1:],
+    "bag cat --end {} a.bag": TIMES[1:],
+    "bag cat -n {} a.bag": COUNTS,
+    "bag export --start {} a.bag b": TIMES[1:],
+    "bag export --end {} a.bag b": TIMES[1:],
+    "bag split --duration {} a.bag": TIMES[1:],
+    "bag split --size {} a.bag": LIMITS,
 }
 
 

@@ -13,6 +13,7 @@ import sys
 import time
 from collections import deque
 from pathlib import Path
+from pwd import getpwuid
 from typing import Any
 
 __all__ = ("main",)
@@ -124,7 +125,7 @@ def main() -> None:
     subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
     environ, home = job["environ"], job["environ"]["HOME"]
     os.chown(home, _NOBODY, _NOBODY)
-    _show_python(Path(sys.base_prefix), Path.home(), Path(job["spare"]))
+    _show_python(Path(sys.base_prefix), Path(getpwuid(os.getuid()).pw_dir), Path(job["spare"]))
     with Path(home, "core.log").open("wb") as log:
         core = subprocess.Popen(job["core"], env=environ, stdout=log, stderr=log, cwd=home)
         begin = time.monotonic()

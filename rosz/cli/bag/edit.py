@@ -13,7 +13,7 @@ from rosz.cli.bag.group import app
 from rosz.cli.bag.play import list_topics
 from rosz.cli.call import Call
 from rosz.cli.console import count, print_error, print_lines, warn
-from rosz.cli.declare import Argument, Json, Option, at_least
+from rosz.cli.declare import Argument, Json, Option, at_least, no_less_than_zero
 from rosz.errors import NotFoundError, UsageError, near_miss
 
 if TYPE_CHECKING:
@@ -94,6 +94,11 @@ def _compression(name: str) -> Compression:
     return name  # type: ignore[return-value]
 
 
+def _check_times(start: float, end: float | None) -> None:
+    no_less_than_zero("--start", start)
+    no_less_than_zero("--end", end)
+
+
 def _check_output(output: str, bags: Sequence[str]) -> None:
     if any(Path(output).resolve() == Path(bag).resolve() for bag in bags):
         raise UsageError(f"'{output}' is both read and written")
@@ -122,6 +127,7 @@ def filter_command(
     from rosz.introspect.fields import Filter
     from rosz.msgs.builtin_interfaces.msg import Time
 
+    _check_times(start, end)
     _check_output(output, [bag])
     condition = Filter(expression) if expression else None
     shown = Filter(show) if show else None
@@ -201,6 +207,7 @@ def split_command(
     """Write a bag as several ones, by time or size."""
     from rosz.bags.editing import divide
 
+    no_less_than_zero("--duration", duration)
     at_least("--size", size, 0, "MB")
     with _open([bag]) as source:
         parts = divide(
@@ -238,6 +245,7 @@ def cat_command(
     from rosz.introspect.echo import EchoOptions
     from rosz.introspect.fields import Filter
 
+    _check_times(start, end)
     at_least("-n", limit, 1, "messages")
     options = EchoOptions(
         plot=plot,
@@ -271,9 +279,10 @@ def export_command(
     end: _End = None,
     json: Annotated[bool, Option("--json", "Write lines of JSON, with all fields.")] = False,
 ) -> int:
-    """Write each topic of a bag into a file of comma-separated numbers, one row per message."""
+    """Write each topic of a bag into a CSV file, one row per message."""
     from rosz.introspect.echo import EchoOptions
 
+    _check_times(start, end)
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     suffix = "jsonl" if json else "csv"

@@ -12,8 +12,8 @@ from rosz.cli import suggest
 from rosz.cli.bag.group import app
 from rosz.cli.call import Call
 from rosz.cli.console import print_error, print_lines, takes_escapes, warn
-from rosz.cli.declare import Argument, Option, at_least, per_second
-from rosz.errors import ClosedError, UsageError
+from rosz.cli.declare import Argument, Option, at_least, no_less_than_zero, per_second
+from rosz.errors import ClosedError
 
 if TYPE_CHECKING:
     from rosz.bags.player import Player, Progress
@@ -106,9 +106,10 @@ def play_command(
     per_second("--rate", rate)
     per_second("--hz", hz)
     at_least("--queue", queue, 0, "messages")
-    for name, value in (("--start", start), ("--delay", delay), ("--duration", duration or 0)):
-        if value < 0:
-            raise UsageError(f"{name} is {value:g}; expected 0 or more seconds")
+    no_less_than_zero("--start", start)
+    no_less_than_zero("--delay", delay)
+    no_less_than_zero("--duration", duration)
+    no_less_than_zero("--skip-empty", skip_empty)
     from rosz.bags import open_reader
     from rosz.bags.player import Player, PlayOptions
     from rosz.node import Node

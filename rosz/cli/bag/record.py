@@ -15,7 +15,7 @@ from rosz.cli import suggest
 from rosz.cli.bag.group import app
 from rosz.cli.call import Call
 from rosz.cli.console import print_error, takes_escapes, until_stopped
-from rosz.cli.declare import Argument, Option, at_least
+from rosz.cli.declare import Argument, Option, at_least, no_less_than_zero
 from rosz.errors import BagError, UsageError
 
 if TYPE_CHECKING:
@@ -104,6 +104,7 @@ def record_command(
     at_least("-b", buffsize, 0, "MB")
     at_least("--chunksize", chunksize, 1, "KB", 1 << 20)
     at_least("-l", limit, 0, "messages")
+    no_less_than_zero("--snapshot", snapshot)
     from rosz.bags.recording import RecordOptions, Selection
 
     compression: Compression = "bz2" if bz2 else "lz4" if lz4 else "zstd" if zstd else "none"
@@ -120,8 +121,6 @@ def record_command(
     )
     if split and not (options.size or options.duration):
         raise UsageError("--split needs a limit: --size or --duration")
-    if snapshot < 0:
-        raise UsageError(f"--snapshot is {snapshot:g}; expected seconds above 0")
     selection = Selection(
         tuple(topics or ()) if regex else tuple(call.resolve(one, _TOOL) for one in topics or ()),
         every=every,

@@ -99,11 +99,16 @@ SCRIPT = """
 import sys, threading, roslaunch, rospy
 uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
 roslaunch.configure_logging(uuid)
+
+def say(*words):
+    # In one piece: lines of the nodes come between the parts of a print.
+    sys.stdout.write(" ".join(map(str, words)) + chr(10))
+
 died = threading.Event()
 
 class Listener(roslaunch.pmon.ProcessListener):
     def process_died(self, name, code):
-        print("died", name, code)
+        say("died", name, code)
         parent.pm.has_process(name)
         died.set()
 
@@ -111,25 +116,25 @@ parent = roslaunch.parent.ROSLaunchParent(
     uuid, [(sys.argv[1], ["name:=bob"])], process_listeners=[Listener()], show_summary=False
 )
 parent.start()
-print("names", parent.pm.get_active_names())
+say("names", parent.pm.get_active_names())
 died.wait(30)
 script = roslaunch.scriptapi.ROSLaunch()
 script.start()
 node = roslaunch.core.Node("rosz_tutorials", "publisher.py", "extra", output="screen")
 process = script.launch(node)
-print("alive", process.is_alive(), process.name)
+say("alive", process.is_alive(), process.name)
 try:
     script.launch(roslaunch.core.Node("rosz_tutorials", "no_such.py", "lost"))
 except roslaunch.RLException as error:
-    print("refused", "no_such.py" in str(error))
+    say("refused", "no_such.py" in str(error))
 rospy.init_node("user")
-print("who", rospy.get_param("/who"))
+say("who", rospy.get_param("/who"))
 rospy.wait_for_message("/numbers", rospy.AnyMsg, 30)
 process.stop()
-print("alive", process.is_alive())
+say("alive", process.is_alive())
 script.stop()
 parent.shutdown()
-print("active", parent.pm.get_active_names())
+say("active", parent.pm.get_active_names())
 """
 LAUNCH = """<launch>
   <arg name="name"/><param name="who" value="$(arg name)"/>
