@@ -37,7 +37,7 @@ class ClientGoal:
     Attributes:
         id: Identification of the goal in messages.
         status: Last known state, with the text of the server.
-        comm_state: How far the exchange with the server is, a constant of `CommState`.
+        comm_state: State of the goal in the client, a constant of `CommState`.
         result: Result of the goal; None while there is none.
         started: Whether the server has begun to execute the goal.
     """

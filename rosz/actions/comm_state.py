@@ -1,4 +1,4 @@
-"""What a client knows of a goal, and how states from the server change it (ROS wiki, actionlib)."""
+"""The state of a goal in a client, and its changes by the server (ROS wiki, actionlib)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ("CommState", "path")
 
 
 class CommState:
-    """How far the exchange with the server about a goal is."""
+    """The states of a goal in a client."""
 
     WAITING_FOR_GOAL_ACK = 0
     PENDING = 1

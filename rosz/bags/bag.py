@@ -159,7 +159,7 @@ class BagReader(Protocol):
 
     @property
     def problems(self) -> Sequence[BagError]:
-        """What was found damaged or missing as the bag was opened."""
+        """The errors that were found when the bag was opened."""
 
     def count(self, channel: Channel | None = None) -> int:
         """Return the number of messages of a channel, or of all."""

@@ -53,7 +53,7 @@ class FilledChunk:
         return max(max(index[::2]) for index in self.index.values())
 
     def add(self, record: bytes) -> None:
-        """Add a record that is no message."""
+        """Add a record of another kind than a message."""
         self.parts.append(record)
         self.size += len(record)
 

@@ -137,7 +137,7 @@ class McapReader:
 
     @property
     def problems(self) -> Sequence[BagError]:
-        """What was found damaged or missing as the bag was opened."""
+        """The errors that were found when the bag was opened."""
         return self._found
 
     def count(self, channel: Channel | None = None) -> int:
@@ -369,7 +369,7 @@ class McapReader:
             return data
         op, length = HEAD.unpack_from(data)
         if op != Op.CHUNK or HEAD.size + length != span.length:
-            raise DamagedRecord("there is no chunk where the index says so")
+            raise DamagedRecord("the index points to a place that has no chunk")
         cursor = Cursor(data)
         cursor.take(HEAD.size)
         _, _, uncompressed, checksum = cursor.fields(_CHUNK_HEAD)

@@ -26,7 +26,7 @@ def class_of(channel: Channel, types: TypeStore) -> type[Message]:
         types: Types for channels without a definition, and for those that are equal to one here.
 
     Raises:
-        TypeNotFound: The bag has no definition, and there is no such type here.
+        TypeNotFound: Neither the bag nor this machine has a definition of the type.
         DefinitionError: The definition is not well-formed.
     """
     if channel.encoding == "ros1" and channel.md5:
@@ -45,8 +45,8 @@ def decoder_of(channel: Channel, types: TypeStore) -> Callable[[Payload], Messag
     """Return the function that makes messages of a channel's payloads.
 
     Raises:
-        TypeNotFound: The bag has no definition, and there is no such type here; or the payloads
-            are neither CDR nor in ROS 1's layout.
+        TypeNotFound: Neither the bag nor this machine has a definition of the type, or the payloads
+            are in neither CDR nor ROS 1's layout.
         DefinitionError: The definition is not well-formed.
     """
     if channel.encoding == "ros1":

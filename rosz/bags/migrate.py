@@ -30,7 +30,7 @@ class MigrationError(DefinitionError):
 
 
 class Conversion(msgspec.Struct, frozen=True):
-    """How messages of a channel become CDR of a type known here.
+    """The conversion of a channel's messages to CDR of a type known here.
 
     Attributes:
         message_type: The class that they have then.
@@ -47,7 +47,7 @@ class Conversion(msgspec.Struct, frozen=True):
 def find_conversion(channel: Channel, types: TypeStore) -> Conversion:
     """Return how messages of a channel are converted.
 
-    If there is no type of the name here, the type in the bag is taken.
+    The type in the bag is used if this machine has no type of that name.
 
     Raises:
         MigrationError: Fields in the bag do not fit those of the type here.

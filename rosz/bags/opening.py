@@ -36,7 +36,7 @@ def find_format(path: str | os.PathLike[str]) -> str:
     """Return the format of a bag: ``mcap``, ``rosbag`` (ROS 1) or ``rosbag2``.
 
     Raises:
-        BagError: The file cannot be read, or is no bag.
+        BagError: The file cannot be read, or is not a bag.
     """
     if Path(path).is_dir():
         return "rosbag2"
@@ -65,7 +65,7 @@ def open_reader(path: str | os.PathLike[str]) -> BagReader:
     """Open a bag of any format.
 
     Raises:
-        BagError: The file cannot be read, or is no bag.
+        BagError: The file cannot be read, or is not a bag.
         UsageError: The library for its compression is not installed.
     """
     kind = find_format(path)
@@ -142,7 +142,7 @@ def open(  # noqa: A001
         types: Types for channels without a definition; those that come with rosz when not given.
 
     Raises:
-        BagError: The file cannot be read or created, or is no bag.
+        BagError: The file cannot be read or created, or is not a bag.
         UsageError: The suffix or the compression is not known.
     """
     if mode == "r":

@@ -126,7 +126,7 @@ class ParameterRecord:
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the values below a name that are no dictionaries, by full name."""
+    """Yield full names and values of all parameters below a name that are not dictionaries."""
     if isinstance(value, dict) and value:
         for key, below in value.items():
             yield from _leaves(f"{name}/{key}", below)

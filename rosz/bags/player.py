@@ -37,7 +37,7 @@ _Item: TypeAlias = "tuple[int, Publisher[Any], bytes]"
 
 
 class PlayOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """How bags are played.
+    """Options for playing bags.
 
     Attributes:
         rate: Seconds of the bag per second.

@@ -355,7 +355,7 @@ class Ros1Reader:
 
     @property
     def problems(self) -> Sequence[BagError]:
-        """What was found damaged or missing as the bag was opened."""
+        """The errors that were found when the bag was opened."""
         return self._damage
 
     @cached_property
