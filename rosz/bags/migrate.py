@@ -15,9 +15,9 @@ import msgspec
 
 from rosz.bags.bag import Channel, Payload
 from rosz.bags.messages import class_of
-from rosz.bags.transcode import compile_transcoder
 from rosz.errors import DefinitionError, RoszError, TypeNotFound
 from rosz.message import ARRAY_CODES, INTEGER_RANGES, OCTETS, Message, Slot, slot_type, slots
+from rosz.message.transcode import compile_transcoder
 from rosz.typestore import TypeStore
 
 __all__ = ("Conversion", "MigrationError", "find_conversion", "find_migration")

@@ -32,7 +32,7 @@ from rosz.message.schema import (
     slots,
 )
 
-PUBLIC_MODULES = ("convert", "runtime", "text", "tuples")
+PUBLIC_MODULES = ("convert", "runtime", "text", "transcode", "tuples")
 
 __all__ = (
     "ARRAY_CODES",

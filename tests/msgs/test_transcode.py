@@ -1,4 +1,4 @@
-"""Messages in ROS 1's layout become the CDR that decoding and encoding makes of them."""
+"""Messages change between ROS 1's layout and CDR as by decoding and encoding them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from collections.abc import Callable
 import pytest
 
 from rosz.bags import Payload
-from rosz.bags.transcode import compile_transcoder
 from rosz.errors import DecodeError
 from rosz.message import Message
+from rosz.message.transcode import compile_from_cdr, compile_transcoder
 from rosz.msgs.nav_msgs.msg import Odometry
 from rosz.msgs.shape_msgs.msg import SolidPrimitive
+from rosz.msgs.std_msgs.msg import Header
 
 from .test_ros1_layout import NAMES, ros1_value
 
@@ -48,3 +49,34 @@ def test_bytes_that_are_cut_are_refused_as_by_decoding() -> None:
     for size in range(len(data)):
         with pytest.raises(DecodeError):
             translate(data[:size])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_cdr_is_translated_as_by_decoding(name: str) -> None:
+    rng = random.Random(name)
+    for _ in range(5):
+        message = ros1_value(name, rng)
+        cls = type(message)
+
+        def plainly(data: bytes, _seq: bytes, cls: type[Message] = cls) -> bytes:
+            return cls.from_cdr(data).to_ros1()
+
+        translate = compile_from_cdr(cls, plainly)
+        data = cls.from_ros1(message.to_ros1()).to_cdr()
+        expected = cls.from_cdr(data).to_ros1()
+        assert translate(data, bytes(4)) == expected
+        assert translate(data + bytes(3), bytes(4)) == expected
+
+
+def test_headers_get_the_sequence_number() -> None:
+    data = Odometry(header=Header(frame_id="map")).to_cdr()
+    translate = compile_from_cdr(Odometry, lambda data, _seq: data)
+    assert Odometry.from_ros1(translate(data, b"\x07\0\0\0")).header.seq == 7
+
+
+def test_cdr_that_is_cut_is_refused_as_by_decoding() -> None:
+    data = ros1_value("nav_msgs/Odometry", random.Random(1)).to_cdr()
+    translate = compile_from_cdr(Odometry, lambda data, _seq: Odometry.from_cdr(data).to_ros1())
+    for size in range(len(data)):
+        with pytest.raises(DecodeError):
+            translate(data[:size], bytes(4))

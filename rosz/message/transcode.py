@@ -1,0 +1,280 @@
+"""From ROS 1's layout to CDR and back, without making messages.
+
+Both layouts have the same fields in the same order. CDR aligns each number to its size, ends
+strings with a zero, and has no sequence number in headers. So most bytes can be copied in runs. The
+function that does it is compiled for each type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from struct import Struct, error
+from typing import Any, TypeAlias
+
+from rosz.message.base import Message
+from rosz.message.ros1_layout import ros1_fields
+from rosz.message.schema import SCALAR_SIZES, Slot, slots
+
+__all__ = ("compile_from_cdr", "compile_transcoder")
+
+_Data: TypeAlias = bytes | bytearray | memoryview
+
+_HEADER = b"\0\1\0\0"
+_LITTLE_ENDIAN = 1
+_PADDING = tuple(bytes(size) for size in range(8))
+_SEQ = "seq"
+
+
+def compile_transcoder(
+    cls: type[Message], plainly: Callable[[_Data], bytes]
+) -> Callable[[_Data], bytes]:
+    """Return the function that makes CDR with its header of messages in ROS 1's layout.
+
+    Bytes behind a message are left out, as genpy ignores them. Text is not checked.
+
+    Args:
+        cls: The class of the messages.
+        plainly: Function that does the same; it is called for bytes that do not fit the type, and
+            is returned for types that are not the same fields in both layouts.
+    """
+    if not _is_alike(cls):
+        return plainly
+    return _compile(_ToCdr(), cls, plainly)
+
+
+def compile_from_cdr(
+    cls: type[Message], plainly: Callable[[bytes, bytes], bytes]
+) -> Callable[[bytes, bytes], bytes]:
+    """Return the function that makes ROS 1's layout of messages in CDR with its header.
+
+    Its second argument is the sequence number for the headers, as four bytes. Text is not checked.
+
+    Args:
+        cls: The class of the messages.
+        plainly: Function that does the same; it is called for bytes that do not fit the type or
+            are big-endian, and is returned for types that are not the same fields in both layouts.
+    """
+    if not _is_alike(cls):
+        return plainly
+    return _compile(_FromCdr(), cls, plainly)
+
+
+def _compile(
+    source: _Source, cls: type[Any], plainly: Callable[..., bytes]
+) -> Callable[..., bytes]:
+    source.message(cls)
+    source.flush()
+    space: dict[str, Any] = {
+        "HEADER": _HEADER,
+        "PAD": _PADDING,
+        "error": error,
+        "length": Struct("<I").unpack_from,
+        "pack": Struct("<I").pack,
+        "plainly": plainly,
+    }
+    exec(source.text(), space)  # noqa: S102  # the text is made of numbers and constant names
+    made: Callable[..., bytes] = space["code"]
+    return made
+
+
+def _is_alike(cls: type[Any]) -> bool:
+    """Return whether a type has fields, the same in both layouts, and none with bounds."""
+    here = ros1_fields(cls)
+    if not here or len(here) != len(slots(cls)) + (here[0].name == _SEQ and cls._sequenced):
+        return False
+    return all(
+        not slot.bound
+        and slot.shape != "bounded"
+        and (
+            slot.kind in SCALAR_SIZES or slot.kind == "string"
+            if isinstance(slot.kind, str)
+            else _is_alike(slot.kind)
+        )
+        for slot in here
+    )
+
+
+class _Source:
+    """Writes the function.
+
+    ``p`` is the position in the data, behind CDR's header. A run is a number of bytes that are
+    copied as they are, since they need no padding within.
+    """
+
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+        self._indent = " " * 8
+        self._alignment = 0
+        self._size = 0
+        self._depth = 0
+
+    def text(self) -> str:
+        """Return the source."""
+        raise NotImplementedError
+
+    def _align(self, size: int) -> None:
+        """Emit the padding before numbers of a size."""
+        raise NotImplementedError
+
+    def _copy(self, size: str) -> None:
+        """Emit the copying of a number of bytes."""
+        raise NotImplementedError
+
+    def _text(self) -> None:
+        """Emit the copying of a string."""
+        raise NotImplementedError
+
+    def _sequence_number(self) -> None:
+        """Emit what becomes of the sequence number of a header."""
+        raise NotImplementedError
+
+    def _emit(self, *lines: str) -> None:
+        self._lines += [self._indent + line for line in lines]
+
+    def _take(self, size: int) -> None:
+        """Add a number to the run, or begin another one where it would need padding."""
+        if self._size and (size > self._alignment or self._size % size):
+            self.flush()
+        if not self._size:
+            self._alignment = size
+        self._size += size
+
+    def flush(self) -> None:
+        """Emit the copying of the run."""
+        if self._size:
+            self._align(self._alignment)
+            self._copy(str(self._size))
+            self._size = 0
+
+    def message(self, cls: type[Any]) -> None:
+        """Copy the fields of a message."""
+        fields = ros1_fields(cls)
+        if fields[0].name == _SEQ and cls._sequenced:
+            self.flush()
+            self._sequence_number()
+            fields = fields[1:]
+        for slot in fields:
+            self._field(slot)
+
+    def _field(self, slot: Slot) -> None:
+        if slot.shape == "one":
+            self._one(slot.kind)
+            return
+        size = SCALAR_SIZES.get(slot.kind, 0) if isinstance(slot.kind, str) else 0
+        if slot.shape == "fixed" and size:
+            for _ in range(slot.size):
+                self._take(size)
+            return
+        count = str(slot.size)
+        if slot.shape == "sequence":
+            self._take(4)
+            self.flush()
+            self._depth += 1
+            count = f"n{self._depth}"
+            self._emit(f"{count}, = length(data, p - 4)")
+        self.flush()
+        if size:
+            self._emit(f"if {count}:")
+            self._indent += "    "
+            self._align(size)
+            self._emit(f"k = {count} * {size}")
+            self._copy("k")
+        else:
+            self._emit(f"if {count} > len(data): raise ValueError", f"for _ in range({count}):")
+            self._indent += "    "
+            self._one(slot.kind)
+            self.flush()
+        self._indent = self._indent[:-4]
+
+    def _one(self, kind: Any) -> None:
+        if not isinstance(kind, str):
+            self.message(kind)
+        elif kind == "string":
+            self.flush()
+            self._text()
+        else:
+            self._take(SCALAR_SIZES[kind])
+
+
+class _ToCdr(_Source):
+    """``o`` is the position in the CDR."""
+
+    def text(self) -> str:
+        return "\n".join(
+            [
+                "def code(data):",
+                "    try:",
+                "        p = o = 0",
+                "        out = [HEADER]",
+                "        add = out.append",
+                *self._lines,
+                "        if p > len(data): raise ValueError",
+                "    except (error, ValueError):",
+                "        return plainly(data)",
+                '    return b"".join(out)',
+            ]
+        )
+
+    def _align(self, size: int) -> None:
+        if size > 1:
+            self._emit(f"k = -o & {size - 1}", "if k: add(PAD[k]); o += k")
+
+    def _copy(self, size: str) -> None:
+        self._emit(f"add(data[p:p + {size}])", f"p += {size}", f"o += {size}")
+
+    def _text(self) -> None:
+        self._align(4)
+        self._emit(
+            "n, = length(data, p)",
+            "p += 4",
+            "add(pack(n + 1))",
+            "add(data[p:p + n])",
+            'add(b"\\0")',
+            "p += n",
+            "o += n + 5",
+        )
+
+    def _sequence_number(self) -> None:
+        self._emit("p += 4")
+
+
+class _FromCdr(_Source):
+    """Writes the function of the other direction."""
+
+    def text(self) -> str:
+        return "\n".join(
+            [
+                "def code(whole, seq):",
+                "    try:",
+                f"        if whole[1] != {_LITTLE_ENDIAN}: raise ValueError",
+                "        data = memoryview(whole)[4:]",
+                "        p = 0",
+                "        out = []",
+                "        add = out.append",
+                *self._lines,
+                "        if p > len(data): raise ValueError",
+                "    except (error, ValueError, IndexError):",
+                "        return plainly(whole, seq)",
+                '    return b"".join(out)',
+            ]
+        )
+
+    def _align(self, size: int) -> None:
+        if size > 1:
+            self._emit(f"p += -p & {size - 1}")
+
+    def _copy(self, size: str) -> None:
+        self._emit(f"add(data[p:p + {size}])", f"p += {size}")
+
+    def _text(self) -> None:
+        self._align(4)
+        self._emit(
+            "n, = length(data, p)",
+            "p += 4",
+            "add(pack(n - 1))",
+            "add(data[p:p + n - 1])",
+            "p += n",
+        )
+
+    def _sequence_number(self) -> None:
+        self._emit("add(seq)")
