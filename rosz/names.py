@@ -151,10 +151,13 @@ def short_type(name: str) -> str:
     """Return a type name without its middle part, as ROS 1 spells it.
 
     ``std_msgs/msg/String`` gives ``std_msgs/String``, ``std_srvs/srv/SetBool_Request`` gives
-    ``std_srvs/SetBoolRequest``.
+    ``std_srvs/SetBoolRequest``. The types of ROS 2's actions, which ROS 1 does not have, keep their
+    names.
     """
     package, _, rest = name.partition("/")
     kind, _, base = rest.rpartition("/")
+    if kind == "action":
+        return name
     if kind == "srv":
         base = re.sub(r"_(Request|Response)$", r"\1", base)
     return f"{package}/{base}"

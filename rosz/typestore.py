@@ -26,25 +26,28 @@ from rosz.idl import (
     Catalog,
     Definition,
     Folders,
+    action_of,
     full_name,
     identity,
+    is_service,
     split_definitions,
 )
 from rosz.idl.cache import SourceCache
-from rosz.idl.generate import MARKER, generate, message_module, service_module, shipped_module
-from rosz.message import Message, Service
+from rosz.idl.generate import MARKER, generate, module_source, shipped_module
+from rosz.message import Action, Message, Service
 from rosz.packages import PackageIndex
 
 __all__ = ("Kind", "TypeStore", "is_generated", "shipped_packages", "shipped_types")
 
-Kind: TypeAlias = Literal["msg", "srv"]
-_KINDS: tuple[Kind, ...] = ("msg", "srv")
+Kind: TypeAlias = Literal["msg", "srv", "action"]
+_KINDS: tuple[Kind, ...] = ("msg", "srv", "action")
+_BASES: dict[Kind, type] = {"msg": Message, "srv": Service, "action": Action}
 
 _BUILT_IN = frozenset(
     {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration", "std_msgs/msg/Header"}
 )
 """Types that ROS 1 writes in another way; their classes are always the shipped ones."""
-_NAME = re.compile(r"([A-Za-z]\w*)/(?:(msg|srv)/)?([A-Za-z]\w*)", re.ASCII)
+_NAME = re.compile(r"([A-Za-z]\w*)/(?:(msg|srv|action)/)?([A-Za-z]\w*)", re.ASCII)
 
 
 class _StaleError(Exception):
@@ -52,7 +55,7 @@ class _StaleError(Exception):
 
 
 class TypeStore:
-    """Message and service classes by name.
+    """Message, service and action classes by name.
 
     Args:
         packages: Index of packages besides those that rosz ships, which come first so that their
@@ -71,7 +74,8 @@ class TypeStore:
         """Return a message class.
 
         Args:
-            name: ``std_msgs/String`` or ``std_msgs/msg/String``.
+            name: ``std_msgs/String`` or ``std_msgs/msg/String``; a message of an action is
+                ``example_interfaces/action/Fibonacci_FeedbackMessage``.
 
         Raises:
             TypeNotFound: There is no such type.
@@ -84,13 +88,27 @@ class TypeStore:
         """Return a service class.
 
         Args:
-            name: ``std_srvs/SetBool`` or ``std_srvs/srv/SetBool``.
+            name: ``std_srvs/SetBool`` or ``std_srvs/srv/SetBool``; a service of an action is
+                ``example_interfaces/action/Fibonacci_SendGoal``.
 
         Raises:
             TypeNotFound: There is no such type.
             DefinitionError: The type or one in it is not well-formed.
         """
         cls: type[Service] = self._class(name, "srv")
+        return cls
+
+    def action(self, name: str) -> type[Action]:
+        """Return an action class.
+
+        Args:
+            name: ``example_interfaces/Fibonacci`` or ``example_interfaces/action/Fibonacci``.
+
+        Raises:
+            TypeNotFound: There is no such type.
+            DefinitionError: The type or one in it is not well-formed.
+        """
+        cls: type[Action] = self._class(name, "action")
         return cls
 
     def message_from_text(
@@ -136,7 +154,7 @@ class TypeStore:
         """Return the names of all types of a kind, as ``std_msgs/String``, sorted.
 
         Args:
-            kind: ``msg`` or ``srv``.
+            kind: ``msg``, ``srv`` or ``action``.
             package: Package that the types belong to; any when not given.
 
         Raises:
@@ -164,7 +182,8 @@ class TypeStore:
         """Return the definition of a type.
 
         Args:
-            name: Full name, ``std_msgs/msg/String`` or ``std_srvs/srv/SetBool``.
+            name: Full name, ``std_msgs/msg/String`` or ``std_srvs/srv/SetBool``, or that of an
+                action or of what ROS 2 makes of it.
 
         Raises:
             TypeNotFound: There is no such type.
@@ -215,13 +234,14 @@ class TypeStore:
             package = rest.pop(0)
             if package in done:
                 continue
-            messages, services = (self._own_names(package, kind) for kind in _KINDS)
+            types: dict[str, list[str]] = {kind: self._own_names(package, kind) for kind in _KINDS}
             if self._folder(package) is None:
                 raise PackageNotFound(package, self.packages(), self._searched())
-            if not messages and not services:
+            if not any(types.values()):
                 raise TypeNotFound(package, f"package '{package}' has no types of its own")
-            done[package] = generate(package, messages, services, self._catalog, self._place)
-            specs = [part for name in messages + services for part in self._catalog.parts(name)]
+            done[package] = generate(package, types, self._catalog, self._place)
+            names = [name for own in types.values() for name in own]
+            specs = [part for name in names for part in self._catalog.parts(name)]
             below = {name for spec in specs for name in self._catalog.below(spec)}
             rest += sorted({name.partition("/")[0] for name in below if not _is_shipped(name)})
         return done
@@ -236,19 +256,25 @@ class TypeStore:
         return [name for name in self._folders.names(package, kind) if not _is_shipped(name)]
 
     def _class(self, name: str, kind: Kind) -> Any:
-        package, _, base = self._check_name(name, kind).split("/")
-        if base in shipped_types(package, kind):
-            return getattr(import_module(shipped_module(f"{package}/{kind}/{base}")), base)
-        if base not in self._bases(package, kind):
-            raise TypeNotFound(name, self._why_not(package, kind, base))
-        return getattr(self.module(package, kind), base)
+        full = self._check_name(name, kind)
+        place: Kind
+        package, place, base = full.split("/")  # type: ignore[assignment]
+        if _is_shipped(full):
+            cls = getattr(import_module(shipped_module(full)), base)
+        elif _file_of(place, base) in self._bases(package, place):
+            cls = getattr(self.module(package, place), base)
+        else:
+            raise TypeNotFound(name, self._why_not(package, place, base))
+        if not issubclass(cls, _BASES[kind]):
+            raise TypeNotFound(name, f"it is not the name of a {kind}")
+        return cls
 
     def _check_name(self, name: str, kind: Kind) -> str:
-        """Return the full name of a type of a kind."""
+        """Return the full name of a type of a kind, or of what is made of an action."""
         match = _NAME.fullmatch(name)
-        if match is None or match[2] not in (None, kind):
+        if match is None or match[2] not in (None, kind, "action"):
             raise TypeNotFound(name, f"expected a name such as 'package/Type' of a {kind}")
-        return f"{match[1]}/{kind}/{match[3]}"
+        return f"{match[1]}/{match[2] or kind}/{match[3]}"
 
     def _why_not(self, package: str, kind: Kind, base: str) -> str:
         bases = self._bases(package, kind)
@@ -314,8 +340,9 @@ class TypeStore:
 
         def missing(base: str) -> Any:
             """Raise the error of a type that the module lacks."""
-            if f"{package}/{kind}/{base}" in names:
-                self._catalog.parts(f"{package}/{kind}/{base}")
+            whole = f"{package}/{kind}/{_file_of(kind, base)}"
+            if whole in names:
+                self._catalog.parts(whole)
             raise AttributeError(f"module '{package}.{kind}' has no attribute '{base}'")
 
         module.__dict__["__getattr__"] = missing
@@ -337,12 +364,12 @@ class TypeStore:
             stem,
             [name.rpartition("/")[2] for name in names],
             self.message,
-            lambda: _source(names, self._catalog),
+            lambda: module_source(names, self._catalog, _injected),
         )
 
 
 class _Compiler:
-    """Generates modules of message and service classes, and runs them.
+    """Generates modules of classes, and runs them.
 
     Args:
         cache: Folder for generated sources; None to keep them in memory only.
@@ -426,7 +453,7 @@ class _TextTypes:
     def find(self, name: str) -> Any:
         """Return a message or service class; the store's own if its definition is the same."""
         wanted = identity(name, self._catalog)
-        look = self._store.message if name.split("/")[1] == "msg" else self._store.service
+        look = self._store.service if is_service(name) else self._store.message
         try:
             known = look(name)
         except (TypeNotFound, DefinitionError):
@@ -446,17 +473,9 @@ class _TextTypes:
             stem,
             [base],
             self.find,
-            lambda: _source([name], self._catalog),
+            lambda: module_source([name], self._catalog, _injected),
         )
         return getattr(module, base)
-
-
-def _source(names: Sequence[str], catalog: Catalog) -> str:
-    """Return the source of a module of types of one package and kind."""
-    package, kind, _ = names[0].split("/")
-    if kind == "msg":
-        return message_module([catalog.message(one) for one in names], catalog, _injected, package)
-    return service_module([catalog.service(one) for one in names], catalog, _injected, package)
 
 
 def is_generated(file: str) -> bool:
@@ -477,13 +496,19 @@ def shipped_types(package: str, kind: str) -> tuple[str, ...]:
     if package not in shipped_packages():
         return ()
     index = import_module(f"rosz.msgs.{package}")
-    names: tuple[str, ...] = index.MESSAGES if kind == "msg" else index.SERVICES
+    kinds = {"msg": index.MESSAGES, "srv": index.SERVICES, "action": index.ACTIONS}
+    names: tuple[str, ...] = kinds[kind]
     return names
 
 
 def _is_shipped(name: str) -> bool:
     package, kind, base = name.split("/")
-    return base in shipped_types(package, kind)
+    return _file_of(kind, base) in shipped_types(package, kind)
+
+
+def _file_of(kind: str, base: str) -> str:
+    """Return the name of the definition that a type is made of: that of its action, or its own."""
+    return action_of(base) if kind == "action" else base
 
 
 def shipped_packages() -> frozenset[str]:

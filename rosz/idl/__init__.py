@@ -18,6 +18,7 @@ from rosz.idl.catalog import (
 )
 from rosz.idl.grammar import parse_action, parse_message, parse_service
 from rosz.idl.hashes import (
+    action_hash,
     describe,
     identity,
     message_hash,
@@ -26,6 +27,7 @@ from rosz.idl.hashes import (
     service_md5,
     service_parts,
 )
+from rosz.idl.names import action_of, is_service
 from rosz.idl.spec import ActionSpec, Constant, Field, FieldType, MessageSpec, ServiceSpec
 
 PUBLIC_MODULES = ("cache", "generate")
@@ -40,9 +42,12 @@ __all__ = (
     "Folders",
     "MessageSpec",
     "ServiceSpec",
+    "action_hash",
+    "action_of",
     "describe",
     "full_name",
     "identity",
+    "is_service",
     "message_hash",
     "message_md5",
     "parse_action",

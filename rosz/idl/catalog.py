@@ -9,8 +9,9 @@ from pathlib import Path
 import msgspec
 
 from rosz.errors import DefinitionError, TypeNotFound, near_miss
-from rosz.idl.grammar import parse_message, parse_service
-from rosz.idl.spec import PRIMITIVES, Field, MessageSpec, ServiceSpec
+from rosz.idl.grammar import parse_action, parse_message, parse_service
+from rosz.idl.names import action_of, is_service
+from rosz.idl.spec import PRIMITIVES, ActionSpec, Field, MessageSpec, ServiceSpec
 
 __all__ = (
     "Catalog",
@@ -35,6 +36,35 @@ _ENVELOPES = {
         "{name}ActionFeedback action_feedback\n"
     ),
 }
+
+
+_ACTION_TYPES = {
+    "FeedbackMessage": "unique_identifier_msgs/msg/UUID goal_id\n{name}_Feedback feedback\n",
+    "SendGoal": (
+        "unique_identifier_msgs/msg/UUID goal_id\n{name}_Goal goal\n"
+        "---\nbool accepted\nbuiltin_interfaces/msg/Time stamp\n"
+    ),
+    "GetResult": (
+        "unique_identifier_msgs/msg/UUID goal_id\n---\nint8 status\n{name}_Result result\n"
+    ),
+}
+"""Definitions of the types that ROS 2 makes of an action, besides its three parts."""
+
+
+def _action_type(action: str, definition: Definition, base: str) -> Definition | None:
+    """Return the definition of a type that ROS 2 makes of an action; None if it makes none such.
+
+    Args:
+        action: Full name of the action.
+        definition: Definition of the action.
+        base: Name of the type without its package, ``Fibonacci_SendGoal``.
+    """
+    part = base.removeprefix(f"{action.rpartition('/')[2]}_")
+    if part in _ACTION_TYPES:
+        return Definition(_ACTION_TYPES[part].format(name=action), definition.path)
+    spec = parse_action(action, definition.text, definition.path)
+    texts = {"Goal": spec.goal.text, "Result": spec.result.text, "Feedback": spec.feedback.text}
+    return Definition(texts[part], definition.path) if part in texts else None
 
 
 def _action_parts(name: str) -> list[str]:
@@ -78,6 +108,7 @@ class Catalog:
         self._find = find
         self._messages: dict[str, MessageSpec] = {}
         self._services: dict[str, ServiceSpec] = {}
+        self._actions: dict[str, ActionSpec] = {}
         self._checked: set[str] = set()
 
     def with_definition(self, name: str, definition: Definition) -> Catalog:
@@ -110,17 +141,39 @@ class Catalog:
             self._services[name] = spec
         return self._services[name]
 
-    def parts(self, name: str) -> list[MessageSpec]:
-        """Return the message, or the request and the response, of a full name.
+    def action(self, name: str) -> ActionSpec:
+        """Return the spec of an action, checked to refer to existing types only.
 
         Raises:
             TypeNotFound: There is no such type.
             DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
         """
-        if name.split("/")[1] == "msg":
+        if name not in self._actions:
+            definition = self._find(name)
+            spec = parse_action(name, definition.text, definition.path)
+            for part in (spec.goal, spec.result, spec.feedback):
+                self._check(self._messages.setdefault(part.name, part), ())
+            self._actions[name] = spec
+        return self._actions[name]
+
+    def parts(self, name: str) -> list[MessageSpec]:
+        """Return the message, the request and the response, or the goal, result and feedback.
+
+        Args:
+            name: Full name of the message, service or action.
+
+        Raises:
+            TypeNotFound: There is no such type.
+            DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
+        """
+        _, kind, base = name.split("/")
+        if is_service(name):
+            service = self.service(name)
+            return [service.request, service.response]
+        if kind == "msg" or action_of(base) != base:
             return [self.message(name)]
-        service = self.service(name)
-        return [service.request, service.response]
+        action = self.action(name)
+        return [action.goal, action.result, action.feedback]
 
     def below(self, spec: MessageSpec) -> dict[str, MessageSpec]:
         """Return all message types that a message holds, at any depth, by name."""
@@ -209,13 +262,14 @@ def read_definition(file: Path) -> Definition:
 
 
 class Folders:
-    """Definitions in the folders of packages: ``<package>/msg/*.msg`` and ``srv/*.srv``.
+    """Definitions in the folders of packages: ``msg/*.msg``, ``srv/*.srv`` and ``action/*.action``.
 
-    The messages that ROS 1 makes of ``<package>/action/*.action`` are among them.
+    The messages that ROS 1 makes of actions are among the ``msg``; what ROS 2 makes of an action
+    is found by its name, ``<package>/action/<Action>_Goal``.
 
     Args:
         folder: Function that returns the folder of a package by its name, or None.
-        actions: Whether to include the messages of actions.
+        actions: Whether to include the messages that ROS 1 makes of actions.
     """
 
     def __init__(self, folder: Callable[[str], Path | None], *, actions: bool = True) -> None:
@@ -246,7 +300,12 @@ class Folders:
             raise TypeNotFound(name, f"there is no package '{package}'")
         file = folder / kind / f"{base}.{kind}"
         if not file.is_file():
-            made = self._of_action(folder, base) if kind == "msg" and self._actions else None
+            made = None
+            if kind == "msg" and self._actions:
+                made = self._of_action(folder, base)
+            elif kind == "action" and action_of(base) != base:
+                action = f"{package}/action/{action_of(base)}"
+                made = _action_type(action, self.find(action), base)
             if made is not None:
                 return made
             known = [one.rpartition("/")[2] for one in self.names(package, kind)]

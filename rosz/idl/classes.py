@@ -1,4 +1,4 @@
-"""Writes the source of message and service classes."""
+"""Writes the source of message, service and action classes."""
 
 from __future__ import annotations
 
@@ -9,13 +9,20 @@ import re
 from rosz.idl.catalog import Catalog
 from rosz.idl.decoder_source import Decoder
 from rosz.idl.encoder_source import Encoder
-from rosz.idl.hashes import message_hash, message_md5, service_hash, service_md5
-from rosz.idl.names import ClassNames, ModuleNames, attribute, class_name
-from rosz.idl.spec import Field, FieldType, MessageSpec, Scalar, ServiceSpec
+from rosz.idl.hashes import action_hash, message_hash, message_md5, service_hash, service_md5
+from rosz.idl.names import (
+    ACTION_MESSAGES,
+    ACTION_SERVICES,
+    ClassNames,
+    ModuleNames,
+    attribute,
+    class_name,
+)
+from rosz.idl.spec import ActionSpec, Field, FieldType, MessageSpec, Scalar, ServiceSpec
 from rosz.message import ARRAY_CODES, OCTETS
 from rosz.names import short_type
 
-__all__ = ("message_class", "service_class")
+__all__ = ("action_class", "message_class", "service_class")
 
 _TIME = "builtin_interfaces/msg/Time"
 _DURATION = "builtin_interfaces/msg/Duration"
@@ -84,9 +91,23 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> s
 def service_class(spec: ServiceSpec, catalog: Catalog) -> str:
     """Return the source of a service class, which refers to those of its two messages."""
     name = class_name(spec.name)
-    body = [f"Request = {name}Request", f"Response = {name}Response"]
+    halves = {"Request": spec.request, "Response": spec.response}
+    body = [f"{role} = {class_name(half.name)}" for role, half in halves.items()]
     body += _names(spec.name, service_hash(spec, catalog), service_md5(spec, catalog), spec.text)
     return "\n".join([f"class {name}(_Service):", *_docstring(spec.text), *_indented(body)])
+
+
+def action_class(spec: ActionSpec, catalog: Catalog) -> str:
+    """Return the source of an action class, which refers to those of its messages and services."""
+    name = class_name(spec.name)
+    parts = (*ACTION_MESSAGES, *ACTION_SERVICES)
+    body = [f"{part} = {class_name(f'{spec.name}_{part}')}" for part in parts]
+    body += [
+        f'_type_name = "{spec.name}"',
+        f'_type_hash = "{action_hash(spec, catalog)}"',
+        *_text(spec.text),
+    ]
+    return "\n".join([f"class {name}(_Action):", *_docstring(spec.text), *_indented(body)])
 
 
 def _indented(lines: list[str]) -> list[str]:

@@ -18,9 +18,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from rosz.idl.catalog import Catalog
-from rosz.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
+from rosz.idl.names import ACTION_MESSAGES, ACTION_SERVICES, is_service
+from rosz.idl.spec import ActionSpec, Field, FieldType, MessageSpec, ServiceSpec
 
 __all__ = (
+    "action_hash",
     "describe",
     "identity",
     "message_hash",
@@ -111,9 +113,15 @@ def service_hash(spec: ServiceSpec, catalog: Catalog) -> str:
     return _type_hash(whole, below.values())
 
 
+def action_hash(spec: ActionSpec, catalog: Catalog) -> str:
+    """Return the type hash of an action."""
+    whole, below = _action_parts(spec, catalog)
+    return _type_hash(whole, below.values())
+
+
 def identity(name: str, catalog: Catalog) -> tuple[str, str]:
     """Return the type hash and the md5 of a message or a service by its full name."""
-    if name.split("/")[1] == "srv":
+    if is_service(name):
         service = catalog.service(name)
         return service_hash(service, catalog), service_md5(service, catalog)
     spec = catalog.message(name)
@@ -149,6 +157,29 @@ def service_parts(
         ),
     )
     return whole, below
+
+
+def _action_parts(spec: ActionSpec, catalog: Catalog) -> tuple[MessageSpec, dict[str, MessageSpec]]:
+    """Return the type that an action is hashed as, and all types in it by name."""
+    goal, result, feedback, message = (f"{spec.name}_{part}" for part in ACTION_MESSAGES)
+    send_goal, get_result = (f"{spec.name}_{part}" for part in ACTION_SERVICES)
+    fields = {
+        "goal": goal,
+        "result": result,
+        "feedback": feedback,
+        "send_goal_service": send_goal,
+        "get_result_service": get_result,
+        "feedback_message": message,
+    }
+    below: dict[str, MessageSpec] = {}
+    for name in (send_goal, get_result):
+        whole, inner = service_parts(catalog.service(name), catalog)
+        below |= {name: whole, **inner}
+    for name in (goal, result, feedback, message):
+        part = catalog.message(name)
+        below |= {name: part, **catalog.below(part)}
+    members = tuple(Field(name, FieldType(kind)) for name, kind in fields.items())
+    return MessageSpec(spec.name, members), below
 
 
 def describe(spec: MessageSpec) -> dict[str, Any]:

@@ -8,7 +8,23 @@ import re
 
 from rosz.idl.spec import FieldType
 
-__all__ = ("ClassNames", "LocalNames", "ModuleNames", "attribute", "class_name")
+__all__ = (
+    "ACTION_MESSAGES",
+    "ACTION_SERVICES",
+    "ClassNames",
+    "LocalNames",
+    "ModuleNames",
+    "action_of",
+    "attribute",
+    "class_name",
+    "is_service",
+)
+
+ACTION_MESSAGES = ("Goal", "Result", "Feedback", "FeedbackMessage")
+"""The messages that ROS 2 makes of an action, behind its name and ``_``."""
+
+ACTION_SERVICES = ("SendGoal", "GetResult")
+"""The services that ROS 2 makes of an action."""
 
 
 _RESERVED = re.compile(r"[befhkmnpq][0-9]*")
@@ -22,11 +38,27 @@ def attribute(name: str) -> str:
 
 def class_name(name: str) -> str:
     """Return the class name of a full type name: ``Twist``, ``SetBoolRequest``, ``SetBool``."""
-    _, kind, base = name.split("/")
+    _, kind, base = name.split("/")  # those of actions are named as rclpy names them
     for part in ("Request", "Response"):
         if kind == "srv" and base.endswith(f"_{part}"):
             return base.removesuffix(f"_{part}") + part
     return attribute(base)
+
+
+def action_of(base: str) -> str:
+    """Return the action that a type in an ``action`` folder belongs to, both without packages.
+
+    ``Fibonacci_Goal`` gives ``Fibonacci``, and so does ``Fibonacci``.
+    """
+    action, _, part = base.rpartition("_")
+    return action if action and part in (*ACTION_MESSAGES, *ACTION_SERVICES) else base
+
+
+def is_service(name: str) -> bool:
+    """Return whether a full name is that of a service, such as one of the two of an action."""
+    _, kind, base = name.split("/")
+    part = base.removeprefix(f"{action_of(base)}_")
+    return kind == "srv" or (kind == "action" and part in ACTION_SERVICES)
 
 
 class LocalNames:

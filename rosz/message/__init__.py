@@ -9,6 +9,7 @@ modules ``convert`` (plain values, JSON, YAML) and ``text`` are public and impor
 from __future__ import annotations
 
 from rosz.message.base import (
+    Action,
     Array,
     Bytes,
     Derived,
@@ -40,6 +41,7 @@ __all__ = (
     "OCTETS",
     "SCALAR_CODES",
     "SCALAR_SIZES",
+    "Action",
     "Array",
     "Bytes",
     "Derived",

@@ -1,4 +1,4 @@
-"""Base classes of messages and services, and the schema by which a class describes its fields.
+"""Base classes of messages, services and actions, and the schema that describes fields.
 
 A generated class holds only what differs from type to type: fields, constants, names, hashes, its
 definition, and its codec as straight-line code. The rest is derived here from the class's schema
@@ -25,6 +25,7 @@ import msgspec
 from rosz.message.schema import SEQ, Schema, Slot, rclpy_type, slot_type, slots
 
 __all__ = (
+    "Action",
     "Array",
     "Bytes",
     "Derived",
@@ -401,3 +402,29 @@ class Service:
     _full_text = _Derived(_full_text)
     _request_class = _Derived(lambda cls: cls.Request)
     _response_class = _Derived(lambda cls: cls.Response)
+
+
+class Action:
+    """Base of all action classes; never instantiated.
+
+    Attributes:
+        Goal: Class of goals.
+        Result: Class of results.
+        Feedback: Class of feedback.
+        FeedbackMessage: Class of the messages that carry feedback.
+        SendGoal: Class of the service that sends goals.
+        GetResult: Class of the service that returns results.
+        _type_name: ROS 2 name, ``example_interfaces/action/Fibonacci``.
+        _type_hash: RIHS01 hash.
+        _text: Text of the definition.
+    """
+
+    Goal: ClassVar[type[Any]]
+    Result: ClassVar[type[Any]]
+    Feedback: ClassVar[type[Any]]
+    FeedbackMessage: ClassVar[type[Any]]
+    SendGoal: ClassVar[type[Service]]
+    GetResult: ClassVar[type[Service]]
+    _type_name: ClassVar[str] = ""
+    _type_hash: ClassVar[str] = ""
+    _text: ClassVar[str] = ""

@@ -8,7 +8,15 @@ from typing import Any
 import msgspec
 
 from rosz.errors import RoszError, TypeNotFound
-from rosz.idl import Catalog, MessageSpec, describe, message_hash, service_hash, service_parts
+from rosz.idl import (
+    Catalog,
+    MessageSpec,
+    describe,
+    is_service,
+    message_hash,
+    service_hash,
+    service_parts,
+)
 from rosz.msgs.type_description_interfaces.msg import (
     Field,
     FieldType,
@@ -104,16 +112,16 @@ def request_type(node: NodeCore, entity: Token, timeout: float = 10.0) -> type[A
         UsageError: The timeout is not a number.
     """
     types, name = node.context.types, entity.type_name
-    is_service = name.split("/")[1] == "srv"
+    serves = is_service(name)
     found: type[Any] | None
     try:
-        found = types.service(name) if is_service else types.message(name)
+        found = types.service(name) if serves else types.message(name)
     except RoszError:
         found = None
     if found is not None and entity.type_hash in {NO_HASH, found._type_hash}:
         return found
     definition = request_definition(node, entity, timeout)
-    compile_type = types.service_from_text if is_service else types.message_from_text
+    compile_type = types.service_from_text if serves else types.message_from_text
     made: type[Any] = compile_type(name, definition.text, definition.others)
     if entity.type_hash not in {NO_HASH, made._type_hash}:
         raise TypeNotFound(
@@ -138,13 +146,13 @@ def describe_type(
     """
     name = request.type_name
     _, _, kind = name.rpartition("/")[0].partition("/")
-    if kind not in _TEXTS:
+    if kind not in (*_TEXTS, "action"):
         return _failure(
             f"'{name}' is not a type; expected the form 'pkg/msg/Name' or 'pkg/srv/Name'"
         )
     catalog = Catalog(types.definition)
     try:
-        if kind == "srv":
+        if is_service(name):
             service = catalog.service(name)
             found = service_hash(service, catalog)
             whole, below = service_parts(service, catalog)
@@ -184,4 +192,4 @@ def _source(types: TypeStore, spec: MessageSpec) -> TypeSource:
         text = types.definition(spec.name).text
     except RoszError:
         return TypeSource(spec.name, "implicit", "")
-    return TypeSource(spec.name, spec.name.split("/")[1], text)
+    return TypeSource(spec.name, "srv" if is_service(spec.name) else "msg", text)

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 __all__ = ("install", "package_path", "type_store", "uninstall")
 
-_KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
+_KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv", "action": "action"}
 _CFG = "cfg"
 
 
@@ -146,7 +146,7 @@ class _Types:
     def folder(self, package: str) -> Path | None:
         """Return the folder of a package that has types or dynamic_reconfigure files."""
         try:
-            known = self.store.has(package, "msg") or self.store.has(package, "srv")
+            known = any(self.store.has(package, kind) for kind in _KINDS.values())
             return self.packages.find(package).path if known or self.cfg_files(package) else None
         except RoszError:  # a broken package must not break other imports
             return None
@@ -257,9 +257,11 @@ class _FrontFinder(MetaPathFinder):
         if not inner:
             if package in self._shipped:
                 return _alias(name, lambda: add_names(self.types.shipped(package, kind)))
-            generated = PathFinder.find_spec(name, path)
-            if generated is not None and generated.origin and is_generated(generated.origin):
-                return generated
+            found = PathFinder.find_spec(name, path)
+            # catkin makes no module of actions, so a package may have one of its own.
+            own = kind == "action"
+            if found is not None and found.origin and (own or is_generated(found.origin)):
+                return found
             return _alias(name, lambda: add_names(self.types.store.module(package, kind)))
         module = import_module(f"{package}.{kind}")
         if not inner.startswith("_") or not hasattr(module, inner[1:]):

@@ -9,8 +9,8 @@ from pathlib import Path
 import msgspec
 
 from rosz.environment import Environment, package_index
-from rosz.errors import DefinitionError, NotFoundError, RoszError, TypeNotFound
-from rosz.idl import Catalog, Definition, parse_action, read_definition
+from rosz.errors import DefinitionError, NotFoundError, RoszError
+from rosz.idl import Catalog, Definition, read_definition
 from rosz.packages import MANIFEST, Package, PackageIndex, crawl, manifest_of
 from rosz.typestore import TypeStore
 from rosz.workspace.manifest import check_manifest
@@ -123,7 +123,7 @@ def _check_definition(name: str, definition: Definition, catalog: Catalog) -> It
     lines = definition.text.split("\n")
     while True:
         try:
-            _read_definition(name, definition, catalog)
+            _read_definition(name, catalog)
         except RoszError as fault:
             yield from_error(fault, Path(definition.path))
             if not isinstance(fault, DefinitionError) or fault.path != definition.path:
@@ -137,24 +137,10 @@ def _check_definition(name: str, definition: Definition, catalog: Catalog) -> It
             return
 
 
-def _read_definition(name: str, definition: Definition, catalog: Catalog) -> None:
+def _read_definition(name: str, catalog: Catalog) -> None:
     kind = name.split("/")[1]
-    if kind == "msg":
-        catalog.message(name)
-        return
-    if kind == "srv":
-        catalog.service(name)
-        return
-    action = parse_action(name, definition.text, definition.path)
-    for part in (action.goal, action.result, action.feedback):
-        for field in part.fields:
-            if field.type.primitive:
-                continue
-            try:
-                catalog.message(field.type.base)
-            except TypeNotFound as fault:
-                reason = f"type '{field.type.written}' of field '{field.name}': {fault}"
-                raise DefinitionError(reason, definition.path, field.line, field.column) from fault
+    read = {"msg": catalog.message, "srv": catalog.service, "action": catalog.action}
+    read[kind](name)
 
 
 def find_packages(words: Sequence[str], cwd: Path, index: PackageIndex) -> list[Path]:

@@ -24,7 +24,7 @@ from rosz.typestore import Kind, TypeStore, shipped_packages, shipped_types
 __all__ = ("Stubs", "editor_folder", "write_stubs")
 
 _SOURCE = Path(__file__).parents[1]
-_KINDS: tuple[Kind, ...] = ("msg", "srv")
+_KINDS: tuple[Kind, ...] = ("msg", "srv", "action")
 _HEAD = "# Written by rosz env --editor; do not edit.\n"
 
 

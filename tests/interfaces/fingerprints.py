@@ -67,7 +67,17 @@ def action(
         [Member("accepted", BOOL), Member("stamp", NESTED, TIME)],
     )
     outcome = [Member("status", INT8), Member("result", NESTED, f"{name}_Result")]
-    return parts | service(f"{name}_GetResult", [goal_id], outcome)
+    parts |= service(f"{name}_GetResult", [goal_id], outcome)
+    whole = {
+        "goal": "Goal",
+        "result": "Result",
+        "feedback": "Feedback",
+        "send_goal_service": "SendGoal",
+        "get_result_service": "GetResult",
+        "feedback_message": "FeedbackMessage",
+    }
+    fields = [Member(field, NESTED, f"{name}_{part}") for field, part in whole.items()]
+    return {**parts, name: fields}
 
 
 def types(definition: Definition) -> dict[str, list[Member]]:

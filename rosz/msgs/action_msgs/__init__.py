@@ -9,3 +9,4 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "CancelGoal",
 )
+ACTIONS: tuple[str, ...] = ()

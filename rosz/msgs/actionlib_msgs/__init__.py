@@ -7,3 +7,4 @@ MESSAGES: tuple[str, ...] = (
     "GoalStatusArray",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -6,3 +6,4 @@ MESSAGES: tuple[str, ...] = (
     "Status",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -6,3 +6,4 @@ MESSAGES: tuple[str, ...] = (
     "Time",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -10,3 +10,4 @@ SERVICES: tuple[str, ...] = (
     "AddDiagnostics",
     "SelfTest",
 )
+ACTIONS: tuple[str, ...] = ()

@@ -16,3 +16,4 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "Reconfigure",
 )
+ACTIONS: tuple[str, ...] = ()

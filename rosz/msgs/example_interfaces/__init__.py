@@ -37,3 +37,6 @@ SERVICES: tuple[str, ...] = (
     "SetBool",
     "Trigger",
 )
+ACTIONS: tuple[str, ...] = (
+    "Fibonacci",
+)

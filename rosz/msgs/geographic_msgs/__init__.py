@@ -25,3 +25,4 @@ SERVICES: tuple[str, ...] = (
     "GetRoutePlan",
     "UpdateGeographicMap",
 )
+ACTIONS: tuple[str, ...] = ()

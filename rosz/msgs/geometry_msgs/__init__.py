@@ -36,3 +36,4 @@ MESSAGES: tuple[str, ...] = (
     "WrenchStamped",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -13,3 +13,4 @@ SERVICES: tuple[str, ...] = (
     "GetAvailableTransitions",
     "GetState",
 )
+ACTIONS: tuple[str, ...] = ()

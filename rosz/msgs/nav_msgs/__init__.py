@@ -21,3 +21,6 @@ SERVICES: tuple[str, ...] = (
     "LoadMap",
     "SetMap",
 )
+ACTIONS: tuple[str, ...] = (
+    "GetMap",
+)

@@ -26,3 +26,4 @@ SERVICES: tuple[str, ...] = (
     "SetParameters",
     "SetParametersAtomically",
 )
+ACTIONS: tuple[str, ...] = ()

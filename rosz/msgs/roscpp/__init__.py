@@ -9,3 +9,4 @@ SERVICES: tuple[str, ...] = (
     "GetLoggers",
     "SetLoggerLevel",
 )
+ACTIONS: tuple[str, ...] = ()

@@ -5,3 +5,4 @@ MESSAGES: tuple[str, ...] = ()
 SERVICES: tuple[str, ...] = (
     "TwoInts",
 )
+ACTIONS: tuple[str, ...] = ()

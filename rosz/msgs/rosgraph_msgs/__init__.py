@@ -7,3 +7,4 @@ MESSAGES: tuple[str, ...] = (
     "TopicStatistics",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

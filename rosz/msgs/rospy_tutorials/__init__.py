@@ -9,3 +9,4 @@ SERVICES: tuple[str, ...] = (
     "AddTwoInts",
     "BadTwoInts",
 )
+ACTIONS: tuple[str, ...] = ()

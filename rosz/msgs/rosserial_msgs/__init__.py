@@ -8,3 +8,4 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "RequestParam",
 )
+ACTIONS: tuple[str, ...] = ()

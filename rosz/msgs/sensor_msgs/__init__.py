@@ -33,3 +33,4 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "SetCameraInfo",
 )
+ACTIONS: tuple[str, ...] = ()

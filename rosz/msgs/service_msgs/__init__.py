@@ -5,3 +5,4 @@ MESSAGES: tuple[str, ...] = (
     "ServiceEventInfo",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -8,3 +8,4 @@ MESSAGES: tuple[str, ...] = (
     "SolidPrimitive",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -7,3 +7,4 @@ MESSAGES: tuple[str, ...] = (
     "SmachContainerStructure",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -36,3 +36,4 @@ MESSAGES: tuple[str, ...] = (
     "UInt8MultiArray",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

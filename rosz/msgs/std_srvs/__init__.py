@@ -7,3 +7,4 @@ SERVICES: tuple[str, ...] = (
     "SetBool",
     "Trigger",
 )
+ACTIONS: tuple[str, ...] = ()

@@ -5,3 +5,4 @@ MESSAGES: tuple[str, ...] = (
     "DisparityImage",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

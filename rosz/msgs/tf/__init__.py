@@ -7,3 +7,4 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "FrameGraph",
 )
+ACTIONS: tuple[str, ...] = ()

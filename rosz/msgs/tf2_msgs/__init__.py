@@ -8,3 +8,6 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "FrameGraph",
 )
+ACTIONS: tuple[str, ...] = (
+    "LookupTransform",
+)

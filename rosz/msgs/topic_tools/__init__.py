@@ -12,3 +12,4 @@ SERVICES: tuple[str, ...] = (
     "MuxList",
     "MuxSelect",
 )
+ACTIONS: tuple[str, ...] = ()

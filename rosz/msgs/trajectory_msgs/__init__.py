@@ -8,3 +8,4 @@ MESSAGES: tuple[str, ...] = (
     "MultiDOFJointTrajectoryPoint",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

@@ -12,3 +12,6 @@ SERVICES: tuple[str, ...] = (
     "TeleportAbsolute",
     "TeleportRelative",
 )
+ACTIONS: tuple[str, ...] = (
+    "RotateAbsolute",
+)

@@ -12,3 +12,4 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "GetTypeDescription",
 )
+ACTIONS: tuple[str, ...] = ()

@@ -5,3 +5,4 @@ MESSAGES: tuple[str, ...] = (
     "UUID",
 )
 SERVICES: tuple[str, ...] = ()
+ACTIONS: tuple[str, ...] = ()

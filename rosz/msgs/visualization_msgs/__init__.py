@@ -18,3 +18,4 @@ MESSAGES: tuple[str, ...] = (
 SERVICES: tuple[str, ...] = (
     "GetInteractiveMarkers",
 )
+ACTIONS: tuple[str, ...] = ()
