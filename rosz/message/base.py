@@ -205,11 +205,42 @@ def _initialize(self: Any, *args: Any, **members: Any) -> None:
             setattr(self, name, value)
 
 
+def _has_sequences(kind: Any) -> bool:
+    return getattr(kind, "__eq__", None) is _equal
+
+
+def _equal(self: Any, other: Any) -> Any:
+    """Compare messages that have sequences.
+
+    A field that is a list in a new message is an array, a tuple or bytes in a received one.
+    """
+    if type(self) is not type(other):
+        return NotImplemented
+    for name, _, suffix in self._schema:
+        ours, theirs = getattr(self, name), getattr(other, name)
+        if suffix and (type(ours) is not type(theirs) or hasattr(ours, "dtype")):
+            ours, theirs = _elements(ours), _elements(theirs)
+        if ours != theirs:
+            return False
+    return True
+
+
+def _elements(values: Any) -> Any:
+    if hasattr(values, "tolist"):
+        return values.tolist()
+    return values if isinstance(values, str) or not hasattr(values, "__iter__") else list(values)
+
+
+def _unequal(self: Any, other: object) -> Any:
+    equal = self.__eq__(other)
+    return equal if equal is NotImplemented else not equal
+
+
 class Message(msgspec.Struct, gc=False):
     """Base of all message classes.
 
     Fields are given by position or name; missing ones get their defaults. Instances are compared by
-    value, and can be copied and pickled.
+    value, sequences by their elements whatever their types, and can be copied and pickled.
 
     Attributes:
         _type: ROS 1 name, ``geometry_msgs/Twist``.
@@ -241,6 +272,9 @@ class Message(msgspec.Struct, gc=False):
 
     def __init_subclass__(cls, **_options: object) -> None:
         cls.__slots__ = [name for name, _, _ in cls._schema]
+        if any(suffix or _has_sequences(kind) for _, kind, suffix in vars(cls).get("_schema", ())):
+            setattr(cls, "__eq__", _equal)  # noqa: B010  # mypy refuses an assignment
+            setattr(cls, "__ne__", _unequal)  # noqa: B010
 
     @staticmethod
     def _encode(m: Any) -> bytes:
@@ -354,6 +388,10 @@ class Sequenced(Message):
         if type(other) is not type(self):
             return NotImplemented
         return all(getattr(self, n) == getattr(other, n) for n, _, _ in self._schema)
+
+    def __ne__(self, other: object) -> bool:
+        equal: bool = _unequal(self, other)
+        return equal
 
 
 def ros1_slots(cls: Any) -> dict[str, Slot]:

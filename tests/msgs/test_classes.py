@@ -14,13 +14,22 @@ from typing import Any
 
 import pytest
 
-from rosz.message import Message, Service
+from rosz.message import Derived, Message, Service
 from rosz.msgs.builtin_interfaces.msg import Duration, Time
 from rosz.msgs.diagnostic_msgs.msg import DiagnosticStatus
-from rosz.msgs.geometry_msgs.msg import Pose, PoseStamped, Twist, Vector3
+from rosz.msgs.geometry_msgs.msg import (
+    Point32,
+    Polygon,
+    Pose,
+    PoseStamped,
+    PoseWithCovariance,
+    Twist,
+    Vector3,
+)
+from rosz.msgs.nav_msgs.msg import Odometry
 from rosz.msgs.rospy_tutorials.srv import AddTwoInts, AddTwoIntsRequest, AddTwoIntsResponse
 from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, JointState
-from rosz.msgs.std_msgs.msg import Float64, Header, String
+from rosz.msgs.std_msgs.msg import Float64, Header, String, UInt8MultiArray
 from rosz.msgs.std_srvs.srv import SetBool, Trigger
 from rosz.msgs.stereo_msgs.msg import DisparityImage
 from rosz.typestore import TypeStore
@@ -89,6 +98,43 @@ def test_equality_copies_and_pickles() -> None:
         hash(pose)
 
 
+def test_sequences_are_equal_by_their_elements() -> None:
+    sent = Odometry(pose=PoseWithCovariance(covariance=[1.0] * 36))
+    received = Odometry.from_cdr(sent.to_cdr())
+    assert type(sent.pose.covariance) is not type(received.pose.covariance)
+    assert sent == received
+    assert not sent != received  # noqa: SIM202  # another function
+    received.pose.covariance[35] = 2.0
+    assert not sent == received  # noqa: SIM201
+    assert sent != received
+    same: tuple[Any, ...] = ([1, 2], (1, 2), b"\1\2", array("B", (1, 2)), memoryview(b"\1\2"))
+    for data in same:
+        assert UInt8MultiArray(data=data) == UInt8MultiArray(data=b"\1\2")
+        assert UInt8MultiArray(data=data) != UInt8MultiArray(data=b"\1\2\3")
+    nothing: Any = None
+    assert UInt8MultiArray(data=nothing) != UInt8MultiArray(data=[])
+    assert Polygon([Point32(1.0)]) != Polygon([Point32(2.0)])
+    points: Any = (Point32(1.0),)
+    assert Polygon(points) == Polygon([Point32(1.0)])
+
+
+def test_arrays_of_numpy_are_equal_by_their_elements() -> None:
+    numpy = pytest.importorskip("numpy")
+    stamped = JointState(position=numpy.array([1.0, 2.0]))
+    assert stamped == JointState(position=numpy.array([1.0, 2.0])) == JointState(position=[1, 2])
+    assert stamped != JointState(position=numpy.array([1.0, 3.0]))
+
+
+def test_a_subclass_may_compare_in_its_own_way() -> None:
+    class Tagged(JointState, metaclass=Derived):
+        def __eq__(self, other: object) -> bool:
+            return isinstance(other, JointState)
+
+        __hash__ = None  # type: ignore[assignment]
+
+    assert Tagged() == JointState(name=["hip"])
+
+
 def test_repr() -> None:
     assert repr(Vector3(1.0)) == "Vector3(x=1.0, y=0.0, z=0.0)"
     assert repr(Header()) == "Header(seq=0, stamp=Time(sec=0, nanosec=0), frame_id='')"
@@ -101,6 +147,7 @@ def test_headers_have_a_sequence_number_beside_the_wire() -> None:
     assert Header.from_cdr(header.to_cdr()) == header
     assert header != Header(frame_id="odom")
     assert header != 5
+    assert not Header(1) != Header(2)  # noqa: SIM202  # another function
     assert Header._has_header is False
     assert (Image._has_header, String._has_header) == (True, False)
     assert Written("Header head")()._has_header is False
