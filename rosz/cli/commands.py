@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rosz.cli.declare import App
 
-__all__ = ("COMMANDS", "format_rows", "load")
+__all__ = ("COMMANDS", "OLD_NAMES", "format_rows", "load")
 
 COMMANDS = {
     "launch": "start the nodes of a launch file",
@@ -33,6 +33,21 @@ COMMANDS = {
     "help": "list and print the pages of the manual",
 }
 """Every command with its summary, in the order of ``rosz --help``."""
+
+OLD_NAMES = {
+    "rosbag": "bag",
+    "roscore": "core",
+    "roslaunch": "launch",
+    "rosmsg": "msg",
+    "rosnode": "node",
+    "rosparam": "param",
+    "rosrun": "run",
+    "rosservice": "service",
+    "rossrv": "srv",
+    "rostopic": "topic",
+    "roswtf": "doctor",
+}
+"""ROS 1's names of commands; a command that is run by one has it in its help and its errors."""
 
 _APPS = {"msg": "types:msg", "srv": "types:srv", "help": "manual:app"}
 """Module and name of each app that is not ``app`` in the module named like its command."""

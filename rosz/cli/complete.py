@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from rosz.cli import suggest
-from rosz.cli.commands import COMMANDS, load
+from rosz.cli.commands import COMMANDS, OLD_NAMES, load
 from rosz.cli.declare import Argument, Option, Parameter
 from rosz.cli.env import ALIASES
 from rosz.cli.manual import pages
@@ -105,7 +105,8 @@ def expand(words: Sequence[str]) -> list[str]:
     if command == "rosz":
         return ["rosz", *rest[1:]]
     if command in ALIASES:
-        return ["rosz", *ALIASES[command].split(), *rest[1:]]
+        first, *others = ALIASES[command].split()
+        return ["rosz", OLD_NAMES.get(first, first), *others, *rest[1:]]
     return rest if command in HELPERS else []
 
 

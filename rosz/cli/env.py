@@ -16,6 +16,7 @@ import sys
 from pathlib import Path, PurePath
 from typing import Annotated
 
+from rosz.cli.commands import OLD_NAMES
 from rosz.cli.console import print_json, print_result, warn
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import UsageError, near_miss
@@ -25,19 +26,9 @@ __all__ = ("ALIASES", "SHELLS", "app")
 SHELLS = ("bash", "zsh", "fish")
 
 ALIASES = {
+    **{name: name for name in OLD_NAMES},
     "catkin_create_pkg": "pkg create --bare",
     "catkin_make": "pkg check --setup",
-    "roscore": "core",
-    "roslaunch": "launch",
-    "rosmsg": "msg",
-    "rosnode": "node",
-    "rosparam": "param",
-    "rosrun": "run",
-    "rosservice": "service",
-    "rossrv": "srv",
-    "rosbag": "bag",
-    "rostopic": "topic",
-    "roswtf": "doctor",
     "xacro": "run xacro xacro",
 }
 """ROS 1's commands, with the commands of rosz that replace them."""

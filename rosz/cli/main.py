@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
-from rosz.cli.commands import COMMANDS, format_rows, load
+from rosz.cli.commands import COMMANDS, OLD_NAMES, format_rows, load
 from rosz.errors import RoszError, UsageError, near_miss
 
 if TYPE_CHECKING:
@@ -142,6 +142,8 @@ def _dispatch(argv: list[str]) -> int:
         from rosz.cli.complete import complete
 
         return complete(words)
+    if name in OLD_NAMES:
+        return _invoke(load(OLD_NAMES[name]), words, name)
     if name not in COMMANDS:
         from rosz.replacements import instead_of
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
 from rosz.cli.declare import App, Argument, Command, Option
@@ -36,7 +37,29 @@ def run(app: App, argv: Sequence[str], program: str) -> Any:
     except TyperException as error:
         if app.help and words and words[0] in app.commands:
             program += f" {words[0]}"
-        raise UsageError(_reword(error.format_message(), program)) from error
+        raise UsageError(_reword(error.format_message(), program) + _usage(error)) from error
+
+
+def _usage(error: TyperException) -> str:
+    """Return the usage of a command that was run by its name of ROS 1, whose tools print it."""
+    context: Any = getattr(error, "ctx", None)
+    if context is None or context.command_path.startswith("rosz "):
+        return ""
+    return f"\n{context.get_usage()}"
+
+
+class _Group(TyperGroup):
+    """A group that lists its commands as ROS 1's tools do, when it has the name of one of them."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands with their descriptions."""
+        name = ctx.command_path
+        if name.startswith("rosz "):
+            super().format_commands(ctx, formatter)
+            return
+        rows = [(f"{name} {one}", made.get_short_help_str()) for one, made in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
 
 def _reword(text: str, program: str) -> str:
@@ -50,6 +73,7 @@ def _reword(text: str, program: str) -> str:
 def translate(app: App, remappings: Sequence[str]) -> typer.Typer:
     """Return the app as typer declares it."""
     made = typer.Typer(
+        cls=_Group,
         help=app.help or None,
         add_completion=False,
         rich_markup_mode=None,

@@ -7,7 +7,7 @@ out of each (``--noarr``, ``--nostr``).
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -18,7 +18,7 @@ from rosz.message import Message
 from rosz.message.convert import to_jsonable
 from rosz.time import DurationValue, TimeValue
 
-__all__ = ("Echo", "EchoOptions", "dump_bytes")
+__all__ = ("Echo", "EchoOptions", "dump_bytes", "plot_columns", "plot_values", "shorten")
 
 _CLEAR = "\033[2J\033[;H"
 _DUMP_WIDTH = 16
@@ -90,7 +90,8 @@ class Echo:
         if self._options.plot:
             return self._plot(value)
         if self._shortened:
-            value = self._shorten(value, self._type_name)
+            no_arrays, no_strings = self._options.no_arrays, self._options.no_strings
+            value = shorten(value, self._type_name, no_arrays, no_strings)
         if self._options.as_json:
             return msgspec.json.encode(to_jsonable(value)).decode() + "\n"
         return self._yaml(value)
@@ -108,30 +109,6 @@ class Echo:
         )
         return f"{_CLEAR * self._options.clear}{text}\n---\n"
 
-    # Arrays and strings left out.
-
-    def _shorten(self, value: Any, type_name: str) -> Any:
-        """Return a value, with notes in place of what is left out."""
-        note = self._note(value, type_name)
-        if note is not None:
-            return note
-        if not isinstance(value, Message) or value._type in _STAMPS:
-            return value
-        shortened = _untyped(type(value))()
-        for name, inner in zip(value.__slots__, value._slot_types, strict=True):
-            setattr(shortened, name, self._shorten(getattr(value, name), inner))
-        return shortened
-
-    def _note(self, value: Any, type_name: str) -> str | None:
-        """Return the note that replaces a value; None where the value stays."""
-        element, bracket, _ = type_name.partition("[")
-        text = self._options.no_strings and element.startswith("string")
-        if bracket and (self._options.no_arrays or text):
-            return f"<array type: {element}, length: {len(value)}>"
-        if text and not bracket:
-            return f"<string length: {len(value)}>"
-        return None
-
     # Rows of numbers.
 
     def _plot(self, value: Any) -> str:
@@ -144,11 +121,11 @@ class Echo:
         offset = now if self._options.offset else 0
         if isinstance(value, Message) and value._has_header:
             time = value.header.stamp.to_nsec()  # type: ignore[attr-defined]  # it has one
-        row = f"{time - offset}," + ",".join(self._numbers(value, offset)) + "\n"
+        row = f"{time - offset}," + ",".join(plot_values(value, offset, self._fields)) + "\n"
         if self._has_head:
             return row
         self._has_head = True
-        return f"%time,{','.join(self._columns(value, 'field'))}\n{row}"
+        return f"%time,{','.join(plot_columns(value, 'field', self._fields))}\n{row}"
 
     def _fields(self, message: Message) -> Iterator[str]:
         """Yield the fields of a message that are shown."""
@@ -159,37 +136,90 @@ class Echo:
             ):
                 yield name
 
-    def _columns(self, value: Any, name: str) -> Iterator[str]:
-        if isinstance(value, Message) and not isinstance(value, TimeValue | DurationValue):
-            for field in self._fields(value):
-                yield from self._columns(getattr(value, field), f"{name}.{field}")
-        elif isinstance(value, list | tuple | array):
-            for number, one in enumerate(value):
-                yield from self._columns(one, f"{name}{number}")
-        elif not isinstance(value, bytes):
-            yield name
 
-    def _numbers(self, value: Any, offset: int) -> Iterator[str]:
-        if isinstance(value, bool):
-            yield "1" if value else "0"
-        elif isinstance(value, TimeValue):
-            yield str(value.to_nsec() - offset)
-        elif isinstance(value, DurationValue):
-            yield str(value.to_nsec())
-        elif isinstance(value, Message):
-            for field in self._fields(value):
-                yield from self._numbers(getattr(value, field), offset)
-        elif isinstance(value, list | tuple | array):
-            for one in value:
-                yield from self._numbers(one, offset)
-        elif not isinstance(value, bytes):
-            yield str(value)
+def shorten(value: Any, type_name: str, no_arrays: bool, no_strings: bool) -> Any:
+    """Return a value, with notes in place of what is left out.
+
+    Args:
+        value: A message, or a value in it.
+        type_name: Type of the value, as ROS 1 spells it.
+        no_arrays: Whether to leave out arrays.
+        no_strings: Whether to leave out strings.
+    """
+    element, bracket, _ = type_name.partition("[")
+    text = no_strings and element.startswith("string")
+    if bracket and (no_arrays or text):
+        return f"<array type: {element}, length: {len(value)}>"
+    if text and not bracket:
+        return f"<string length: {len(value)}>"
+    if not isinstance(value, Message) or value._type in _STAMPS:
+        return value
+    shortened = _untyped(type(value))()
+    for name, inner in zip(value.__slots__, value._slot_types, strict=True):
+        setattr(shortened, name, shorten(getattr(value, name), inner, no_arrays, no_strings))
+    return shortened
 
 
 @lru_cache(maxsize=1024)
 def _untyped(cls: type[Message]) -> type[Any]:
     """Return a class with the fields of a message class, which hold any value."""
     return type(cls.__name__, (), {"__slots__": cls.__slots__, "_schema": (), "_type": cls._type})
+
+
+FieldNames = Callable[[Any], Iterable[str]]
+"""Function that returns the names of the fields of a message to show."""
+
+
+def plot_columns(value: Any, name: str, fields: FieldNames) -> Iterator[str]:
+    """Yield the names of the columns of a value.
+
+    Args:
+        value: A message, or a value in it.
+        name: Name of the value.
+        fields: Function that returns the names of the fields to show.
+    """
+    if isinstance(value, Message) and not isinstance(value, TimeValue | DurationValue):
+        for field, inner in _inner(value, fields):
+            yield from plot_columns(inner, f"{name}.{field}", fields)
+    elif isinstance(value, list | tuple | array):
+        for number, one in enumerate(value):
+            yield from plot_columns(one, f"{name}{number}", fields)
+    elif not isinstance(value, bytes):
+        yield name
+
+
+def plot_values(value: Any, offset: int, fields: FieldNames) -> Iterator[str]:
+    """Yield the texts in the columns of a value.
+
+    Args:
+        value: A message, or a value in it.
+        offset: Time that is subtracted from all times, in nanoseconds.
+        fields: Function that returns the names of the fields to show.
+    """
+    if isinstance(value, bool):
+        yield "1" if value else "0"
+    elif isinstance(value, TimeValue):
+        yield str(value.to_nsec() - offset)
+    elif isinstance(value, DurationValue):
+        yield str(value.to_nsec())
+    elif isinstance(value, Message):
+        for _, inner in _inner(value, fields):
+            yield from plot_values(inner, offset, fields)
+    elif isinstance(value, list | tuple | array):
+        for one in value:
+            yield from plot_values(one, offset, fields)
+    elif not isinstance(value, bytes):
+        yield str(value)
+
+
+def _inner(message: Message, fields: FieldNames) -> Iterator[tuple[str, Any]]:
+    """Yield the names and values of the fields of a message that are shown."""
+    types = dict(zip(message.__slots__, message._slot_types, strict=True))
+    for name in fields(message):
+        value = getattr(message, name)
+        # Programs of ROS 1 may hold bytes as text.
+        as_text = isinstance(value, str) and types.get(name, "").startswith("uint8[")
+        yield name, [ord(one) for one in value] if as_text else value
 
 
 def dump_bytes(data: bytes) -> str:

@@ -155,16 +155,10 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "roslaunch.xmlloader": {
         "ros1.roslaunch.loader": "LoadException Loader XmlLoader XmlParseException"
     },
-    "roslib.launcher": {"ros1.roslib": "get_depends load_manifest"},
-    "roslib.exceptions": {"ros1.roslib": "ROSLibException"},
+    "roslib.launcher": {"ros1.roslib.packages": "get_depends load_manifest"},
+    "roslib.exceptions": {"ros1.roslib.packages": "ROSLibException"},
     "roslib.manifest": {
         "ros1.rospkg": "MANIFEST_FILE Manifest InvalidManifest parse_file=read_manifest"
-    },
-    "roslib.msgs": {
-        "ros1.msg_types": "BUILTIN_TYPES COMMENTCHAR CONSTCHAR DURATION EXT MsgSpecException"
-        " PRIMITIVE_TYPES RESERVED_TYPES TIME base_msg_type is_builtin is_header_type"
-        " is_valid_constant_type is_valid_msg_field_name is_valid_msg_type parse_type resolve_type",
-        "ros1.genmsg": "HEADER SEP",
     },
     "roslib.network": {
         "ros1.rosgraph.network": "ROSHandshakeException create_local_xmlrpc_uri"
@@ -172,33 +166,33 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         " get_bind_address get_host_name get_local_address get_local_addresses is_local_address",
         "ros1.rosgraph.names": "ROS_HOSTNAME ROS_IP",
     },
-    "roslib.resources": {"ros1.roslib": "list_package_resources list_package_resources_by_dir"},
+    "roslib.resources": {
+        "ros1.roslib.packages": "list_package_resources list_package_resources_by_dir"
+    },
     "roslib.rosenv": {
-        "ros1.roslib": "ROSEnvException",
+        "ros1.roslib.packages": "ROSEnvException",
         "ros1.rosgraph.names": "ROS_HOSTNAME ROS_IP ROS_MASTER_URI ROS_NAMESPACE get_master_uri",
         "ros1.rosgraph.roslogging": "makedirs_with_parent_perms",
         "ros1.rospkg": "get_log_dir get_ros_home get_ros_package_path get_ros_root"
         " get_test_results_dir",
     },
     "roslib.scriptutil": {
-        "ros1.roslib": "get_master get_param_server=get_master",
+        "ros1.roslib.packages": "get_master get_param_server=get_master",
         "ros1.rosgraph.names": "script_resolve_name",
     },
-    "roslib.stacks": {"ros1.roslib": "ROSStackException=ROSPkgException"},
+    "roslib.stacks": {"ros1.roslib.packages": "ROSStackException=ROSPkgException"},
     "roslib.message": {**_MESSAGE, "time": "TVal=StampValue"},
     "roslib.names": {
         "ros1.genmsg": f"PRN_SEPARATOR {_NAMES}",
-        "ros1.roslib": "TYPE_SEPARATOR",
+        "ros1.roslib.packages": "TYPE_SEPARATOR",
         "ros1.rosgraph.names": "ANYTYPE GLOBALNS PRIV_NAME REMAP SEP anonymous_name"
         " canonicalize_name get_ros_namespace is_global is_legal_base_name is_legal_name is_private"
         " load_mappings make_caller_id make_global_ns namespace ns_join resolve_name",
     },
-    "roslib.packages": {
-        "ros1.roslib": "MANIFEST_FILE PACKAGE_FILE InvalidROSPkgException MultipleNodesException"
-        " ROSPkgException find_node find_resource get_dir_pkg get_pkg_dir get_pkg_subdir list_pkgs"
-        " list_pkgs_by_path resource_file"
+    "roslib.rospack": {
+        "ros1.roslib.packages": "list_pkgs",
+        "ros1.rospkg": "ResourceNotFound RosPack",
     },
-    "roslib.rospack": {"ros1.roslib": "list_pkgs", "ros1.rospkg": "ResourceNotFound RosPack"},
     "rospkg.common": {"ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE ResourceNotFound"},
     "rospkg.distro": {"ros1.os_detect": "InvalidDistro current_distro_codename"},
     "rospkg.os_detect": {"ros1.os_detect": "OsDetect OsNotDetected"},
@@ -250,12 +244,7 @@ _NEEDS_TCPROS = (
 )
 _REASONS = {
     "rosbagmain": "run 'rosz bag'",
-    "rosmsgmain": "run 'rosz msg'",
-    "rosnodemain": "run 'rosz node'",
-    "rosservicemain": "run 'rosz service'",
-    "rostopicmain": "run 'rosz topic'",
     "start_node": "use rospy.init_node()",
-    "yamlmain": "run 'rosz param'",
     **dict.fromkeys(_NEEDS_MASTER.split(), _NO_MASTER),
     **dict.fromkeys(_NEEDS_TCPROS.split(), _NO_TCPROS),
 }

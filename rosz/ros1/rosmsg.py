@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +11,27 @@ from rosz.errors import RoszError
 from rosz.introspect.definitions import Definitions
 from rosz.ros1.importer import type_store
 from rosz.ros1.rospkg import ResourceNotFound, RosPack
+from rosz.ros1.tool import Tool
 
 __all__ = (
     "MODE_MSG",
     "MODE_SRV",
     "ROSMsgException",
+    "fullusage",
     "get_msg_text",
     "get_srv_text",
     "iterate_packages",
     "list_msgs",
     "list_srvs",
     "list_types",
+    "rosmsg_cmd_list",
+    "rosmsg_cmd_md5",
+    "rosmsg_cmd_package",
+    "rosmsg_cmd_packages",
+    "rosmsg_cmd_show",
     "rosmsg_md5",
     "rosmsg_search",
+    "rosmsgmain",
 )
 
 MODE_MSG = ".msg"
@@ -129,3 +138,62 @@ def rosmsg_search(rospack: RosPack, mode: str, base_type: str) -> Iterator[str]:
         except ResourceNotFound:
             continue
         yield from (one for one in found if one.rpartition("/")[2] == base_type)
+
+
+# The command line.
+
+
+def _tool(mode: str) -> Tool:
+    _definitions(mode)
+    return Tool(f"ros{mode[1:]}")
+
+
+def fullusage(mode: str) -> str:
+    """Return the help of ``rosmsg`` or ``rossrv``."""
+    return _tool(mode).usage()
+
+
+def rosmsgmain(mode: str = MODE_MSG) -> None:
+    """Run the command line of the process as ``rosmsg`` or ``rossrv``.
+
+    Raises:
+        SystemExit: The command failed, or its help was asked for.
+    """
+    _tool(mode).main()
+
+
+def _command(mode: str, name: str, argv: Sequence[str] | None) -> None:
+    """Run a command; like in ROS 1, the command line of the process has a program in front."""
+    words = sys.argv[2:] if argv is None else argv[1:]
+    _tool(mode).main(["", name, *words])
+
+
+def rosmsg_cmd_show(mode: str, full: str, alias: str = "show") -> None:  # noqa: ARG001  # ROS 1's
+    """Run ``rosmsg show`` with the command line of the process."""
+    _command(mode, alias, None)
+
+
+def rosmsg_cmd_md5(mode: str, full: str) -> None:  # noqa: ARG001
+    """Run ``rosmsg md5`` with the command line of the process."""
+    _command(mode, "md5", None)
+
+
+def rosmsg_cmd_package(mode: str, full: str) -> None:  # noqa: ARG001
+    """Run ``rosmsg package`` with the command line of the process."""
+    _command(mode, "package", None)
+
+
+def rosmsg_cmd_packages(mode: str, full: str, argv: Sequence[str] | None = None) -> None:  # noqa: ARG001
+    """Run ``rosmsg packages``.
+
+    Args:
+        mode: `MODE_MSG` or `MODE_SRV`.
+        full: Ignored.
+        argv: The command and its options; from the command line of the process when not given.
+    """
+    _command(mode, "packages", argv)
+
+
+def rosmsg_cmd_list(mode: str, full: str, argv: Sequence[str] | None = None) -> None:  # noqa: ARG001
+    """Run ``rosmsg list``; see `rosmsg_cmd_packages`."""
+    _command(mode, "list", argv)

@@ -13,6 +13,7 @@ from rosz.introspect.topics import in_namespace
 from rosz.ros1.rosgraph.masterapi import Master, MasterException
 from rosz.ros1.rosgraph.names import script_resolve_name
 from rosz.ros1.state import ready_context, survey, token_uri
+from rosz.ros1.tool import Tool
 from rosz.wire import Token
 
 __all__ = (
@@ -32,6 +33,7 @@ __all__ = (
     "rosnode_listnodes",
     "rosnode_ping",
     "rosnode_ping_all",
+    "rosnodemain",
 )
 
 NAME = "rosnode"
@@ -236,3 +238,9 @@ def rosnode_info(node_name: str, quiet: bool = False) -> None:
     elif not quiet:
         sys.stdout.write(f"\ncontacting node {address} ...\n")
         sys.stdout.write(get_node_connection_info_description(address, master) + "\n")
+
+
+_tool = Tool(NAME)
+rosnodemain = _tool.main
+_fullusage = _tool.print_usage
+globals().update(_tool.parts("cleanup info kill list machine ping"))

@@ -13,6 +13,7 @@ from rosz.params.yaml import dump, load, load_documents
 from rosz.ros1.rosgraph.masterapi import Master
 from rosz.ros1.rosgraph.names import GLOBALNS, get_ros_namespace, make_global_ns
 from rosz.ros1.state import params_of
+from rosz.ros1.tool import Tool
 
 __all__ = (
     "GLOBALNS",
@@ -31,6 +32,7 @@ __all__ = (
     "set_param",
     "set_param_raw",
     "upload_params",
+    "yamlmain",
 )
 
 NAME = "rosparam"
@@ -245,3 +247,9 @@ def dump_params(filename: str | None, param: str, verbose: bool = False) -> None
         Path(filename).write_text(dump(tree), encoding="utf-8")
     except OSError as error:
         raise RosParamIOException(f"cannot write [{filename}]: {error.strerror}") from error
+
+
+_tool = Tool(NAME)
+yamlmain = _tool.main
+_fullusage = _tool.print_usage
+globals().update(_tool.parts("delete list"))

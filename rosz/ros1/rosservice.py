@@ -13,6 +13,7 @@ from rosz.ros1.genpy import get_printable_message_args, get_service_class
 from rosz.ros1.rosgraph.masterapi import Master
 from rosz.ros1.rosgraph.names import make_global_ns, script_resolve_name
 from rosz.ros1.state import survey, unnamed_node
+from rosz.ros1.tool import Tool
 
 __all__ = (
     "NAME",
@@ -27,6 +28,7 @@ __all__ = (
     "get_service_uri",
     "has_service_args",
     "rosservice_find",
+    "rosservicemain",
 )
 
 NAME = "rosservice"
@@ -164,3 +166,9 @@ def call_service(
         raise ROSServiceException(str(error)) from error
     finally:
         client.close()
+
+
+_tool = Tool(NAME)
+rosservicemain = _tool.main
+_fullusage = _tool.print_usage
+globals().update(_tool.parts("args call find info list node type uri"))

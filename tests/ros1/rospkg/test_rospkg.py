@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from oracle import same
 
-from rosz.ros1 import roslib, rospkg
+from rosz.ros1 import rospkg
+from rosz.ros1.roslib import packages as roslib
 
 ARM = """<package format="2">
   <name>arm</name>

@@ -1,4 +1,4 @@
-"""roslib: packages and the files in them, for programs older than rospkg (ROS wiki, roslib)."""
+"""roslib.packages: packages and the files in them (ROS wiki, roslib)."""
 
 from __future__ import annotations
 
@@ -6,18 +6,35 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from rosz.packages import Package
 from rosz.ros1.modules import MODULES
 from rosz.ros1.rospkg import MANIFEST_FILE, PACKAGE_FILE, ResourceNotFound, RosPack
 
-__all__ = ("load_manifest", "message", "names", "packages")
-
-message: ModuleType  # built by the importer, as the next two
-names: ModuleType
-packages: ModuleType
+__all__ = (
+    "MANIFEST_FILE",
+    "PACKAGE_FILE",
+    "TYPE_SEPARATOR",
+    "InvalidROSPkgException",
+    "MultipleNodesException",
+    "ROSEnvException",
+    "ROSLibException",
+    "ROSPkgException",
+    "find_node",
+    "find_resource",
+    "get_depends",
+    "get_dir_pkg",
+    "get_master",
+    "get_pkg_dir",
+    "get_pkg_subdir",
+    "list_package_resources",
+    "list_package_resources_by_dir",
+    "list_pkgs",
+    "list_pkgs_by_path",
+    "load_manifest",
+    "resource_file",
+)
 
 TYPE_SEPARATOR = "/"
 
