@@ -25,8 +25,17 @@ from rosz.bags.bag import (
 from rosz.bags.mcap_reader import McapReader
 from rosz.bags.mcap_writer import McapWriter
 from rosz.bags.messages import Bag, BagMessage, BagOutput, class_of, decoder_of
-from rosz.bags.opening import create_writer, find_format, open, open_reader  # noqa: A004
+from rosz.bags.opening import (
+    FORMATS,
+    create_file,
+    create_writer,
+    find_format,
+    form_of,
+    open,  # noqa: A004
+    open_reader,
+)
 from rosz.bags.qos_text import format_profiles, parse_profiles
+from rosz.bags.rosbag2_reader import STORAGES, Storage
 
 PUBLIC_MODULES = (
     "editing",
@@ -42,6 +51,8 @@ PUBLIC_MODULES = (
 )
 
 __all__ = (
+    "FORMATS",
+    "STORAGES",
     "Attachment",
     "Bag",
     "BagMessage",
@@ -56,10 +67,13 @@ __all__ = (
     "McapReader",
     "McapWriter",
     "Payload",
+    "Storage",
     "class_of",
+    "create_file",
     "create_writer",
     "decoder_of",
     "find_format",
+    "form_of",
     "format_profiles",
     "open",
     "open_reader",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from rosz.bags.bag import BagReader, BagWriter, Channel, Compression, Entry, Payload
-from rosz.bags.opening import create_writer
+from rosz.bags.opening import create_writer, form_of
 from rosz.bags.ros1_form import to_cdr, to_ros1
 from rosz.errors import BagError, RoszError, UsageError
 from rosz.typestore import TypeStore
@@ -93,7 +93,7 @@ class Transfer:
 
 def divide(
     entries: Iterable[Entry],
-    path: Path,
+    path: str,
     types: TypeStore,
     report: Callable[[str], object],
     *,
@@ -105,7 +105,8 @@ def divide(
 
     Args:
         entries: The messages.
-        path: Path that the names are made of: ``x.mcap`` gives ``x_0.mcap`` and so on.
+        path: Path that the names are made of: ``x.mcap`` gives ``x_0.mcap`` and so on, and ``x/``
+            the folders ``x_0`` and so on.
         types: Types for channels without a definition.
         report: Function called with a sentence for each channel that is left out.
         seconds: Longest time of a bag; 0 for no limit.
@@ -118,14 +119,17 @@ def divide(
     """
     if not (seconds or size):
         raise UsageError("no limit is given: --duration SECONDS or --size MB")
+    form = form_of(path)
+    whole = Path(path)
     rest = iter(entries)
     entry = next(rest, None)
     number = 0
     while entry is not None:
-        file = path.with_name(f"{path.stem}_{number}{path.suffix}")
+        suffix = "" if form == "rosbag2" else whole.suffix
+        file = whole.with_name(f"{whole.name.removesuffix(suffix)}_{number}{suffix}")
         end = entry.stamp + int(seconds * 1_000_000_000) if seconds else None
         taken = 0
-        with create_writer(file, compression=compression) as writer:
+        with create_writer(file, compression=compression, form=form) as writer:
             transfer = Transfer(writer, types, report)
             while entry is not None and (end is None or entry.stamp < end):
                 if size and taken and taken + len(entry.data) > size:

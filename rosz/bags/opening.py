@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
 
-from rosz.bags.bag import BagReader, Compression
+from rosz.bags.bag import BagReader, BagWriter, Compression
 from rosz.bags.chunk_writer import ChunkWriter
 from rosz.bags.mcap_reader import McapReader
 from rosz.bags.mcap_records import MAGIC
@@ -16,17 +16,31 @@ from rosz.bags.messages import Bag, BagOutput
 from rosz.bags.ros1_reader import Ros1Reader
 from rosz.bags.ros1_records import describe_begin
 from rosz.bags.ros1_writer import Ros1Writer
-from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
+from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader, Storage
+from rosz.bags.rosbag2_writer import Rosbag2Writer
 from rosz.errors import BagError, UsageError
 
 if TYPE_CHECKING:
     from rosz.typestore import TypeStore
 
-__all__ = ("ACTIVE", "create_writer", "find_format", "open", "open_reader")
+__all__ = (
+    "ACTIVE",
+    "FORMATS",
+    "create_file",
+    "create_writer",
+    "find_format",
+    "form_of",
+    "open",
+    "open_reader",
+)
 
 _MOST_MAGIC = 16
 _SQLITE = b"SQLite format 3"
-_WRITERS: dict[str, type[ChunkWriter]] = {".mcap": McapWriter, ".bag": Ros1Writer}
+_WRITERS: dict[str, type[ChunkWriter]] = {"mcap": McapWriter, "rosbag": Ros1Writer}
+_SUFFIXES = {".mcap": "mcap", ".bag": "rosbag"}
+
+FORMATS = ("mcap", "rosbag", "rosbag2")
+"""The names of the formats."""
 
 ACTIVE = ".active"
 """Suffix of a bag that is being recorded, or was when its recorder was killed."""
@@ -81,11 +95,59 @@ def create_writer(
     *,
     compression: Compression = "none",
     replace: bool = False,
+    form: str = "",
+    storage: Storage = "mcap",
+) -> BagWriter:
+    """Create a bag of any format.
+
+    Args:
+        path: Path that tells the format: ``NAME.mcap``, ``NAME.bag`` for a bag of ROS 1, or
+            ``NAME/`` for a folder of rosbag2.
+        compression: Name of the compression.
+        replace: Whether a file that exists is replaced; otherwise it is an error, as is a folder.
+        form: Format, as `find_format` names it; that of the path when not given.
+        storage: Storage of rosbag2.
+
+    Raises:
+        BagError: The bag cannot be created.
+        UsageError: The format is not known, or has no such compression.
+    """
+    kind = form or form_of(path)
+    if kind == "rosbag2":
+        return Rosbag2Writer(path, storage=storage, compression=compression)
+    if kind not in _WRITERS:
+        raise UsageError(f"there is no format '{kind}'; known are {', '.join(FORMATS)}")
+    return _WRITERS[kind](path, compression=compression, replace=replace)
+
+
+def form_of(path: str | os.PathLike[str]) -> str:
+    """Return the format that a path tells for a bag to write, as `find_format` names it.
+
+    Raises:
+        UsageError: It tells none.
+    """
+    text = str(path)
+    if text.endswith(os.sep):
+        return "rosbag2"
+    suffix = Path(text.removesuffix(ACTIVE)).suffix
+    if suffix not in _SUFFIXES:
+        raise UsageError(
+            f"'{text}' does not tell the format of the bag; expected a name.mcap, a name.bag, or a"
+            " folder/ of rosbag2"
+        )
+    return _SUFFIXES[suffix]
+
+
+def create_file(
+    path: str | os.PathLike[str],
+    *,
+    compression: Compression = "none",
+    replace: bool = False,
     chunk_size: int = 768 << 10,
     capacity: int = 64 << 20,
     checksums: bool = True,
 ) -> ChunkWriter:
-    """Create a bag; the suffix of the path tells the format.
+    """Create a bag that is a file; the suffix of the path tells the format.
 
     Args:
         path: Path that ends in ``.mcap``, or ``.bag`` for a bag of ROS 1; ``.active`` may follow.
@@ -99,12 +161,10 @@ def create_writer(
         BagError: The file cannot be created.
         UsageError: The suffix is not known, or the format has no such compression.
     """
-    suffix = Path(str(path).removesuffix(ACTIVE)).suffix
-    if suffix not in _WRITERS:
-        raise UsageError(
-            f"'{path}' does not tell the format of the bag; expected a name.mcap or a name.bag"
-        )
-    return _WRITERS[suffix](
+    kind = form_of(path)
+    if kind not in _WRITERS:
+        raise UsageError(f"'{path}' is a folder; expected a name.mcap or a name.bag")
+    return _WRITERS[kind](
         path,
         compression=compression,
         replace=replace,

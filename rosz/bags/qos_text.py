@@ -13,7 +13,7 @@ import msgspec
 
 from rosz.qos import FOREVER, QoS
 
-__all__ = ("format_profiles", "parse_profiles")
+__all__ = ("format_profiles", "parse_profiles", "profile_rows")
 
 _SECOND = 1_000_000_000
 _POLICIES: dict[str, dict[str, int]] = {
@@ -25,14 +25,27 @@ _POLICIES: dict[str, dict[str, int]] = {
 _DURATIONS = {"deadline": "deadline", "lifespan": "lifespan", "lease": "liveliness_lease_duration"}
 
 
-def format_profiles(profiles: Iterable[QoS]) -> str:
-    """Return the text of the QoS of some publishers."""
+def format_profiles(profiles: Iterable[QoS], *, names: bool = False) -> str:
+    """Return the text of the QoS of some publishers.
+
+    Args:
+        profiles: What each of them offers.
+        names: Whether values of policies are names, as since Jazzy.
+    """
     import yaml  # slow to import, and most bags do without
 
+    rows = profile_rows(profiles, names=names)
+    return yaml.safe_dump(rows, sort_keys=False) if rows else ""
+
+
+def profile_rows(profiles: Iterable[QoS], *, names: bool = False) -> list[dict[str, Any]]:
+    """Return the QoS of some publishers as the rows of `format_profiles`."""
     rows = []
     for qos in profiles:
         given = msgspec.structs.asdict(qos)
-        policies = {name: codes[given[name]] for name, codes in _POLICIES.items()}
+        policies: dict[str, Any] = {
+            name: given[name] if names else codes[given[name]] for name, codes in _POLICIES.items()
+        }
         durations = {
             text: dict(zip(("sec", "nsec"), divmod(given[name], _SECOND), strict=True))
             for name, text in _DURATIONS.items()
@@ -44,7 +57,7 @@ def format_profiles(profiles: Iterable[QoS]) -> str:
         row["liveliness_lease_duration"] = durations["liveliness_lease_duration"]
         row["avoid_ros_namespace_conventions"] = False
         rows.append(row)
-    return yaml.safe_dump(rows, sort_keys=False) if rows else ""
+    return rows
 
 
 def parse_profiles(text: str) -> tuple[QoS, ...]:

@@ -16,7 +16,7 @@ import msgspec
 
 from rosz.bags.bag import Channel, Compression, Payload
 from rosz.bags.chunk_writer import ChunkWriter
-from rosz.bags.opening import ACTIVE, create_writer
+from rosz.bags.opening import ACTIVE, create_file
 from rosz.bags.ros1_form import FromCdr, to_ros1
 from rosz.errors import BagError, UsageError
 from rosz.typestore import TypeStore
@@ -433,7 +433,7 @@ def _create(options: RecordOptions, index: int) -> tuple[Path, ChunkWriter]:
             raise BagError(f"it exists already, and nothing is overwritten; {hint}", str(taken))
         if taken is None:
             with suppress(FileExistsError):
-                return target, create_writer(
+                return target, create_file(
                     active,
                     compression=options.compression,
                     chunk_size=options.chunk_size,

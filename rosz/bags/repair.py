@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import msgspec
 from rosz.bags.bag import BagReader, BagWriter, Channel, Compression, Entry
 from rosz.bags.messages import class_of
 from rosz.bags.opening import ACTIVE, create_writer, open_reader
+from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
 from rosz.errors import BagError, RoszError
 from rosz.typestore import TypeStore
 
@@ -81,13 +83,20 @@ def copy_bag(reader: BagReader, writer: BagWriter, problems: list[BagError] | No
     return count
 
 
-def recover(path: Path, target: Path, *, compression: Compression = "none") -> Copied:
+def recover(
+    path: Path,
+    target: str | os.PathLike[str],
+    *,
+    compression: Compression = "none",
+    like: bool = False,
+) -> Copied:
     """Write what can be read of a bag into a new one.
 
     Args:
         path: The bag, which may be damaged or have no index.
-        target: The new bag; must not exist.
+        target: The new bag, whose path tells its format; must not exist.
         compression: Compression of the new bag.
+        like: Whether the new bag has the format of the old one, whatever its path.
 
     Raises:
         BagError: The bag cannot be read at all, or the new one cannot be written.
@@ -95,9 +104,11 @@ def recover(path: Path, target: Path, *, compression: Compression = "none") -> C
     """
     with open_reader(path) as reader:
         problems = list(reader.problems)
-        with create_writer(target, compression=compression) as writer:
+        storage = reader.storage if isinstance(reader, Rosbag2Reader) else "mcap"
+        form = reader.format if like else ""
+        with create_writer(target, compression=compression, form=form, storage=storage) as writer:
             count = copy_bag(reader, writer, problems)
-    return Copied(target, None, count, problems)
+    return Copied(Path(target), None, count, problems)
 
 
 def rewrite(
@@ -131,20 +142,31 @@ def rewrite(
         raise BagError(f"the backup '{backup}' exists already; -f replaces it", str(path))
     if backup is None and target.exists():
         raise BagError(f"'{target}' exists already", str(path))
-    made = target.with_name(f"{target.stem}.part{os.getpid()}{target.suffix}")
+    with open_reader(path) as reader:
+        wanted = _compression_of(reader) if compression is None else compression
+        if isinstance(reader, SqliteReader):
+            raise BagError("it is one file of a bag of rosbag2; give the folder", str(path))
+    holder = target.with_name(f".{name}.part{os.getpid()}")
     try:
-        with open_reader(path) as reader:
-            wanted = _compression_of(reader) if compression is None else compression
-        copied = recover(path, made, compression=wanted)
+        holder.mkdir()
+    except OSError as error:
+        raise BagError(f"cannot create it: {error.strerror}", str(holder)) from error
+    try:
+        made = holder / name
+        copied = recover(path, made, compression=wanted, like=True)
         if backup is not None:
+            if backup.is_dir():
+                shutil.rmtree(backup)
             path.replace(backup)
         made.replace(target)
     finally:
-        made.unlink(missing_ok=True)
+        shutil.rmtree(holder)
     return msgspec.structs.replace(copied, path=target, backup=backup)
 
 
 def _compression_of(reader: BagReader) -> Compression:
+    if isinstance(reader, Rosbag2Reader):
+        return reader.compression
     found: list[Compression] = [chunk.compression for chunk in reader.chunks]
     return max(found, key=found.count) if found else "none"
 

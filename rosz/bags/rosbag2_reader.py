@@ -12,18 +12,39 @@ import sqlite3
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Literal, Protocol, Self, TypeAlias
 from urllib.parse import quote
 
-from rosz.bags.bag import Attachment, Channel, Chunk, DamageReport, Entry, Payload
+from rosz.bags.bag import (
+    Attachment,
+    Channel,
+    Chunk,
+    Compression,
+    DamageReport,
+    Entry,
+    Payload,
+)
 from rosz.bags.mcap_reader import McapReader
 from rosz.bags.qos_text import parse_profiles
 from rosz.errors import BagError, UsageError
 
-__all__ = ("METADATA", "Rosbag2Reader", "SqliteReader")
+__all__ = (
+    "METADATA",
+    "METADATA_RECORD",
+    "STORAGES",
+    "Rosbag2Reader",
+    "SqliteReader",
+    "Storage",
+    "zstandard_library",
+)
 
+Storage: TypeAlias = Literal["mcap", "sqlite3"]
+STORAGES: tuple[Storage, ...] = ("mcap", "sqlite3")
 METADATA = "metadata.yaml"
+METADATA_RECORD = "rosbag2"
+"""Name of the record in MCAP that has the metadata too."""
 _SUFFIXES = (".db3", ".mcap")
 _ZSTD_FRAME = b"\x28\xb5\x2f\xfd"
 
@@ -31,14 +52,20 @@ _ZSTD_FRAME = b"\x28\xb5\x2f\xfd"
 class _Part(Protocol):
     """A file of a bag."""
 
+    format: str
     start: int
     end: int
     indexed: bool
 
     @property
+    def chunks(self) -> Sequence[Chunk]: ...
+    @property
     def channels(self) -> Sequence[Channel]: ...
     @property
+    def metadata(self) -> Mapping[str, Mapping[str, str]]: ...
+    @property
     def problems(self) -> Sequence[BagError]: ...
+    def attachments(self) -> Iterator[Attachment]: ...
     def count(self, channel: Channel | None = None) -> int: ...
     def messages(
         self,
@@ -194,7 +221,6 @@ class Rosbag2Reader:
     """
 
     format = "rosbag2"
-    metadata: Mapping[str, Mapping[str, str]] = {}
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
@@ -202,7 +228,9 @@ class Rosbag2Reader:
         self.problems: list[BagError] = []
         found = self._read_metadata()
         self.version = str(found.get("version", ""))
+        self._custom = found.get("custom_data")
         compressed = str(found.get("compression_mode", "")).lower()
+        self._compressed = compressed not in {"", "none"}
         self._by_message = compressed == "message" and found.get("compression_format") == "zstd"
         self._parts: list[_Part] = []
         try:
@@ -265,7 +293,7 @@ class Rosbag2Reader:
         """Return a temporary file with the contents of a compressed one."""
         import tempfile
 
-        zstandard = _zstandard()
+        zstandard = zstandard_library()
         folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="rosz-bag-"))
         plain = Path(folder, file.stem)
         try:
@@ -276,9 +304,35 @@ class Rosbag2Reader:
         return plain
 
     @property
+    def storage(self) -> Storage:
+        """What the files are written by."""
+        return "mcap" if self._parts[0].format == "mcap" else "sqlite3"
+
+    @property
+    def compression(self) -> Compression:
+        """The compression of the first chunk, or of the files or messages."""
+        chunks = self._parts[0].chunks
+        return "zstd" if self._compressed else chunks[0].compression if chunks else "none"
+
+    @property
     def size(self) -> int:
         """Size of all files in bytes."""
         return sum(one.stat().st_size for one in self.path.iterdir() if one.is_file())
+
+    @cached_property
+    def metadata(self) -> Mapping[str, Mapping[str, str]]:
+        """Named texts by name of the record; those of ``custom_data`` are named ``NAME/KEY``."""
+        found = {
+            name: texts
+            for part in self._parts
+            for name, texts in part.metadata.items()
+            if name != METADATA_RECORD
+        }
+        texts: dict[str, dict[str, str]] = {}
+        for key, text in (self._custom if isinstance(self._custom, dict) else {}).items():
+            name, _, rest = str(key).rpartition("/")
+            texts.setdefault(name or "custom_data", {})[rest] = str(text)
+        return {**found, **texts}
 
     @cached_property
     def channels(self) -> Sequence[Channel]:
@@ -315,7 +369,7 @@ class Rosbag2Reader:
         merged = heapq.merge(*parts, key=lambda one: one.stamp, reverse=reverse)
         if not self._by_message:
             return merged
-        unpack = _zstandard().ZstdDecompressor().decompress
+        unpack = zstandard_library().ZstdDecompressor().decompress
 
         def plain(data: Payload) -> bytes:
             found: bytes = unpack(data) if bytes(data[:4]) == _ZSTD_FRAME else bytes(data)
@@ -324,8 +378,8 @@ class Rosbag2Reader:
         return (Entry(one.channel, one.stamp, plain(one.data)) for one in merged)
 
     def attachments(self) -> Iterator[Attachment]:
-        """Yield nothing: the format has no files within."""
-        return iter(())
+        """Yield the files within the bag, which only those of MCAP have."""
+        return chain.from_iterable(part.attachments() for part in self._parts)
 
     def close(self) -> None:
         """Close the files; a second call has no effect."""
@@ -338,7 +392,12 @@ class Rosbag2Reader:
         self.close()
 
 
-def _zstandard() -> Any:
+def zstandard_library() -> Any:
+    """Return the module zstandard.
+
+    Raises:
+        UsageError: It is not installed.
+    """
     try:
         import zstandard
     except ImportError as error:

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, Self
 
-from rosz.bags import BagReader, BagWriter, Channel, Entry, create_writer, decoder_of, open_reader
+from rosz.bags import BagReader, BagWriter, Channel, Entry, create_file, decoder_of, open_reader
 from rosz.bags.editing import Transfer
 from rosz.bags.ros1_form import ros1_definition
 from rosz.bags.ros1_reader import Ros1Reader
@@ -210,7 +210,7 @@ class Bag:
         target = self._temporary or self._path
         suffix = target.suffix in {".bag", ".mcap"}
         try:
-            self._writer = create_writer(
+            self._writer = create_file(
                 target if suffix else target.with_name(f"{target.name}.bag"),
                 compression=self._compression,  # type: ignore[arg-type]
                 replace=True,

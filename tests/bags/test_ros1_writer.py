@@ -11,7 +11,7 @@ from oracle import PYTHON, require
 
 from bags.messages import MESSAGES
 from rosz.bags import Channel, Compression, open_reader
-from rosz.bags.opening import create_writer
+from rosz.bags.opening import create_file
 from rosz.bags.ros1_form import to_cdr, to_ros1
 from rosz.errors import BagError, UsageError
 from rosz.qos import LATCHED
@@ -34,7 +34,7 @@ print(json.dumps(rows))
 
 def write(path: Path, compression: Compression = "none", times: int = 3) -> None:
     """Write each message several times, as a recorder of ROS 1's format does."""
-    with create_writer(path, compression=compression, chunk_size=3000) as writer:
+    with create_file(path, compression=compression, chunk_size=3000) as writer:
         handles = {}
         for topic, message in MESSAGES.items():
             cls = type(message)
@@ -103,9 +103,9 @@ def test_debian_reads_the_same(tmp_path: Path, compression: Compression) -> None
 
 def test_what_the_format_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no compression 'zstd'; they have bz2 and lz4"):
-        create_writer(tmp_path / "a.bag", compression="zstd")
+        create_file(tmp_path / "a.bag", compression="zstd")
     with (
-        create_writer(tmp_path / "a.bag") as writer,
+        create_file(tmp_path / "a.bag") as writer,
         pytest.raises(BagError, match="cannot hold messages of '/a' as cdr"),
     ):
         writer.add(Channel("/a", "std_msgs/msg/String"))

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TextIO
 
 from rosz.cli import suggest
 from rosz.cli.bag.group import app
@@ -17,7 +17,7 @@ from rosz.cli.declare import Argument, Json, Option, at_least, no_less_than_zero
 from rosz.errors import NotFoundError, UsageError, near_miss
 
 if TYPE_CHECKING:
-    from rosz.bags import BagReader, Channel, Compression, Entry, Payload
+    from rosz.bags import BagReader, BagWriter, Channel, Compression, Entry, Payload
     from rosz.errors import BagError
     from rosz.introspect.echo import Echo, EchoOptions
 
@@ -27,14 +27,22 @@ _NS = 1_000_000_000
 _COMPRESSIONS = ("none", "bz2", "lz4", "zstd")
 
 _Bag = Annotated[str, Argument("BAG", source=suggest.files)]
-_Output = Annotated[str, Argument("OUTPUT", "The suffix tells the format: .mcap or .bag.")]
+_Output = Annotated[
+    str, Argument("OUTPUT", "NAME.mcap, NAME.bag, or NAME/ for a folder of rosbag2.")
+]
 _Topics = Annotated[
     list[str] | None, Option("--topics TOPIC", "Take these topics only; several may follow.")
 ]
 _Start = Annotated[float, Option("-s --start SECONDS", "Leave out the beginning.")]
 _End = Annotated[float | None, Option("--end SECONDS", "Leave out what is later in the bag.")]
 _Compression = Annotated[
-    str, Option("--compression NAME", "none, lz4, or bz2 (.bag) or zstd (.mcap).")
+    str, Option("--compression NAME", "none, lz4, or bz2 (.bag) or zstd (.mcap, rosbag2).")
+]
+_To = Annotated[
+    str, Option("--to FORMAT", "mcap, rosbag or rosbag2, if OUTPUT does not tell the format.")
+]
+_Storage = Annotated[
+    str, Option("--storage NAME", "Storage of rosbag2: mcap (the default) or sqlite3.")
 ]
 
 
@@ -155,10 +163,16 @@ def filter_command(
 
 @app.command("convert")
 def convert_command(
-    call: Call, bag: _Bag, output: _Output, *, compression: _Compression = "none"
+    call: Call,
+    bag: _Bag,
+    output: _Output,
+    *,
+    to: _To = "",
+    storage: _Storage = "",
+    compression: _Compression = "none",
 ) -> int:
-    """Write a bag in another format: MCAP, or that of ROS 1."""
-    return _write(call, [bag], output, compression)
+    """Write a bag in another format: MCAP, that of ROS 1, or a folder of rosbag2."""
+    return _write(call, [bag], output, _Form(to, storage, compression))
 
 
 @app.command("merge")
@@ -166,25 +180,56 @@ def merge_command(
     call: Call,
     bags: Annotated[list[str], Argument("BAG", source=suggest.files)],
     *,
-    output: Annotated[str, Option("-o --output OUTPUT", "The new bag: NAME.mcap or NAME.bag.")],
+    output: Annotated[
+        str, Option("-o --output OUTPUT", "The new bag: NAME.mcap, NAME.bag or NAME/.")
+    ],
+    to: _To = "",
+    storage: _Storage = "",
     compression: _Compression = "none",
 ) -> int:
     """Write several bags into one, merged by time."""
-    return _write(call, bags, output, compression)
+    return _write(call, bags, output, _Form(to, storage, compression))
 
 
-def _write(call: Call, bags: Sequence[str], output: str, compression: str) -> int:
-    from rosz.bags import create_writer
+class _Form(NamedTuple):
+    """The format of a new bag, as options give it."""
+
+    to: str
+    storage: str
+    compression: str
+
+    def create(self, output: str) -> BagWriter:
+        """Create the bag."""
+        from rosz.bags import FORMATS, STORAGES, create_writer, form_of
+
+        if self.to and self.to not in FORMATS:
+            raise UsageError(f"--to is '{self.to}'; expected {', '.join(FORMATS)}")
+        if self.storage and self.storage not in STORAGES:
+            raise UsageError(f"--storage is '{self.storage}'; expected {' or '.join(STORAGES)}")
+        form = self.to or ("rosbag2" if self.storage else form_of(output))
+        if self.storage and form != "rosbag2":
+            raise UsageError(f"--storage is for rosbag2, and the new bag is of the format {form}")
+        return create_writer(
+            output,
+            compression=_compression(self.compression),
+            form=form,
+            storage=self.storage or "mcap",
+        )
+
+
+def _write(call: Call, bags: Sequence[str], output: str, form: _Form) -> int:
     from rosz.bags.editing import Transfer
 
     _check_output(output, bags)
     with (
         _open(bags) as source,
-        create_writer(output, compression=_compression(compression)) as writer,
+        form.create(output) as writer,
     ):
         for reader in source.readers:
             for name, texts in reader.metadata.items():
                 writer.add_metadata(name, texts)
+            for attachment in reader.attachments():
+                writer.add_attachment(attachment)
         transfer = Transfer(writer, call.types, source.problems.report)
         for entry in source.entries():
             transfer.write(entry)
@@ -212,7 +257,7 @@ def split_command(
     with _open([bag]) as source:
         parts = divide(
             source.entries(),
-            Path(output or bag),
+            output or (bag if Path(bag).is_file() else f"{bag.rstrip('/')}/"),
             call.types,
             source.problems.report,
             seconds=duration,

@@ -63,7 +63,7 @@ def fix_command(
     """Write what can be read of a damaged bag into a new one."""
     from rosz.bags.repair import recover
 
-    return _report([recover(Path(bag), Path(output))], quiet=False)
+    return _report([recover(Path(bag), output)], quiet=False)
 
 
 @app.command("reindex")
