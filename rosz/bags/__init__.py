@@ -39,15 +39,18 @@ from rosz.bags.rosbag2_reader import STORAGES, Storage
 
 PUBLIC_MODULES = (
     "editing",
+    "images",
     "opening",
     "parameters",
     "player",
+    "plotting",
     "recorder",
     "recording",
     "repair",
     "ros1_form",
     "ros1_reader",
     "summary",
+    "tables",
 )
 
 __all__ = (

@@ -18,7 +18,7 @@ from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
 from rosz.message import Message, Slot, ros1_slots, slot_type, slots
 from rosz.names import short_type
 
-__all__ = ("FieldPath", "Filter", "Target", "find_target")
+__all__ = ("FieldPath", "Filter", "FilterFailed", "Target", "find_target")
 
 _STEP = re.compile(r"(\w+)(?:\[([^\]]*)\])?")
 _MOST_SLICE_PARTS = 3
@@ -196,6 +196,10 @@ def find_target(name: str, topics: Mapping[str, Sequence[str]], load: Loader) ->
     raise NotFoundError(f"unknown topic '{name}'{refused or near_miss(name, topics)}")
 
 
+class FilterFailed(RoszError):
+    """A filter failed on a message."""
+
+
 class Filter:
     """A condition on messages, written in Python as ``rostopic`` takes it: ``m.data > 3``.
 
@@ -211,8 +215,9 @@ class Filter:
         try:
             self._code = compile(ast.parse(text.strip(), "<filter>", "eval"), "<filter>", "eval")
         except SyntaxError as error:
-            place = f" at column {error.offset}" if error.offset else ""
-            raise self._refused(f"{error.msg}{place}") from error
+            before = len(text) - len(text.lstrip())
+            column = before + (error.offset or len(text.strip()) + 1)
+            raise self._refused(f"{error.msg} at column {column}") from error
         except ValueError as error:
             raise self._refused(str(error)) from error
         except (MemoryError, RecursionError) as error:
@@ -225,7 +230,7 @@ class Filter:
         """Return whether a message passes.
 
         Raises:
-            RoszError: The expression fails on this message.
+            FilterFailed: The expression fails on this message.
         """
         return bool(self.value(message, topic, time))
 
@@ -238,12 +243,12 @@ class Filter:
             time: Value of ``t``, which only messages of bags have.
 
         Raises:
-            RoszError: The expression fails on this message.
+            FilterFailed: The expression fails on this message.
         """
         known = {"m": message, "topic": topic}
         try:
             return eval(self._code, known if time is None else {**known, "t": time})  # noqa: S307  # the user's
         except Exception as error:
-            raise RoszError(
+            raise FilterFailed(
                 f"filter '{self.text}' failed: {type(error).__name__}: {error}"
             ) from error

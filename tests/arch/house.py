@@ -58,6 +58,7 @@ FLOORS = {
     "rosz.node": 5,
     "rosz.actions": 6,
     "rosz.bags": 6,
+    "rosz.bags.images": 7,
     "rosz.introspect": 6,
     "rosz.launch.run": 6,
     "rosz.reconfigure": 6,

@@ -1,40 +1,34 @@
-"""``rosz bag filter``, ``convert``, ``merge``, ``split``, ``cat`` and ``export``."""
+"""``rosz bag filter``, ``convert``, ``merge`` and ``split``."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from rosz.cli import suggest
 from rosz.cli.bag.group import app
 from rosz.cli.bag.play import list_topics
+from rosz.cli.bag.source import BagArgument, End, Start, Topics, check_times, open_bags
 from rosz.cli.call import Call
-from rosz.cli.console import count, print_error, print_lines, warn
-from rosz.cli.declare import Argument, Json, Option, at_least, no_less_than_zero
-from rosz.errors import NotFoundError, UsageError, near_miss
+from rosz.cli.console import count, print_lines
+from rosz.cli.declare import Argument, Option, at_least, no_less_than_zero
+from rosz.errors import BagError, RoszError, UsageError
 
 if TYPE_CHECKING:
-    from rosz.bags import BagReader, BagWriter, Channel, Compression, Entry, Payload
-    from rosz.errors import BagError
-    from rosz.introspect.echo import Echo, EchoOptions
+    from rosz.bags import BagWriter, Compression
 
 __all__ = ()
 
 _NS = 1_000_000_000
 _COMPRESSIONS = ("none", "bz2", "lz4", "zstd")
 
-_Bag = Annotated[str, Argument("BAG", source=suggest.files)]
 _Output = Annotated[
     str, Argument("OUTPUT", "NAME.mcap, NAME.bag, or NAME/ for a folder of rosbag2.")
 ]
-_Topics = Annotated[
-    list[str] | None, Option("--topics TOPIC", "Take these topics only; several may follow.")
-]
-_Start = Annotated[float, Option("-s --start SECONDS", "Leave out the beginning.")]
-_End = Annotated[float | None, Option("--end SECONDS", "Leave out what is later in the bag.")]
 _Compression = Annotated[
     str, Option("--compression NAME", "none, lz4, or bz2 (.bag) or zstd (.mcap, rosbag2).")
 ]
@@ -46,65 +40,10 @@ _Storage = Annotated[
 ]
 
 
-class _Problems:
-    """Prints problems, and counts them."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def report(self, problem: BagError | str) -> None:
-        self.count += 1
-        print_error(f"ERROR: {problem}")
-
-
-class _Input:
-    """Bags that are read, and what is chosen of them."""
-
-    def __init__(self, readers: Sequence[BagReader], problems: _Problems) -> None:
-        self.readers = readers
-        self.problems = problems
-
-    def entries(
-        self, topics: Sequence[str] | None = None, start: float = 0.0, end: float | None = None
-    ) -> Iterator[Entry]:
-        from rosz.bags.editing import merged
-
-        known = {channel.topic for one in self.readers for channel in one.channels}
-        wanted = {one if one.startswith("/") else f"/{one}" for one in topics or ()}
-        for one in sorted(wanted - known):
-            raise NotFoundError(f"no topic '{one}' in the bag{near_miss(one, known)}")
-        first = min((one.start for one in self.readers if one.count()), default=0)
-        return merged(
-            self.readers,
-            self.problems.report,
-            topics=wanted or None,
-            start=first + int(start * _NS) if start else None,
-            end=None if end is None else first + int(end * _NS),
-        )
-
-
-@contextmanager
-def _open(bags: Sequence[str]) -> Iterator[_Input]:
-    from rosz.bags import open_reader
-
-    with ExitStack() as stack:
-        readers = [stack.enter_context(open_reader(bag)) for bag in bags]
-        problems = _Problems()
-        for reader in readers:
-            for problem in reader.problems:
-                problems.report(problem)
-        yield _Input(readers, problems)
-
-
 def _compression(name: str) -> Compression:
     if name not in _COMPRESSIONS:
         raise UsageError(f"--compression is '{name}'; expected {', '.join(_COMPRESSIONS)}")
     return name  # type: ignore[return-value]
-
-
-def _check_times(start: float, end: float | None) -> None:
-    no_less_than_zero("--start", start)
-    no_less_than_zero("--end", end)
 
 
 def _check_output(output: str, bags: Sequence[str]) -> None:
@@ -115,7 +54,7 @@ def _check_output(output: str, bags: Sequence[str]) -> None:
 @app.command("filter", arrange=list_topics)
 def filter_command(
     call: Call,
-    bag: _Bag,
+    bag: BagArgument,
     output: _Output,
     expression: Annotated[
         str, Argument("EXPRESSION", "Python; topic, m (the message) and t (its time) are known.")
@@ -124,47 +63,76 @@ def filter_command(
     show: Annotated[
         str, Option("-p --print EXPRESSION", "Print the value of this for each message.")
     ] = "",
-    topics: _Topics = None,
-    start: _Start = 0.0,
-    end: _End = None,
+    topics: Topics = None,
+    start: Start = 0.0,
+    end: End = None,
     compression: _Compression = "none",
 ) -> int:
     """Write some of the messages of a bag into another one."""
-    from rosz.bags import Bag, create_writer
+    from rosz.bags import Bag
     from rosz.bags.editing import Transfer
-    from rosz.introspect.fields import Filter
+    from rosz.introspect.fields import Filter, FilterFailed
     from rosz.msgs.builtin_interfaces.msg import Time
 
-    _check_times(start, end)
+    check_times(start, end)
     _check_output(output, [bag])
     condition = Filter(expression) if expression else None
     shown = Filter(show) if show else None
     types = call.types
-    with _open([bag]) as source:
+    with open_bags([bag]) as source, _created(output, compression) as writer:
         decode = Bag(source.readers[0], types).decoder
-        entries = source.entries(topics, start, end)
-        with create_writer(output, compression=_compression(compression), replace=True) as writer:
-            transfer = Transfer(writer, types, source.problems.report)
-            for entry in entries:
-                if condition is not None or shown is not None:
-                    topic = entry.channel.topic
-                    message: Any = decode(entry.channel)(entry.data)
-                    stamp = Time.from_nsec(entry.stamp)
+        transfer = Transfer(writer, types, source.problems.report)
+        for number, entry in enumerate(source.entries(topics, start, end), 1):
+            if condition is not None or shown is not None:
+                topic = entry.channel.topic
+                message: Any = decode(entry.channel)(entry.data)
+                stamp = Time.from_nsec(entry.stamp)
+                try:
                     taken = condition is None or condition.accepts(message, topic, stamp)
-                    if shown is not None:
-                        value = shown.value(message, topic, stamp)
-                        print_lines([f"{'MATCH' if taken else 'NO MATCH'} {value}"])
-                    if not taken:
-                        continue
-                transfer.write(entry)
+                    value = shown.value(message, topic, stamp) if shown is not None else None
+                except FilterFailed as error:
+                    place = f"at message {number}, of '{topic}' at {entry.stamp / _NS:.9f}"
+                    raise RoszError(f"{error}, {place}") from error
+                if shown is not None:
+                    print_lines([f"{'MATCH' if taken else 'NO MATCH'} {value}"])
+                if not taken:
+                    continue
+            transfer.write(entry)
     print_lines([f"{output}: {count(transfer.count, 'message')}"])
     return int(bool(source.problems.count))
+
+
+@contextmanager
+def _created(output: str, compression: str) -> Iterator[BagWriter]:
+    """Create a bag; a file of its name is replaced when the new one is complete."""
+    from rosz.bags import create_writer, form_of
+
+    form, wanted = form_of(output), _compression(compression)
+    target = Path(output)
+    made = target
+    if form != "rosbag2":
+        made = target.with_name(f".{target.stem}.part{os.getpid()}{target.suffix}")
+    writer = create_writer(made, compression=wanted, form=form, replace=True)
+    try:
+        with writer:
+            yield writer
+        if made != target:
+            try:
+                made.replace(target)
+            except OSError as error:
+                raise BagError(f"cannot create it: {error.strerror}", output) from error
+    except BaseException:
+        if made.is_dir():
+            shutil.rmtree(made)
+        else:
+            made.unlink(missing_ok=True)
+        raise
 
 
 @app.command("convert")
 def convert_command(
     call: Call,
-    bag: _Bag,
+    bag: BagArgument,
     output: _Output,
     *,
     to: _To = "",
@@ -222,7 +190,7 @@ def _write(call: Call, bags: Sequence[str], output: str, form: _Form) -> int:
 
     _check_output(output, bags)
     with (
-        _open(bags) as source,
+        open_bags(bags) as source,
         form.create(output) as writer,
     ):
         for reader in source.readers:
@@ -240,7 +208,7 @@ def _write(call: Call, bags: Sequence[str], output: str, form: _Form) -> int:
 @app.command("split")
 def split_command(
     call: Call,
-    bag: _Bag,
+    bag: BagArgument,
     *,
     duration: Annotated[float, Option("-u --duration SECONDS", "Longest time of a part.")] = 0.0,
     size: Annotated[int, Option("--size MB", "Largest size of the messages in a part.")] = 0,
@@ -254,7 +222,7 @@ def split_command(
 
     no_less_than_zero("--duration", duration)
     at_least("--size", size, 0, "MB")
-    with _open([bag]) as source:
+    with open_bags([bag]) as source:
         parts = divide(
             source.entries(),
             output or (bag if Path(bag).is_file() else f"{bag.rstrip('/')}/"),
@@ -267,125 +235,3 @@ def split_command(
         for file, number in parts:
             print_lines([f"{file}: {count(number, 'message')}"])
     return int(bool(source.problems.count))
-
-
-@app.command("cat", arrange=list_topics)
-def cat_command(
-    call: Call,
-    bag: _Bag,
-    topic: Annotated[str, Argument("TOPIC_OR_FIELD", "All topics if omitted.")] = "",
-    *,
-    limit: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
-    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False,
-    condition: Annotated[
-        str, Option("--filter EXPRESSION", "Use only messages for which this is true.")
-    ] = "",
-    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False,
-    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False,
-    start: _Start = 0.0,
-    end: _End = None,
-    json: Json = False,
-) -> int:
-    """Print the messages of a bag, as topic echo prints them."""
-    from rosz.introspect.echo import EchoOptions
-    from rosz.introspect.fields import Filter
-
-    _check_times(start, end)
-    at_least("-n", limit, 1, "messages")
-    options = EchoOptions(
-        plot=plot,
-        as_json=json,
-        no_arrays=noarr,
-        no_strings=nostr,
-        condition=Filter(condition) if condition else None,
-    )
-    with _open([bag]) as source:
-        echoes = _Echoes(source.readers[0], topic, options, call)
-        for entry in source.entries(echoes.topics, start, end):
-            text = echoes.text(entry)
-            if text is None:
-                continue
-            sys.stdout.write(text)
-            if limit is not None:
-                limit -= 1
-                if not limit:
-                    break
-    return int(bool(source.problems.count))
-
-
-@app.command("export", arrange=list_topics)
-def export_command(
-    call: Call,
-    bag: _Bag,
-    folder: Annotated[str, Argument("DIR", "The folder of the files; made if it is missing.")],
-    *,
-    topics: _Topics = None,
-    start: _Start = 0.0,
-    end: _End = None,
-    json: Annotated[bool, Option("--json", "Write lines of JSON, with all fields.")] = False,
-) -> int:
-    """Write each topic of a bag into a CSV file, one row per message."""
-    from rosz.introspect.echo import EchoOptions
-
-    _check_times(start, end)
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
-    suffix = "jsonl" if json else "csv"
-    rows: dict[str, int] = {}
-    with _open([bag]) as source, ExitStack() as files:
-        echoes = _Echoes(source.readers[0], "", EchoOptions(plot=not json, as_json=json), call)
-        opened: dict[str, TextIO] = {}
-        for entry in source.entries(topics, start, end):
-            topic = entry.channel.topic
-            text = echoes.text(entry)
-            if text is None:
-                continue
-            if topic not in opened:
-                file = target / f"{topic.strip('/').replace('/', '_')}.{suffix}"
-                opened[topic] = files.enter_context(file.open("w", encoding="utf-8"))
-            opened[topic].write(text)
-            rows[topic] = rows.get(topic, 0) + 1
-    print_lines(f"{topic}: {count(number, 'row')}" for topic, number in sorted(rows.items()))
-    return int(bool(source.problems.count))
-
-
-class _Echoes:
-    """The text of messages of a bag, each by the definition of its channel."""
-
-    def __init__(self, reader: BagReader, topic: str, options: EchoOptions, call: Call) -> None:
-        from rosz.bags import class_of
-        from rosz.introspect.fields import FieldPath, find_target
-
-        self._types = call.types
-        self._options = options
-        self._now = reader.start
-        self._echoes: dict[int, tuple[Channel, Echo, Callable[[Payload], Any]]] = {}
-        self._path = FieldPath("")
-        self.topics: list[str] = []
-        if topic:
-            by_type = {one.type: one for one in reader.channels}
-            known = {one.topic: [one.type] for one in reader.channels}
-            name = topic if topic.startswith("/") else f"/{topic}"
-            target = find_target(name, known, lambda each: class_of(by_type[each], self._types))
-            self._path, self.topics = target.path, [target.topic]
-
-    def text(self, entry: Entry) -> str | None:
-        """Return the text of a message; None if it is left out."""
-        self._now = entry.stamp
-        channel = entry.channel
-        if id(channel) not in self._echoes:
-            self._echoes[id(channel)] = (channel, *self._make(channel))
-        _, echo, decode = self._echoes[id(channel)]
-        try:
-            return echo.text(decode(entry.data))
-        except LookupError as error:
-            warn(f"a message is left out: {error}")
-            return None
-
-    def _make(self, channel: Channel) -> tuple[Echo, Callable[[Payload], Any]]:
-        from rosz.bags import class_of, decoder_of
-        from rosz.introspect.echo import Echo
-
-        kind = self._path.type_in(class_of(channel, self._types))
-        echo = Echo(channel.topic, kind, self._path, self._options, lambda: self._now)
-        return echo, decoder_of(channel, self._types)

@@ -10,11 +10,11 @@ from rosz.cli.bag.group import app
 from rosz.cli.call import Call
 from rosz.cli.console import count, print_error, print_json, print_lines, warn
 from rosz.cli.declare import Argument, Json, Option
-from rosz.errors import RoszError, UsageError
+from rosz.errors import BagError, RoszError, UsageError
 
 if TYPE_CHECKING:
     from rosz.bags import Compression
-    from rosz.bags.repair import Copied
+    from rosz.bags.repair import Copied, Difference
 
 __all__ = ()
 
@@ -32,9 +32,13 @@ def check_command(call: Call, bags: _Bags, *, json: Json = False) -> int:
 
     rows = []
     for bag in bags:
-        read, problems = check_bag(Path(bag))
-        with open_reader(bag) as reader:
-            differences = find_differences(reader.channels, call.types)
+        differences: list[Difference] = []
+        try:
+            read, problems = check_bag(Path(bag))
+            with open_reader(bag) as reader:
+                differences = find_differences(reader.channels, call.types)
+        except BagError as error:
+            read, problems = 0, [error]
         rows.append(
             {
                 "bag": bag,

@@ -1,0 +1,318 @@
+"""``rosz bag cat``, ``export`` and ``plot``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from rosz.cli.bag.group import app
+from rosz.cli.bag.play import list_topics
+from rosz.cli.bag.source import BagArgument, End, Input, Start, Topics, check_times, open_bags
+from rosz.cli.call import Call
+from rosz.cli.console import count, print_lines, warn
+from rosz.cli.declare import Argument, Json, Option, at_least
+from rosz.errors import MessageError, NotFoundError, UsageError
+
+if TYPE_CHECKING:
+    from rosz.bags import BagReader, Channel, Entry, Payload
+    from rosz.introspect.echo import Echo, EchoOptions
+    from rosz.typestore import TypeStore
+
+__all__ = ()
+
+_FORMATS = ("csv", "json", "parquet", "png", "jpg", "mp4")
+_FASTEST = 1000.0
+
+
+@app.command("cat", arrange=list_topics)
+def cat_command(
+    call: Call,
+    bag: BagArgument,
+    topic: Annotated[str, Argument("TOPIC_OR_FIELD", "All topics if omitted.")] = "",
+    *,
+    limit: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
+    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False,
+    condition: Annotated[
+        str, Option("--filter EXPRESSION", "Use only messages for which this is true.")
+    ] = "",
+    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False,
+    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False,
+    start: Start = 0.0,
+    end: End = None,
+    json: Json = False,
+) -> int:
+    """Print the messages of a bag, as topic echo prints them."""
+    from rosz.introspect.echo import EchoOptions
+    from rosz.introspect.fields import Filter
+
+    check_times(start, end)
+    at_least("-n", limit, 1, "messages")
+    options = EchoOptions(
+        plot=plot,
+        as_json=json,
+        no_arrays=noarr,
+        no_strings=nostr,
+        condition=Filter(condition) if condition else None,
+    )
+    with open_bags([bag]) as source:
+        echoes = _Echoes(source.readers[0], topic, options, call)
+        for entry in source.entries(echoes.topics, start, end):
+            text = echoes.text(entry)
+            if text is None:
+                continue
+            sys.stdout.write(text)
+            if limit is not None:
+                limit -= 1
+                if not limit:
+                    break
+    return int(bool(source.problems.count))
+
+
+@app.command("export", arrange=list_topics)
+def export_command(
+    call: Call,
+    bag: BagArgument,
+    folder: Annotated[str, Argument("DIR", "The folder of the files; made if it is missing.")],
+    *,
+    form: Annotated[
+        str,
+        Option(
+            "--format NAME",
+            "csv, json or parquet for all fields; png, jpg or mp4 for topics with images.",
+        ),
+    ] = "csv",
+    json: Annotated[bool, Option("--json", "The same as --format json.")] = False,
+    fps: Annotated[
+        float | None, Option("--fps RATE", "Frames per second of mp4; as recorded if omitted.")
+    ] = None,
+    force: Annotated[bool, Option("-f --force", "Replace files that exist.")] = False,
+    topics: Topics = None,
+    start: Start = 0.0,
+    end: End = None,
+) -> int:
+    """Write each topic of a bag into a file: a table, pictures, or a video.
+
+    Tables have one row per message, behind the time in nanoseconds. In CSV, sequences are JSON in
+    one column, and octets are left out.
+    """
+    check_times(start, end)
+    form = "json" if json else form
+    if form not in _FORMATS:
+        raise UsageError(f"--format is '{form}'; expected {', '.join(_FORMATS)}")
+    if fps is not None and form != "mp4":
+        raise UsageError("--fps is for videos: give --format mp4 too")
+    if fps is not None and not 0 < fps <= _FASTEST:
+        raise UsageError(f"--fps is {fps:g}; expected more than 0, and at most {_FASTEST:g}")
+    with open_bags([bag]) as source:
+        chosen = _Choice(source, topics, start, end)
+        chosen.entries()  # a topic that is not there is an error before any file is made
+        if form in {"csv", "json", "parquet"}:
+            lines = _export_tables(chosen, Path(folder), form, call.types, replace=force)
+        elif form == "mp4":
+            lines = _export_videos(chosen, Path(folder), fps, call.types, replace=force)
+        else:
+            lines = _export_pictures(chosen, Path(folder), form, call.types, replace=force)
+        print_lines(lines)
+    return int(bool(source.problems.count))
+
+
+class _Choice:
+    """The messages of a bag that options choose."""
+
+    def __init__(
+        self, source: Input, topics: Sequence[str] | None, start: float, end: float | None
+    ) -> None:
+        self.reader = source.readers[0]
+        self.report = source.problems.report
+        self._source = source
+        self._chosen = topics, start, end
+
+    def entries(self) -> Iterator[Entry]:
+        """Return the messages, from the first one on."""
+        return self._source.entries(*self._chosen)
+
+    def choose_images(self) -> dict[str, str]:
+        """Choose the topics with images if none are given; return the names of their files."""
+        from rosz.bags.images import IMAGE_TYPES
+        from rosz.bags.tables import file_names
+
+        found = {one.topic: one.type for one in self.reader.channels if one.type in IMAGE_TYPES}
+        given, *times = self._chosen
+        names = [one if one.startswith("/") else f"/{one}" for one in given or found]
+        other = {one.topic: one.type for one in self.reader.channels}
+        for name in names:
+            if name in other and name not in found:
+                raise UsageError(f"topic '{name}' has no images, but {other[name]}")
+        if not names:
+            raise NotFoundError("the bag has no topic with images: no Image, no CompressedImage")
+        self._chosen = names, *times  # type: ignore[assignment]
+        return {topic: name for topic, name in file_names(found).items() if topic in names}
+
+    @contextmanager
+    def guard(self, entry: Entry) -> Iterator[None]:
+        """Report a message that is not well-formed, and go on."""
+        try:
+            yield
+        except MessageError as error:
+            place = f"message of '{entry.channel.topic}' at {entry.stamp / 1e9:.9f}"
+            self.report(f"{place} is left out: {error}")
+
+
+def _export_tables(
+    chosen: _Choice, folder: Path, form: str, types: TypeStore, *, replace: bool
+) -> list[str]:
+    from rosz.bags.tables import Tables
+
+    with Tables(folder, form, chosen.reader.channels, types, replace=replace) as tables:
+        for entry in chosen.entries():
+            with chosen.guard(entry):
+                tables.write(entry)
+    return [f"{file}: {count(rows, 'row')}" for file, rows in sorted(tables.rows.items())]
+
+
+def _export_pictures(
+    chosen: _Choice, folder: Path, form: str, types: TypeStore, *, replace: bool
+) -> list[str]:
+    _check_vision()
+    from rosz.bags import Bag
+    from rosz.bags.images import Pictures
+
+    names = chosen.choose_images()
+    decoder = Bag(chosen.reader, types).decoder
+    found: dict[str, Pictures] = {}
+    for entry in chosen.entries():
+        topic = entry.channel.topic
+        if topic not in found:
+            found[topic] = Pictures(folder / names[topic], form, replace=replace)
+        with chosen.guard(entry):
+            found[topic].write(decoder(entry.channel)(entry.data), entry.stamp)
+    return [
+        f"{folder / names[topic]}: {count(one.count, 'picture')}"
+        for topic, one in sorted(found.items())
+    ]
+
+
+def _export_videos(
+    chosen: _Choice, folder: Path, rate: float | None, types: TypeStore, *, replace: bool
+) -> list[str]:
+    _check_vision()
+    from rosz.bags import Bag
+    from rosz.bags.images import Video, VideoTimes
+
+    names = chosen.choose_images()
+    decoder = Bag(chosen.reader, types).decoder
+    times: dict[str, VideoTimes] = {}
+    for entry in chosen.entries():
+        with chosen.guard(entry):
+            message = decoder(entry.channel)(entry.data)
+            times.setdefault(entry.channel.topic, VideoTimes()).add(message, entry.stamp)
+    lines = []
+    videos: dict[str, Video] = {}
+    try:
+        for topic, one in times.items():
+            videos[topic] = Video(folder / f"{names[topic]}.mp4", one, rate, replace=replace)
+        for entry in chosen.entries():
+            with chosen.guard(entry):
+                videos[entry.channel.topic].write(decoder(entry.channel)(entry.data))
+    finally:
+        for video in videos.values():
+            video.close()
+    for topic, video in sorted(videos.items()):
+        lines.append(
+            f"{folder / names[topic]}.mp4: {count(video.count, 'frame')} at {video.rate:g} per"
+            f" second, {video.repeated} repeated, {video.dropped} left out"
+        )
+    return lines
+
+
+def _check_vision() -> None:
+    try:
+        import cv2  # noqa: F401
+        import numpy  # noqa: F401, ICN001
+    except ImportError as error:
+        raise UsageError("images need OpenCV: pip install 'rosz[vision]'") from error
+
+
+@app.command("plot")
+def plot_command(
+    call: Call,
+    bag: BagArgument,
+    fields: Annotated[
+        list[str],
+        Argument("FIELD", "An axis each: /pose/x, /pose/x:y, /scan/ranges[0], or some by commas."),
+    ],
+    *,
+    output: Annotated[str, Option("-o --output FILE", "NAME.png, NAME.svg or NAME.pdf.")],
+    title: Annotated[
+        str, Option("--title TEXT", "Text above; the name of the bag if omitted.")
+    ] = "",
+    start: Start = 0.0,
+    end: End = None,
+) -> int:
+    """Draw numbers of a bag over time into a picture."""
+    from rosz.bags import Bag, class_of
+    from rosz.bags.plotting import check_format, draw, find_curves, read_curves
+
+    check_times(start, end)
+    check_format(Path(output))
+    with open_bags([bag]) as source:
+        reader = source.readers[0]
+        by_type = {one.type: one for one in reader.channels}
+        known = {one.topic: [one.type] for one in reader.channels}
+        axes = find_curves(fields, known, lambda each: class_of(by_type[each], call.types))
+        topics = [*dict.fromkeys(curve.topic for axis in axes for curve in axis)]
+        read_curves(
+            axes, source.entries(topics, start, end), Bag(reader, call.types).decoder, reader.start
+        )
+        for curve in (curve for axis in axes for curve in axis):
+            if curve.missing:
+                warn(f"{count(curve.missing, 'message')} have no '{curve.label}'")
+            elif not curve.lines:
+                source.problems.report(f"no value of '{curve.label}' at that time")
+        draw(axes, Path(output), reader.start, title or Path(bag).name)
+    return int(bool(source.problems.count))
+
+
+class _Echoes:
+    """The text of messages of a bag, each by the definition of its channel."""
+
+    def __init__(self, reader: BagReader, topic: str, options: EchoOptions, call: Call) -> None:
+        from rosz.bags import class_of
+        from rosz.introspect.fields import FieldPath, find_target
+
+        self._types = call.types
+        self._options = options
+        self._now = reader.start
+        self._echoes: dict[int, tuple[Channel, Echo, Callable[[Payload], Any]]] = {}
+        self._path = FieldPath("")
+        self.topics: list[str] = []
+        if topic:
+            by_type = {one.type: one for one in reader.channels}
+            known = {one.topic: [one.type] for one in reader.channels}
+            name = topic if topic.startswith("/") else f"/{topic}"
+            target = find_target(name, known, lambda each: class_of(by_type[each], self._types))
+            self._path, self.topics = target.path, [target.topic]
+
+    def text(self, entry: Entry) -> str | None:
+        """Return the text of a message; None if it is left out."""
+        self._now = entry.stamp
+        channel = entry.channel
+        if id(channel) not in self._echoes:
+            self._echoes[id(channel)] = (channel, *self._make(channel))
+        _, echo, decode = self._echoes[id(channel)]
+        try:
+            return echo.text(decode(entry.data))
+        except LookupError as error:
+            warn(f"a message is left out: {error}")
+            return None
+
+    def _make(self, channel: Channel) -> tuple[Echo, Callable[[Payload], Any]]:
+        from rosz.bags import class_of, decoder_of
+        from rosz.introspect.echo import Echo
+
+        kind = self._path.type_in(class_of(channel, self._types))
+        echo = Echo(channel.topic, kind, self._path, self._options, lambda: self._now)
+        return echo, decoder_of(channel, self._types)
