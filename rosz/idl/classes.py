@@ -41,6 +41,9 @@ _ROS1_FIELDS = {
 }
 """Fields that ROS 1 spells in another way, from its name to ours."""
 
+_ROS2_DEFAULTS = {"geometry_msgs/msg/Quaternion": {"w"}, "sensor_msgs/msg/NavSatStatus": {"status"}}
+"""Fields that have a default in ROS 2's definition and zero in ROS 1's."""
+
 _PYTHON = {
     "bool": "bool",
     "float32": "float",
@@ -70,7 +73,8 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> s
     base = "_Renamed" if renamed else BASES.get(spec.name, plain)
     fields = {attribute(field.name) for field in spec.fields}
     names = ClassNames(module, fields | {attribute(one.name) for one in spec.constants})
-    body = [_field(field, names) for field in spec.fields]
+    ros2 = _ROS2_DEFAULTS.get(spec.name, set())
+    body = [_field(field, names, ros2=field.name in ros2) for field in spec.fields]
     body += _ros1_fields(renamed)
     body += [f"{attribute(one.name)} = {_literal(one.value)}" for one in spec.constants]
     body += _names(spec.name, message_hash(spec, catalog), message_md5(spec, catalog), spec.text)
@@ -201,8 +205,12 @@ def _schema(spec: MessageSpec, names: ClassNames) -> str:
     return f"({', '.join(entries)}{',' * (len(entries) == 1)})"
 
 
-def _field(field: Field, names: ClassNames) -> str:
-    return f"{attribute(field.name)}: {_annotation(field.type, names)} = {_default(field, names)}"
+def _field(field: Field, names: ClassNames, *, ros2: bool) -> str:
+    default = _default(field, names)
+    if ros2 and field.default:
+        made = names.module.define("_d", f"_Ros2Default({default})")
+        default = f"_field(default_factory={made})"
+    return f"{attribute(field.name)}: {_annotation(field.type, names)} = {default}"
 
 
 def _annotation(kind: FieldType, names: ClassNames) -> str:

@@ -44,6 +44,7 @@ _ALWAYS = {
     "_FAULTS": "from rosz.message.runtime import FAULTS as _FAULTS",
     "_Message": "from rosz.message import Message as _Message",
     "_Renamed": "from rosz.message import Renamed as _Renamed",
+    "_Ros2Default": "from rosz.message import Ros2Default as _Ros2Default",
     "_Sequenced": "from rosz.message import Sequenced as _Sequenced",
     "_Service": "from rosz.message import Service as _Service",
     "_Stamped": "from rosz.message import Stamped as _Stamped",

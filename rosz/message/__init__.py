@@ -21,6 +21,7 @@ from rosz.message.base import (
     Writable,
     ros1_slots,
 )
+from rosz.message.defaults import Ros2Default
 from rosz.message.ros1_layout import ros1_fields
 from rosz.message.schema import (
     ARRAY_CODES,
@@ -47,6 +48,7 @@ __all__ = (
     "Derived",
     "Message",
     "Renamed",
+    "Ros2Default",
     "Sequenced",
     "Service",
     "Slot",

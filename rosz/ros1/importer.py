@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 
 from rosz.environment import Environment, package_index
 from rosz.errors import PackageError, RoszError
+from rosz.message import Ros2Default
 from rosz.packages import PackageIndex
 from rosz.replacements import instead_of
 from rosz.ros1 import derived
@@ -48,6 +49,7 @@ __all__ = ("install", "package_path", "type_store", "uninstall")
 
 _KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv", "action": "action"}
 _CFG = "cfg"
+_RCLPY = "rclpy"
 
 
 def install(store: TypeStore | None = None, packages: PackageIndex | None = None) -> None:
@@ -212,6 +214,15 @@ class _FrontFinder(MetaPathFinder):
             # ``from sensor_msgs import point_cloud2`` looks below the module's own name.
             alias = fullname.removeprefix("rosz.msgs.")
             return self._of_rosz(alias, alias) if alias in ELSEWHERE else self._compiled(fullname)
+        found = self._of_ros(fullname, root, rest, path)
+        if found is not None:
+            Ros2Default.ros1 = root != _RCLPY and _RCLPY not in sys.modules
+        return found
+
+    def _of_ros(
+        self, fullname: str, root: str, rest: str, path: Sequence[str] | None
+    ) -> ModuleSpec | None:
+        """Find a module by its name in ROS."""
         first, _, inner = rest.partition(".")
         if first in _KINDS and fullname not in SUBMODULES:
             return self._of_package(fullname, root, _KINDS[first], inner, path)

@@ -98,6 +98,20 @@ def test_shipped_packages(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(("client", "expected"), [("rospy", "0.0 0"), ("rclpy", "1.0 -2")])
+def test_defaults_are_those_of_the_ros_that_a_program_uses(
+    client: str, expected: str, tmp_path: Path
+) -> None:
+    code = f"""
+        import rosz.ros1
+        from nav_msgs.msg import Odometry
+        import {client}
+        from sensor_msgs.msg import NavSatFix
+        print(Odometry().pose.pose.orientation.w, NavSatFix().status.status)
+    """
+    assert run(code, tmp_path).strip() == expected
+
+
 def test_all_names_of_a_package(tmp_path: Path, workspace: Path) -> None:
     code = """
         import rosz.ros1

@@ -8,6 +8,7 @@ from itertools import starmap as _starmap
 from msgspec import field as _field
 from rosz.message import Array as _Array
 from rosz.message import Message as _Message
+from rosz.message import Ros2Default as _Ros2Default
 from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
@@ -728,6 +729,7 @@ class PolygonStamped(_Stamped):
             return _explain(data, PolygonStamped)
 
 
+_d2 = _Ros2Default(1.0)
 _p7 = _Struct("<I4d").pack
 _u12 = _Struct("<I4d").unpack_from
 
@@ -738,7 +740,7 @@ class Quaternion(_Message):
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
-    w: float = 1.0
+    w: float = _field(default_factory=_d2)
     _type = "geometry_msgs/Quaternion"
     _type_name = "geometry_msgs/msg/Quaternion"
     _type_hash = "RIHS01_8a765f66778c8ff7c8ab94afcc590a2ed5325a1d9a076ffff38fbce36f458684"

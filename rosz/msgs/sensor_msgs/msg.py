@@ -10,6 +10,7 @@ from rosz.message import Array as _Array
 from rosz.message import Bytes as _Bytes
 from rosz.message import Message as _Message
 from rosz.message import Renamed as _Renamed
+from rosz.message import Ros2Default as _Ros2Default
 from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
 from rosz.message.runtime import PADDING as _PADDING
@@ -1497,6 +1498,7 @@ class MultiEchoLaserScan(_Stamped):
             return _explain(data, MultiEchoLaserScan)
 
 
+_d3 = _Ros2Default(-2)
 _p10 = _Struct("<IbxH").pack
 _u13 = _Struct("<IbxH").unpack_from
 
@@ -1504,7 +1506,7 @@ _u13 = _Struct("<IbxH").unpack_from
 class NavSatStatus(_Message):
     """How good a satellite fix is and where it comes from."""
 
-    status: int = -2
+    status: int = _field(default_factory=_d3)
     service: int = 0
     STATUS_UNKNOWN = -2
     STATUS_NO_FIX = -1
