@@ -337,7 +337,9 @@ class Message(msgspec.Struct, gc=False):
         Raises:
             EncodeError: A value does not fit its field.
         """
-        buff.write(self.to_ros1())
+        data = self.to_ros1()
+        if data:  # an empty message is written to streams of text, too, as in genpy
+            buff.write(data)
 
     def deserialize(self, data: bytes) -> Self:
         """Fill this message from ROS 1's bytes and return it (genpy's spelling).
@@ -347,7 +349,7 @@ class Message(msgspec.Struct, gc=False):
         """
         from rosz.message.tuples import ros1_decoder
 
-        other = ros1_decoder(type(self))(bytes(data))
+        other = ros1_decoder(type(self))(bytes(data or b""))
         for name in self.__struct_fields__:
             setattr(self, name, getattr(other, name))
         return self

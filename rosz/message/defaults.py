@@ -24,6 +24,9 @@ class Ros2Default:
         self._value = value
         self._zero = type(value)(0)
 
+    def __repr__(self) -> str:
+        return f"Ros2Default({self._value})"
+
     def __call__(self) -> Any:
         """Return the default."""
         return self._zero if Ros2Default.ros1 else self._value

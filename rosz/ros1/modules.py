@@ -215,7 +215,8 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "rospy.impl.tcpros": {"ros1.rospy.topics": "DEFAULT_BUFF_SIZE"},
     "rospy.impl.tcpros_base": {"ros1.rospy.topics": "DEFAULT_BUFF_SIZE"},
     "rospy.impl.tcpros_service": {
-        "ros1.rospy.service": "Service ServiceException ServiceProxy wait_for_service"
+        "ros1.rospy.service": "Service ServiceException ServiceImpl=Service ServiceProxy"
+        " convert_return_to_response wait_for_service"
     },
     "tf.broadcaster": {"ros1.tf.frames": "TransformBroadcaster"},
     "tf.listener": {

@@ -187,7 +187,8 @@ def _of(field: Any) -> str:
     if field.default is not msgspec.NODEFAULT:
         return f" = {_plain(field.default)}"
     if field.default_factory is not msgspec.NODEFAULT:
-        return f" = {field.default_factory.__name__}()"
+        made = field.default_factory
+        return f" = {getattr(made, '__name__', repr(made))}()"
     return ""
 
 

@@ -1,9 +1,28 @@
 """actionlib: goals that take time, of ROS 1 (ROS wiki, actionlib).
 
-`rosz.actions` holds the logic; the modules here have ROS 1's names for it.
+`rosz.actions` holds the logic; the modules here have ROS 1's names for it. ROS 1's package has no
+``__all__``, and programs use whatever ``from actionlib import *`` binds: ``threading``, ``rospy``.
 """
 
-from rosz.msgs.actionlib_msgs.msg import GoalStatus
+import threading
+import time
+import traceback
+import weakref
+
+from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from rosz.msgs.std_msgs.msg import Header
+from rosz.ros1 import rospy
+from rosz.ros1.actionlib import (
+    action_client,
+    action_server,
+    exceptions,
+    goal_id_generator,
+    handle_tracker_deleter,
+    server_goal_handle,
+    simple_action_client,
+    simple_action_server,
+    status_tracker,
+)
 from rosz.ros1.actionlib.action_client import (
     ActionClient,
     ClientGoalHandle,
@@ -27,15 +46,32 @@ __all__ = (
     "ActionServer",
     "ClientGoalHandle",
     "CommState",
+    "GoalID",
     "GoalIDGenerator",
     "GoalManager",
     "GoalStatus",
+    "GoalStatusArray",
     "HandleTrackerDeleter",
+    "Header",
     "ServerGoalHandle",
     "SimpleActionClient",
     "SimpleActionServer",
     "SimpleGoalState",
     "StatusTracker",
     "TerminalState",
+    "action_client",
+    "action_server",
+    "exceptions",
     "get_name_of_constant",
+    "goal_id_generator",
+    "handle_tracker_deleter",
+    "rospy",
+    "server_goal_handle",
+    "simple_action_client",
+    "simple_action_server",
+    "status_tracker",
+    "threading",
+    "time",
+    "traceback",
+    "weakref",
 )

@@ -11,6 +11,7 @@ import atexit
 import logging
 import os
 import signal
+import sys
 import threading
 import time
 import warnings
@@ -28,6 +29,7 @@ from rosz.ros1.exceptions import (
     ROSInterruptException,
     ROSSerializationException,
 )
+from rosz.ros1.modules import attribute
 from rosz.ros1.rospy.names import (
     canonicalize_name,
     get_caller_id,
@@ -242,6 +244,14 @@ def wait_for_shutdown() -> None:
     # In slices: Python would not notice a signal that comes right before a longer wait.
     while state.context is not None and not state.context.wait_for_shutdown(SLICE):
         pass
+
+
+_missing = attribute("rospy.core", sys.modules[__name__], {})
+
+
+def __getattr__(name: str) -> Any:
+    """Return rospy's variable for the shutdown, which programs read."""
+    return node_is_shutdown() if name == "_in_shutdown" else _missing(name)
 
 
 # The environment.

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Self
+from io import BytesIO
+from struct import Struct
+from typing import Any, BinaryIO, ClassVar, Self
 
-from rosz.errors import EncodeError
+from rosz.errors import DecodeError, EncodeError
 from rosz.message import Message, Writable
 from rosz.ros1.exceptions import ROSException
 from rosz.time import DurationValue, TimeValue
 
-__all__ = ("AnyMsg", "args_kwds_to_message", "encode", "in_words_of_genpy", "to_ros1_log")
+__all__ = (
+    "AnyMsg",
+    "args_kwds_to_message",
+    "deserialize_messages",
+    "encode",
+    "in_words_of_genpy",
+    "serialize_message",
+    "to_ros1_log",
+)
 
+_SIZE = Struct("<I")
 _STAMPS = (TimeValue, DurationValue)
 
 
@@ -90,7 +101,7 @@ class AnyMsg:
 
     def deserialize(self, data: bytes) -> Self:
         """Set the bytes."""
-        self._buff = bytes(data)
+        self._buff = data
         return self
 
 
@@ -135,6 +146,69 @@ def _by_name(data_class: type[Any], fields: Mapping[str, Any]) -> Any:
         if name not in data_class.__slots__:
             raise AttributeError(f"{name} is not an attribute of {data_class.__name__}")
     return data_class(**{name: value for name, value in fields.items() if value is not None})
+
+
+def serialize_message(b: BinaryIO, seq: int, msg: Any) -> None:
+    """Write a message to a buffer behind its size, as TCPROS carries it.
+
+    Args:
+        b: The buffer; what it holds behind its position is overwritten.
+        seq: Sequence number for the header of the message, if it has one.
+        msg: The message.
+
+    Raises:
+        EncodeError: A value does not fit its field.
+    """
+    if getattr(type(msg), "_has_header", False):
+        msg.header.seq = seq
+        if msg.header.frame_id is None:
+            msg.header.frame_id = "0"
+    data = BytesIO()
+    msg.serialize(data)
+    b.write(_SIZE.pack(data.tell()))
+    b.write(data.getvalue())
+
+
+def deserialize_messages(
+    b: BinaryIO,
+    msg_queue: list[Any],
+    data_class: type[Any],
+    queue_size: int | None = None,
+    max_msgs: int | None = None,
+    start: int = 0,
+) -> None:
+    """Take the complete messages in a buffer; what is left moves to their place.
+
+    Args:
+        b: The buffer, up to its position.
+        msg_queue: List to append the messages to.
+        data_class: Message class.
+        queue_size: Number of the newest messages to keep in the list; no limit when not given.
+        max_msgs: Largest number of messages to take; no limit when not given.
+        start: Position of the first message.
+
+    Raises:
+        DecodeError: The bytes are not messages of this type, or an argument is None.
+    """
+    if b is None or msg_queue is None:
+        raise DecodeError(data_class._type, -1, "there is no buffer, or no list for messages")
+    end = b.tell()
+    b.seek(start)
+    data = b.read(end - start)
+    found: list[bytes] = []
+    at = 0
+    while len(data) - at >= _SIZE.size and not (max_msgs and len(found) >= max_msgs):
+        (size,) = _SIZE.unpack_from(data, at)
+        if len(data) - at - _SIZE.size < size:
+            break
+        at += _SIZE.size + size
+        found.append(data[at - size : at])
+    b.seek(start)
+    b.truncate()
+    b.write(data[at:])
+    kept = slice(None) if queue_size is None else slice(-queue_size, None)
+    msg_queue += [data_class().deserialize(one) for one in found[kept]]
+    msg_queue[:] = msg_queue[kept]
 
 
 def encode(message: Any) -> bytes:

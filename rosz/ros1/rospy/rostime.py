@@ -9,7 +9,7 @@ from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.ros1.exceptions import ROSInitException
 from rosz.ros1.state import has_node, state
-from rosz.time import ClassicConstructor
+from rosz.time import ClassicConstructor, TimeValue
 
 if TYPE_CHECKING:
     from rosz.node import Clock
@@ -102,11 +102,27 @@ def set_rostime_initialized(val: bool) -> None:
 
 def is_wallclock() -> bool:
     """Return whether ROS time is wall time, not that of a simulation."""
-    return state.node is None or not state.node.clock.simulated
+    return not is_rostime_initialized() or not clock().simulated
 
 
 def switch_to_wallclock() -> None:
-    """Do nothing: ``/use_sim_time`` selects the clock when the node starts."""
+    """Take wall time again before ``init_node``; ``/use_sim_time`` selects the clock of a node."""
+    if state.clock is not None:
+        set_rostime_initialized(True)
+
+
+def _set_rostime(t: TimeValue) -> None:
+    """Set the ROS time, as tests of programs do.
+
+    Raises:
+        ValueError: The argument is not a time.
+    """
+    if not isinstance(t, TimeValue):
+        raise ValueError(f"must be Time instance: {type(t)}")  # noqa: TRY004  # rospy's
+    if not is_rostime_initialized():
+        set_rostime_initialized(True)
+    clock().enable_simulation()
+    clock().advance(t.to_nsec())
 
 
 def wallsleep(duration: float) -> None:

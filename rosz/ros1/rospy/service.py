@@ -69,7 +69,8 @@ class _Server(NodeService):
         service = self._service
         state.local.delivery = (request, service, caller)
         try:
-            return encode(self._response(service.handler(request)))
+            response = service.handler(request)
+            return encode(convert_return_to_response(response, service.response_class))
         except ServiceException as error:
             raise ServiceError(f"service cannot process request: {error}") from error
         except BaseException as error:  # it must not end the thread
@@ -82,21 +83,31 @@ class _Server(NodeService):
                 )
             raise ServiceError(f"error processing request: {error}") from error
 
-    def _response(self, value: Any) -> Any:
-        kind = self._service.response_class
-        if isinstance(value, kind):
-            return value
-        if value is None:
-            raise ServiceException("service handler returned None")
-        args, fields, fault = [value], {}, "returned invalid value"
-        if isinstance(value, dict):
-            args, fields = [], value
-        elif isinstance(value, list | tuple):
-            args, fault = list(value), "returned wrong number of values"
-        try:
-            return args_kwds_to_message(kind, args, fields)
-        except (AttributeError, TypeError) as error:
-            raise ServiceException(f"handler {fault}: {error}") from error
+
+def convert_return_to_response(response: Any, response_class: type[Any]) -> Any:
+    """Return the message for what the handler of a service returned.
+
+    Args:
+        response: A response; a list or tuple of all its fields; a dictionary of some of them; or
+            the value of its only field.
+        response_class: Message class.
+
+    Raises:
+        ServiceException: The value does not make a response.
+    """
+    if isinstance(response, response_class):
+        return response
+    if response is None:
+        raise ServiceException("service handler returned None")
+    args, fields, fault = [response], {}, "returned invalid value"
+    if isinstance(response, dict):
+        args, fields = [], response
+    elif isinstance(response, list | tuple):
+        args, fault = list(response), "returned wrong number of values"
+    try:
+        return args_kwds_to_message(response_class, args, fields)
+    except (AttributeError, TypeError) as error:
+        raise ServiceException(f"handler {fault}: {error}") from error
 
 
 class Service(_ServiceBase):

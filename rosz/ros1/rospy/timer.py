@@ -41,7 +41,7 @@ def sleep(duration: float | DurationValue) -> None:
     if seconds < 0:
         return
     in_hook = state.hook_thread is threading.current_thread() and not state.lifecycle.closed
-    if state.node is None or in_hook:
+    if in_hook or (state.node is None and is_wallclock()):
         # As in rospy, a hook may stop a robot and wait for it.
         wallsleep(seconds)
     elif is_shutdown():

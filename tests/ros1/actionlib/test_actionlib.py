@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from network import Network
+from oracle import ours as in_rosz
 from oracle import real
 
 from rosz.environment import Environment, package_index
@@ -160,6 +161,18 @@ def test_handles_of_goals(network: Network) -> None:
     assert program.exit_code(50) == 0, program.output
     lines = [line for line in program.lines if line.startswith("= ")]
     assert lines == (PROGRAMS / "goals.txt").read_text().splitlines()
+
+
+@pytest.mark.ros1
+def test_all_names_of_actionlib() -> None:
+    snippet = """
+        bound = {}
+        exec("from actionlib import *", bound)
+        result = sorted(set(bound) - {"__builtins__"})
+    """
+    states = {"CommStateMachine", "INVALID_TRANSITION", "NO_TRANSITION", "g_goal_id", "nop_cb"}
+    theirs = real(snippet, "actionlib", "python3-actionlib")
+    assert in_rosz(snippet) == [name for name in theirs if name not in states]
 
 
 @pytest.mark.ros1

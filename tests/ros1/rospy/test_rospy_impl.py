@@ -85,6 +85,35 @@ def test_what_is_published_after_the_shutdown_is_dropped(printed: Printed) -> No
         """) == ["None", "None", "None", "None", "None 0"]
 
 
+def test_names_of_modules_that_programs_use(printed: Printed) -> None:
+    assert printed("""
+        import rospy
+        from rospy.impl import tcpros_service
+        from std_srvs.srv import SetBoolResponse
+        convert = tcpros_service.convert_return_to_response
+        print(convert((True, "yes"), SetBoolResponse).message)
+        print(issubclass(rospy.Service, tcpros_service.ServiceImpl))
+        try:
+            convert(None, SetBoolResponse)
+        except rospy.ServiceException as error:
+            print(error)
+        print(rospy.core._in_shutdown)
+        rospy.signal_shutdown("end")
+        print(rospy.core._in_shutdown)
+        try:
+            rospy.core._in_shutdwn
+        except AttributeError as error:
+            print(error)
+        """) == [
+        "yes",
+        "True",
+        "service handler returned None",
+        "False",
+        "True",
+        "module 'rospy.core' of rosz has no attribute '_in_shutdwn'",
+    ]
+
+
 def test_the_time_can_be_read_without_a_node(printed: Printed) -> None:
     assert printed("""
         import time

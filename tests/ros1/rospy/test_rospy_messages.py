@@ -77,6 +77,50 @@ def test_empty_messages_are_those_of_rospy(printed: Printed) -> None:
     ]
 
 
+def test_messages_in_buffers_as_rospy_has_them(printed: Printed) -> None:
+    assert printed("""
+        import genpy
+        import io
+        import struct
+        import rospy
+        from rospy.msg import deserialize_messages, serialize_message
+        from std_msgs.msg import Empty, Int8, String
+        from geometry_msgs.msg import PointStamped
+
+        buffer = io.BytesIO()
+        for text in "abc":
+            serialize_message(buffer, 0, String(text))
+        written = [struct.pack("<IIc", 5, 1, text) for text in (b"a", b"b", b"c")]
+        print(buffer.getvalue() == b"".join(written))
+        buffer.write(b"\\5\\0\\0")
+        queue = []
+        deserialize_messages(buffer, queue, String, max_msgs=1)
+        print([one.data for one in queue], buffer.tell())
+        deserialize_messages(buffer, queue, String, queue_size=1)
+        print([one.data for one in queue], buffer.getvalue())
+        stamped = PointStamped()
+        stamped.header.frame_id = None
+        serialize_message(io.BytesIO(), 7, stamped)
+        print(stamped.header.seq, stamped.header.frame_id)
+        try:
+            deserialize_messages(None, queue, String)
+        except genpy.DeserializationError as error:
+            print(error)
+        any = rospy.AnyMsg().deserialize("text")
+        out = io.StringIO()
+        rospy.Message().serialize(out)
+        Empty().serialize(out)
+        print(any._buff, repr(out.getvalue()), rospy.Message().deserialize(""))
+        """) == [
+        "True",
+        "['a'] 21",
+        "['c'] b'\\x05\\x00\\x00'",
+        "7 0",
+        "std_msgs/String: there is no buffer, or no list for messages",
+        "text '' ",
+    ]
+
+
 def test_bytes_are_signed(printed: Printed) -> None:
     assert printed("""
         import rospy

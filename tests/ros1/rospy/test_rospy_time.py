@@ -170,6 +170,36 @@ def test_timers(printed: Printed) -> None:
     assert lines[-2:] == ["ValueError: boom", "False"]
 
 
+def test_tests_set_the_time(printed: Printed) -> None:
+    assert printed("""
+        import rospy, threading, time
+        rospy.rostime.set_rostime_initialized(True)
+        rospy.rostime._set_rostime(rospy.Time(5))
+        print(rospy.Time.now(), rospy.rostime.is_wallclock())
+        slept = threading.Event()
+        def sleep():
+            rospy.sleep(10)
+            slept.set()
+        threading.Thread(target=sleep, daemon=True).start()
+        seconds = 5
+        while not slept.wait(0.01):
+            seconds += 1
+            rospy.rostime._set_rostime(rospy.Time(seconds))
+        print(seconds >= 15)
+        rospy.rostime.switch_to_wallclock()
+        print(abs(rospy.get_time() - time.time()) < 60, rospy.rostime.is_wallclock())
+        try:
+            rospy.rostime._set_rostime(5)
+        except ValueError as error:
+            print(error)
+        """) == [
+        "5000000000 False",
+        "True",
+        "True True",
+        "must be Time instance: <class 'int'>",
+    ]
+
+
 def test_simulated_time(network: Network, printed: Printed) -> None:
     node = network.node("simulator")
     node.params.set("/use_sim_time", True)
