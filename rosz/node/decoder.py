@@ -38,6 +38,7 @@ class MessageInfo(msgspec.Struct, frozen=True):
             queue by newer ones.
         type_name: ``pkg/msg/Name``.
         type_hash: ``RIHS01_…``, the hash of the type's definition.
+        size: Length of the message as it was sent, in bytes.
     """
 
     source_time: int
@@ -47,6 +48,7 @@ class MessageInfo(msgspec.Struct, frozen=True):
     lost: int
     type_name: str
     type_hash: str = ""
+    size: int = 0
 
 
 Received = tuple[Any, MessageInfo | None]
@@ -140,7 +142,14 @@ class Decoder:
         if not self._with_info:
             return message, None
         return message, MessageInfo(
-            source_time, time.time_ns(), sequence, gid, lost, self._type_name, self._type_hash
+            source_time,
+            time.time_ns(),
+            sequence,
+            gid,
+            lost,
+            self._type_name,
+            self._type_hash,
+            len(payload),
         )
 
     def _publisher(self, gid: bytes) -> _Publisher:

@@ -9,7 +9,7 @@ import threading
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rosz.errors import ClosedError, EncodeError, RoszError, WaitTimeout
 from rosz.message import Message
@@ -20,6 +20,9 @@ from rosz.ros1.exceptions import ROSException, ROSSerializationException
 from rosz.ros1.rospy.msg import AnyMsg, in_words_of_genpy, to_ros1_log
 from rosz.ros1.state import context, is_shutdown, state, when_ready
 from rosz.wire import Token, format_token, gid
+
+if TYPE_CHECKING:
+    from rosz.ros1.rospy.statistics import Statistics
 
 __all__ = ("DEFAULT_BUFF_SIZE", "SharedPublisher", "SharedSubscription", "SubscribeListener")
 
@@ -33,6 +36,8 @@ _NO_LIMIT = 10_000
 """Queue size when none is given: more messages than TCP and a publisher's queue hold in rospy."""
 _ORIGIN_TIMEOUT = 1.0
 _HEADER = "_connection_header"
+_STATISTICS = "/statistics"
+_NOT_MEASURED = frozenset({"/clock", _STATISTICS})
 _LOGS = frozenset({"/rosout", "/rosout_agg"})
 """Topics of the log in ROS 1."""
 
@@ -313,6 +318,8 @@ class SharedSubscription(_Shared):
         self._subscription: Subscription[Any] | None = None
         self._origins: dict[bytes, Token] = {}
         self._latched: dict[bytes, tuple[Any, MessageInfo]] = {}
+        self._statistics: Statistics | None = None
+        self._reports: SharedPublisher | None = None
 
     def configure(self, queue_size: int | None, buff_size: int, *, tcp_nodelay: bool) -> None:
         """Set the attributes that a subscriber gives; the first queue size counts."""
@@ -327,6 +334,7 @@ class SharedSubscription(_Shared):
         with self._lock:
             if self.closed:
                 return
+            self._measure(node)
             limited = self._depth > 0
             qos = QoS(depth=self._depth if limited else _NO_LIMIT)
             name = self.name
@@ -352,6 +360,18 @@ class SharedSubscription(_Shared):
                     warn_dropped=not limited,
                 )
             )
+
+    def _measure(self, node: Node) -> None:
+        """Measure what arrives, if that is wanted."""
+        if self.name in _NOT_MEASURED or not node.params.get("/enable_statistics", False):
+            return
+        from rosz.msgs.rosgraph_msgs.msg import TopicStatistics
+        from rosz.ros1.rospy.statistics import Statistics
+
+        key = _STATISTICS, TopicStatistics
+        self._reports = SharedPublisher.of(key, state.publishers, 10)
+        self._reports.start()
+        self._statistics = Statistics(self.name, node.name, node.params, self._reports.publish)
 
     def add_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
         """Call a function with each message.
@@ -392,6 +412,8 @@ class SharedSubscription(_Shared):
         """Share it no longer; the last one closes it."""
         if self._leave(state.subscriptions) and self._subscription is not None:
             self._subscription.close()
+            if self._reports is not None:
+                self._reports.leave()
 
     def _peers(self) -> list[Token]:
         subscription = self._subscription
@@ -444,6 +466,9 @@ class SharedSubscription(_Shared):
 
     def _receive(self, message: Any, info: MessageInfo) -> None:
         origin = self._origins.get(info.gid) or self._origin(info.gid)
+        if self._statistics is not None and origin is not None:
+            now = context().clock.now()
+            self._statistics.record(message, info, origin.node_name, now)
         if origin is not None and origin.qos is not None and origin.qos.latched:
             with self._lock:
                 self._latched[info.gid] = (message, info)
