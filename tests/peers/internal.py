@@ -29,7 +29,11 @@ INTERNAL = {
     ("test_roslaunch_server.py", "*"): _LAUNCH,
     ("test_roslaunch_depends.py", "*"): "what catkin's roslaunch_add_file_check calls in builds",
     ("test_substitution_args.py", "*test__arg"): "the function behind one of the substitutions",
-    ("test_rospy_tcpros*.py", "*"): _TCPROS,
+    ("test_rospy_tcpros.py", "*"): _TCPROS,
+    ("test_rospy_tcpros_base.py", "*"): _TCPROS,
+    ("test_rospy_tcpros_pubsub.py", "*"): _TCPROS,
+    ("test_rospy_tcpros_service.py", "*TCP*"): _TCPROS,
+    ("test_rospy_tcpros_service.py", "*test_service_connection_handler"): _TCPROS,
     ("test_rospy_transport.py", "*"): _TCPROS,
     ("test_rospy_registration.py", "*"): _XMLRPC,
     ("test_rospy_paramserver.py", "*"): "rospy's cache of parameters; every process has a replica",
@@ -62,12 +66,11 @@ INTERNAL = {
     ("test_rospy_core.py", "*test_xmlrpcapi"): _XMLRPC,
     ("test_rospy_service.py", "*test_ServiceManager"): _PRIVATE,
     ("test_rospy_rostime.py", "*test_import_simtime"): _PRIVATE,
-    ("test_rospy_rostime.py", "*test_set_rostime"): _PRIVATE,
-    ("test_rospy_rostime.py", "*test_sleep"): _PRIVATE,
     ("test_publisher_consistency_listener.py", "*fails_without"): "expects lost first messages",
     ("client-param-server.test", "*test_search_param"): _PRIVATE,
     ("node.test", "*"): _SLAVE,
-    ("deregister.test", "*"): _SLAVE,
+    ("deregister.test", "*test_unpublish"): _SLAVE,
+    ("deregister.test", "*test_unsubscribe"): _SLAVE,
 }
 """Reasons, by patterns of file names and of test names."""
 

@@ -238,8 +238,13 @@ def in_words_of_genpy(message: Any, error: EncodeError) -> EncodeError:
     return error
 
 
-def to_ros1_log(message: Any) -> Any:
-    """Convert a ROS 2 log message to ROS 1's; the topics of its node are unknown."""
+def to_ros1_log(message: Any, topics_of: Callable[[str], Sequence[str]]) -> Any:
+    """Convert a ROS 2 log message to ROS 1's.
+
+    Args:
+        message: The message.
+        topics_of: Function that returns the topics of a node by its full name.
+    """
     from rosz.msgs.rcl_interfaces.msg import Log as Ros2Log
     from rosz.msgs.rosgraph_msgs.msg import Log
     from rosz.msgs.std_msgs.msg import Header
@@ -250,12 +255,14 @@ def to_ros1_log(message: Any) -> Any:
         (Ros2Log.WARN, Log.WARN),
         (Ros2Log.INFO, Log.INFO),
     )
+    name = "/" + message.name.lstrip("/").replace(".", "/")
     return Log(
         header=Header(stamp=message.stamp),
         level=next((ours for theirs, ours in levels if message.level >= theirs), Log.DEBUG),
-        name="/" + message.name.lstrip("/").replace(".", "/"),
+        name=name,
         msg=message.msg,
         file=message.file,
         function=message.function,
         line=message.line,
+        topics=list(topics_of(name)),
     )

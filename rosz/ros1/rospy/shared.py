@@ -12,6 +12,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
 from rosz.errors import ClosedError, EncodeError, RoszError, WaitTimeout
+from rosz.graph import View
 from rosz.message import Message
 from rosz.node import MessageInfo, Node, SubscriberLink, Subscription
 from rosz.node import Publisher as NodePublisher
@@ -19,7 +20,7 @@ from rosz.qos import QoS
 from rosz.ros1.exceptions import ROSException, ROSSerializationException
 from rosz.ros1.rospy.msg import AnyMsg, in_words_of_genpy, to_ros1_log
 from rosz.ros1.state import context, is_shutdown, state, when_ready
-from rosz.wire import Token, format_token, gid
+from rosz.wire import Kind, Token, format_token, gid
 
 if TYPE_CHECKING:
     from rosz.ros1.rospy.statistics import Statistics
@@ -318,6 +319,8 @@ class SharedSubscription(_Shared):
         self._subscription: Subscription[Any] | None = None
         self._origins: dict[bytes, Token] = {}
         self._latched: dict[bytes, tuple[Any, MessageInfo]] = {}
+        self._view: View | None = None
+        self._topics: dict[str, set[str]] = {}
         self._statistics: Statistics | None = None
         self._reports: SharedPublisher | None = None
 
@@ -478,7 +481,15 @@ class SharedSubscription(_Shared):
         self._deliver(message, info, callbacks)
 
     def _receive_log(self, message: Any, info: MessageInfo) -> None:
-        self._receive(to_ros1_log(message), info)
+        self._receive(to_ros1_log(message, self._topics_of), info)
+
+    def _topics_of(self, node: str) -> list[str]:
+        view = context().graph.view()
+        if view is not self._view:
+            self._view, self._topics = view, {}
+            for token in view.entities(Kind.PUBLISHER, Kind.SUBSCRIPTION):
+                self._topics.setdefault(token.node_name, set()).add(token.name)
+        return sorted(self._topics.get(node, ()))
 
     def _receive_any(self, payload: bytes, info: MessageInfo) -> None:
         header = self.connection_header(info)

@@ -158,3 +158,25 @@ def test_rosout(network: Network) -> None:
         ).wait_for(f"from {name}")
     eventually(lambda: "from loud" in [line.msg for line in lines], "the line on /rosout")
     assert "from mute" not in [line.msg for line in lines]
+
+
+def test_log_messages_name_the_topics_of_their_node(printed: Printed) -> None:
+    assert (
+        printed("""
+        import threading
+        import rospy
+        from rosgraph_msgs.msg import Log
+        from std_msgs.msg import String
+        rospy.init_node("worker")
+        complete = threading.Event()
+        def take(message):
+            if message.topics == ["/rosout", "/words"]:
+                complete.set()
+        rospy.Subscriber("/rosout", Log, take)
+        words = rospy.Publisher("words", String, queue_size=1)
+        while not complete.wait(0.05):  # the tokens of the node come back to it
+            rospy.loginfo("working")
+        print("complete")
+        """)[-1]
+        == "complete"
+    )
