@@ -157,9 +157,6 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     },
     "roslib.launcher": {"ros1.roslib.packages": "get_depends load_manifest"},
     "roslib.exceptions": {"ros1.roslib.packages": "ROSLibException"},
-    "roslib.manifest": {
-        "ros1.rospkg": "MANIFEST_FILE Manifest InvalidManifest parse_file=read_manifest"
-    },
     "roslib.network": {
         "ros1.rosgraph.network": "ROSHandshakeException create_local_xmlrpc_uri"
         " decode_ros_handshake_header encode_ros_handshake_header get_address_override"
@@ -169,18 +166,10 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "roslib.resources": {
         "ros1.roslib.packages": "list_package_resources list_package_resources_by_dir"
     },
-    "roslib.rosenv": {
-        "ros1.roslib.packages": "ROSEnvException",
-        "ros1.rosgraph.names": "ROS_HOSTNAME ROS_IP ROS_MASTER_URI ROS_NAMESPACE get_master_uri",
-        "ros1.rosgraph.roslogging": "makedirs_with_parent_perms",
-        "ros1.rospkg": "get_log_dir get_ros_home get_ros_package_path get_ros_root"
-        " get_test_results_dir",
-    },
     "roslib.scriptutil": {
         "ros1.roslib.packages": "get_master get_param_server=get_master",
         "ros1.rosgraph.names": "script_resolve_name",
     },
-    "roslib.stacks": {"ros1.roslib.packages": "ROSStackException=ROSPkgException"},
     "roslib.message": {**_MESSAGE, "time": "TVal=StampValue"},
     "roslib.names": {
         "ros1.genmsg": f"PRN_SEPARATOR {_NAMES}",
@@ -190,7 +179,8 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         " load_mappings make_caller_id make_global_ns namespace ns_join resolve_name",
     },
     "roslib.rospack": {
-        "ros1.roslib.packages": "list_pkgs",
+        "ros1.roslib.packages": "list_pkgs rospack_depends rospack_depends_1 rospack_depends_on"
+        " rospack_depends_on_1",
         "ros1.rospkg": "ResourceNotFound RosPack",
     },
     "rospkg.common": {"ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE ResourceNotFound"},
@@ -204,7 +194,9 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE Depend Export InvalidManifest Manifest"
         " ResourceNotFound RosDep read_manifest"
     },
-    "rospkg.rospack": {"ros1.rospkg": "ManifestManager RosPack RosStack get_package_name"},
+    "rospkg.rospack": {
+        "ros1.rospkg": "ManifestManager list_by_path RosPack RosStack get_package_name"
+    },
     "rospy.exceptions": {
         "ros1.exceptions": "ROSException ROSInitException ROSInternalException"
         " ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException"

@@ -1,10 +1,11 @@
 """rospkg: packages on the package path (documentation of rospkg), from rosz's package index.
 
-Stacks and rosdep keys are missing, since catkin packages do not have them.
+Rosdep keys of the system are missing, since nothing is installed with them.
 """
 
 from __future__ import annotations
 
+import builtins
 import os
 from collections.abc import Container, Mapping, Sequence
 from functools import cached_property
@@ -19,6 +20,7 @@ from rosz.ros1.importer import package_path
 __all__ = (
     "MANIFEST_FILE",
     "PACKAGE_FILE",
+    "STACK_FILE",
     "InvalidManifest",
     "Manifest",
     "ManifestManager",
@@ -33,11 +35,13 @@ __all__ = (
     "get_ros_paths",
     "get_ros_root",
     "get_test_results_dir",
+    "list_by_path",
     "on_ros_path",
 )
 
 MANIFEST_FILE = "manifest.xml"
 PACKAGE_FILE = "package.xml"
+STACK_FILE = "stack.xml"
 
 _DEPENDS = (
     "depend",
@@ -418,31 +422,71 @@ class RosPack(ManifestManager):
 
 
 class RosStack:
-    """The stacks on the package path; there are none.
+    """The stacks of rosbuild on the package path: folders with a ``stack.xml``.
 
     Args:
-        ros_paths: Folders that an error names.
+        ros_paths: Folders to search; those of the process when not given.
     """
 
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
-        self.ros_paths = list(ros_paths or ())
+        self.ros_paths = get_ros_paths() if ros_paths is None else [*ros_paths]
 
     @classmethod
     def get_instance(cls, ros_paths: Sequence[str] | None = None) -> Self:
         """Return an instance."""
         return cls(ros_paths)
 
-    def list(self) -> Sequence[str]:
-        """Return an empty list."""
-        return []
+    @cached_property
+    def _folders(self) -> dict[str, str]:
+        found: dict[str, str] = {}
+        for root in reversed(self.ros_paths):
+            found |= list_by_path(STACK_FILE, root)
+        return found
+
+    def list(self) -> builtins.list[str]:
+        """Return the names of all stacks."""
+        return [*self._folders]
 
     def get_path(self, name: str) -> str:
-        """Raise an error.
+        """Return the folder of a stack.
 
         Raises:
-            ResourceNotFound: Always.
+            ResourceNotFound: There is no such stack.
         """
-        raise ResourceNotFound(name, ros_paths=self.ros_paths)
+        try:
+            return self._folders[name]
+        except KeyError:
+            raise ResourceNotFound(name, ros_paths=self.ros_paths) from None
+
+    def packages_of(self, name: str) -> Sequence[str]:
+        """Return the names of the packages in a stack.
+
+        Raises:
+            ResourceNotFound: There is no such stack.
+        """
+        return RosPack([self.get_path(name)]).list()
+
+
+def list_by_path(
+    manifest_name: str, path: str, cache: dict[str, str] | None = None
+) -> dict[str, str]:
+    """Return the names and folders of the stacks or packages in a folder.
+
+    Args:
+        manifest_name: Name of the file that such a folder has.
+        path: The folder.
+        cache: Dict that gets them as well.
+    """
+    found: dict[str, str] = {}
+    for folder, below, files in os.walk(path, followlinks=True):
+        if manifest_name in files:
+            found.setdefault(Path(folder).name, folder)
+        if {manifest_name, PACKAGE_FILE, MANIFEST_FILE, "CATKIN_IGNORE"} & set(files):
+            below.clear()
+        below[:] = [name for name in sorted(below) if not name.startswith(".")]
+    if cache is not None:
+        cache.update(found)
+    return found
 
 
 def get_package_name(path: str) -> str | None:

@@ -1,7 +1,7 @@
 """The command lines of ROS 1's tools, as their modules offer them (``rostopic.rostopicmain``).
 
-A command runs as a program of its own, which is that of rosz; what it writes goes to ``sys.stdout``
-of the caller, whatever that is.
+A command runs as a program of its own, which is that of rosz; it reads ``sys.stdin`` and
+writes ``sys.stdout`` of the caller, whatever those are.
 """
 
 from __future__ import annotations
@@ -65,6 +65,13 @@ class Tool:
     def _run(self, words: Sequence[str]) -> int:
         sys.stdout.flush()
         command = [*self._command, *words]
+        if "-" in words and sys.stdin is not sys.__stdin__:
+            given = sys.stdin.read()
+            ended = subprocess.run(
+                command, input=given, stdout=subprocess.PIPE, encoding="utf-8", check=False
+            )
+            sys.stdout.write(ended.stdout)
+            return ended.returncode
         if sys.stdout is sys.__stdout__:
             return subprocess.run(command, check=False).returncode
         with subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as process:

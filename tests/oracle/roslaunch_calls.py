@@ -71,7 +71,7 @@ def process(node: Any) -> dict[str, Any]:
         "respawn_delay": node.respawn_delay,
         "required": node.required,
         "output": node.output or "log",
-        "cwd": node.cwd or "ROS_HOME",
+        "cwd": node.cwd,
         "remaps": [list(pair) for pair in node.remap_args],
         "env": [list(pair) for pair in node.env_args],
         "file": node.filename,

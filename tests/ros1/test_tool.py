@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
+from network import Network
 
 from rosz.ros1 import rosmsg, rosnode, rosparam, rosservice, rostopic
 
@@ -36,3 +39,16 @@ def test_help_exits_as_in_ros1(module: object, capsys: pytest.CaptureFixture[str
     assert ended.value.code == 64
     name = module.NAME  # type: ignore[attr-defined]
     assert f"\n  {name} list " in capsys.readouterr().out
+
+
+def test_input_comes_from_the_stdin_of_the_caller(
+    network: Network, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    node = network.node("store")
+    for name, value in network.variables().items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("sys.stdin", io.StringIO("speed: 1.5"))
+    rosparam.yamlmain(["rosparam", "load", "-", "/wheels"])
+    assert node.params.get("/wheels/speed") == 1.5
+    monkeypatch.undo()
+    assert capsys.readouterr().out == ""

@@ -185,7 +185,8 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
         respawn_max: Maximum number of respawns, or None for no limit.
         required: Whether the launch ends when the process ends.
         output: ``screen`` or ``log``.
-        cwd: ``node`` (the executable's folder), ``ROS_HOME``, or a path for an ``<executable>``.
+        cwd: ``node`` (the executable's folder), a path for an ``<executable>``, or
+            ``ROS_HOME``, as empty.
         remaps: (from, to) in order, as written.
         env: (name, value) in order, of which the last one counts; without ``ROS_NAMESPACE``.
         wait_for: Waits before the start; all of them must end.
@@ -208,7 +209,7 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
     respawn_max: int | None = None
     required: bool = False
     output: Literal["log", "screen"] = "log"
-    cwd: str = "ROS_HOME"
+    cwd: str = ""
     remaps: tuple[tuple[str, str], ...] = ()
     env: tuple[tuple[str, str], ...] = ()
     wait_for: tuple[Wait, ...] = ()

@@ -129,7 +129,7 @@ def read_executable(tag: Tag, builder: PlanBuilder) -> None:
         namespace=names.canonical(scope.ns),
         place=tag.place,
         args=tag.words("args"),
-        cwd=tag.get("cwd") or "ROS_HOME",
+        cwd=tag.get("cwd") or "",
         env=tuple(scope.env),
         wait_for=(*scope.waits, *read_wait(tag, scope.ns, name or base)),
     )
@@ -261,7 +261,9 @@ def _check_words(tag: Tag, package: str, type_name: str, name: str) -> None:
 
 def _read_cwd(tag: Tag) -> str:
     cwd = tag.get("cwd")
-    if cwd in {None, "ROS_HOME", "ros_home"}:
+    if cwd is None:
+        return ""
+    if cwd in {"ROS_HOME", "ros_home"}:
         return "ROS_HOME"
     if cwd != "node":
         tag.fail(f"'cwd' is '{cwd}'; expected node or ROS_HOME", "cwd")

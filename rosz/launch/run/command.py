@@ -116,7 +116,7 @@ class Workplace(msgspec.Struct, frozen=True):
     def _cwd(self, choice: str, program: Path | None) -> str:
         if choice.lower() == "node" and program is not None:
             return str(program.parent)
-        if choice.lower() == "ros_home":
+        if choice.lower() in {"", "ros_home"}:
             return str(self.environment.home) if program is not None else self.cwd
         return str(Path(self.cwd, choice))
 

@@ -230,7 +230,7 @@ def node_plan(node: Node) -> NodePlan:
         "env": tuple((key, value) for key, value in node.env_args),
     }
     if node.cwd is not None or node.plan is None:
-        changes["cwd"] = node.cwd or "ROS_HOME"
+        changes["cwd"] = node.cwd or ""
     if node.plan is not None:
         return msgspec.structs.replace(node.plan, **changes)
     return NodePlan(package=node.package, type=node.type, place=_PLACE, **changes)

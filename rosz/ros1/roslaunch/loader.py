@@ -231,7 +231,7 @@ def _shared(found: NodePlan) -> dict[str, Any]:
         "args": shlex.join(found.args),
         "remap_args": [list(pair) for pair in found.remaps],
         "env_args": found.env,
-        "cwd": "node" if found.cwd == "node" else None,
+        "cwd": found.cwd or None,
         "launch_prefix": shlex.join(found.launch_prefix) or None,
         "filename": found.place.file,
     }

@@ -7,10 +7,18 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from rosz.ros1.roslib import packages
-from rosz.ros1.roslib.packages import load_manifest
+from rosz.ros1.roslib import packages, stacks
+from rosz.ros1.roslib.packages import is_interactive, load_manifest, set_interactive
 
-__all__ = ("load_manifest", "message", "names", "packages")
+__all__ = (
+    "is_interactive",
+    "load_manifest",
+    "message",
+    "names",
+    "packages",
+    "set_interactive",
+    "stacks",
+)
 
 message: ModuleType  # built by the importer, as the next one
 names: ModuleType

@@ -28,12 +28,18 @@ __all__ = (
     "get_master",
     "get_pkg_dir",
     "get_pkg_subdir",
+    "is_interactive",
     "list_package_resources",
     "list_package_resources_by_dir",
     "list_pkgs",
     "list_pkgs_by_path",
     "load_manifest",
     "resource_file",
+    "rospack_depends",
+    "rospack_depends_1",
+    "rospack_depends_on",
+    "rospack_depends_on_1",
+    "set_interactive",
 )
 
 TYPE_SEPARATOR = "/"
@@ -280,3 +286,41 @@ def get_master() -> Any:
     from rosz.ros1.rospy import get_master as get
 
     return get()
+
+
+def rospack_depends(pkg: str) -> list[str]:
+    """Return the packages that a package depends on.
+
+    Raises:
+        ResourceNotFound: There is no such package.
+    """
+    return list(RosPack().get_depends(pkg))
+
+
+def rospack_depends_1(pkg: str) -> list[str]:
+    """Return the packages that a package itself names; see `rospack_depends`."""
+    return list(RosPack().get_depends(pkg, implicit=False))
+
+
+def rospack_depends_on(pkg: str) -> list[str]:
+    """Return the packages that depend on a package; see `rospack_depends`."""
+    return list(RosPack().get_depends_on(pkg))
+
+
+def rospack_depends_on_1(pkg: str) -> list[str]:
+    """Return the packages that name a package themselves; see `rospack_depends`."""
+    return list(RosPack().get_depends_on(pkg, implicit=False))
+
+
+_interactive = False
+
+
+def set_interactive(interactive: bool) -> None:
+    """Set whether a person types into the program."""
+    global _interactive  # noqa: PLW0603  # ROS 1's
+    _interactive = interactive
+
+
+def is_interactive() -> bool:
+    """Return whether a person types into the program."""
+    return _interactive

@@ -180,7 +180,7 @@ def _process(node: NodePlan) -> dict[str, Any]:
         "respawn_delay": node.respawn_delay,
         "required": node.required,
         "output": node.output,
-        "cwd": node.cwd,
+        "cwd": node.cwd or None,
         "remaps": [list(pair) for pair in node.remaps],
         "env": [list(pair) for pair in node.env],
         "file": node.place.file,

@@ -95,7 +95,7 @@ def test_variables(workplace: Workplace, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("cwd", "expected"),
-    [("ROS_HOME", "home"), ("ros_home", "home"), ("node", "ws/src/demo/scripts")],
+    [("", "home"), ("ROS_HOME", "home"), ("ros_home", "home"), ("node", "ws/src/demo/scripts")],
 )
 def test_folder_of_a_node(workplace: Workplace, tmp_path: Path, cwd: str, expected: str) -> None:
     command = workplace.command(node("tool", cwd=cwd), log_file=None, tag="t:1")
