@@ -16,10 +16,11 @@ from rosz.bags.bag import BagReader, Channel, Entry, Payload
 from rosz.bags.migrate import Conversion, find_conversion
 from rosz.bags.pace import Pace
 from rosz.errors import MessageError, RoszError
+from rosz.node import Publisher
 from rosz.qos import QoS
 
 if TYPE_CHECKING:
-    from rosz.node import Node, Publisher
+    from rosz.node import Node
 
 __all__ = ("PlayOptions", "Player", "Progress")
 
@@ -247,8 +248,9 @@ class Player:
                     f"topic '{channel.topic}': the bag lacks {', '.join(conversion.added)} of"
                     f" '{cls._type}', which get their defaults"
                 )
-            name = self._options.prefix + channel.topic
-            made = self._made[key] = self._node.publisher(name, cls, qos=self._qos(channel))
+            name = self._node.resolve(self._options.prefix + channel.topic)
+            made = Publisher(self._node, name, cls, self._qos(channel), waits=True)
+            self._made[key] = self._node.keep(made)
             if channel.topic in map(_absolute, self._options.pause_topics):
                 self._pausing.add(made.name)
         return channel, self._made[key], conversion

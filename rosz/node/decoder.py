@@ -58,11 +58,41 @@ Received = tuple[Any, MessageInfo | None]
 class _Publisher:
     """The last sequence number of a publisher, and whether its samples may be replayed."""
 
-    __slots__ = ("last", "replays")
+    __slots__ = ("_before", "_replayed", "last", "replays")
 
     def __init__(self) -> None:
         self.last = 0
         self.replays = False
+        # The first sample of a replay that no live one has followed yet, and the last before it.
+        self._replayed = 0
+        self._before = 0
+
+    def advance(self, sequence: int, *, replayed: bool) -> int | None:
+        """Go on to a sample of a publisher whose samples may be replayed.
+
+        A replay comes on a way of its own, and may overtake live samples that wait to be decoded.
+
+        Args:
+            sequence: The sequence number.
+            replayed: Whether it comes from the cache of the publisher.
+
+        Returns:
+            The number of samples missing before it; ``None`` if it is a repetition.
+        """
+        last, first, before = self.last, self._replayed, self._before
+        if sequence <= last and (replayed or sequence >= first):
+            return None
+        self.last = sequence
+        if replayed:
+            if not first:
+                self._replayed, self._before = sequence, last
+            return 0
+        self._replayed = 0
+        if first and sequence > last:
+            return sequence - last - 1 + (first - before - 1 if before else 0)
+        if first:
+            last = before
+        return max(sequence - last - 1, 0) if last else 0
 
 
 class Decoder:
@@ -124,13 +154,17 @@ class Decoder:
                 if sequence > 0:
                     publisher = self._publishers.get(gid) or self._publisher(gid)
                     last = publisher.last
-                    if sequence <= last and publisher.replays:
-                        return None
-                    publisher.last = sequence
-                    if last and sequence > last:
-                        lost = sequence - last - 1
-                        if lost:
-                            self._report_lost(lost)
+                    if publisher.replays:
+                        missing = publisher.advance(sequence, replayed=isinstance(sample, Reply))
+                        if missing is None:
+                            return None
+                        lost = missing
+                    else:
+                        publisher.last = sequence
+                        if last and sequence > last:
+                            lost = sequence - last - 1
+                    if lost:
+                        self._report_lost(lost)
             payload = sample.payload
             message: Any = payload if self._decode is None else self._decode(payload)
         except DecodeError as error:

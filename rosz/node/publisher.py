@@ -71,13 +71,29 @@ class Publisher(Entity, Generic[M]):
     ``queue_size`` in pieces, each at its own pace. When it closes, the publisher waits until they
     have, at most 8 seconds.
 
+    Args:
+        node: The node that the publisher belongs to.
+        topic: Resolved name of the topic.
+        message_type: Class of the messages.
+        qos: The QoS that others see.
+        waits: Whether a full link makes ``publish`` wait instead of dropping the message, also
+            where the QoS keeps only some messages.
+
     Attributes:
         message_type: The class of the messages.
         dropped: The number of samples that newer ones replaced before a subscription on another
             machine had fetched them.
     """
 
-    def __init__(self, node: NodeCore, topic: str, message_type: type[M], qos: QoS) -> None:
+    def __init__(
+        self,
+        node: NodeCore,
+        topic: str,
+        message_type: type[M],
+        qos: QoS,
+        *,
+        waits: bool = False,
+    ) -> None:
         super().__init__(
             node, Kind.PUBLISHER, topic, message_type._type_name, message_type._type_hash, qos
         )
@@ -88,7 +104,7 @@ class Publisher(Entity, Generic[M]):
         self.dropped: int = 0
         # A signal handler that publishes may interrupt this thread while it publishes.
         self._ordered = threading.RLock()
-        self._blocks = qos.reliable and qos.history == "keep_all"
+        self._blocks = waits or (qos.reliable and qos.history == "keep_all")
         self._raw = node.context.session.publisher(
             self.key,
             reliable=qos.reliable,

@@ -25,13 +25,13 @@ from rosz.node.decoder import AnySample, Decoder, Received
 from rosz.node.entity import ANY, Entity
 from rosz.node.fetch import FetchedSample, Fetcher
 from rosz.qos import QoS
-from rosz.session import LONGEST_WAIT, clamp_timeout
-from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, ros_type
+from rosz.session import LONGEST_WAIT, Reply, clamp_timeout
+from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, read_attachment, ros_type
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
-    from rosz.session import PullSubscriber, Reply, Sample
+    from rosz.session import PullSubscriber, Sample
 
 __all__ = ("GenericSubscription", "Subscription")
 
@@ -44,6 +44,9 @@ _MOST = 1 << 20
 """Largest queue: Zenoh allocates 256 bytes for each sample at once, and aborts if it cannot."""
 
 _HISTORY_TIMEOUT = 10.0
+_LIVE_SECONDS = 1.0
+"""Seconds that a replayed sample waits at most for the live ones that it may overtake."""
+_POLL_SECONDS = 0.005
 
 
 _Item = tuple[AnySample, Decoder | None]
@@ -100,6 +103,7 @@ class Subscription(Entity, Generic[M]):
         self._queue = _Queue(self._depth)
         self._queue_worker: Worker[_Item] | None = None
         self._turn = threading.RLock()
+        self._opened = time.time_ns()
         self._learning = threading.RLock()  # a signal handler may come in between
         self._decoder = None
         self._decoders: dict[tuple[str, str], Decoder | None] = {}
@@ -163,9 +167,26 @@ class Subscription(Entity, Generic[M]):
                 if self._queue_worker is None:
                     self._queue_worker = Worker(
                         f"rosz-sub{self.name}",
-                        lambda item: self._dispatch(*item),
+                        self._dispatch_queued,
                         receive=self._queue.receive,
                     )
+
+    def _dispatch_queued(self, item: _Item) -> None:
+        if isinstance(item[0], Reply) and item[1] is not None:
+            self._await_live(item[0], item[1])
+        self._dispatch(*item)
+
+    def _await_live(self, replayed: Reply, decoder: Decoder) -> None:
+        """Wait for the live samples up to a replayed one that was published since the start."""
+        try:
+            sequence, published, source = read_attachment(replayed.attachment or b"")
+        except DecodeError:
+            return  # `_dispatch` says what is wrong
+        deadline = time.monotonic() + _LIVE_SECONDS
+        while published > self._opened and decoder.last(source) < sequence:
+            if self._queue.closed or time.monotonic() >= deadline:
+                return
+            time.sleep(_POLL_SECONDS)
 
     def _decode(self, sample: AnySample, decoder: Decoder | None) -> Received | None:
         decoder = decoder or self._decoder or self._decoder_of(sample)

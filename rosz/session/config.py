@@ -57,6 +57,10 @@ take long when many processes start at once, and Zenoh tries each peer that it h
 """
 _OPEN_BEYOND_MS = 3_000
 """The same beyond the machine, where an attempt that the network lost should soon be repeated."""
+_LOCAL_QUEUE = 16
+"""Batches of 64 kB that wait for a link of this machine, the most that Zenoh allows: some thousand
+small messages that are published at once. Zenoh drops what finds no room for a millisecond, and on
+a busy machine its own threads may not run for longer."""
 _ROUTER_TIMEOUT = 10.0
 """Seconds that a node waits for its router, which may have been started just before it."""
 
@@ -233,7 +237,13 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             if config.shared_memory
             else {"enabled": False},
             "unicast": _LOCAL_LINKS if local else {"open_timeout": _OPEN_BEYOND_MS},
-            "link": {"tx": {"lease": _LEASE_MS if local else _LEASE_BEYOND_MS, "keep_alive": 4}},
+            "link": {
+                "tx": {
+                    "lease": _LEASE_MS if local else _LEASE_BEYOND_MS,
+                    "keep_alive": 4,
+                    "queue": {"size": {"data": _LOCAL_QUEUE}} if local else {},
+                }
+            },
         },
     }
 

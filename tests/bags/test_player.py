@@ -257,3 +257,11 @@ def test_the_end_of_the_node_ends_it(network: Network, tmp_path: Path) -> None:
     threading.Thread(target=player._node.context.close).start()
     running.join(15)
     assert not running.is_alive()
+
+
+def test_it_waits_for_full_links_whatever_was_recorded(network: Network, tmp_path: Path) -> None:
+    player = _player(network, _latched_bag(tmp_path / "a.mcap"), wait_for_subscribers=False)
+    assert {one.name: (one._blocks, one.qos) for one in player._made.values()} == {
+        "/map": (True, LATCHED),
+        "/a": (True, QoS(depth=7)),
+    }

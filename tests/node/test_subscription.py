@@ -13,6 +13,7 @@ from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import Header, Int32, String
 from rosz.node import MessageInfo, Node, Publisher
 from rosz.qos import LATCHED, QoS
+from rosz.session import Reply
 
 
 def meet(talker: Node, listener: Node) -> None:
@@ -357,6 +358,40 @@ class TestLatched:
         assert got.get(timeout=TIMEOUT) == "old"
         publisher.publish("new")
         assert got.get(timeout=TIMEOUT) == "new"
+
+    def test_waits_for_the_callback_of_what_came_before(
+        self, network: Network, talker: Node, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        publisher = chatter(talker, latch=True)
+        entered, go_on = threading.Event(), threading.Event()
+        got: SimpleQueue[str] = SimpleQueue()
+
+        def callback(message: String) -> None:
+            entered.set()
+            assert go_on.wait(TIMEOUT)
+            got.put(message.data)
+            raise ValueError  # so that `report` is called, where another thread may go on
+
+        listener = network.node("listener")
+        monkeypatch.setattr(listener.log, "report", lambda *_: threading.Event().wait(0.01))
+        subscription = listener.subscription("chatter", String, callback)
+        publisher.wait_for_subscribers()
+        eventually(subscription.publishers)
+        for number in range(5):
+            publisher.publish(str(number))
+        assert entered.wait(TIMEOUT)
+        replayed = threading.Event()
+
+        def receive(reply: Reply) -> None:
+            subscription._receive(reply, subscription._decoder)
+            replayed.set()
+
+        (token,) = subscription.publishers()
+        subscription._request_history(token, 1, receive)
+        assert replayed.wait(TIMEOUT)
+        go_on.set()
+        assert [got.get(timeout=TIMEOUT) for _ in range(5)] == ["0", "1", "2", "3", "4"]
+        assert got.empty()
 
     def test_transient_local_reader(self, network: Network, talker: Node) -> None:
         """The reader of ROS 2, which recovers history by itself."""
