@@ -163,6 +163,7 @@ class LaunchFileError(SourceError):
 
     Attributes:
         includes: Places of the ``<include>`` tags that led here, outermost first.
+        plain_reason: The reason without these places.
     """
 
     def __init__(
@@ -174,6 +175,7 @@ class LaunchFileError(SourceError):
         includes: tuple[str, ...] = (),
     ) -> None:
         self.includes = includes
+        self.plain_reason = reason
         chain = "".join(f"\n  included from {place}" for place in reversed(includes))
         super().__init__(reason + chain, path, line, column)
 

@@ -222,10 +222,10 @@ def _print_checked(
     """
     checked = _follow(done, total)
     colored = colored and takes_escapes(sys.stdout)
-    problems = [one for each in checked for one in each.problems]
+    problems = {one for each in checked for one in each.problems}
     plain = [one for one in problems if not one.missing]
     places: dict[tuple[str, str], list[Problem]] = {}
-    for one in sorted(plain, key=lambda one: one.level):
+    for one in sorted(plain, key=lambda one: (one.level, one)):
         places.setdefault((one.level, one.text), []).append(one)
     for same in places.values():
         sys.stdout.write(_format_problem(same, cwd, colored=colored))

@@ -8,7 +8,7 @@ from typing import Literal
 
 import msgspec
 
-from rosz.errors import PackageNotFound, SourceError
+from rosz.errors import LaunchFileError, PackageNotFound, SourceError
 
 __all__ = ("REMEDY", "Problem", "error", "from_absence", "from_error", "warning")
 
@@ -60,10 +60,12 @@ def from_error(fault: Exception, path: Path) -> Problem:
     """
     if not isinstance(fault, SourceError):
         return error(path, str(fault))
-    absent = _ABSENT.match(fault.reason)
-    if absent is None or _MISTYPED in fault.reason:
-        return Problem(fault.path, fault.line, fault.column, "error", fault.reason)
-    return Problem(fault.path, fault.line, fault.column, "warning", fault.reason, absent[1])
+    # Several launch files may include the wrong one.
+    reason = fault.plain_reason if isinstance(fault, LaunchFileError) else fault.reason
+    absent = _ABSENT.match(reason)
+    if absent is None or _MISTYPED in reason:
+        return Problem(fault.path, fault.line, fault.column, "error", reason)
+    return Problem(fault.path, fault.line, fault.column, "warning", reason, absent[1])
 
 
 def from_absence(fault: PackageNotFound, path: Path, node: str, place: tuple[int, int]) -> Problem:

@@ -156,10 +156,12 @@ def compiled_programs(folder: Path) -> dict[str, int]:
 
 
 def check_cmake(folder: Path) -> Iterator[Problem]:
-    """Yield the C++ programs of a package, which rosz does not build."""
-    file = folder / "CMakeLists.txt"
-    for name, line in compiled_programs(folder).items():
-        yield warning(file, f"'{name}' is C++: rosz does not build it, and has no C++ API", line)
+    """Yield a problem that names the C++ programs of a package, which rosz does not build."""
+    found = compiled_programs(folder)
+    if found:
+        names = ", ".join(found)
+        text = f"rosz does not build C++ programs, and has no C++ API: {names}"
+        yield warning(folder / "CMakeLists.txt", text, min(found.values()))
 
 
 def check_configs(
@@ -266,5 +268,8 @@ def _check_node(
     try:
         locate(package, node.type)
     except NotFoundError as fault:
+        text = f"node '{node.name}': {fault}"
+        if node.type in compiled_programs(package.path):
+            text = f"'{node.type}' of package '{package.name}' is C++, and is not built"
         make = error if is_ours(package.path) else warning
-        yield make(place[0], f"node '{node.name}': {fault}", *place[1:])
+        yield make(place[0], text, *place[1:])

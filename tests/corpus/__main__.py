@@ -58,7 +58,7 @@ def main() -> None:
     given = options()
     oracle.marked = True
     own = {path.resolve() for path in given.paths}
-    beside = sorted(given.beside.resolve().iterdir()) if given.beside else []
+    beside = sorted(path.resolve() for path in given.beside.iterdir()) if given.beside else []
     corpus = Corpus([*sorted(own), *(path for path in beside if path not in own)], _INSTALLED)
     (given.work / "devel").mkdir(parents=True, exist_ok=True)
     rows = []

@@ -45,13 +45,17 @@ def _rows(corpus: Corpus, repository: Repository, limit: int) -> Iterator[dict[s
         return
     found = found[:: -(-len(found) // limit)]
     with TemporaryDirectory() as home:
-        shipped = map(str, package_index(Environment()).roots)
+        shipped = list(map(str, package_index(Environment()).roots))
         paths = [
             corpus.path(repository, real=True),
             ":".join([corpus.path(repository, real=False), *shipped]),
         ]
         variables = [environment(Path(), Path(home)) | {"ROS_PACKAGE_PATH": path} for path in paths]
         roslaunch, rosz = Roslaunch(variables[0]), Rosz(variables[1])
+        # Each side has its own package path, and its own programs of ROS 1's packages.
+        own = [(path, "PATH") for path in paths]
+        own += [(f"{root}/", "INSTALLED/") for root in shipped]
+        own += [("/usr/lib/", "INSTALLED/"), ("/usr/share/", "INSTALLED/")]
         try:
             for path in found:
                 print(f"launch {path}", file=sys.stderr, flush=True)
@@ -59,6 +63,7 @@ def _rows(corpus: Corpus, repository: Repository, limit: int) -> Iterator[dict[s
                 ours = rosz.ask([path.name], path.parent)
                 if not (real["error"] or ours["error"]):
                     _drop_programs(ours["args"], real["args"])
+                    ours, real = _renamed(ours, own), _renamed(real, own)
                 differing = differences(ours, real)
                 yield {
                     "case": f"{repository.name}:{path.relative_to(repository.path)}",
@@ -76,3 +81,15 @@ def _drop_programs(ours: dict[str, Any], real: dict[str, Any]) -> None:
     for name in [name for name in real if (ours.get(name) is None) != (real[name] is None)]:
         del real[name]
         ours.pop(name, None)
+
+
+def _renamed(value: Any, names: list[tuple[str, str]]) -> Any:
+    """Return a report with other names for places."""
+    if isinstance(value, dict):
+        return {key: _renamed(one, names) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_renamed(one, names) for one in value]
+    if isinstance(value, str):
+        for old, new in names:
+            value = value.replace(old, new)
+    return value

@@ -21,6 +21,7 @@ from rosz.packages import is_python
 
 from .devel import Devel
 from .packages import Corpus, Package, Repository
+from .third_party import link
 
 __all__ = ("Nodes",)
 
@@ -36,6 +37,8 @@ _OWN = re.compile(
     r"|.*/(describe|get|list|set)_parameter\w*|rosdistro|rosversion|run_id|roslaunch/.*)$"
 )
 _QUIET, _LONGEST = 2.5, 30.0
+_LATER = 12.0, 60.0
+"""For nodes whose outcomes differ: what they do after a while, and on a busy machine."""
 
 
 class Node(NamedTuple):
@@ -65,6 +68,7 @@ class Nodes:
         self._corpus, self._devel, self._limit = corpus, devel, limit
         self._kept = folder / "ros1"
         self._kept.mkdir(parents=True, exist_ok=True)
+        self._third_party = link(folder / "third_party")
 
     def compare(
         self, repositories: list[Repository], words: list[str], jobs: int
@@ -99,8 +103,8 @@ class Nodes:
     def _row(self, node: Node) -> dict[str, Any]:
         real = self._on_ros1(node)
         ours = self._on_rosz(node)
-        if not _same(ours, real):  # a busy machine may have cut one of them short
-            ours = self._on_rosz(node)
+        if not _same(ours, real):  # one of them may have been seen earlier than the other
+            ours = self._on_rosz(node, again=True)
         if not _same(ours, real):
             real = self._on_ros1(node, again=True)
         row: dict[str, Any] = {
@@ -136,14 +140,15 @@ class Nodes:
             "ready": [PYTHON, "-c", "import socket;socket.create_connection(('127.0.0.1',11311))"],
             "node": [PYTHON, str(node.path)],
         }
-        found = self._run(job, environ, node)
+        found = self._run(job, environ, node, again=again)
         found["again"] = again
         if found["outcome"][0] != "stage":
             kept.write_text(json.dumps(found))
         return found
 
-    def _on_rosz(self, node: Node) -> dict[str, Any]:
+    def _on_rosz(self, node: Node, *, again: bool = False) -> dict[str, Any]:
         environ = {
+            "PYTHONPATH": str(self._third_party),
             "ROS_PACKAGE_PATH": self._corpus.path(node.repository, real=False),
             "ROSZ_RENDEZVOUS": "tcp/127.0.0.1:7447",
             "ROS_DOMAIN_ID": "0",
@@ -156,9 +161,11 @@ class Nodes:
             "ready": [*rosz, "param", "list"],
             "node": [*rosz, "run", node.package.name, node.path.name],
         }
-        return self._run(job, environ, node)
+        return self._run(job, environ, node, again=again)
 
-    def _run(self, job: dict[str, Any], environ: dict[str, str], node: Node) -> dict[str, Any]:
+    def _run(
+        self, job: dict[str, Any], environ: dict[str, str], node: Node, *, again: bool
+    ) -> dict[str, Any]:
         with (
             tempfile.TemporaryDirectory(prefix="rosz-corpus-") as home,
             tempfile.TemporaryDirectory() as spare,
@@ -176,7 +183,8 @@ class Nodes:
             }
             if job["real"]:
                 variables["PATH"] = "/usr/bin:/bin:/usr/sbin:/sbin"
-            limits = {"quiet": _QUIET, "longest": _LONGEST, "spare": spare}
+            quiet, longest = _LATER if again else (_QUIET, _LONGEST)
+            limits = {"quiet": quiet, "longest": longest, "spare": spare}
             namespaces = ["--net", "--pid", "--ipc", "--fork", "--mount-proc", "--kill-child"]
             done = subprocess.run(
                 ["unshare", *namespaces, sys.executable, "-P", str(_STAGE)],

@@ -90,13 +90,15 @@ class Corpus:
             real: Whether for ROS 1, which finds the installed repositories, too.
         """
         found = [repository]
+        if real:
+            found += [one for one in self.repositories if one.name in self._installed]
         for one in found:
             names = {name for package in one.packages.values() for name in package.depends}
             for name in sorted(names):
                 other = self._home.get(name)
                 if other is None or other in found or name in repository.packages:
                     continue
-                if real or other.name not in self._installed:
+                if other.name not in self._installed:
                     found.append(other)
         return found
 

@@ -144,7 +144,8 @@ def test_manifests(workspace: Path, text: str, expected: str) -> None:
         (
             "CMakeLists.txt",
             "project(demo)\nadd_executable(talker src/talker.cpp)\n",
-            "demo/CMakeLists.txt:2: warning: 'talker' is C++",
+            "demo/CMakeLists.txt:2: warning: rosz does not build C++ programs, and has no C++ API:"
+            " talker",
         ),
         ("cfg/A.cfg!", "ParameterGenerator(\n", "demo/cfg/A.cfg:1:19: error: not valid Python"),
     ],
@@ -241,6 +242,29 @@ def test_a_command_that_mends_is_told_once(workspace: Path) -> None:
     script = workspace / "src/demo/scripts/a.py"
     assert problems(workspace) == [
         f"demo/scripts/a.py: error: not executable; run: chmod +x {script}"
+    ]
+
+
+def test_an_error_in_an_included_file_is_told_once(workspace: Path) -> None:
+    include = '<launch><include file="$(find demo)/launch/wrong.launch"/></launch>'
+    put(workspace, "launch/wrong.launch", "<launch><node/></launch>")
+    put(workspace, "launch/a.launch", include)
+    put(workspace, "launch/b.launch", include)
+    (line,) = problems(workspace)
+    assert line.startswith("demo/launch/wrong.launch:1:9: error: ")
+    assert "included from" not in line
+
+
+def test_compiled_programs_of_nodes_are_named_as_such(workspace: Path) -> None:
+    node = '<node pkg="demo" type="talker" name="{}"/>'
+    put(workspace, "CMakeLists.txt", "add_executable(talker a.cpp)\nadd_executable(b b.cpp)\n")
+    put(workspace, "launch/a.launch", f"<launch>{node.format('x')}{node.format('y')}</launch>")
+    text = "'talker' of package 'demo' is C++, and is not built"
+    assert problems(workspace) == [
+        "demo/CMakeLists.txt:1: warning: rosz does not build C++ programs, and has no C++ API:"
+        " talker, b",
+        f"demo/launch/a.launch:1:9: error: {text}",
+        f"demo/launch/a.launch:1:50: error: {text}",
     ]
 
 
