@@ -31,11 +31,19 @@ _FRAME = re.compile(r'File "([^"]+)", line (\d+), in ')
 _RAISED = re.compile(r"^(?:[\w.]+\.)?([A-Za-z_]\w*)(?:: (.*))?$")
 _MODULE = re.compile(r"No module named '?([\w.]+)'?|cannot import name '?(\w+)'?")
 _NUMBERS = re.compile(r"_\d+_\d{6,}")
+_SYNTAX = frozenset({"IndentationError", "SyntaxError", "TabError"})
 _SKIPPED = frozenset({"test", "tests", "setup.py", "doc", "docs", "ci", ".ci", "cfg"})
 _OWN = re.compile(
     r"/(rosout\w*|clock|parameter_events|.*/(get_loggers|set_logger_level|get_type_description)"
     r"|.*/(describe|get|list|set)_parameter\w*|rosdistro|rosversion|run_id|roslaunch/.*)$"
 )
+_PATH = "/usr/bin:/bin:/usr/sbin:/sbin"
+_ROSPACK = f"""\
+#!{PYTHON}
+import sys
+import rospkg
+print(rospkg.RosPack().get_path(sys.argv[2]))
+"""
 _QUIET, _LONGEST = 2.5, 30.0
 _LATER = 12.0, 60.0
 """For nodes whose outcomes differ: what they do after a while, and on a busy machine."""
@@ -68,7 +76,8 @@ class Nodes:
         self._corpus, self._devel, self._limit = corpus, devel, limit
         self._kept = folder / "ros1"
         self._kept.mkdir(parents=True, exist_ok=True)
-        self._third_party = link(folder / "third_party")
+        self._environ = _rosz_environment(link(folder / "third_party"))
+        self._programs = _real_programs(folder / "programs")
 
     def compare(
         self, repositories: list[Repository], words: list[str], jobs: int
@@ -113,7 +122,7 @@ class Nodes:
             "rosz": ours,
             "ros1": real,
         }
-        row["python2"] = real["outcome"][1:2] in (["SyntaxError"], ["TabError"])
+        row["python2"] = real["outcome"][1:2] in [[name] for name in _SYNTAX]
         row["equal"] = _same(ours, real)
         mark = "equal" if row["equal"] else "python 2" if row["python2"] else "DIFFERS"
         print(
@@ -128,6 +137,7 @@ class Nodes:
             done: dict[str, Any] = json.loads(kept.read_text())
             return done
         environ = {
+            "PATH": f"{self._programs}:{_PATH}",
             "PYTHONPATH": self._devel.python_path(node.repository),
             "ROS_PACKAGE_PATH": self._corpus.path(node.repository, real=True),
             "ROS_MASTER_URI": "http://127.0.0.1:11311",
@@ -148,7 +158,7 @@ class Nodes:
 
     def _on_rosz(self, node: Node, *, again: bool = False) -> dict[str, Any]:
         environ = {
-            "PYTHONPATH": str(self._third_party),
+            **self._environ,
             "ROS_PACKAGE_PATH": self._corpus.path(node.repository, real=False),
             "ROSZ_RENDEZVOUS": "tcp/127.0.0.1:7447",
             "ROS_DOMAIN_ID": "0",
@@ -172,7 +182,7 @@ class Nodes:
         ):
             Path(home).chmod(0o755)
             variables = {
-                "PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin:/usr/sbin:/sbin",
+                "PATH": _PATH,
                 "HOME": home,
                 "ROS_HOME": home,
                 "ROS_IP": "127.0.0.1",
@@ -181,8 +191,6 @@ class Nodes:
                 "PYTHONDONTWRITEBYTECODE": "1",
                 **environ,
             }
-            if job["real"]:
-                variables["PATH"] = "/usr/bin:/bin:/usr/sbin:/sbin"
             quiet, longest = _LATER if again else (_QUIET, _LONGEST)
             limits = {"quiet": quiet, "longest": longest, "spare": spare}
             namespaces = ["--net", "--pid", "--ipc", "--fork", "--mount-proc", "--kill-child"]
@@ -198,6 +206,28 @@ class Nodes:
             return {"outcome": ["stage", done.stderr[-500:]], "stderr": done.stderr[-2000:]}
         report = json.loads(done.stdout)
         return _normal(report, node)
+
+
+def _rosz_environment(third_party: Path) -> dict[str, str]:
+    """Return what a shell has that evaluated ``rosz env``."""
+    own = {"PATH": f"{Path(sys.executable).parent}:{_PATH}", "PYTHONPATH": str(third_party)}
+    done = subprocess.run(
+        ["/bin/bash", "-c", 'eval "$(rosz env bash)"; env -0'],
+        env=own,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = dict(line.partition("=")[::2] for line in done.stdout.split("\0") if line)
+    return {name: found[name] for name in (*own, "ROSZ_PYTHON")}
+
+
+def _real_programs(folder: Path) -> Path:
+    """Write rospack, which Debian does not have without C++; return the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "rospack").write_text(_ROSPACK)
+    (folder / "rospack").chmod(0o755)
+    return folder
 
 
 def _programs(repository: Repository, package: Package) -> Iterator[Node]:
@@ -232,6 +262,8 @@ def _normal(report: dict[str, Any], node: Node) -> dict[str, Any]:
 def _ending(code: int, stderr: str, node: Node) -> list[Any]:
     """Return the exit code, and the exception that ended a program with its last own frame."""
     lines = [line for line in stderr.splitlines() if line.strip()]
+    if code and lines and (match := _RAISED.match(lines[-1])) and match[1] in _SYNTAX:
+        return ["raised", match[1], ""]
     marks = [n for n, line in enumerate(lines) if line.startswith("Traceback (most recent")]
     if not code or not marks:
         return ["ended", code]
@@ -246,8 +278,6 @@ def _ending(code: int, stderr: str, node: Node) -> list[Any]:
             missing = _MODULE.search(match[2] or "")
             if missing:
                 raised += f" {missing[1] or missing[2]}"
-    if raised in {"SyntaxError", "TabError", "IndentationError"}:
-        frame = ""
     return ["raised", raised, frame]
 
 
