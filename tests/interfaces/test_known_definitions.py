@@ -18,6 +18,8 @@ EMPTY = [("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))]
 UNKNOWN = {
     "example_interfaces",
     "geographic_msgs",
+    "map_msgs",
+    "move_base_msgs",
     "rospy_tutorials",
     "rosserial_msgs",
     "smach_msgs",

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from rosz import actions
+from rosz import actions, names
 from rosz.actions import ClientGoal, CommState
 from rosz.errors import EncodeError
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
@@ -156,7 +156,7 @@ class ActionClient:
     def __init__(self, ns: str, ActionSpec: type[Any]) -> None:  # noqa: N803  # ROS 1's
         self.ns: str = ns
         self.ActionSpec: type[Any] = ActionSpec
-        self.client = actions.ActionClient(state.node(), ns, ActionSpec)
+        self.client = actions.ActionClient(state.node(), names.canonical(ns), ActionSpec)
         self.manager = GoalManager(self.client)
         whole = ActionSpec()
         self.ActionGoal: type[Any] = type(whole.action_goal)

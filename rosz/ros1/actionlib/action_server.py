@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rosz import actions
+from rosz import actions, names
 from rosz.ros1 import rospy, state
 from rosz.ros1.actionlib.server_goal_handle import ServerGoalHandle
 
@@ -55,7 +55,7 @@ class ActionServer(actions.ActionServer):
         auto_start: bool = True,
     ) -> None:
         node = state.node()
-        super().__init__(node, ns, ActionSpec, goal_cb, cancel_cb)
+        super().__init__(node, names.canonical(ns), ActionSpec, goal_cb, cancel_cb)
         queue_size = int(rospy.get_param("actionlib_server_pub_queue_size", _QUEUE_SIZE))
         self.queue_size = _QUEUE_SIZE if queue_size < 0 else queue_size
         found = rospy.search_param("actionlib_status_frequency")

@@ -65,7 +65,8 @@ def type_of(name: str) -> int:
     encoding = parse(name)
     generic = _GENERIC.fullmatch(name)
     depth = generic[1] if generic is not None else f"{encoding.bits}U"
-    return int(cv2.CV_MAKETYPE(getattr(cv2, f"CV_{depth}"), encoding.channels))
+    # CV_MAKETYPE is not in Python's OpenCV before 4.8.
+    return int(getattr(cv2, f"CV_{depth}")) + ((encoding.channels - 1) << _SHIFT)
 
 
 # Versions of OpenCV keep the depth in another number of bits.

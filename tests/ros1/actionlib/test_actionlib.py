@@ -36,7 +36,7 @@ SERVER = """
         server.set_succeeded(CountResult(total), "counted")
 
     rospy.init_node("server")
-    server = actionlib.SimpleActionServer("count", CountAction, execute, auto_start=False)
+    server = actionlib.SimpleActionServer("count/", CountAction, execute, auto_start=False)
     server.start()
     print("ready", flush=True)
     rospy.spin()
@@ -48,7 +48,7 @@ CLIENT = """
     from actionlib_msgs.msg import GoalStatus
     from counting.msg import CountAction, CountGoal
     rospy.init_node("client")
-    client = actionlib.SimpleActionClient("count", CountAction)
+    client = actionlib.SimpleActionClient("//count", CountAction)  # rospy tidies names
     assert client.wait_for_server(rospy.Duration(15))
 """
 
@@ -138,7 +138,7 @@ def test_goal_callbacks(network: Network, path: str) -> None:
             server.set_preempted(CountResult(1))
         server.register_preempt_callback(give_way)
         server.start()
-        client = actionlib.SimpleActionClient("count", CountAction)
+        client = actionlib.SimpleActionClient("//count", CountAction)  # rospy tidies names
         print(client.get_state(), client.wait_for_server(rospy.Duration(15)))
         active = threading.Event()
         client.send_goal(CountGoal(7), active_cb=active.set)

@@ -190,3 +190,12 @@ def test_what_a_format_does_not_hold_is_refused(form: str) -> None:
 
     with pytest.raises(CvBridgeError, match=form):
         CvBridge().cv2_to_compressed_imgmsg(np.zeros((2, 2, 3), np.uint8), form)
+
+
+def test_older_versions_of_opencv_lack_a_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    cv2 = pytest.importorskip("cv2")
+    from rosz.ros1.cv_bridge.encodings import type_of
+
+    monkeypatch.delattr(cv2, "CV_MAKETYPE", raising=False)
+    type_of.cache_clear()
+    assert (type_of("bgr8"), type_of("32FC4")) == (cv2.CV_8UC3, cv2.CV_32FC4)
