@@ -25,6 +25,9 @@ They have one root, so that ``except RoszError`` catches what rosz reports and n
     ├── WaitTimeout                 an event did not happen in time (also TimeoutError)
     ├── ServiceError                a service call failed
     │   └── ServiceNotFound
+    ├── ActionError                 a goal was not reached, or nobody can say so
+    │   ├── GoalRejected            the server did not take the goal
+    │   └── GoalFailed              the goal was aborted or canceled: status, result
     ├── ParamError                  a parameter value or write is not allowed
     ├── StoreError                  a file of parameters cannot be used
     ├── BagError                    a bag cannot be read or written: path, offset
@@ -43,7 +46,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+TYPE_CHECKING = False  # typing takes longer to import than everything else here
+if TYPE_CHECKING:
+    from typing import Any
+
 __all__ = (
+    "ActionError",
     "BagError",
     "BagUnindexed",
     "ClosedError",
@@ -54,6 +62,8 @@ __all__ = (
     "ExtrapolationNeeded",
     "FrameNotFound",
     "FramesNotConnected",
+    "GoalFailed",
+    "GoalRejected",
     "InvalidName",
     "LaunchError",
     "LaunchFileError",
@@ -325,6 +335,28 @@ class ServiceError(RoszError):
 
 class ServiceNotFound(ServiceError):
     """No node serves a service of the requested name."""
+
+
+class ActionError(RoszError):
+    """A goal of an action was not reached, or it is not known what became of it."""
+
+
+class GoalRejected(ActionError):
+    """The server of an action did not accept a goal."""
+
+
+class GoalFailed(ActionError):
+    """A goal of an action was aborted or canceled.
+
+    Attributes:
+        status: Final status of the goal.
+        result: Result that the server sent.
+    """
+
+    def __init__(self, text: str, status: int, result: Any) -> None:
+        self.status = status
+        self.result = result
+        super().__init__(text)
 
 
 class ParamError(RoszError):

@@ -22,8 +22,10 @@ from rosz.node.timer import Rate, Timer, TimerEvent
 from rosz.qos import SERVICES, QoS, for_queue
 
 if TYPE_CHECKING:
-    from rosz.message import Message
+    from rosz.message import Action, Message
     from rosz.message import Service as ServiceType
+    from rosz.node.action_client import ActionClient
+    from rosz.node.action_server import ActionServer, Policy, ServerGoal
 
 __all__ = ("Node",)
 
@@ -247,6 +249,70 @@ class Node(NodeCore):
             ClosedError: The node is closed.
         """
         return self.keep(Client(self, self.resolve(name), service_type, qos, timeout))
+
+    def action_server(
+        self,
+        name: str,
+        action_type: type[Action],
+        execute: Callable[[ServerGoal], object],
+        *,
+        goal: Callable[[Any], bool] | None = None,
+        cancel: Callable[[ServerGoal], bool] | None = None,
+        policy: Policy = "parallel",
+        keep_results: float = 900.0,
+        most_results: int = 200,
+    ) -> ActionServer:
+        """Serve an action.
+
+        Args:
+            name: Name of the action; resolved and remapped.
+            action_type: Class of the action, such as ``Fibonacci``.
+            execute: Function that gets a `ServerGoal`, on a thread of the server, and ends it with
+                ``succeed``, ``abort`` or ``canceled``. If it raises, the goal is aborted.
+            goal: Function that gets a goal message and returns whether to accept it; without one,
+                all are accepted.
+            cancel: Function that gets a `ServerGoal` and returns whether to end it as a client
+                asks; without one, all requests are granted.
+            policy: ``parallel`` to execute goals at the same time; ``queue`` one after the other;
+                ``preempt`` one at a time, where a newer goal cancels all older ones.
+            keep_results: Seconds for which clients can ask for the result of a goal that has ended.
+            most_results: Largest number of such results; the oldest is forgotten.
+
+        Raises:
+            InvalidName: The name is not legal.
+            UsageError: The policy is none of these.
+            ClosedError: The node is closed.
+        """
+        from rosz.node.action_server import ActionServer
+
+        return self.keep(
+            ActionServer(
+                self,
+                self.resolve(name),
+                action_type,
+                execute,
+                goal=goal,
+                cancel=cancel,
+                policy=policy,
+                keep_results=keep_results,
+                most_results=most_results,
+            )
+        )
+
+    def action_client(self, name: str, action_type: type[Action]) -> ActionClient:
+        """Make a client of an action.
+
+        Args:
+            name: Name of the action; resolved and remapped.
+            action_type: Class of the action, such as ``Fibonacci``.
+
+        Raises:
+            InvalidName: The name is not legal.
+            ClosedError: The node is closed.
+        """
+        from rosz.node.action_client import ActionClient
+
+        return self.keep(ActionClient(self, self.resolve(name), action_type))
 
     def timer(
         self, period: float, callback: Callable[[TimerEvent], Any], *, oneshot: bool = False

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.message import Service as ServiceType
 
-__all__ = ("Service", "to_response")
+__all__ = ("Call", "CallService", "Service", "to_response")
 
 _NO_GID = bytes(16)
 
@@ -70,29 +70,26 @@ class Service(Entity):
 
     def serve(self, query: Query) -> None:
         """Respond to a request, and close its query."""
+        call = self._read(query)
+        if call is None:
+            return
         try:
-            if self.closed:
-                return
-            attachment = query.attachment
-            sequence, gid = 0, _NO_GID
-            if attachment is not None:
-                sequence, _, gid = read_attachment(attachment)
-            request = self._decode(query.payload or b"")
-            payload = self.respond(request, gid)
-            query.reply(
-                self.key, payload, attachment=pack_attachment(sequence, time.time_ns(), gid)
-            )
-        except ClosedError:
-            return  # the session ends, and the client gets no response
-        except TransportError as error:
-            self.node.log.warning("cannot respond to a call of '%s': %s", self.name, error)
-        except (ServiceError, DecodeError) as error:
-            try:
-                query.reply_error(str(error))
-            except RoszError as unsent:
-                self.node.log.warning("cannot respond to a call of '%s': %s", self.name, unsent)
-        finally:
+            payload = self.respond(call.request, call.caller)
+        except ServiceError as error:
+            call.refuse(str(error))
+        else:
+            call.answer(payload)
+
+    def _read(self, query: Query) -> Call | None:
+        """Return the call of a query; None if that is not one, which the caller learns."""
+        if self.closed:
             query.close()
+            return None
+        try:
+            return Call(self, query, self._decode(query.payload or b""))
+        except DecodeError as error:
+            _refuse(self, query, str(error))
+            return None
 
     def respond(self, request: Any, caller: bytes) -> bytes:
         """Return the encoded response to a request.
@@ -118,6 +115,77 @@ class Service(Entity):
         except EncodeError as error:
             self.node.log.exception("handler of service '%s' returned no response", self.name)
             raise ServiceError(f"handler returned invalid value: {error}") from error
+
+
+class Call:
+    """A request that has not been answered yet.
+
+    Args:
+        service: Service that received it.
+        query: Query that carried it.
+        request: The request.
+
+    Attributes:
+        request: The request.
+        caller: GID of the client; zeros if the client does not tell.
+
+    Raises:
+        DecodeError: The attachment is damaged.
+    """
+
+    __slots__ = ("_query", "_sequence", "_service", "caller", "request")
+
+    def __init__(self, service: Service, query: Query, request: Any) -> None:
+        self._service = service
+        self._query = query
+        self._sequence = 0
+        self.caller: bytes = _NO_GID
+        self.request: Any = request
+        attachment = query.attachment
+        if attachment is not None:
+            self._sequence, _, self.caller = read_attachment(attachment)
+
+    def answer(self, payload: bytes) -> None:
+        """Send the encoded response."""
+        attachment = pack_attachment(self._sequence, time.time_ns(), self.caller)
+        with self._query as query:
+            try:
+                query.reply(self._service.key, payload, attachment=attachment)
+            except ClosedError:
+                return  # the session ends, and the client gets no response
+            except TransportError as error:
+                _warn(self._service, error)
+
+    def refuse(self, text: str) -> None:
+        """Send an error instead of a response."""
+        _refuse(self._service, self._query, text)
+
+
+def _refuse(service: Service, query: Query, text: str) -> None:
+    """Send an error as the only reply to a query."""
+    with query:
+        try:
+            query.reply_error(text)
+        except RoszError as error:
+            _warn(service, error)
+
+
+def _warn(service: Service, error: RoszError) -> None:
+    service.node.log.warning("cannot respond to a call of '%s': %s", service.name, error)
+
+
+class CallService(Service):
+    """A service whose handler gets each `Call`, and may answer it later, on any thread."""
+
+    def serve(self, query: Query) -> None:
+        """Hand a call to the handler."""
+        call = self._read(query)
+        if call is None:
+            return
+        try:
+            self._handler(call)
+        except ServiceError as error:
+            call.refuse(str(error))
 
 
 def to_response(response: type[Message], result: Any) -> Message:

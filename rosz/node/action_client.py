@@ -1,0 +1,434 @@
+"""Action clients, by the protocol of ROS 2.
+
+The result of a goal is asked for as soon as the goal is accepted, and the server answers when there
+is one. So a server that ends is noticed at once: the query ends without an answer.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Self
+from weakref import WeakValueDictionary
+
+from rosz.errors import (
+    ActionError,
+    ClosedError,
+    GoalFailed,
+    GoalRejected,
+    RoszError,
+    ServiceNotFound,
+    WaitTimeout,
+)
+from rosz.lifecycle import Lifecycle
+from rosz.msgs.action_msgs.msg import GoalInfo, GoalStatusArray
+from rosz.msgs.action_msgs.srv import CancelGoal, CancelGoalResponse
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.unique_identifier_msgs.msg import UUID
+from rosz.node.client import Client
+from rosz.node.goals import CANCEL, FEEDBACK, FINAL, RESULT, SEND, STATUS, GoalState
+from rosz.node.subscription import Subscription
+from rosz.qos import DEFAULT, LATCHED, SERVICES
+from rosz.session import LONGEST_WAIT, clamp_timeout
+from rosz.worker import start_thread
+
+if TYPE_CHECKING:
+    from rosz.graph import View
+    from rosz.message import Action
+    from rosz.node.core import NodeCore
+
+__all__ = ("ActionClient", "ClientGoal")
+
+_MOST_FEEDBACK = 1000
+"""Messages of feedback that wait to be iterated over; older ones are dropped."""
+
+
+class ClientGoal:
+    """A goal that was sent; see `ActionClient.send`.
+
+    Iterate over it to get its feedback until it ends. As a context manager it cancels the goal if
+    that has not ended.
+
+    Attributes:
+        id: Identification of the goal.
+        accepted: Time at which the server accepted it, in nanoseconds of the server's clock.
+    """
+
+    def __init__(
+        self, client: ActionClient, goal_id: uuid.UUID, feedback: Callable[[Any], object] | None
+    ) -> None:
+        self.id: uuid.UUID = goal_id
+        self.accepted: int = 0
+        self._client = client
+        self._on_feedback = feedback
+        self._state = GoalState.UNKNOWN
+        self._feedback: deque[Any] = deque(maxlen=_MOST_FEEDBACK)
+        self._changed = threading.Condition()
+        self._result: Any = None
+        self._error: RoszError | None = None
+        self._ended = False
+        self._on_done: list[Callable[[ClientGoal], object]] = []
+
+    @property
+    def status(self) -> GoalState:
+        """The last known state of the goal."""
+        return self._state
+
+    @property
+    def done(self) -> bool:
+        """Whether the goal has ended, or its server has."""
+        return self._ended
+
+    def wait(self, timeout: float | None = None) -> GoalState:
+        """Wait until the goal has ended.
+
+        Args:
+            timeout: Time limit in seconds; none when not given.
+
+        Returns:
+            The final state.
+
+        Raises:
+            WaitTimeout: It has not ended in time.
+            ActionError: The server ended first, or does not know the goal any more.
+            ClosedError: The client was closed meanwhile.
+            UsageError: The timeout is not a number.
+        """
+        limit = LONGEST_WAIT if timeout is None else clamp_timeout(timeout)
+        with self._changed:
+            if not self._changed.wait_for(lambda: self._ended, limit):
+                raise WaitTimeout(
+                    f"result of action '{self._client.name}'", limit, f"it is {self._state.text}"
+                )
+        if self._error is not None:
+            raise self._error
+        return self._state
+
+    def result(self, timeout: float | None = None) -> Any:
+        """Wait for the result of the goal.
+
+        Args:
+            timeout: Time limit in seconds; none when not given.
+
+        Returns:
+            The result of a goal that succeeded.
+
+        Raises:
+            GoalFailed: The goal was aborted or canceled; the error has the result.
+            WaitTimeout: It has not ended in time.
+            ActionError: The server ended first, or does not know the goal any more.
+            ClosedError: The client was closed meanwhile.
+            UsageError: The timeout is not a number.
+        """
+        state = self.wait(timeout)
+        if state is not GoalState.SUCCEEDED:
+            text = f"the goal of action '{self._client.name}' was {state.text}"
+            raise GoalFailed(text, state, self._result)
+        return self._result
+
+    def cancel(self, timeout: float = 10.0) -> bool:
+        """Ask the server to end the goal; wait for its end with `wait`.
+
+        Args:
+            timeout: Time limit in seconds for the answer of the server.
+
+        Returns:
+            Whether the server ends it; not if it refuses, or if the goal has ended before.
+
+        Raises:
+            ServiceError: The server ended, or nobody serves the action any more.
+            WaitTimeout: The server did not answer in time.
+            ClosedError: The client is closed.
+        """
+        response = self._client.request_cancel(GoalInfo(UUID(self.id.bytes)), timeout)
+        return any(bytes(info.goal_id.uuid) == self.id.bytes for info in response.goals_canceling)
+
+    def on_done(self, callback: Callable[[ClientGoal], object]) -> None:
+        """Call a function with this object when the goal has ended, on a thread of the client.
+
+        If it has, the function is called at once.
+        """
+        with self._changed:
+            if not self._ended:
+                self._on_done.append(callback)
+                return
+        self._call(callback, self)
+
+    def __iter__(self) -> Iterator[Any]:
+        """Yield feedback as it comes, until the goal ends; what comes later is left out."""
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._feedback or self._ended)
+                if not self._feedback:
+                    return
+                feedback = self._feedback.popleft()
+            yield feedback
+
+    def accept(self, stamp: int) -> None:
+        """Note that the server has accepted the goal; for the client."""
+        self.accepted = stamp
+        self.update(GoalState.ACCEPTED)
+
+    def update(self, state: GoalState) -> None:
+        """Note a state that the server published; for the client."""
+        with self._changed:
+            if not self._ended and state > self._state and state not in FINAL:
+                self._state = state
+
+    def receive_feedback(self, feedback: Any) -> None:
+        """Take feedback; for the client."""
+        if self._on_feedback is not None:
+            self._call(self._on_feedback, feedback)
+            return
+        with self._changed:
+            self._feedback.append(feedback)
+            self._changed.notify_all()
+
+    def finish(self, state: GoalState, result: Any, error: RoszError | None = None) -> None:
+        """Note the end of the goal; for the client."""
+        with self._changed:
+            if self._ended:
+                return
+            self._state, self._result, self._error = state, result, error
+            self._ended = True
+            callbacks, self._on_done = self._on_done, []
+            self._changed.notify_all()
+        for callback in callbacks:
+            self._call(callback, self)
+
+    def _call(self, callback: Callable[[Any], object], value: Any) -> None:
+        try:
+            callback(value)
+        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+            self._client.report("a callback", error)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._client.abandon([self])
+
+    def __repr__(self) -> str:
+        return f"<goal {self.id} of {self._client.name}, {self._state.text}>"
+
+
+class ActionClient:
+    """Send goals to an action; see `rosz.Node.action_client`. Safe for threads and callbacks.
+
+    As a context manager it cancels the goals that have not ended.
+
+    Attributes:
+        name: Full name of the action.
+        action_type: Class of the action.
+    """
+
+    def __init__(self, node: NodeCore, name: str, action_type: type[Action]) -> None:
+        self.name: str = name
+        self.action_type: type[Action] = action_type
+        self._node = node
+        self._goals: dict[bytes, ClientGoal] = {}
+        # A result may overtake the last feedback, which still goes to those who hold the goal.
+        self._known: WeakValueDictionary[bytes, ClientGoal] = WeakValueDictionary()
+        self._lifecycle = Lifecycle(f"the client of action '{name}'", log=node.log)
+        keep = self._lifecycle.keep
+        keep(
+            Subscription(
+                node,
+                f"{name}/{FEEDBACK}",
+                action_type.FeedbackMessage,
+                self._receive_feedback,
+                DEFAULT,
+            )
+        )
+        keep(Subscription(node, f"{name}/{STATUS}", GoalStatusArray, self._receive_status, LATCHED))
+        kinds = {RESULT: action_type.GetResult, CANCEL: CancelGoal, SEND: action_type.SendGoal}
+        limits = {RESULT: LONGEST_WAIT}
+        self._clients = {
+            part: keep(Client(node, f"{name}/{part}", kind, SERVICES, limits.get(part, 10.0)))
+            for part, kind in kinds.items()
+        }
+
+    @property
+    def goals(self) -> list[ClientGoal]:
+        """The goals that have not ended, the oldest first."""
+        return list(self._goals.values())
+
+    def wait_for_server(self, timeout: float = 10.0) -> None:
+        """Wait until a node serves the action with this type.
+
+        Args:
+            timeout: Time limit in seconds.
+
+        Raises:
+            WaitTimeout: No node did in time.
+            ClosedError: The client is closed, or the context was shut down meanwhile.
+            UsageError: The timeout is not a number.
+        """
+        self._lifecycle.check_open("wait")
+        deadline = time.monotonic() + clamp_timeout(timeout)
+        what = f"server of action '{self.name}' with type '{self.action_type._type_name}'"
+        try:
+            for client in self._clients.values():
+                client.wait_for_service(max(0.0, deadline - time.monotonic()))
+        except WaitTimeout as error:
+            raise WaitTimeout(what, timeout) from error
+
+    def is_served(self) -> bool:
+        """Return whether a node serves the action with this type."""
+        view: View = self._node.context.graph.view()
+        return all(
+            any(map(client.matches, view.servers(client.name))) for client in self._clients.values()
+        )
+
+    def send(
+        self,
+        goal: Any,
+        *,
+        feedback: Callable[[Any], object] | None = None,
+        timeout: float = 10.0,
+        goal_id: uuid.UUID | None = None,
+    ) -> ClientGoal:
+        """Send a goal, and wait until the server has accepted it.
+
+        Args:
+            goal: The goal message.
+            feedback: Function called with each feedback message, on a thread of the client. Without
+                one, iterate over the goal that is returned.
+            timeout: Time limit in seconds for the answer of the server.
+            goal_id: Identification of the goal; a random one when not given.
+
+        Returns:
+            The goal, which is followed until it ends.
+
+        Raises:
+            GoalRejected: The server did not accept it.
+            EncodeError: A field of the goal has a value that does not fit.
+            ServiceNotFound: No node serves the action.
+            ServiceError: The server failed, or ended.
+            WaitTimeout: The server did not answer in time; the goal may be executed.
+            ClosedError: The client is closed.
+            UsageError: The timeout is not a number.
+        """
+        self._lifecycle.check_open("send a goal")
+        sent = ClientGoal(self, goal_id or uuid.uuid4(), feedback)
+        request = self.action_type.SendGoal.Request(UUID(sent.id.bytes), goal)
+        # Before the answer, which feedback may overtake.
+        self._goals[sent.id.bytes] = self._known[sent.id.bytes] = sent
+        accepted = False
+        try:
+            response = self._call(SEND, request, timeout)
+            accepted = response.accepted
+        finally:
+            if not accepted:
+                self._goals.pop(sent.id.bytes, None)
+        if not accepted:
+            raise GoalRejected(f"the server of action '{self.name}' rejected the goal")
+        sent.accept(response.stamp.to_nsec())
+        name = f"rosz-goal{self.name}"
+        start_thread(threading.Thread(target=self._follow, args=(sent,), name=name, daemon=True))
+        return sent
+
+    def cancel_all(self, before: int = 0, timeout: float = 10.0) -> int:
+        """Ask the server to end goals of all clients.
+
+        Args:
+            before: Time in nanoseconds; only goals accepted until then are meant. 0 for all.
+            timeout: Time limit in seconds for the answer of the server.
+
+        Returns:
+            Number of goals that the server ends.
+
+        Raises:
+            ServiceError: The server ended, or nobody serves the action.
+            WaitTimeout: The server did not answer in time.
+            ClosedError: The client is closed.
+        """
+        info = GoalInfo(stamp=Time.from_nsec(before))
+        return len(self.request_cancel(info, timeout).goals_canceling)
+
+    def request_cancel(self, goal: GoalInfo, timeout: float) -> CancelGoalResponse:
+        """Ask the server to end goals, in the terms of the protocol; errors as `cancel_all`.
+
+        Args:
+            goal: A goal, a time, or both.
+            timeout: Time limit in seconds for the answer of the server.
+        """
+        response: CancelGoalResponse = self._call(CANCEL, CancelGoal.Request(goal), timeout)
+        return response
+
+    def _call(self, part: str, request: Any, timeout: float) -> Any:
+        try:
+            return self._clients[part].call(request, timeout)
+        except ServiceNotFound as error:
+            view = self._node.context.graph.view()
+            others = view.servers(f"{self.name}/{part}")
+            why = f": {error}" if others else "; nobody serves that name"
+            raise ServiceNotFound(f"action '{self.name}' is not available{why}") from error
+
+    def _follow(self, goal: ClientGoal) -> None:
+        """Wait for the result of a goal, which ends the goal."""
+        state, result = GoalState.UNKNOWN, None
+        error: RoszError | None = None
+        try:
+            request = self.action_type.GetResult.Request(UUID(goal.id.bytes))
+            response = self._clients[RESULT].call(request, LONGEST_WAIT)
+            state, result = GoalState(response.status), response.result
+            if state not in FINAL:
+                error = ActionError(
+                    f"the server of action '{self.name}' does not know goal {goal.id}: it was"
+                    " started anew, or has forgotten the result"
+                )
+        except ClosedError as fault:
+            error = fault
+        except (RoszError, ValueError) as fault:
+            error = ActionError(f"the result of goal {goal.id} of '{self.name}' is lost: {fault}")
+        self._goals.pop(goal.id.bytes, None)
+        goal.finish(state, result, error)
+
+    def _receive_feedback(self, message: Any) -> None:
+        goal = self._known.get(bytes(message.goal_id.uuid))
+        if goal is not None:
+            goal.receive_feedback(message.feedback)
+
+    def _receive_status(self, message: GoalStatusArray) -> None:
+        for status in message.status_list:
+            goal = self._goals.get(bytes(status.goal_info.goal_id.uuid))
+            if goal is not None and status.status in tuple(GoalState):
+                goal.update(GoalState(status.status))
+
+    def report(self, what: str, error: BaseException) -> None:
+        """Log what a function of the program raised."""
+        self._node.log.report(f"{what} of action '{self.name}' failed", error)
+
+    def abandon(self, goals: list[ClientGoal]) -> None:
+        """Ask the server to end goals that have not ended; failures are logged."""
+        for goal in goals:
+            if goal.done or self._lifecycle.closing:
+                continue
+            try:
+                goal.cancel()
+            except RoszError as error:
+                self._node.log.warning("cannot cancel a goal of action '%s': %s", self.name, error)
+
+    def close(self) -> None:
+        """End the client; goals go on, and are not followed any more."""
+        try:
+            self._lifecycle.close()
+        finally:
+            self._node.forget(self)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        try:
+            self.abandon(self.goals)
+        finally:
+            self.close()
+
+    def __repr__(self) -> str:
+        state = " closed" if self._lifecycle.closing else ""
+        return f"<ActionClient {self.name} [{self.action_type._type_name}]{state}>"

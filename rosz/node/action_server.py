@@ -1,0 +1,421 @@
+"""Action servers, by the protocol of ROS 2.
+
+A goal is registered before the client learns that it was accepted, so that it can be cancelled and
+its result asked for at once. Its execution begins after that. Results are kept for clients that ask
+late, for a time and up to a number.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+from rosz.errors import ClosedError, ServiceError, UsageError
+from rosz.lifecycle import Lifecycle
+from rosz.msgs.action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
+from rosz.msgs.action_msgs.srv import CancelGoal, CancelGoalResponse
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.unique_identifier_msgs.msg import UUID
+from rosz.node.goals import CANCEL, FEEDBACK, FINAL, RESULT, SEND, STATUS, GoalState, may_become
+from rosz.node.publisher import Publisher
+from rosz.node.service import Call, CallService
+from rosz.qos import DEFAULT, LATCHED, SERVICES
+from rosz.worker import Worker
+
+if TYPE_CHECKING:
+    from rosz.message import Action
+    from rosz.node.core import NodeCore
+
+__all__ = ("ActionServer", "Policy", "ServerGoal")
+
+Policy = Literal["parallel", "queue", "preempt"]
+"""What becomes of a goal that arrives while another one is executed: see `rosz.Node`."""
+
+_POLICIES = ("parallel", "queue", "preempt")
+_MOST_AT_ONCE = 128
+_THREADS = 16
+_NO_GOAL = bytes(16)
+
+
+class ServerGoal:
+    """A goal that a server has accepted.
+
+    Attributes:
+        id: Identification of the goal, which its client chose.
+        request: The goal message.
+        accepted: Time at which it was accepted, in nanoseconds.
+    """
+
+    def __init__(self, server: ActionServer, goal_id: bytes, request: Any, accepted: int) -> None:
+        self.id: uuid.UUID = uuid.UUID(bytes=goal_id)
+        self.request: Any = request
+        self.accepted: int = accepted
+        self._server = server
+        self._state = GoalState.ACCEPTED
+        self._cancelled = threading.Event()
+        self._waiting: list[Call] = []
+        self._response: bytes | None = None
+        self.expires: float = 0.0
+
+    @property
+    def status(self) -> GoalState:
+        """The state of the goal."""
+        return self._state
+
+    @property
+    def done(self) -> bool:
+        """Whether the goal has ended."""
+        return self._state in FINAL
+
+    @property
+    def cancel_requested(self) -> bool:
+        """Whether to end: a client or a newer goal asks for it, or the server closes."""
+        return self._cancelled.is_set()
+
+    def wait_for_cancel(self, seconds: float) -> bool:
+        """Wait until the goal is to end.
+
+        Args:
+            seconds: Time limit in seconds.
+
+        Returns:
+            Whether it is.
+        """
+        return self._cancelled.wait(seconds)
+
+    def feedback(self, feedback: Any) -> None:
+        """Publish feedback; after the end of the server do nothing.
+
+        Raises:
+            EncodeError: A value does not fit its field.
+        """
+        self._server.publish_feedback(self, feedback)
+
+    def succeed(self, result: Any = None) -> None:
+        """End the goal as reached.
+
+        Args:
+            result: The result; an empty one when not given.
+
+        Raises:
+            EncodeError: A value does not fit its field. The goal has not ended.
+            UsageError: The goal has ended before, or is not executed yet.
+        """
+        self._server.end(self, GoalState.SUCCEEDED, result)
+
+    def abort(self, result: Any = None) -> None:
+        """End the goal as failed; arguments and errors as those of `succeed`."""
+        self._server.end(self, GoalState.ABORTED, result)
+
+    def canceled(self, result: Any = None) -> None:
+        """End the goal as cancelled; arguments and errors as those of `succeed`.
+
+        A goal that nobody asked to end cannot be ended so.
+        """
+        self._server.end(self, GoalState.CANCELED, result)
+
+    def move(self, state: GoalState) -> None:
+        """Go to another state; for the server, which holds its lock.
+
+        Raises:
+            UsageError: The goal cannot go there.
+        """
+        if not may_become(self._state, state):
+            raise UsageError(
+                f"goal {self.id} of action '{self._server.name}' is {self._state.text}: it cannot"
+                f" become {state.text}"
+            )
+        self._state = state
+        if state is GoalState.CANCELING:
+            self._cancelled.set()
+
+    def finish(self, response: bytes) -> list[Call]:
+        """Keep the response to those who ask for the result, and return those who wait for it."""
+        self._response = response
+        waiting, self._waiting = self._waiting, []
+        return waiting
+
+    def wait_for_result(self, call: Call) -> bytes | None:
+        """Return the response; None if the call has to wait until there is one."""
+        if self._response is None:
+            self._waiting.append(call)
+        return self._response
+
+    def interrupt(self) -> list[Call]:
+        """Let the execution know that the server ends, and return those who wait."""
+        self._cancelled.set()
+        waiting, self._waiting = self._waiting, []
+        return waiting
+
+    def info(self) -> GoalInfo:
+        """Return what identifies the goal in messages."""
+        return GoalInfo(UUID(self.id.bytes), Time.from_nsec(self.accepted))
+
+    def __repr__(self) -> str:
+        return f"<goal {self.id} of {self._server.name}, {self._state.text}>"
+
+
+class ActionServer:
+    """Serve an action; see `rosz.Node.action_server`.
+
+    Attributes:
+        name: Full name of the action.
+        action_type: Class of the action.
+    """
+
+    def __init__(
+        self,
+        node: NodeCore,
+        name: str,
+        action_type: type[Action],
+        execute: Callable[[ServerGoal], object],
+        *,
+        goal: Callable[[Any], bool] | None,
+        cancel: Callable[[ServerGoal], bool] | None,
+        policy: Policy,
+        keep_results: float,
+        most_results: int,
+    ) -> None:
+        if policy not in _POLICIES:
+            raise UsageError(f"policy is {policy!r}: expected 'parallel', 'queue' or 'preempt'")
+        self.name: str = name
+        self.action_type: type[Action] = action_type
+        self._node = node
+        self._execute = execute
+        self._accept = goal
+        self._allow_cancel = cancel
+        self._policy = policy
+        self._keep_results = keep_results
+        self._most_results = most_results
+        self._lock = threading.RLock()
+        self._goals: dict[bytes, ServerGoal] = {}
+        self._ended: deque[ServerGoal] = deque()
+        self._current: ServerGoal | None = None
+        self._publishing = threading.Lock()
+        self._lifecycle = Lifecycle(f"the server of action '{name}'", log=node.log)
+        limit = _MOST_AT_ONCE if policy == "parallel" else 1
+        self._worker: Worker[ServerGoal] = Worker(f"rosz-action{name}", self._run, threads=limit)
+        keep = self._lifecycle.keep
+        keep(self._worker)
+        feedback = action_type.FeedbackMessage
+        self._feedback = keep(Publisher(node, f"{name}/{FEEDBACK}", feedback, DEFAULT))
+        self._status = keep(Publisher(node, f"{name}/{STATUS}", GoalStatusArray, LATCHED))
+        kinds: dict[str, tuple[Any, Callable[[Call], None]]] = {
+            RESULT: (action_type.GetResult, self._get_result),
+            CANCEL: (CancelGoal, self._cancel_goals),
+            SEND: (action_type.SendGoal, self._receive),
+        }
+        for part, (kind, handle) in kinds.items():
+            keep(CallService(node, f"{name}/{part}", kind, handle, SERVICES, _THREADS))
+        self._publish_status()
+
+    @property
+    def goals(self) -> list[ServerGoal]:
+        """The goals that have not ended, the oldest first."""
+        with self._lock:
+            return [goal for goal in self._goals.values() if not goal.done]
+
+    # What clients ask for.
+
+    def _receive(self, call: Call) -> None:
+        goal_id = bytes(call.request.goal_id.uuid)
+        known = self._goals.get(goal_id)
+        if known is not None:  # sent twice: it is executed once
+            self._respond(call, known)
+            return
+        if not self._is_accepted(call.request.goal):
+            self._respond(call, None)
+            return
+        goal = ServerGoal(self, goal_id, call.request.goal, self._node.clock.now())
+        with self._lock:
+            first = self._goals.setdefault(goal_id, goal)
+        self._respond(call, first)
+        if first is goal:
+            self._publish_status()
+            self._make_room(goal)
+            self._worker.submit(goal)
+
+    def _respond(self, call: Call, goal: ServerGoal | None) -> None:
+        stamp = Time.from_nsec(goal.accepted) if goal is not None else Time()
+        call.answer(self.action_type.SendGoal.Response(goal is not None, stamp).to_cdr())
+
+    def _is_accepted(self, request: Any) -> bool:
+        if self._lifecycle.closing:
+            return False
+        if self._accept is None:
+            return True
+        try:
+            return bool(self._accept(request))
+        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+            self._node.log.report(f"the goal callback of action '{self.name}' failed", error)
+            return False
+
+    def _make_room(self, goal: ServerGoal) -> None:
+        """Ask other goals to end if only the newest one is wanted."""
+        if self._policy != "preempt":
+            return
+        for other in self.goals:
+            if other is not goal and other.accepted <= goal.accepted:
+                self._begin_cancel(other)
+
+    def _cancel_goals(self, call: Call) -> None:
+        info = call.request.goal_info
+        goal_id, stamp = bytes(info.goal_id.uuid), info.stamp.to_nsec()
+        response = CancelGoalResponse()
+        self._expire()
+        with self._lock:
+            named = self._goals.get(goal_id)
+            everything = goal_id == _NO_GOAL and not stamp
+            wanted = [
+                one
+                for one in self._goals.values()
+                if not one.done and (everything or one is named or 0 < one.accepted <= stamp)
+            ]
+        cancelled = [one for one in wanted if self._is_cancel_allowed(one)]
+        cancelled = [one for one in cancelled if self._begin_cancel(one)]
+        if wanted and not cancelled:
+            response.return_code = response.ERROR_REJECTED
+        elif not cancelled and goal_id != _NO_GOAL:
+            ended = named is not None
+            response.return_code = (
+                response.ERROR_GOAL_TERMINATED if ended else response.ERROR_UNKNOWN_GOAL_ID
+            )
+        response.goals_canceling = [one.info() for one in cancelled]
+        call.answer(response.to_cdr())
+
+    def _is_cancel_allowed(self, goal: ServerGoal) -> bool:
+        if self._allow_cancel is None:
+            return True
+        try:
+            return bool(self._allow_cancel(goal))
+        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+            self._node.log.report(f"the cancel callback of action '{self.name}' failed", error)
+            return False
+
+    def _begin_cancel(self, goal: ServerGoal) -> bool:
+        """Ask a goal to end; return whether it has not ended before."""
+        with self._lock:
+            if goal.done:
+                return False
+            waits = goal.status is GoalState.ACCEPTED
+            if goal.status is not GoalState.CANCELING:
+                goal.move(GoalState.CANCELING)
+        if waits:  # nobody executes it
+            self.end(goal, GoalState.CANCELED, None)
+        else:
+            self._publish_status()
+        return True
+
+    def _get_result(self, call: Call) -> None:
+        self._expire()
+        goal = self._goals.get(bytes(call.request.goal_id.uuid))
+        if goal is None:
+            call.answer(self._response(GoalState.UNKNOWN, None))
+            return
+        with self._lock:
+            if self._lifecycle.closing:
+                raise ServiceError(self._ending)
+            response = goal.wait_for_result(call)
+        if response is not None:
+            call.answer(response)
+
+    # What the execution of goals does.
+
+    def _run(self, goal: ServerGoal) -> None:
+        with self._lock:
+            if goal.status is not GoalState.ACCEPTED or self._lifecycle.closing:
+                return  # cancelled before its turn
+            goal.move(GoalState.EXECUTING)
+        self._publish_status()
+        log = self._node.log
+        try:
+            self._execute(goal)
+        except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
+            if self._lifecycle.closing:
+                return
+            log.report(f"the execute function of action '{self.name}' failed", error)
+        else:
+            if goal.done or self._lifecycle.closing:
+                return
+            log.warning(
+                "the execute function of action '%s' returned without ending the goal, which is"
+                " aborted; call goal.succeed, goal.abort or goal.canceled",
+                self.name,
+            )
+        if not goal.done:
+            self.end(goal, GoalState.ABORTED, None)
+
+    def publish_feedback(self, goal: ServerGoal, feedback: Any) -> None:
+        """Publish feedback about a goal; see `ServerGoal.feedback`."""
+        message = self.action_type.FeedbackMessage(UUID(goal.id.bytes), feedback)
+        self._publish(self._feedback, message)
+
+    def end(self, goal: ServerGoal, state: GoalState, result: Any) -> None:
+        """End a goal; see `ServerGoal.succeed`."""
+        response = self._response(state, result)
+        with self._lock:
+            goal.move(state)
+            waiting = goal.finish(response)
+            goal.expires = time.monotonic() + self._keep_results
+            self._ended.append(goal)
+            self._expire()
+        for call in waiting:
+            call.answer(response)
+        self._publish_status()
+
+    def _response(self, state: GoalState, result: Any) -> bytes:
+        outcome = self.action_type.Result() if result is None else result
+        return self.action_type.GetResult.Response(int(state), outcome).to_cdr()
+
+    def _expire(self) -> None:
+        """Forget goals whose results nobody has asked for in time."""
+        with self._lock:
+            now, ended = time.monotonic(), self._ended
+            while ended and (len(ended) > self._most_results or ended[0].expires <= now):
+                self._goals.pop(ended.popleft().id.bytes, None)
+
+    def _publish_status(self) -> None:
+        with self._publishing:  # so that no older status comes after a newer one
+            with self._lock:
+                statuses = [
+                    GoalStatus(goal.info(), int(goal.status)) for goal in self._goals.values()
+                ]
+            self._publish(self._status, GoalStatusArray(statuses))
+
+    def _publish(self, publisher: Publisher[Any], message: Any) -> None:
+        try:
+            publisher.publish(message)
+        except ClosedError:
+            if not (self._lifecycle.closing or publisher.closed):
+                raise
+
+    @property
+    def _ending(self) -> str:
+        return f"the server of action '{self.name}' ends"
+
+    def close(self) -> None:
+        """End the server: those who wait for results learn it, and executed goals are cancelled."""
+        try:
+            self._lifecycle.close(self._finish)
+        finally:
+            self._node.forget(self)
+
+    def _finish(self) -> None:
+        with self._lock:
+            waiting = [call for goal in self._goals.values() for call in goal.interrupt()]
+        for call in waiting:
+            call.refuse(self._ending)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = " closed" if self._lifecycle.closing else ""
+        return f"<ActionServer {self.name} [{self.action_type._type_name}]{state}>"
