@@ -20,6 +20,7 @@ COMMANDS = {
     "topic": "list, show, measure and publish topics",
     "bag": "record and play bags, show, change and repair them",
     "service": "list and call services",
+    "action": "list actions, and send goals to them",
     "node": "list, inspect, ping and kill nodes",
     "msg": "show message types",
     "srv": "show service types",

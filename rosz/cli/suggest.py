@@ -20,14 +20,16 @@ if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
     from rosz.packages import PackageIndex
     from rosz.session import Session
-    from rosz.typestore import TypeStore
+    from rosz.typestore import Kind, TypeStore
 
 __all__ = (
     "Line",
     "Source",
+    "actions",
     "definitions",
     "executables",
     "files",
+    "goal_values",
     "launch_words",
     "machines",
     "nodes",
@@ -186,6 +188,23 @@ def request_values(line: Line) -> list[str]:
     return [_as_yaml(line.types.service(servers[0].type_name).Request)] if servers else []
 
 
+def actions(line: Line) -> list[str]:
+    """Return the actions."""
+    from rosz.introspect.actions import list_actions
+
+    survey = line.survey
+    return [] if survey is None else [entry.name for entry in list_actions(survey.view)]
+
+
+def goal_values(line: Line) -> list[str]:
+    """Return a goal of the action before, with all defaults, as one word of YAML."""
+    from rosz.introspect.actions import find_action
+
+    if len(line.before) != 1 or line.survey is None:
+        return []
+    return [_as_yaml(line.types.action(find_action(line.survey.view, line.before[0])).Goal)]
+
+
 def nodes(line: Line) -> list[str]:
     """Return the nodes."""
     return [] if line.survey is None else sorted(set(line.survey.view.nodes()))
@@ -209,7 +228,8 @@ def params(line: Line) -> list[str]:
 
 def definitions(line: Line) -> list[str]:
     """Return all types of the kind that the group shows."""
-    return line.types.names("srv" if line.group == "srv" else "msg")
+    kinds: dict[str, Kind] = {"srv": "srv", "action": "action"}
+    return line.types.names(kinds.get(line.group, "msg"))
 
 
 def packages(line: Line) -> list[str]:

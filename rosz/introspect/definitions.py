@@ -48,7 +48,7 @@ class Definitions:
 
     Args:
         store: Types by name.
-        kind: ``msg`` or ``srv``.
+        kind: ``msg``, ``srv`` or ``action``.
     """
 
     def __init__(self, store: TypeStore, kind: Kind) -> None:
@@ -82,8 +82,8 @@ class Definitions:
             self._store.definition(full)
         except (TypeNotFound, ValueError):  # the latter for too many slashes
             # The store raises an error that says why.
-            look = self._store.message if self._kind == "msg" else self._store.service
-            look(name)
+            store = self._store
+            {"msg": store.message, "srv": store.service, "action": store.action}[self._kind](name)
         return [full]
 
     def show(self, name: str) -> str:

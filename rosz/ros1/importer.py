@@ -224,8 +224,11 @@ class _FrontFinder(MetaPathFinder):
     ) -> ModuleSpec | None:
         """Find a module by its name in ROS."""
         first, _, inner = rest.partition(".")
-        if first in _KINDS and fullname not in SUBMODULES:
-            return self._of_package(fullname, root, _KINDS[first], inner, path)
+        kind = _KINDS.get(first) if fullname not in SUBMODULES else None
+        if kind == "action" and not self.types.store.has(root, kind):
+            kind = None  # such as rclpy.action
+        if kind is not None:
+            return self._of_package(fullname, root, kind, inner, path)
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
         if root in self._modules or fullname in self._modules:
@@ -266,18 +269,23 @@ class _FrontFinder(MetaPathFinder):
         if not self.types.store.has(package, kind):
             return None
         if not inner:
-            if package in self._shipped:
-                return _alias(name, lambda: add_names(self.types.shipped(package, kind)))
-            found = PathFinder.find_spec(name, path)
+            generated = PathFinder.find_spec(name, path) if package not in self._shipped else None
             # catkin makes no module of actions, so a package may have one of its own.
             own = kind == "action"
-            if found is not None and found.origin and (own or is_generated(found.origin)):
-                return found
-            return _alias(name, lambda: add_names(self.types.store.module(package, kind)))
+            origin = generated.origin if generated is not None else None
+            if origin and (own or is_generated(origin)):
+                return generated
+            return _alias(name, lambda: self._module(package, kind))
         module = import_module(f"{package}.{kind}")
         if not inner.startswith("_") or not hasattr(module, inner[1:]):
             return None
         return _alias(name, lambda: _single(name, module, inner[1:]))
+
+    def _module(self, package: str, kind: Kind) -> ModuleType:
+        shipped = package in self._shipped
+        types = self.types
+        module = types.shipped(package, kind) if shipped else types.store.module(package, kind)
+        return module if kind == "action" else add_names(module)
 
     def _of_cfg(
         self, name: str, package: str, inner: str, path: Sequence[str] | None

@@ -112,6 +112,12 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.genpy": f"MessageException is_simple {_MESSAGE['ros1.genpy']}",
     },
     "genpy.rostime": {"ros1.genpy": "Duration TVal Time"},
+    "rclpy.action.client": {
+        "ros2.rclpy.action": "ActionClient ClientGoalHandle GoalStatus",
+    },
+    "rclpy.action.server": {
+        "ros2.rclpy.action": "ActionServer CancelResponse GoalResponse ServerGoalHandle",
+    },
     "rclpy.callback_groups": {
         "ros2.rclpy.executors": "CallbackGroup MutuallyExclusiveCallbackGroup"
         " ReentrantCallbackGroup"

@@ -329,3 +329,33 @@ def test_threads_import_concurrently(tmp_path: Path, workspace: Path) -> None:
         print("fine")
     """
     assert run(code, tmp_path, workspace) == "fine\n"
+
+
+def test_actions(tmp_path: Path) -> None:
+    """A package's own module wins over that of its actions, which catkin does not make."""
+    for name in ("plain", "own"):
+        package = tmp_path / "src" / name
+        (package / "action").mkdir(parents=True)
+        (package / "action" / "Do.action").write_text("int32 a\n---\n---\n")
+        (package / "package.xml").write_text(f"<package><name>{name}</name></package>")
+        (package / "setup.py").write_text(
+            "from distutils.core import setup\n"
+            f"setup(name='{name}', packages=['{name}'], package_dir={{'': 'src'}})\n"
+        )
+        (package / "src" / name).mkdir(parents=True)
+        (package / "src" / name / "__init__.py").write_text("")
+    (tmp_path / "src" / "own" / "src" / "own" / "action.py").write_text("Mine = 1\n")
+    code = """
+        from rosz.ros1.importer import install
+        install()
+        from example_interfaces.action import Fibonacci
+        from plain.action import Do
+        from plain.msg import DoGoal
+        from own.action import Mine
+        from own.msg import DoAction
+        import rclpy.action.server
+        import rosz.msgs.example_interfaces.action
+        assert Fibonacci is rosz.msgs.example_interfaces.action.Fibonacci
+        assert Do.Goal(a=1).a == DoGoal(a=1).a
+    """
+    run(code, tmp_path, tmp_path / "src")

@@ -1,7 +1,7 @@
 """rclpy: the part of ROS 2's Python interface that tutorials and simple nodes use.
 
-Callbacks run while an executor spins, on its thread. Actions, lifecycle nodes, guard conditions,
-waitables and event handlers are missing: using them raises an ``AttributeError`` or
+Callbacks run while an executor spins, on its thread. Lifecycle nodes, guard conditions, waitables
+and event handlers are missing: using them raises an ``AttributeError`` or
 ``ModuleNotFoundError`` with their name. Submodules of rclpy that share a file here
 (``rclpy.publisher``, ``rclpy.duration``, …) are listed in ``rosz.ros1.modules``.
 """

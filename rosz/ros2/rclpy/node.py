@@ -73,7 +73,7 @@ class Node(NodeParameters):
         for name in ("", node.base_name, node.name):
             overrides |= given.params.get(name, {})
         overrides |= {one.name: one.value for one in parameter_overrides or ()}
-        super().__init__(node, overrides, self._rosz_call_soon)
+        super().__init__(node, overrides, self.rosz_call_soon)
         self._clock = ROSClock(self.rosz_node.clock)
         self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
         write_as_rclpy(self.rosz_node.log, self._rosz_logger_name)
@@ -97,14 +97,17 @@ class Node(NodeParameters):
         """Yield the entities with callbacks, timers first, which is rclpy's order."""
         parts = list(self._rosz_parts)
         yield from (part for part in parts if isinstance(part, Timer))
-        yield from (part for part in parts if isinstance(part, Subscription | Service))
+        others = (part for part in parts if not isinstance(part, Timer))
+        yield from (part for part in others if hasattr(part, "take"))
 
-    def _rosz_wake(self) -> None:
+    def rosz_wake(self) -> None:
+        """Make the executor look for what is ready."""
         executor = self.executor
         if executor is not None:
             executor.wake()
 
-    def _rosz_call_soon(self, job: Callable[[], object]) -> None:
+    def rosz_call_soon(self, job: Callable[[], object]) -> None:
+        """Let the executor call a function."""
         (self.executor or get_global_executor()).call_soon(job)
 
     def get_name(self) -> str:
@@ -140,7 +143,7 @@ class Node(NodeParameters):
             qos_profile: Profile, or depth of the queue.
         """
         raw = self.rosz_node.publisher(topic, msg_type, qos=to_qos(qos_profile))
-        return self._rosz_add(Publisher(raw, qos_profile))
+        return self.rosz_add(Publisher(raw, qos_profile))
 
     def create_subscription(
         self,
@@ -163,7 +166,7 @@ class Node(NodeParameters):
             callback_group: Group of the callback; the node's default group when not given.
             raw: Whether to pass encoded messages.
         """
-        return self._rosz_add(
+        return self.rosz_add(
             Subscription(
                 self.rosz_node,
                 topic,
@@ -172,7 +175,7 @@ class Node(NodeParameters):
                 to_qos(qos_profile),
                 raw=raw,
                 group=callback_group or self.default_callback_group,
-                wake=self._rosz_wake,
+                wake=self.rosz_wake,
             )
         )
 
@@ -193,14 +196,14 @@ class Node(NodeParameters):
             clock: Clock to follow; the node's when not given.
             autostart: Whether the timer starts at once; otherwise ``reset`` starts it.
         """
-        return self._rosz_add(
+        return self.rosz_add(
             Timer(
                 round(timer_period_sec * _SECOND),
                 callback,
                 self.rosz_node.clock,
                 clock=clock or self._clock,
                 group=callback_group or self.default_callback_group,
-                wake=self._rosz_wake,
+                wake=self.rosz_wake,
                 report=self.rosz_node.log.report,
                 autostart=autostart,
             )
@@ -223,14 +226,14 @@ class Node(NodeParameters):
             callback: Function called with a request and an empty response; returns the response.
             callback_group: Group of the callback; the node's default group when not given.
         """
-        return self._rosz_add(
+        return self.rosz_add(
             Service(
                 self.rosz_node,
                 srv_name,
                 srv_type,
                 callback,
                 group=callback_group or self.default_callback_group,
-                wake=self._rosz_wake,
+                wake=self.rosz_wake,
             )
         )
 
@@ -241,8 +244,8 @@ class Node(NodeParameters):
             srv_type: Type of the service.
             srv_name: Name of the service.
         """
-        return self._rosz_add(
-            Client(self.rosz_node, srv_name, srv_type, call_soon=self._rosz_call_soon)
+        return self.rosz_add(
+            Client(self.rosz_node, srv_name, srv_type, call_soon=self.rosz_call_soon)
         )
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:  # noqa: ARG002
@@ -259,10 +262,16 @@ class Node(NodeParameters):
             raise UsageError(f"a rate is '{frequency}' Hz; expected above 0")
         return Rate(int(_SECOND / frequency), self.rosz_node.clock)
 
-    def _rosz_add(self, part: P) -> P:
+    def rosz_add(self, part: P) -> P:
+        """Close an entity with the node, and let the executor run its callbacks."""
         self._rosz_parts.append(part)
-        self._rosz_wake()
+        self.rosz_wake()
         return part
+
+    def rosz_remove(self, part: Any) -> None:
+        """Remove an entity that closes itself."""
+        if part in self._rosz_parts:
+            self._rosz_parts.remove(part)
 
     def _rosz_destroy(self, part: Any) -> bool:
         if part not in self._rosz_parts:

@@ -1,0 +1,126 @@
+"""Actions: listing and finding them, and sending goals from a command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rosz.errors import NotFoundError, near_miss
+from rosz.node.goals import SEND
+from rosz.wire import Kind
+
+if TYPE_CHECKING:
+    from rosz.graph import View
+    from rosz.node import Context
+    from rosz.node.action_client import ActionClient
+    from rosz.wire import Token
+
+__all__ = (
+    "ActionEntry",
+    "describe_action",
+    "find_action",
+    "list_actions",
+    "make_goal",
+    "wait_for_action",
+)
+
+_SUFFIX = f"/{SEND}"
+_SERVICE = "_SendGoal"
+
+
+class ActionEntry(msgspec.Struct, frozen=True):
+    """An action.
+
+    Attributes:
+        name: Full name of the action.
+        types: Names of its types; more than one is a fault.
+        servers: Full names of the nodes that serve it.
+        clients: Full names of the nodes that have a client of it.
+    """
+
+    name: str
+    types: tuple[str, ...]
+    servers: tuple[str, ...]
+    clients: tuple[str, ...]
+
+
+def list_actions(view: View) -> list[ActionEntry]:
+    """Return the actions that nodes serve or use, sorted by name."""
+    found: dict[str, list[Token]] = {}
+    for token in view.entities(Kind.SERVICE, Kind.CLIENT):
+        if token.name.endswith(_SUFFIX):
+            found.setdefault(token.name.removesuffix(_SUFFIX), []).append(token)
+    return [_entry(name, tokens) for name, tokens in sorted(found.items())]
+
+
+def _entry(name: str, tokens: Sequence[Token]) -> ActionEntry:
+    def nodes(kind: Kind) -> tuple[str, ...]:
+        return tuple(sorted({token.node_name for token in tokens if token.kind is kind}))
+
+    types = sorted({token.type_name.removesuffix(_SERVICE) for token in tokens})
+    return ActionEntry(name, tuple(types), nodes(Kind.SERVICE), nodes(Kind.CLIENT))
+
+
+def describe_action(view: View, name: str) -> ActionEntry:
+    """Return an action that is served or used.
+
+    Raises:
+        NotFoundError: No node serves or uses it.
+    """
+    known = {entry.name: entry for entry in list_actions(view)}
+    if name not in known:
+        raise NotFoundError(f"unknown action '{name}'{near_miss(name, known)}")
+    return known[name]
+
+
+def find_action(view: View, name: str) -> str:
+    """Return the type of an action that is served.
+
+    Raises:
+        NotFoundError: No node serves it.
+    """
+    entry = describe_action(view, name)
+    if not entry.servers:
+        raise NotFoundError(f"action '{name}' has clients and no server")
+    return view.servers(name + _SUFFIX)[0].type_name.removesuffix(_SERVICE)
+
+
+def wait_for_action(context: Context, name: str, timeout: float) -> str:
+    """Return the type of an action, and wait while nobody serves it.
+
+    Args:
+        context: The context whose graph is watched.
+        name: Full name of the action.
+        timeout: Time limit in seconds.
+
+    Raises:
+        WaitTimeout: No node served it in time.
+        ClosedError: The context is shut down meanwhile.
+    """
+    view = context.graph.wait_for(
+        lambda view: bool(view.servers(name + _SUFFIX)), timeout, f"server of action '{name}'"
+    )
+    return find_action(view, name)
+
+
+def make_goal(client: ActionClient, values: Sequence[Any], now: int) -> Any:
+    """Make a goal of values from a command line.
+
+    Args:
+        client: Client of the action.
+        values: One dictionary of fields, or a value for each field.
+        now: ROS time in nanoseconds, for ``now`` and ``auto``.
+
+    Raises:
+        EncodeError: The values do not fit the goal.
+    """
+    from rosz.errors import EncodeError
+    from rosz.introspect.arguments import make_message, with_arguments
+
+    goal_type = client.action_type.Goal
+    try:
+        return make_message(goal_type, values, now)
+    except EncodeError as error:
+        raise with_arguments(error, goal_type) from error

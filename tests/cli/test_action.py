@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import signal
+import threading
+from typing import Any
+
+import pytest
+from network import TIMEOUT, Network
+
+from rosz.msgs.example_interfaces.action import Fibonacci
+from rosz.node import Node
+
+from .shell import Shell
+
+
+def execute(goal: Any) -> None:
+    """Count; a negative order waits to be cancelled."""
+    if goal.request.order < 0:
+        assert goal.wait_for_cancel(TIMEOUT)
+        goal.canceled(Fibonacci.Result([-1]))
+        return
+    goal.feedback(Fibonacci.Feedback([goal.request.order]))
+    if goal.request.order == 13:
+        goal.abort()
+    else:
+        goal.succeed(Fibonacci.Result([0, 1]))
+
+
+@pytest.fixture
+def server(network: Network) -> Node:
+    node = network.node("server")
+    node.action_server("/robot/fib", Fibonacci, execute, goal=lambda goal: goal.order != 99)
+    return node
+
+
+pytestmark = pytest.mark.usefixtures("server")
+
+
+def test_list_and_info(shell: Shell, network: Network) -> None:
+    user = network.node("user")
+    client = user.action_client("/robot/fib", Fibonacci)
+    client.wait_for_server(TIMEOUT)
+    assert shell("action", "list").lines == ["/robot/fib"]
+    assert shell("action", "list", "-t").lines == [
+        "/robot/fib [example_interfaces/action/Fibonacci]"
+    ]
+    assert shell("action", "info", "/robot/fib").lines == [
+        "Action: /robot/fib",
+        "Type: example_interfaces/action/Fibonacci",
+        "Action servers: 1",
+        "    /server",
+        "Action clients: 1",
+        "    /user",
+    ]
+    assert shell("action", "info", "--json", "/robot/fib").json["clients"] == ["/user"]
+    assert shell("action", "type", "/robot/fib").lines == ["example_interfaces/action/Fibonacci"]
+
+
+def test_show(shell: Shell) -> None:
+    expected = ["int32 order", "---", "int32[] sequence", "---", "int32[] sequence"]
+    shown = shell("action", "show", "example_interfaces/Fibonacci").lines
+    assert [line for line in shown if line] == expected
+    assert shell("action", "show", "Fibonacci").lines[0].startswith("[")
+    assert "--- " not in shell("action", "show", "-r", "example_interfaces/Fibonacci").out
+
+
+def test_send(shell: Shell) -> None:
+    lines = shell("action", "send", "/robot/fib", "5").lines
+    assert lines[0].startswith("goal ")
+    assert lines[1:] == ["result:", "  sequence: [0, 1]", "goal succeeded"]
+    found = shell("action", "send", "--json", "/robot/fib", "{order: 3}").json
+    assert found == {"status": "succeeded", "result": {"sequence": [0, 1]}}
+
+
+def test_send_with_feedback(shell: Shell) -> None:
+    out = shell("action", "send", "-f", "/robot/fib", "5").out
+    assert "feedback:\n  sequence: [5]\n---\n" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "text"),
+    [
+        (["/robot/fib", "13"], 1, ""),
+        (["/robot/fib", "99"], 1, "rejected the goal"),
+        (["/robot/fib", "x"], 1, "order"),
+        (["/robot/fob"], 1, "unknown action '/robot/fob'; did you mean '/robot/fib'?"),
+        (["/robot/fib", "[1"], 2, "is not YAML"),
+    ],
+)
+def test_what_goes_wrong(shell: Shell, words: list[str], code: int, text: str) -> None:
+    result = shell("action", "send", *words)
+    assert result.code == code, result
+    assert text in result.err
+
+
+def test_interrupt_cancels_the_goal(shell: Shell) -> None:
+    program = shell.start("action", "send", "/robot/fib", "-1")
+    program.wait_for("accepted")
+    program.send(signal.SIGINT)
+    program.wait_for("goal canceled")
+    assert program.exit_code() == 1
+
+
+def test_waiting_for_a_server(shell: Shell, network: Network) -> None:
+    late = network.node("late")
+    program = shell.start("action", "send", "--wait", "/late", "1")
+    threading.Event().wait(0)
+    late.action_server("/late", Fibonacci, execute)
+    program.wait_for("goal succeeded")
+    assert program.exit_code() == 0
