@@ -76,11 +76,12 @@ def see() -> None:
 
 
 def inspect(topic: str) -> None:
-    info = sdk.get_topic_info(topic, verbose=True, **PLACE)
-    say(
-        publishers=[[e.node_namespace, e.node_name, e.topic_type] for e in info.publishers],
-        subscriptions=[[e.node_namespace, e.node_name, e.topic_type] for e in info.subscribers],
+    info = sdk.get_topic_info(topic, verbose=True, **PLACE)  # None for a topic that is not known
+    ends = (info.publishers, info.subscribers) if info else ((), ())
+    publishers, subscriptions = (
+        [[one.node_namespace, one.node_name, one.topic_type] for one in some] for some in ends
     )
+    say(publishers=publishers, subscriptions=subscriptions)
 
 
 def main() -> None:
