@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import threading
 import time
@@ -10,7 +11,6 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from rosz import names
 from rosz.errors import InvalidName, ParamError, ParamNotFound
 from rosz.node import Node, RosoutHandler, serve_loggers
 from rosz.ros1.exceptions import ROSException, ROSInitException
@@ -133,11 +133,16 @@ def init_node(  # noqa: PLR0917  # rospy's signature
 
 
 def _open(name: str, *, anonymous: bool, log_level: int | None, signals: bool) -> Node:
-    if not names.is_valid(name) or names.is_private(name):
+    legal = re.sub("[^A-Za-z0-9_]", "_", name)
+    if not legal[0].isalpha():
+        legal = f"node_{legal}"
+    if legal != name:
         warnings.warn(
-            f"'{name}' is not a legal ROS base name. This may cause problems with other ROS tools.",
+            f"'{name}' is not a legal ROS base name. This may cause problems with other ROS tools."
+            f" The node is named '{legal}'.",
             stacklevel=3,
         )
+        name = legal
     if anonymous and "__name" not in arguments().special:
         name = f"{name}_{os.getpid()}_{time.time_ns() // 1_000_000}"
     node = Node(name, context=context(), handle_signals=signals)

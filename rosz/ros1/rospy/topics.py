@@ -6,6 +6,7 @@ subscribers share a subscription: `SharedPublisher` and `SharedSubscription`.
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -26,10 +27,20 @@ from rosz.ros1.state import has_node, state
 
 __all__ = ("DEFAULT_BUFF_SIZE", "Publisher", "SubscribeListener", "Subscriber", "Topic")
 
+_TAKEN = re.compile(r"(/[A-Za-z0-9_.~+=-]+)+")
 _NO_QUEUE_SIZE = (
     "The publisher should be created with an explicit keyword argument 'queue_size'. Please see"
     " http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers for more information."
 )
+
+
+def _check(name: str) -> str:
+    """Return a full name that ROS 1 takes, legal or not, if Zenoh has such keys.
+
+    Raises:
+        InvalidName: It has not.
+    """
+    return name if _TAKEN.fullmatch(name) else check(name)
 
 
 class Topic:
@@ -63,7 +74,7 @@ class Topic:
             )
         warn_of_illegal_name(name, 4)
         resolve = resolve_name if has_node() else resolve_name_without_node_name
-        self.name: str = check(resolve(name))
+        self.name: str = _check(resolve(name))
         self.resolved_name: Any = self.name
         self.type: Any = data_class._type
         self.data_class: Any = data_class

@@ -163,3 +163,43 @@ def test_log_messages_name_the_file_without_its_folder(printed: Printed) -> None
         found = rospy.wait_for_message("/rosout", Log, 10)
         print(found.file == os.path.basename(__file__), found.function)
         """)[-1:] == ["True <module>"]
+
+
+def test_names_that_are_not_legal(printed: Printed) -> None:
+    """ROS 1 warns of them; a blank keeps a node of ROS 1 from being registered."""
+    assert printed("""
+        import threading
+        import warnings
+        import rospy
+        from std_msgs.msg import String
+        warnings.filterwarnings("error", message=".*not a legal ROS base name")
+        for name in ("motor-driver", "motor driver", "3d", "/a"):
+            try:
+                rospy.init_node(name)
+            except Warning as warning:
+                print(str(warning).partition("tools. ")[2])
+            except ValueError as error:
+                print(error)
+        warnings.simplefilter("ignore")
+        rospy.init_node("motor driver")
+        print(rospy.get_name())
+        heard = threading.Event()
+        rospy.Subscriber("~left-wheel", String, lambda message: heard.set())
+        out = rospy.Publisher("~left-wheel", String, queue_size=1)
+        while not heard.wait(0.05):
+            out.publish("on")
+        print(out.name)
+        try:
+            rospy.Publisher("left*", String, queue_size=1)
+        except ValueError as error:
+            print(error)
+        """) == [
+        "The node is named 'motor_driver'.",
+        "The node is named 'motor_driver'.",
+        "The node is named 'node_3d'.",
+        "namespaces are not allowed in node names",
+        "/motor_driver",
+        "/motor_driver/left-wheel",
+        "'/left*' is not a valid name: character '*' at position 6; expected letters, digits,"
+        " '_' or '/'",
+    ]
