@@ -205,7 +205,7 @@ def ready_context() -> Context:
 
 
 def survey() -> Survey:
-    """Return the nodes and endpoints that are alive now.
+    """Return the nodes and endpoints that are alive now; after the shutdown, those known last.
 
     Raises:
         TransportError: The session cannot be opened.
@@ -214,7 +214,10 @@ def survey() -> Survey:
     from rosz.introspect.survey import Survey
 
     opened = ready_context()
-    view = opened.graph.refresh()
+    try:
+        view = opened.graph.refresh()
+    except ClosedError:  # threads of a program look at the graph while it ends
+        view = opened.graph.view()
     return Survey(opened.domain, view, {(p.zid, p.node_id): p for p in view.processes()})
 
 

@@ -85,6 +85,32 @@ def test_what_is_published_after_the_shutdown_is_dropped(printed: Printed) -> No
         """) == ["None", "None", "None", "None", "None 0"]
 
 
+def test_the_master_is_asked_while_the_node_goes(printed: Printed) -> None:
+    assert printed("""
+        import threading
+        import rosgraph
+        import rospy
+        rospy.init_node("asking")
+        asked = rosgraph.Master("asking").getSystemState, rospy.get_published_topics
+        failed = []
+        ended = threading.Event()
+        def ask():
+            while not ended.is_set():
+                for call in asked:
+                    try:
+                        call()
+                    except Exception as error:
+                        failed.append(error)
+        thread = threading.Thread(target=ask)
+        thread.start()
+        rospy.signal_shutdown("end")
+        print(rospy.get_master().getSystemState()[0], len(asked[0]()))
+        ended.set()
+        thread.join()
+        print(failed)
+        """) == ["1 3", "[]"]
+
+
 def test_names_of_modules_that_programs_use(printed: Printed) -> None:
     assert printed("""
         import rospy
