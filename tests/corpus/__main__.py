@@ -66,14 +66,18 @@ def main() -> None:
         for row in compared(given, corpus, [one for one in corpus.repositories if one.path in own]):
             rows.append(row)
             print(json.dumps(row), file=file, flush=True)
-    counted = [row for row in rows if not row.get("python2")]
+    aside = [row for row in rows if row.get("setup")]
+    counted = [row for row in rows if not (row.get("python2") or row.get("setup"))]
     total = Counter(row["case"].split(":")[0] for row in counted)
     equal = Counter(row["case"].split(":")[0] for row in counted if row["equal"])
     for name, count in sorted(total.items()):
         print(f"{name:50} {equal[name]:5} of {count:5}")
     percent = 100 * equal.total() / max(total.total(), 1)
     print(f"{'all':50} {equal.total():5} of {total.total():5} ({percent:.1f} %)")
-    print(f"of {len(total)} repositories; {len(rows) - len(counted)} are of Python 2 and left out")
+    old = len(rows) - len(counted) - len(aside)
+    print(f"of {len(total)} repositories; left out: {old} are of Python 2, {len(aside)} as follows")
+    for row in aside:
+        print(f"set-up differs: {row['case']}: {row['setup']}")
 
 
 if __name__ == "__main__":

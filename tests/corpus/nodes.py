@@ -37,6 +37,14 @@ _OWN = re.compile(
     r"/(rosout\w*|clock|parameter_events|.*/(get_loggers|set_logger_level|get_type_description)"
     r"|.*/(describe|get|list|set)_parameter\w*|rosdistro|rosversion|run_id|roslaunch/.*)$"
 )
+_ALIASES = {"tf/tfMessage": "tf2_msgs/TFMessage"}
+"""Names of one type, with one md5, of which rosz has one class."""
+_SETUPS = {
+    re.compile(r"'PyKDL\.\w+' object has no attribute"): (
+        "Debian's PyKDL takes no new attributes, as Noetic's does"
+    ),
+}
+"""What ROS 1 says where its set-up here is not that of a ROS 1 user, and what differs."""
 _PATH = "/usr/bin:/bin:/usr/sbin:/sbin"
 _ROSPACK = f"""\
 #!{PYTHON}
@@ -124,7 +132,9 @@ class Nodes:
         }
         row["python2"] = real["outcome"][1:2] in [[name] for name in _SYNTAX]
         row["equal"] = _same(ours, real)
+        row["setup"] = "" if row["equal"] else _setup(real)
         mark = "equal" if row["equal"] else "python 2" if row["python2"] else "DIFFERS"
+        mark = "set-up" if row["setup"] else mark
         print(
             f"{mark} {node.case}: {ours['outcome']} {real['outcome']}", file=sys.stderr, flush=True
         )
@@ -249,7 +259,7 @@ def _normal(report: dict[str, Any], node: Node) -> dict[str, Any]:
     found["stdout"] = report["stdout"][-1000:]
     for kind in ("publishers", "subscribers"):
         found[kind] = {
-            _NUMBERS.sub("_N", name): type_name
+            _NUMBERS.sub("_N", name): _ALIASES.get(type_name, type_name)
             for name, type_name in sorted(report[kind].items())
             if not _OWN.match(name)
         }
@@ -279,6 +289,12 @@ def _ending(code: int, stderr: str, node: Node) -> list[Any]:
             if missing:
                 raised += f" {missing[1] or missing[2]}"
     return ["raised", raised, frame]
+
+
+def _setup(real: dict[str, Any]) -> str:
+    """Return how ROS 1 as it is installed here differs from what its users have; or nothing."""
+    said = real["stderr"] + real.get("stdout", "")
+    return next((reason for pattern, reason in _SETUPS.items() if pattern.search(said)), "")
 
 
 def _same(ours: dict[str, Any], real: dict[str, Any]) -> bool:
