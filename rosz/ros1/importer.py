@@ -33,6 +33,7 @@ from rosz.ros1 import derived
 from rosz.ros1.modules import (
     ELSEWHERE,
     EXTRAS,
+    LAST,
     MODULES,
     SUBMODULES,
     add_submodules,
@@ -334,6 +335,8 @@ class _EndFinder(MetaPathFinder):
             found = PathFinder.find_spec(fullname, [str(code)]) if code is not None else None
         if found is not None:
             return found
+        if fullname in LAST:
+            return _alias(fullname, lambda: import_module(f"rosz.ros1.{fullname}"))
         instead = instead_of(fullname)
         if instead:
             text = f"No module named '{fullname}': rosz does not have it: {instead}"

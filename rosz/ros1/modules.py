@@ -16,6 +16,7 @@ from rosz.errors import near_miss
 __all__ = (
     "ELSEWHERE",
     "EXTRAS",
+    "LAST",
     "MODULES",
     "SUBMODULES",
     "add_submodules",
@@ -28,6 +29,7 @@ MODULES = (
     "PyKDL",
     "actionlib",
     "bondpy",
+    "camera_info_manager",
     "cv_bridge",
     "diagnostic_analysis",
     "diagnostic_updater",
@@ -53,6 +55,7 @@ MODULES = (
     "rostest",
     "rostopic",
     "rosunit",
+    "roswtf",
     "smach",
     "smach_ros",
     "smclib",
@@ -65,6 +68,9 @@ MODULES = (
     "tf_conversions",
 )
 """ROS 1's Python modules, which lie beside this one."""
+
+LAST = ("ros",)
+"""Modules beside this one that a file or a package of the user's with their name hides."""
 
 ELSEWHERE = {
     "ament_index_python": "ros2.ament_index_python",

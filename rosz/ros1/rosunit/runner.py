@@ -1,4 +1,4 @@
-"""rosunit: runs a test case and writes its results as JUnit XML (ROS wiki, rosunit)."""
+"""rosunit: runs a test case and writes its results as JUnit XML."""
 
 from __future__ import annotations
 
