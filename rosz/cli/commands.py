@@ -15,6 +15,7 @@ COMMANDS = {
     "launch": "start the nodes of a launch file",
     "run": "run an executable of a package",
     "core": "run a meeting point with a copy of the parameters",
+    "bridge": "let programs that speak other protocols take part",
     "param": "get and set parameters",
     "reconfigure": "read and change settings of nodes while they run",
     "topic": "list, show, measure and publish topics",

@@ -39,6 +39,7 @@ _NUMBER = re.compile(r"\d+")
 _EVERY_SECONDS = 60.0
 _KINDS = 100
 _STANDARD_OUTPUT = 1
+_LAST_PORT = 65535
 _MOST_PROCESSES = 1 << 22
 """The limit of Linux for the number of a process."""
 
@@ -58,18 +59,24 @@ def core_command(
     ] = None,
     keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
     store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = "",
+    ros1: Annotated[
+        bool, Option("--ros1", "Also be the master of programs that speak ROS 1's protocol.")
+    ] = False,
+    port: Annotated[str, Option("-p --port PORT", "Port of --ros1, instead of 11311.")] = "",
+    address: Annotated[
+        str,
+        Option(
+            "--address ADDRESS",
+            "Address of --ros1, instead of 127.0.0.1; 0.0.0.0 for programs on other machines.",
+        ),
+    ] = "",
     owner: Annotated[int, Option("--owner PID")] = 0,
-    port: Annotated[str, Option("-p --port")] = "",
 ) -> None:
     """Run a meeting point with a copy of the parameters, until it is stopped.
 
     No node needs a core. It links machines, and keeps parameters when no node runs.
     """
-    if port:
-        raise UsageError(
-            "there is no master, and so no port: ROSZ_RENDEZVOUS moves the meeting point,"
-            " ROS_DOMAIN_ID keeps groups of nodes apart"
-        )
+    master_at = read_master_place(port, address, wanted=ros1)
     at_least("--owner", owner, 0, "as the number of a process", _MOST_PROCESSES)
     import msgspec
 
@@ -95,6 +102,7 @@ def core_command(
         replica = Replica(router.session, domain, storage=storage, handover=before.parameters)
         stack.enter_context(closing(replica))
         _set_core_params(replica)
+        master = master_at and open_master(environment, *master_at, stack)
         watch = CoreWatch(router, replica, domain, before, key_watch=key_watch)
         stack.enter_context(closing(watch))
         ready()
@@ -104,8 +112,39 @@ def core_command(
         else:
             kept = f"parameters of domain {domain} are kept in {file or 'memory'}"
             lines = _describe(router, environment.rendezvous)
-            print_lines([*lines, kept, "started core; press Ctrl-C to end it"])
+            print_lines([*lines, kept, *(master or ()), "started core; press Ctrl-C to end it"])
         watch.restart_when_needed(owner)
+
+
+def read_master_place(port: str, address: str, *, wanted: bool) -> tuple[str, int] | None:
+    """Return the address and the port of ROS 1's master, or None if there shall be none.
+
+    Raises:
+        UsageError: The port is no number, or there is no master to which they belong.
+    """
+    if not wanted:
+        if port or address:
+            raise UsageError(
+                "there is no master, and so no port, without --ros1: ROSZ_RENDEZVOUS moves the"
+                " meeting point, ROS_DOMAIN_ID keeps groups of nodes apart"
+            )
+        return None
+    if port and not (port.isascii() and port.isdigit() and int(port[:6]) <= _LAST_PORT):
+        raise UsageError(f"--port is '{port}': expected a number from 0 to {_LAST_PORT}")
+    return address or "127.0.0.1", int(port or 11311)
+
+
+def open_master(environment: Environment, address: str, port: int, stack: ExitStack) -> list[str]:
+    """Start ROS 1's master, and return lines that describe it.
+
+    Raises:
+        TransportError: It cannot listen there.
+    """
+    from rosz.bridges.ros1 import MasterBridge
+
+    bridge = stack.enter_context(MasterBridge(environment, address, port))
+    host = "localhost" if address.startswith(("127.", "0.")) else address
+    return [f"ROS 1's programs join with ROS_MASTER_URI=http://{host}:{bridge.port}"]
 
 
 def _describe(router: Router, rendezvous: str) -> list[str]:

@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -264,12 +265,33 @@ class _Launch:
         from rosz.launch.run import Network, Runner
         from rosz.node import Context
 
-        with Context(self.environment) as context:
+        with ExitStack() as stack, Context(self.environment) as context:
             if wait:
                 _wait_for_peer(context)
+            self._open_master(plan, stack)
             network = Network(context, router)
             place = self.workplace()
             return Runner(plan, place, network, options, out=sys.stdout, err=sys.stderr).run()
+
+    def _open_master(self, plan: Plan, stack: ExitStack) -> None:
+        """Be the master of compiled programs, which may speak ROS 1's protocol.
+
+        A master that the environment names and that is running stays theirs.
+        """
+        place = self.workplace()
+        compiled = [node.name for node in plan.nodes if place.is_compiled(node)]
+        if not compiled:
+            return
+        from rosz.bridges.ros1 import open_master, running_master
+
+        uri = running_master(self.environ)
+        whose = "running"
+        if not uri:
+            bridge = stack.enter_context(open_master(self.environment))
+            uri, whose = f"http://127.0.0.1:{bridge.port}", "this launch's"
+            self.environ = {"ROS_IP": "127.0.0.1", **self.environ, "ROS_MASTER_URI": uri}
+        shown = ", ".join(compiled[:_LISTED])
+        print_lines([f"compiled nodes ({shown}) have {whose} ROS 1 master {uri}"])
 
 
 def _anonymous_names() -> Callable[[str], str]:

@@ -5,6 +5,7 @@ are `type_description` and `ros2_parameters`, by what needs definitions of other
 in the form of ROS 2.
 """
 
+from rosz.node.bridged import BridgedNode
 from rosz.node.client import Client
 from rosz.node.clock import Clock
 from rosz.node.context import Context
@@ -31,6 +32,7 @@ from rosz.node.timer import Rate, Timer, TimerEvent
 PUBLIC_MODULES = ("action_client", "action_server", "goals", "ros2_parameters", "type_description")
 
 __all__ = (
+    "BridgedNode",
     "Client",
     "Clock",
     "ConsoleHandler",

@@ -6,4 +6,19 @@ registrations. The others use sockets, nodes and the parameter store.
 
 from __future__ import annotations
 
-__all__ = ()
+from rosz.bridges.ros1.attach import AttachedBridge, Choice
+from rosz.bridges.ros1.bridge import (
+    MASTER_PORT,
+    MasterBridge,
+    open_master,
+    running_master,
+)
+
+__all__ = (
+    "MASTER_PORT",
+    "AttachedBridge",
+    "Choice",
+    "MasterBridge",
+    "open_master",
+    "running_master",
+)

@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from rosz.environment import Environment
-from rosz.errors import ExecutableNotFound
+from rosz.errors import ExecutableNotFound, NotFoundError
 from rosz.launch.plan import NodePlan, report
 from rosz.launch.run.process_tree import TAG
 from rosz.packages import Package, PackageIndex, is_python, start_words
@@ -31,6 +31,7 @@ __all__ = (
 
 _LAUNCH_SUFFIXES = (".launch", ".launch.xml")
 _PYTHON = re.compile(r"python[0-9.]*")
+_ELF = b"\x7fELF"
 _SCRIPT = ("-m", "rosz.script")
 
 
@@ -112,6 +113,16 @@ class Workplace(msgspec.Struct, frozen=True):
             ExecutableNotFound: If the package has no such executable.
         """
         return str(locate(self.packages.find(package), executable))
+
+    def is_compiled(self, node: NodePlan) -> bool:
+        """Return whether a node of this machine is a compiled program, and no script."""
+        if node.machine or node.command:
+            return False
+        try:
+            with Path(self.find(node.package, node.type)).open("rb") as program:
+                return program.read(len(_ELF)) == _ELF
+        except (NotFoundError, OSError):
+            return False  # the launch tells when it starts the node
 
     def _cwd(self, choice: str, program: Path | None) -> str:
         if choice.lower() == "node" and program is not None:

@@ -1,0 +1,233 @@
+"""The registrations of ROS 1's nodes as entities on the network, and connections to the bridge.
+
+All of it runs on one thread, that for changes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Protocol
+
+from rosz.bridges.ros1.frames import encode_header
+from rosz.bridges.ros1.registry import Change, Entry, Role
+from rosz.bridges.ros1.server import Incoming
+from rosz.bridges.ros1.services import Clients, ProvidedService, ServiceConnection
+from rosz.bridges.ros1.shared import Shared
+from rosz.bridges.ros1.sockets import log
+from rosz.bridges.ros1.topics import PublishedTopic, SubscribedTopic
+from rosz.errors import ClosedError, InvalidName, RoszError, ServiceError, UsageError
+from rosz.lifecycle import Registration
+from rosz.node import BridgedNode
+from rosz.wire import Kind, Token
+from rosz.worker import Worker
+
+__all__ = ("Mirror",)
+
+_CALLS = 64
+_MAX_CALLS = 1000
+_CLOSE_TIMEOUT = 10.0
+_RETRY_SECONDS = 0.3
+_MOST_TRIES = 10
+
+
+class _Part(Protocol):
+    """A registration on the network."""
+
+    entry: Entry
+
+    def update(self) -> None:
+        """Adapt to what else there is."""
+
+    def close(self) -> None:
+        """Take it from the network."""
+
+
+_PARTS: dict[Role, Callable[[Shared, BridgedNode, Entry], _Part]] = {
+    "publisher": PublishedTopic,
+    "subscriber": SubscribedTopic,
+    "service": ProvidedService,
+}
+
+
+class Mirror:
+    """Shows ROS 1's nodes to the network.
+
+    Args:
+        shared: What the bridge shares.
+        own: The bridge's own node.
+        terminate: Function that asks a node of ROS 1 to end: its name and the reason.
+        published: Function called with a topic whose publishers on the network have changed.
+        look: Function called when a subscriber connects that is not known yet, but may be soon.
+    """
+
+    def __init__(
+        self,
+        shared: Shared,
+        own: BridgedNode,
+        terminate: Callable[[str, str], object],
+        published: Callable[[str], object],
+        look: Callable[[], object] | None = None,
+    ) -> None:
+        self._shared = shared
+        self._look = look
+        self._terminate = terminate
+        self._published = published
+        self._clients = Clients(own, shared)
+        self._calls: Worker[Callable[[], object]] = Worker(
+            "rosz-ros1-services", threads=_CALLS, capacity=_MAX_CALLS, logger=log
+        )
+        self._parts: dict[tuple[Role, str, str], _Part] = {}
+        self._by_name: dict[str, list[_Part]] = {}
+        self._nodes: dict[str, BridgedNode] = {}
+        self._lock = threading.Lock()
+        self._changed: dict[str, bool] = {}
+        shared.lifecycle.keep(
+            Registration(shared.context.graph.listen(self._on_token))  # ends before what it uses
+        )
+
+    def apply(self, changes: list[Change]) -> None:
+        """Show changes of registrations, soon and in their order; any thread may call it."""
+        self._shared.changes.submit(partial(self._apply, changes))
+
+    def accept(self, incoming: Incoming, header: dict[str, str]) -> None:
+        """Take a connection of a program of ROS 1; any thread may call it."""
+        self._shared.changes.submit(partial(self._accept, incoming, header))
+
+    def connections(self, topic: str) -> list[tuple[str, bool]]:
+        """Return the nodes of ROS 1 that are connected for a topic, and whether they publish."""
+        return [
+            (part.entry.node, isinstance(part, PublishedTopic))
+            for part in list(self._by_name.get(topic, ()))
+            if isinstance(part, PublishedTopic | SubscribedTopic) and part.connected
+        ]
+
+    def close(self) -> None:
+        """Take everything from the network."""
+        self._calls.close(0)
+        self._shared.changes.submit(self._close)
+        self._shared.changes.flush(_CLOSE_TIMEOUT)
+
+    def _close(self) -> None:
+        for part in list(self._parts.values()):
+            part.close()
+        for node in list(self._nodes.values()):
+            node.close()
+
+    def _apply(self, changes: list[Change]) -> None:
+        for change in changes:
+            try:
+                if change.alive:
+                    self._add(change.entry)
+                else:
+                    self._remove(change.entry)
+            except ClosedError:
+                return
+            except (InvalidName, UsageError) as error:
+                log.warning(
+                    "%s '%s' of node '%s' stays in ROS 1: %s",
+                    change.entry.role,
+                    change.entry.name,
+                    change.entry.node,
+                    error,
+                )
+
+    def _add(self, entry: Entry) -> None:
+        make = _PARTS.get(entry.role)
+        if make is None:
+            return
+        node = self._nodes.get(entry.node)
+        if node is None:
+            node = BridgedNode(
+                self._shared.context,
+                self._shared.here(entry.node),
+                partial(self._terminate, entry.node),
+            )
+            self._nodes[entry.node] = node
+        part = make(self._shared, node, entry)
+        self._parts[entry.role, entry.name, entry.node] = part
+        self._by_name.setdefault(self._shared.here(entry.name), []).append(part)
+
+    def _remove(self, entry: Entry) -> None:
+        part = self._parts.pop((entry.role, entry.name, entry.node), None)
+        if part is not None:
+            name = self._shared.here(entry.name)
+            others = self._by_name[name]
+            others.remove(part)
+            if not others:
+                del self._by_name[name]
+            part.close()
+        if not any(node == entry.node for _, _, node in self._parts):
+            node = self._nodes.pop(entry.node, None)
+            if node is not None:
+                node.close()
+
+    # The network.
+
+    def _on_token(self, token: Token, _alive: bool) -> None:
+        """Note that something has changed about a name; runs on the thread of the graph."""
+        if not token.name or token.zid == self._shared.context.session.zid:
+            return
+        with self._lock:
+            first = not self._changed
+            self._changed[token.name] = token.kind is Kind.PUBLISHER or self._changed.get(
+                token.name, False
+            )
+        if first:
+            self._shared.changes.submit(self._update)
+
+    def _update(self) -> None:
+        """Adapt to what has changed on the network."""
+        with self._lock:
+            changed, self._changed = self._changed, {}
+        for name, is_published in changed.items():
+            for part in list(self._by_name.get(name, ())):
+                part.update()
+            self._clients.update(name)
+            if is_published:
+                # Not only for the first and the last: a subscriber may have registered in between.
+                self._published(name)
+
+    # Connections.
+
+    def _accept(self, incoming: Incoming, header: dict[str, str], tries: int = 0) -> None:
+        try:
+            if "service" in header:
+                self._accept_service(incoming, header)
+            elif "topic" in header:
+                self._accept_topic(incoming, header, tries)
+            else:
+                raise ServiceError("a header without 'topic' or 'service'")
+        except RoszError as error:
+            incoming.stream.send([encode_header({"error": str(error)})])
+            incoming.refuse(str(error))
+
+    def _accept_topic(self, incoming: Incoming, header: dict[str, str], tries: int) -> None:
+        topic, node = header["topic"], header.get("callerid", "")
+        part: Any = self._parts.get(("subscriber", topic, node))
+        if part is None and self._look is not None and tries < _MOST_TRIES:
+            self._look()
+            again = partial(self._accept, incoming, header, tries + 1)
+            self._shared.changes.later(_RETRY_SECONDS, again)
+            return
+        if part is None:
+            raise ServiceError(f"node '{node}' is not registered as a subscriber of '{topic}'")
+        part.accept(incoming, header)
+
+    def _accept_service(self, incoming: Incoming, header: dict[str, str]) -> None:
+        client = self._clients.find(self._shared.here(header["service"]))
+        wanted, there = header.get("md5sum", "*"), client.service_type._md5sum
+        if wanted not in {"*", there}:
+            raise ServiceError(
+                f"service '{client.name}' is {client.service_type._type} (md5 {there});"
+                f" expected md5 {wanted}"
+            )
+        connection = ServiceConnection(
+            self._shared,
+            incoming,
+            client,
+            persistent=header.get("persistent") == "1",
+            submit=self._calls.offer,
+        )
+        connection.open(probe=header.get("probe") == "1")

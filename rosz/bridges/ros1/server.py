@@ -1,0 +1,225 @@
+"""The port of a bridge: XML-RPC and TCPROS on one, told apart by their first bytes.
+
+A call begins with ``POST``, which as the length of a connection header would be more than is
+allowed.
+"""
+
+from __future__ import annotations
+
+import errno
+import selectors
+import socket
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rosz.bridges.ros1.calls import Call, CallReader, encode_fault, encode_refusal, encode_result
+from rosz.bridges.ros1.frames import FrameReader, decode_header
+from rosz.bridges.ros1.sockets import SocketLoop, Stream, log
+from rosz.errors import DecodeError, RoszError, TransportError
+from rosz.worker import Worker
+
+__all__ = ("Dispatch", "Incoming", "Server")
+
+Dispatch = Callable[[Call, Stream], Any]
+"""Function that returns the result of a call."""
+
+_POST = b"POST"
+_TAKEN = (
+    "another program listens there: if it is a roscore, `rosz bridge ros1 --master"
+    " http://localhost:{port}` joins it; --port takes another port"
+)
+_THREADS = 16
+_MAX_CALLS = 2000
+_BACKLOG = 512
+_ACCEPTED_AT_ONCE = 64
+_TIMEOUT = 30.0
+_PAUSE = 1.0
+_MAX_REPORTED = 1000
+_PIECE = 1 << 16
+
+
+class Server:
+    """Listens for calls and connections of ROS 1's programs, once it is started.
+
+    Args:
+        loop: The loop that reads.
+        host: Address to listen at.
+        port: Port to listen at; 0 for any.
+
+    Attributes:
+        port: Port that it listens at.
+
+    Raises:
+        TransportError: It cannot listen there.
+    """
+
+    def __init__(self, loop: SocketLoop, host: str, port: int) -> None:
+        self.loop = loop
+        self.dispatch: Dispatch
+        self.connect: Callable[[Incoming, dict[str, str]], object]
+        self.calls: Worker[Callable[[], object]] = Worker(
+            "rosz-ros1-calls", threads=_THREADS, capacity=_MAX_CALLS, logger=log
+        )
+        self._streams: set[Stream] = set()
+        self._reported: set[str] = set()
+        try:
+            self._socket = socket.create_server((host, port), backlog=_BACKLOG)
+        except (OSError, OverflowError) as error:
+            taken = getattr(error, "errno", 0) == errno.EADDRINUSE
+            reason = _TAKEN.format(port=port) if taken else str(error)
+            raise TransportError(f"cannot listen at {host}:{port}: {reason}") from error
+        self._socket.setblocking(False)
+        self.port: int = self._socket.getsockname()[1]
+
+    def start(
+        self, dispatch: Dispatch, connect: Callable[[Incoming, dict[str, str]], object]
+    ) -> None:
+        """Take connections from now on.
+
+        Args:
+            dispatch: Function that returns the result of a call, on a thread of the server; a
+                `RoszError` becomes a fault.
+            connect: Function called with a connection and its header, on the thread of the loop.
+        """
+        self.dispatch, self.connect = dispatch, connect
+        self.loop.call(lambda: self._follow(selectors.EVENT_READ))
+
+    def close(self) -> None:
+        """Close the port and all connections; a second call has no effect."""
+        self.calls.close()
+        self.loop.call(self._close)
+
+    def report(self, text: str) -> None:
+        """Log a warning, unless it has been logged: programs that are refused try again."""
+        if text not in self._reported and len(self._reported) < _MAX_REPORTED:
+            self._reported.add(text)
+            log.warning("%.500s (told once)", text)
+
+    def forget(self, stream: Stream) -> None:
+        """Remove a stream that has ended."""
+        self._streams.discard(stream)
+
+    def _close(self) -> None:
+        if self._socket.fileno() >= 0:
+            self.loop.watch(self._socket, 0, self._accept)
+            self._socket.close()
+        for stream in list(self._streams):
+            stream.close()
+
+    def _follow(self, events: int) -> None:
+        if self._socket.fileno() >= 0:
+            self.loop.watch(self._socket, events, self._accept)
+
+    def _accept(self, _events: int) -> None:
+        for _ in range(_ACCEPTED_AT_ONCE):
+            try:
+                sock, _ = self._socket.accept()
+            except BlockingIOError:
+                return
+            except OSError as error:
+                if self._socket.fileno() >= 0 and error.errno in {errno.EMFILE, errno.ENFILE}:
+                    log.warning("cannot take a connection: %s; trying again", error.strerror)
+                    self._follow(0)
+                    self.loop.later(_PAUSE, lambda: self._follow(selectors.EVENT_READ))
+                return
+            incoming = Incoming(self, sock)
+            self._streams.add(incoming.stream)
+
+
+class Incoming:
+    """A connection that another program has made: calls, or one header.
+
+    Args:
+        server: The server that accepted it.
+        sock: The socket.
+
+    Attributes:
+        stream: The stream.
+    """
+
+    def __init__(self, server: Server, sock: socket.socket) -> None:
+        self._server = server
+        self._piece = bytearray(_PIECE)
+        self._first = b""
+        self._calls: CallReader | None = None
+        self._frames: FrameReader | None = None
+        self._greeted = False
+        self.stream = Stream(server.loop, sock, self, server.forget)
+        server.loop.later(_TIMEOUT, self._check_progress)
+
+    def space(self) -> memoryview:
+        """Return where the next bytes belong."""
+        return memoryview(self._piece)
+
+    def received(self, count: int) -> None:
+        """Read calls, or the header."""
+        data = memoryview(self._piece)[:count]
+        if self._calls is None and self._frames is None:
+            self._first += data
+            if len(self._first) < len(_POST):
+                return
+            if self._first.startswith(_POST):
+                self._calls = CallReader()
+            else:
+                self._frames = FrameReader()
+            data = memoryview(self._first)
+            self._first = b""
+        if self._calls is not None:
+            self._feed_calls(self._calls, data)
+        elif self._frames is not None:
+            self._feed_header(self._frames, data)
+
+    def closed(self) -> None:
+        """Do nothing: the server forgets the stream."""
+
+    def refuse(self, text: str) -> None:
+        """Close the stream after an error in words, which is logged once; any thread may."""
+        self._server.report(f"refused a connection of {self.stream.host}: {text}")
+        self.stream.end()
+
+    def _feed_calls(self, reader: CallReader, data: memoryview) -> None:
+        try:
+            for call in reader.feed(data):
+                if not self._server.calls.offer(partial(self._answer, call)):
+                    self.stream.send([encode_fault("the master is busy: try again")])
+        except DecodeError as error:
+            self.stream.send([encode_refusal(str(error))])
+            raise
+
+    def _answer(self, call: Call) -> None:
+        try:
+            data = encode_result(
+                self._server.dispatch(call, self.stream), keep_alive=call.keep_alive
+            )
+        except RoszError as error:
+            data = encode_fault(str(error), keep_alive=call.keep_alive)
+        self.stream.send([data])
+        if not call.keep_alive:
+            self.stream.end()
+
+    def _feed_header(self, reader: FrameReader, data: memoryview) -> None:
+        while data and not self._greeted:
+            space = reader.space()
+            count = min(len(space), len(data))
+            space[:count] = data[:count]
+            data = data[count:]
+            for frame in reader.take(count):
+                self._greeted = True
+                header = decode_header(frame)
+                # The other end sends nothing until it is answered.
+                self.stream.pause(reading=False)
+                self._server.connect(self, header)
+                return
+
+    def _check_progress(self) -> None:
+        """Close a connection that has begun something and does not come to its end."""
+        if self.stream.is_closed or self._greeted:
+            return
+        if self._calls is not None and not self._calls.pending:
+            self._server.loop.later(_TIMEOUT, self._check_progress)
+            return
+        log.warning(
+            "closed the connection of %s: nothing complete in %g s", self.stream.peer, _TIMEOUT
+        )
+        self.stream.close()

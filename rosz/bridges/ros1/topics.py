@@ -1,0 +1,445 @@
+"""Topics: what ROS 1's nodes publish to the network, and what the network does to them.
+
+A publisher of ROS 1 is a publisher on the network at once, so that others see it. The bridge
+connects to it when the network has a subscription, and disconnects with the last. A subscriber of
+ROS 1 connects to the bridge itself, as the master tells it to; then the bridge subscribes for it.
+All of this runs on the thread for changes, but for the bytes of messages.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from struct import Struct
+from typing import Any
+
+from rosz.bridges.ros1.codec import Codec
+from rosz.bridges.ros1.frames import MAX_FRAME, FrameReader, encode_header
+from rosz.bridges.ros1.peers import Address, call, connect, exchange_headers
+from rosz.bridges.ros1.registry import ANY_TYPE, Entry
+from rosz.bridges.ros1.server import Incoming
+from rosz.bridges.ros1.shared import Shared
+from rosz.bridges.ros1.sockets import Stream, log
+from rosz.errors import ClosedError, DecodeError, MessageError, RoszError, TypeNotFound
+from rosz.node import BridgedNode, Entity, MessageInfo, Publisher, Subscription
+from rosz.qos import QoS, for_queue
+from rosz.wire import Kind, Token
+
+__all__ = ("PublishedTopic", "SubscribedTopic")
+
+_LENGTH = Struct("<I")
+_LATCHED = QoS(depth=1, durability="transient_local")
+_FIRST_RETRY = 0.1
+_LAST_RETRY = 2.0
+_QUEUE = 10
+_PIECE = 1 << 10
+
+
+class PublishedTopic:
+    """A topic that a node of ROS 1 publishes.
+
+    Args:
+        shared: What the bridge shares.
+        node: The node.
+        entry: Its registration.
+    """
+
+    def __init__(self, shared: Shared, node: BridgedNode, entry: Entry) -> None:
+        self.entry = entry
+        self._topic = shared.here(entry.name)
+        self._shared = shared
+        self._node = node
+        self._codec: Codec | None = None
+        self._publisher: Publisher[Any] | None = None
+        self._stream: Stream | None = None
+        self._connecting = False
+        self._closed = False
+        self._delay = _FIRST_RETRY
+        self._reported = ""
+        self._reader = FrameReader(MAX_FRAME)
+        try:
+            self._codec = shared.codecs.of_ros1(entry.name, entry.type_name)
+        except RoszError:
+            pass  # the publisher tells its definition when it is connected
+        else:
+            self._declare(latched=False)
+        self.update()
+
+    @property
+    def connected(self) -> bool:
+        """Whether messages are received from the node."""
+        return self._stream is not None
+
+    def update(self) -> None:
+        """Connect to the node if the network wants its messages, or else disconnect."""
+        if self._closed:
+            return
+        wanted = self._codec is None or bool(self._shared.subscriptions(self._topic))
+        if wanted and self._stream is None and not self._connecting:
+            self._connecting = True
+            if not self._shared.requests.offer(self._connect):
+                self._retry()
+        elif not wanted and self._stream is not None:
+            self._disconnect()
+            if self._publisher is not None and self._publisher.qos.latched:
+                # The node sends its last message again, to whoever is there then.
+                self._declare(latched=True)
+
+    def close(self) -> None:
+        """Take the topic from the network."""
+        self._closed = True
+        self._disconnect()
+        self._undeclare()
+
+    def _declare(self, *, latched: bool) -> None:
+        codec = self._codec
+        assert codec is not None  # noqa: S101  # the callers know it
+        self._undeclare()
+        qos = codec.qos or (_LATCHED if latched else for_queue(_QUEUE))
+        try:
+            publisher = Publisher(self._node, self._topic, codec.cls, qos)
+        except ClosedError:
+            return
+        self._shared.gids.add(publisher.gid)
+        self._publisher = self._node.keep(publisher)
+
+    def _undeclare(self) -> None:
+        publisher, self._publisher = self._publisher, None
+        if publisher is not None:
+            publisher.close()
+            self._shared.gids.discard(publisher.gid)
+
+    def _disconnect(self) -> None:
+        stream, self._stream = self._stream, None
+        if stream is not None:
+            self._shared.loop.call(stream.close)
+
+    def _connect(self) -> None:
+        """Connect to the node; runs on a thread for requests."""
+        shared, entry = self._shared, self.entry
+        try:
+            answer = call(entry.uri, "requestTopic", (shared.name, entry.name, [["TCPROS"]]))
+            if not isinstance(answer, list) or answer[:1] != ["TCPROS"] or len(answer) < 3:  # noqa: PLR2004
+                raise DecodeError("XML-RPC result", -1, f"{answer!r:.80}, expected TCPROS")
+            sock = _connect_either(answer, entry.uri)
+        except RoszError as error:
+            shared.changes.submit(partial(self._failed, str(error)))
+            return
+        fields = {
+            "callerid": shared.name,
+            "topic": entry.name,
+            "type": entry.type_name,
+            "md5sum": ANY_TYPE,  # the answer has the definition, if it is not the one known here
+            "tcp_nodelay": "1",
+        }
+        try:
+            header = exchange_headers(sock, fields)
+        except RoszError as error:
+            sock.close()
+            shared.changes.submit(partial(self._failed, str(error)))
+            return
+        shared.changes.submit(partial(self._connected, sock, header))
+
+    def _connected(self, sock: socket.socket, header: dict[str, str]) -> None:
+        self._connecting = False
+        codec = self._codec
+        if self._closed:
+            sock.close()
+            return
+        if codec is None or not codec.fits(header.get("md5sum", ANY_TYPE)):
+            try:
+                codec = self._learn(header)
+            except RoszError as error:
+                sock.close()
+                self._failed(str(error))
+                return
+            if not self._shared.subscriptions(self._topic):
+                sock.close()
+                return
+        publisher = self._publisher
+        latched = header.get("latching") == "1"
+        if publisher is None or (latched and not publisher.qos.latched):
+            self._declare(latched=latched)
+        self._delay, self._reported = _FIRST_RETRY, ""
+        self._reader = FrameReader(MAX_FRAME)
+        self._stream = Stream(self._shared.loop, sock, self)
+
+    def _learn(self, header: dict[str, str]) -> Codec:
+        """Return the codec of the definition that the node has sent."""
+        entry = self.entry
+        type_name = header.get("type", entry.type_name)
+        definition = header.get("message_definition", "")
+        self._codec = codec = self._shared.codecs.of_ros1(entry.name, type_name, definition)
+        if not codec.fits(header.get("md5sum", ANY_TYPE)):
+            self._codec = None
+            raise TypeNotFound(
+                type_name, f"its md5 is {header.get('md5sum')} there, and {codec.md5sum} here"
+            )
+        self._declare(latched=header.get("latching") == "1")
+        return codec
+
+    def _failed(self, reason: str) -> None:
+        self._connecting = False
+        if self._closed:
+            return
+        if reason != self._reported:
+            self._reported = reason
+            log.warning(
+                "cannot receive '%s' from node '%s': %.300s; trying again (told once)",
+                self.entry.name,
+                self.entry.node,
+                reason,
+            )
+        self._retry()
+
+    def _retry(self) -> None:
+        self._connecting = False
+        self._shared.changes.later(self._delay, self.update)
+        self._delay = min(2 * self._delay, _LAST_RETRY)
+
+    # What the stream calls, on the thread of the loop.
+
+    def space(self) -> memoryview:
+        """Return where the next bytes belong."""
+        return self._reader.space()
+
+    def received(self, count: int) -> None:
+        """Publish the messages that are complete."""
+        codec, publisher = self._codec, self._publisher
+        if codec is None or publisher is None:
+            return
+        for frame in self._reader.take(count):
+            try:
+                publisher.publish_raw(codec.to_cdr(frame))
+            except ClosedError:
+                return
+            except MessageError as error:
+                if str(error) != self._reported:
+                    self._reported = str(error)
+                    log.warning(
+                        "dropping a damaged message on '%s' from node '%s' (told once): %.300s",
+                        self.entry.name,
+                        self.entry.node,
+                        error,
+                    )
+
+    def closed(self) -> None:
+        """Connect again if the node is still there."""
+        self._shared.changes.submit(self._lost)
+
+    def _lost(self) -> None:
+        if self._stream is not None and self._stream.is_closed:
+            self._stream = None
+            self._retry()
+
+
+def _connect_either(answer: list[Any], uri: str) -> socket.socket:
+    """Return a connection to the address that a node names, or to that of its URI."""
+    address = Address(str(answer[1]), int(answer[2]))
+    try:
+        return connect(address)
+    except RoszError:
+        known = Address.parse(uri)
+        if known.host == address.host:
+            raise
+        return connect(Address(known.host, address.port))
+
+
+class SubscribedTopic:
+    """A topic that a node of ROS 1 subscribes to.
+
+    Args:
+        shared: What the bridge shares.
+        node: The node.
+        entry: Its registration.
+    """
+
+    def __init__(self, shared: Shared, node: BridgedNode, entry: Entry) -> None:
+        self.entry = entry
+        self._topic = shared.here(entry.name)
+        self._shared = shared
+        self._node = node
+        self._shown: Entity | None = None
+        self._links: list[_Link] = []
+        self._closed = False
+        self.update()
+
+    @property
+    def connected(self) -> bool:
+        """Whether the node is connected to the bridge."""
+        return bool(self._links)
+
+    def update(self) -> None:
+        """Show the node as a subscriber while it is not connected."""
+        if self._closed or self._links:
+            return
+        if self._shown is None and self.entry.type_name != ANY_TYPE:
+            try:
+                codec = self._shared.codecs.of_ros1(self.entry.name, self.entry.type_name)
+            except RoszError as error:
+                log.info("cannot show a subscriber of '%s': %s", self.entry.name, error)
+                return
+            with suppress(ClosedError):
+                shown = Entity(
+                    self._node,
+                    Kind.SUBSCRIPTION,
+                    self._topic,
+                    codec.cls._type_name,
+                    codec.cls._type_hash,
+                    for_queue(_QUEUE),
+                )
+                shown.announce(watch=False)
+                self._shown = self._node.keep(shown)
+
+    def accept(self, incoming: Incoming, header: dict[str, str]) -> None:
+        """Send what the network publishes to a connection of the node."""
+        publishers = self._shared.publishers(self._topic)
+        try:
+            codec = _choose(self._shared, self.entry.name, publishers, header)
+        except RoszError as error:
+            incoming.stream.send([encode_header({"error": str(error)})])
+            incoming.refuse(str(error))
+            return
+        link = _Link(self._shared, self._node, incoming.stream, codec, self._drop)
+        self._links.append(link)
+        if self._shown is not None:
+            self._shown.close()
+            self._shown = None
+        link.open(self.entry.name, self._topic, publishers)
+
+    def close(self) -> None:
+        """Take the topic from the network, and end the connections."""
+        self._closed = True
+        if self._shown is not None:
+            self._shown.close()
+        for link in list(self._links):
+            link.close()
+
+    def _drop(self, link: _Link) -> None:
+        if link in self._links:
+            self._links.remove(link)
+            link.close()
+            self.update()
+
+
+def _choose(shared: Shared, topic: str, publishers: list[Token], header: dict[str, str]) -> Codec:
+    """Return the codec for a connection of a subscriber.
+
+    Raises:
+        RoszError: There is no publisher of the type that it wants; the text says what there is.
+    """
+    if not publishers:
+        raise RoszError(f"nobody on the network publishes '{topic}'")
+    wanted = header.get("md5sum", ANY_TYPE)
+    found: dict[str, str] = {}
+    for token in publishers:
+        try:
+            codec = shared.codecs.of_network(topic, token.type_name, token.type_hash)
+        except RoszError as error:
+            found[token.type_name] = str(error)
+            continue
+        if codec.fits(wanted):
+            return codec
+        found[token.type_name] = f"topic '{topic}' is {codec.ros1_type} (md5 {codec.md5sum})"
+    there = "; ".join(found.values())
+    raise RoszError(f"{there}; expected {header.get('type', '')} (md5 {wanted})")
+
+
+class _Link:
+    """One connection of a subscriber, and the subscription that feeds it."""
+
+    def __init__(
+        self,
+        shared: Shared,
+        node: BridgedNode,
+        stream: Stream,
+        codec: Codec,
+        ended: Callable[[_Link], object],
+    ) -> None:
+        self._shared = shared
+        self._node = node
+        self._stream = stream
+        self._codec = codec
+        self._ended = ended
+        self._subscription: Subscription[Any] | None = None
+        self._piece = memoryview(bytearray(_PIECE))
+        self._reported = False
+
+    def open(self, name: str, topic: str, publishers: list[Token]) -> None:
+        """Answer the header, and subscribe.
+
+        Args:
+            name: Name of the topic in ROS 1.
+            topic: Name of the topic on the network.
+            publishers: Its publishers there.
+        """
+        known = [token.qos for token in publishers if token.qos is not None]
+        codec, stream = self._codec, self._stream
+        fields = {
+            "callerid": self._shared.name,
+            "latching": "1" if any(qos.latched for qos in known) else "0",
+            "md5sum": codec.md5sum,
+            "message_definition": codec.definition,
+            "topic": name,
+            "type": codec.ros1_type,
+        }
+        depth = max([_QUEUE, *(qos.depth for qos in known)])
+        stream.send([encode_header(fields)])
+        stream.depth = depth
+        self._shared.loop.call(self._follow)
+        with suppress(ClosedError):
+            self._subscription = self._node.keep(
+                Subscription(
+                    self._node,
+                    topic,
+                    codec.cls,
+                    self._send,
+                    for_queue(depth),
+                    raw=True,
+                    with_info=True,
+                )
+            )
+
+    def close(self) -> None:
+        """Unsubscribe, and end the connection."""
+        if self._subscription is not None:
+            self._subscription.close()
+        self._shared.loop.call(self._stream.close)
+
+    def _follow(self) -> None:
+        """Notice the end of the connection."""
+        if self._stream.is_closed:
+            self.closed()
+        else:
+            self._stream.handler = self
+            self._stream.pause(reading=True)
+
+    def _send(self, payload: Any, info: MessageInfo) -> None:
+        if info.gid in self._shared.gids:
+            return  # from ROS 1, which delivers it itself
+        sequence = (info.sequence & 0xFFFFFFFF).to_bytes(4, "little")
+        try:
+            data = self._codec.from_cdr(payload, sequence)
+        except MessageError as error:
+            if not self._reported:
+                self._reported = True
+                log.warning(
+                    "dropping a message for node '%s' (told once): %.300s", self._node.name, error
+                )
+            return
+        self._stream.send((_LENGTH.pack(len(data)), data))
+
+    # What the stream calls, on the thread of the loop.
+
+    def space(self) -> memoryview:
+        """Return where the next bytes belong: a subscriber sends none."""
+        return self._piece
+
+    def received(self, count: int) -> None:
+        """Ignore what a subscriber sends."""
+
+    def closed(self) -> None:
+        """Forget the connection."""
+        self._shared.changes.submit(partial(self._ended, self))

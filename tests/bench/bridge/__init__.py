@@ -1,0 +1,1 @@
+"""The commands beside ROS 1's."""

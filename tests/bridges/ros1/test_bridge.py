@@ -1,0 +1,267 @@
+"""Programs of real ROS 1 and nodes of rosz as neighbours, with rosz as the master."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import struct
+import threading
+from collections.abc import Iterator
+from functools import partial
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from network import TIMEOUT, eventually
+
+from rosz.bridges.ros1 import MasterBridge
+from rosz.bridges.ros1.frames import decode_header, encode_header
+from rosz.errors import ServiceError, TransportError
+from rosz.msgs.rcl_interfaces.msg import Log
+from rosz.msgs.std_msgs.msg import Int32, String
+from rosz.msgs.std_srvs.srv import SetBool
+from rosz.node import Node
+
+from .world import LISTENER, SERVER, TALKER, World
+
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
+
+
+@pytest.fixture(scope="module")
+def world() -> Iterator[World]:
+    made = World()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def node(world: World) -> Iterator[Node]:
+    with Node("neighbour", context=world.network.context()) as made:
+        yield made
+
+
+def _heard(node: Node, topic: str, kind: Any = String) -> SimpleQueue[Any]:
+    found: SimpleQueue[Any] = SimpleQueue()
+    node.subscription(topic, kind, found.put)
+    return found
+
+
+def _nodes(node: Node) -> list[str]:
+    return node.context.graph.view().nodes()
+
+
+def test_debians_commands_use_the_parameters(world: World, node: Node) -> None:
+    world.run("rosparam", "set", "/a/b", "[1, two, 3.5, true]")
+    assert node.params["/a/b"] == [1, "two", 3.5, True]
+    node.params["/a/c"] = "from rosz"
+    expected = "b: - 1 - two - 3.5 - true c: from rosz"
+    assert world.run("rosparam", "get", "/a").split() == expected.split()
+    world.run("rosparam", "delete", "/a/b")
+    assert world.run("rosparam", "list").split() == ["/a/c"]
+    assert world.run("rosparam", "get", "/a/b") == "ERROR: Parameter [/a/b] is not set\n"
+    del node.params["/a"]
+
+
+def test_methods_answer_as_the_master_of_ros_1(world: World) -> None:
+    assert world.call("getParam", "/x", "gone") == [-1, "Parameter [/gone] is not set", 0]
+    assert world.call("setParam", "/n/x", "~own", {"v": 1}) == [1, "parameter /n/x/own set", 0]
+    assert world.call("searchParam", "/n/x/y", "own") == [1, "Found [/n/x/own]", "/n/x/own"]
+    assert world.call("hasParam", "/n/x", "~own/v") == [1, "/n/x/own/v", True]
+    assert world.call("deleteParam", "/n/x", "/n") == [1, "parameter /n deleted", 0]
+    assert world.call("deleteParam", "/n/x", "/n") == [-1, "parameter [/n] is not set", 0]
+    assert world.call("lookupNode", "/x", "/none") == [-1, "unknown node [/none]", ""]
+    assert world.call("lookupService", "/x", "/none") == [-1, "no provider", ""]
+    assert world.call("getParam", "/x") == [-1, "Error: bad call arity", 0]
+    assert world.call("getParam") == [-1, "missing required caller_id parameter", 0]
+    code, text, _ = world.call("registerPublisher", "/x", "/t", "std_msgs/String", "no uri")
+    assert (code, text) == (-1, "ERROR: parameter [no uri] is not an RPC URI")
+    many = [{"methodName": "getParam", "params": ["/x", "gone"]}, {"methodName": "none"}]
+    assert world.call("system.multicall", many) == [
+        [[-1, "Parameter [/gone] is not set", 0]],
+        {"faultCode": 1, "faultString": "expected methodName and params"},
+    ]
+
+
+def test_integers_beyond_32_bits_are_refused(world: World, node: Node) -> None:
+    body = (
+        "<methodCall><methodName>setParam</methodName><params>"
+        "<param><value>/x</value></param><param><value>/big</value></param>"
+        "<param><value><int>5000000000</int></value></param></params></methodCall>"
+    )
+    with socket.create_connection(("127.0.0.1", world.bridge.port)) as sock:
+        head = f"POST /RPC2 HTTP/1.0\r\nContent-Length: {len(body)}\r\n\r\n"
+        sock.sendall((head + body).encode())
+        answer = b"".join(iter(lambda: sock.recv(4096), b"")).decode()
+    assert "5000000000 exceeds the 32 bits" in answer
+    assert not node.params.has("/big")
+    node.params["/big"] = 5_000_000_000
+    with pytest.raises(Exception, match="int exceeds XML-RPC limits"):
+        world.call("getParam", "/x", "/big")
+    del node.params["/big"]
+
+
+def test_topics_cross_both_ways(world: World, node: Node) -> None:
+    world.rospy(TALKER, "rospy_talker", "/of_rospy")
+    heard = _heard(node, "/of_rospy")
+    assert heard.get(timeout=TIMEOUT).data.startswith("rospy ")
+    assert "/rospy_talker" in _nodes(node)
+
+    listener = world.rospy(LISTENER, "rospy_listener", "/of_rosz")
+    publisher = node.publisher("/of_rosz", String, queue_size=10)
+    publisher.wait_for_subscribers(timeout=TIMEOUT)
+    timer = node.timer(0.05, lambda _: publisher.publish("rosz"))
+    listener.wait_for("heard rosz")
+    assert world.run("rostopic", "type", "/of_rosz") == "std_msgs/String\n"
+    assert "/neighbour" in world.run("rosnode", "list").split()
+    info = world.run("rosnode", "info", "neighbour")
+    assert " * /of_rosz [std_msgs/String]" in info
+    assert " * to: /rospy_listener" in info
+    timer.close()
+
+    # What nobody on the other side wants does not cross.
+    publisher.close()
+    listener.send(signal.SIGINT)
+    eventually(lambda: "/rospy_listener" not in _nodes(node))
+
+
+def test_a_killed_node_goes_from_the_network(world: World, node: Node) -> None:
+    program = world.rospy(LISTENER, "killed", "/killed")
+    eventually(lambda: "/killed" in _nodes(node))
+    program.kill()
+    eventually(lambda: "/killed" not in _nodes(node))
+    assert "/killed" not in world.run("rosnode", "list")
+
+
+def test_a_newer_node_of_a_name_ends_the_older(world: World, node: Node) -> None:
+    older = world.rospy(LISTENER, "same", "/same_topic")
+    eventually(lambda: "/same" in _nodes(node))
+    newer = world.rospy(LISTENER, "same", "/same_topic")
+    older.wait_for("new node registered with same name")
+    newer.wait_for("ready")
+    eventually(lambda: _nodes(node).count("/same") == 1)
+    with Node("same", context=world.network.context()):
+        newer.wait_for("new node registered with same name")
+
+
+def test_each_latched_publisher_keeps_its_last_message(world: World, node: Node) -> None:
+    for name in ("first", "second"):
+        world.rospy(TALKER, f"latched_{name}", "/latched", name).wait_for("ready")
+    for _ in range(2):  # also for those that come later
+        with Node("late", context=node.context) as late:
+            heard = _heard(late, "/latched")
+            assert {heard.get(timeout=TIMEOUT).data for _ in range(2)} == {"first", "second"}
+    publisher = node.publisher("/latched_by_rosz", String, latch=True)
+    publisher.publish("kept")
+    for number in range(2):
+        name = f"late_{number}"
+        world.rospy(LISTENER, name, "/latched_by_rosz").wait_for("heard kept")
+
+
+def test_other_types_are_refused_in_words(
+    world: World, node: Node, caplog: pytest.LogCaptureFixture
+) -> None:
+    node.publisher("/number", Int32)
+    world.rospy(LISTENER, "mistaken", "/number")
+    words = "topic '/number' is std_msgs/Int32 (md5 da5909fbe378aeaf85e547e830cc1bb7); expected"
+
+    def told() -> int:
+        return sum(words in record.getMessage() for record in caplog.records)
+
+    eventually(told)
+    # The program tries again and again; that is told once.
+    refused = partial(_refusal, world, "/number", "/mistaken")
+    eventually(lambda: words in refused())
+    assert told() == 1
+
+
+def _refusal(world: World, topic: str, node: str) -> str:
+    header = {"topic": topic, "callerid": node, "md5sum": String._md5sum, "type": String._type}
+    with socket.create_connection(("127.0.0.1", world.bridge.port), TIMEOUT) as sock:
+        sock.sendall(encode_header(header))
+        answer = b"".join(iter(lambda: sock.recv(4096), b""))
+    return decode_header(answer[4:])["error"]
+
+
+def test_services_cross_both_ways(world: World, node: Node) -> None:
+    server = world.rospy(SERVER)
+    server.wait_for("ready")
+    client = node.client("/of_rospy", SetBool, timeout=TIMEOUT)
+    client.wait_for_service(TIMEOUT)
+    assert client(True).message == "from rospy"
+    with pytest.raises(ServiceError, match="never false"):
+        client(False)
+
+    def handle(request: Any) -> Any:
+        if not request.data:
+            raise ServiceError("not by rosz")
+        return [True, "from rosz"]
+
+    node.service("/of_rosz", SetBool, handle)
+    eventually(lambda: world.call("lookupService", "/x", "/of_rosz")[0] == 1)
+    assert world.run("rosservice", "type", "/of_rosz") == "std_srvs/SetBool\n"
+    assert "from rosz" in world.run("rosservice", "call", "/of_rosz", "true")
+    assert "not by rosz" in world.run("rosservice", "call", "/of_rosz", "false")
+
+
+def test_logs_cross_both_ways(world: World, node: Node) -> None:
+    logs = _heard(node, "/rosout", Log)
+    program = world.rospy(SERVER)
+    while (log := logs.get(timeout=TIMEOUT)).msg != "serving":
+        pass
+    assert (log.level, log.name) == (Log.WARN, "/rospy_server")
+    program.send(signal.SIGINT)
+    watcher = world.start("rostopic", "echo", "--noarr", "/rosout")
+    timer = node.timer(0.1, lambda _: node.log.error("from rosz"))
+    watcher.wait_for('msg: "from rosz"')
+    watcher.wait_for("level: 8")
+    timer.close()
+
+
+def test_a_node_of_rosz_answers_ros_1s_questions(world: World) -> None:
+    ended = threading.Event()
+    with Node("asked", context=world.network.context()) as asked:
+        asked.on_shutdown(lambda _reason: ended.set())
+        eventually(lambda: "/asked" in world.run("rosnode", "list").split())
+        assert "xmlrpc reply" in world.run("rosnode", "ping", "-c", "1", "/asked")
+        assert "killed" in world.run("rosnode", "kill", "/asked")
+        assert ended.wait(TIMEOUT)
+
+
+def test_what_is_no_program_of_ros_1_costs_one_line(
+    world: World, caplog: pytest.LogCaptureFixture
+) -> None:
+    for data, words in (
+        (struct.pack("<I", 0xFFFFFFFF), "a length of 4294967295 bytes"),
+        (b"\4\0\0\0\xff\xff\xff\xff", "a field of 4294967295 bytes"),
+        (b"POST / HTTP/1.1\r\nContent-Length: x\r\n\r\n", "Content-length is 'x'"),
+    ):
+        caplog.clear()
+        with socket.create_connection(("127.0.0.1", world.bridge.port), TIMEOUT) as sock:
+            sock.sendall(data)
+            while sock.recv(4096):
+                pass
+        assert [words in record.getMessage() for record in caplog.records] == [True]
+    assert _refusal(world, "/t", "/x") == "node '/x' is not registered as a subscriber of '/t'"
+
+
+def test_a_port_that_is_taken_is_named(world: World) -> None:
+    with pytest.raises(TransportError, match="--master http://localhost:"):
+        MasterBridge(world.network.environment(), port=world.bridge.port)
+
+
+def test_registrations_come_back_after_the_master(world: World, node: Node) -> None:
+    program = world.rospy(TALKER, "staying", "/staying")
+    heard = _heard(node, "/staying")
+    heard.get(timeout=TIMEOUT)
+    port = world.bridge.port
+    file = world.network.folder / "rosz" / f"ros1_master_{port}.json"
+    eventually(lambda: b"/staying" in file.read_bytes())
+    world.bridge.close()
+    eventually(lambda: "/staying" not in _nodes(node))
+    while not heard.empty():
+        heard.get()
+    world.bridge = MasterBridge(world.network.environment(), port=port)
+    assert heard.get(timeout=TIMEOUT).data.startswith("rospy ")
+    assert "/staying" in _nodes(node)
+    program.send(signal.SIGINT)
+    eventually(lambda: "/staying" not in _nodes(node))
