@@ -23,6 +23,7 @@ class Pace:
         self._since = time.monotonic_ns()
         self._rate = rate
         self._paused = paused
+        self._held = False
 
     @property
     def rate(self) -> float:
@@ -44,9 +45,19 @@ class Pace:
         self.jump(self.now())
         self._paused = paused
 
+    @property
+    def held(self) -> bool:
+        """Whether it waits for something else, and so stands still whether paused or not."""
+        return self._held
+
+    @held.setter
+    def held(self, held: bool) -> None:
+        self.jump(self.now())
+        self._held = held
+
     def now(self) -> int:
         """Return the time of the bag, as a stamp."""
-        if self._paused:
+        if self._paused or self._held:
             return self._stamp
         return self._stamp + int((time.monotonic_ns() - self._since) * self._rate)
 

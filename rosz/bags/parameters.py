@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
 from rosz.bags.bag import Channel
-from rosz.bags.recording import BagFiles, Track
+from rosz.bags.recording import BagFiles, Sink
 from rosz.errors import BagError, ClosedError, NoReplica, RoszError
 from rosz.lifecycle import Closable
 from rosz.msgs.builtin_interfaces.msg import Time
@@ -34,24 +34,24 @@ _SECOND = 1_000_000_000
 
 
 class ParameterRecord:
-    """Records the parameters of a network into bags.
+    """Records the parameters of a network.
 
     Where no process holds parameters yet, it looks again until one does.
 
     Args:
         node: Node whose session it uses.
-        files: The bags.
+        sink: What takes the changes; bags also get all parameters at once.
         report: Function called with a sentence for the user.
     """
 
-    def __init__(self, node: Node, files: BagFiles, report: Callable[[str], object]) -> None:
+    def __init__(self, node: Node, sink: Sink, report: Callable[[str], object]) -> None:
         self._node = node
-        self._files = files
+        self._sink = sink
         self._report = report
         self._follower: Follower | None = None
         self._parts: list[Closable] = []
         cls = ParameterEvent
-        channel = Channel(
+        self._channel = Channel(
             _TOPIC,
             cls._type_name,
             definition=cls._full_text,
@@ -59,7 +59,7 @@ class ParameterRecord:
             type_hash=cls._type_hash,
             qos=(PARAMETERS,),
         )
-        self._track: Track = files.track(channel, node.context.types)
+        self._track = sink.track(self._channel, node.context.types)
         self._worker: Worker[Callable[[], object]] = Worker("rosz-bag-parameters")
         self._worker.submit(self._connect)
 
@@ -77,7 +77,8 @@ class ParameterRecord:
             return
         self._follower = follower
         self._parts = [follower.watch("/", self._on_change), follower]
-        self.begin(self._files)
+        if isinstance(self._sink, BagFiles):
+            self.begin(self._sink)
 
     def begin(self, files: BagFiles) -> None:
         """Write all parameters into a bag that has been opened.
@@ -90,7 +91,7 @@ class ParameterRecord:
         tree = self._follower.get("/")
         files.add_metadata("parameters", {"yaml": dump(tree)})
         rows = [Parameter(name, to_ros2(value)) for name, value in _leaves("", tree)]
-        self._write(ParameterEvent(new_parameters=rows), self._node.now())
+        self._write(files, ParameterEvent(new_parameters=rows), self._node.now())
 
     def _on_change(self, change: Changed) -> None:
         event = ParameterEvent(node="")
@@ -105,12 +106,15 @@ class ParameterRecord:
             Parameter(name, to_ros2(value)) for name, value in old.items() if name not in new
         ]
         with suppress(BagError):  # the recorder sees it too
-            self._write(event, change.time)
+            self._write(self._sink, event, change.time)
 
-    def _write(self, event: ParameterEvent, sent: int) -> None:
+    def _write(self, sink: Sink, event: ParameterEvent, sent: int) -> None:
         now = self._node.now()
         event.stamp = Time(*divmod(now, _SECOND))
-        self._files.write(self._track, now, event.to_cdr(), sent, 0)
+        track = self._track
+        if sink is not self._sink:
+            track = sink.track(self._channel, self._node.context.types)
+        sink.write(track, now, event.to_cdr(), sent, 0)
 
     def close(self) -> None:
         """Stop following the parameters; a second call has no effect."""

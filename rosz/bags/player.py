@@ -56,6 +56,9 @@ class PlayOptions(msgspec.Struct, frozen=True, kw_only=True):
         delay: Seconds to wait after the publishers are made.
         queue: Depth of the queues of publishers whose QoS was not recorded.
         skip_empty: Seconds without a message that are skipped if they are more; 0 for none.
+        rate_control_topic: Name of a topic whose messages begin with a header. Without
+            ``immediate``, the time of the bags stays near the stamp of the latest of them.
+        rate_control_max_delay: Seconds of the bags by which their time may be later.
     """
 
     rate: float = 1.0
@@ -73,6 +76,8 @@ class PlayOptions(msgspec.Struct, frozen=True, kw_only=True):
     delay: float = 0.2
     queue: int = 100
     skip_empty: float = 0.0
+    rate_control_topic: str = ""
+    rate_control_max_delay: float = 1.0
 
 
 class Progress(msgspec.Struct, frozen=True):
@@ -84,6 +89,7 @@ class Progress(msgspec.Struct, frozen=True):
         duration: Seconds of the bags in all.
         rate: Seconds of the bag per second.
         paused: Whether it stands still.
+        delayed: Whether it waits for the topic that controls its rate.
         published: Number of messages that were published.
     """
 
@@ -92,6 +98,7 @@ class Progress(msgspec.Struct, frozen=True):
     duration: float
     rate: float
     paused: bool
+    delayed: bool
     published: int
 
 
@@ -150,6 +157,7 @@ class Player:
         self._outputs: dict[int, tuple[Channel, Publisher[Any], Conversion] | None] = {}
         self._made: dict[Any, Publisher[Any]] = {}
         self._tick: Callable[[int], None] | None = None
+        self._controlled = self._start  # the latest stamp of the topic that controls the rate
         self._topics = self._chosen_topics()
 
     def _chosen_topics(self) -> set[str]:
@@ -211,6 +219,8 @@ class Player:
                     self._output(channel)
         if self._options.clock:
             self._tick = self._make_clock()
+        if self._options.rate_control_topic:
+            self._follow_control(self._options.rate_control_topic)
         context = self._node.context
         context.mesh.linked.wait(context.HOLD_TIMEOUT)  # else the publishers would drop
         context.wait_for_shutdown(self._options.delay)
@@ -224,6 +234,24 @@ class Player:
 
         publisher = self._node.publisher(_CLOCK, Clock, qos=QoS(depth=1))
         return lambda stamp: publisher.publish(Clock(clock=Time.from_nsec(stamp)))
+
+    def _follow_control(self, topic: str) -> None:
+        warned: list[str] = []
+
+        def receive(message: Any) -> None:
+            if not message._has_header:
+                if not warned:
+                    warned.append(message._type)
+                    self._warn(
+                        f"'{topic}' controls nothing: '{message._type}' does not begin with a"
+                        " header"
+                    )
+                return
+            with self._changed:
+                self._controlled = message.header.stamp.to_nsec()
+                self._changed.notify_all()
+
+        self._node.subscription(topic, callback=receive)
 
     def _output(self, channel: Channel) -> tuple[Channel, Publisher[Any], Conversion] | None:
         """Return the publisher of a channel, and how its messages are converted; None for none."""
@@ -282,7 +310,7 @@ class Player:
                 if not self._options.loop:
                     break
                 self._pace.jump(self._start)
-                self._last = self._start
+                self._last = self._controlled = self._start
             while self._options.keep_alive and not self._closed:
                 self._wait(_LOOK_SECONDS)
         finally:
@@ -383,8 +411,12 @@ class Player:
             pace.paused = True
         if options.skip_empty and stamp - self._last > options.skip_empty * _NS:
             pace.jump(stamp)
+        ahead = True
         while not self._closed:
-            if pace.paused:
+            ahead = ahead and self._is_ahead()
+            if ahead:
+                left = _FOREVER
+            elif pace.paused:
                 left = _FOREVER
                 if self._steps:
                     self._steps -= 1
@@ -401,6 +433,16 @@ class Player:
                 return True
             self._wait(left)
         return False
+
+    def _is_ahead(self) -> bool:
+        """Return whether the time of the bags is too late for the topic that controls the rate."""
+        options, pace = self._options, self._pace
+        if not options.rate_control_topic or options.immediate:
+            return False
+        ahead = pace.now() - self._controlled > options.rate_control_max_delay * _NS
+        if ahead != pace.held:
+            pace.held = ahead
+        return ahead
 
     def _clock(self, left: float, stamp: int) -> float:
         """Publish the time if its turn has come; return the seconds until its next turn."""
@@ -429,6 +471,7 @@ class Player:
                 duration=(self._end - self._start) / _NS,
                 rate=self._pace.rate,
                 paused=self._pace.paused,
+                delayed=self._pace.held,
                 published=self.published,
             )
         )

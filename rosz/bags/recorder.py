@@ -74,9 +74,10 @@ class Recorder:
         sink: What takes the messages.
         report: Function called with a sentence for the user.
         limit: Number of messages to record of each topic; 0 for all.
+        ended: Event that others may set, too.
 
     Attributes:
-        ended: Set when recording has come to its end, or failed.
+        ended: As given. Set when recording has come to its end, or failed.
         lost: Number of messages that did not arrive or found no room.
         error: What made it fail.
     """
@@ -88,6 +89,7 @@ class Recorder:
         sink: Sink,
         report: Callable[[str], object],
         limit: int = 0,
+        ended: threading.Event | None = None,
     ) -> None:
         self._node = node
         self._selection = selection
@@ -101,7 +103,7 @@ class Recorder:
         self._counts: Counter[str] = Counter()
         self._warned: set[str] = set()
         self._worker: Worker[Callable[[], object]] = Worker("rosz-bag-recorder", threads=4)
-        self.ended: threading.Event = threading.Event()
+        self.ended: threading.Event = ended or threading.Event()
         self.lost: int = 0
         self.error: BagError | None = None
         for name in selection.at_once:

@@ -453,6 +453,7 @@ class Ring:
         report: Function called with a sentence for the user.
 
     Attributes:
+        end: Function called with each bag that is asked for, to write what it ends with.
         dropped: Number of messages that were pushed out by newer ones although they were not old.
     """
 
@@ -466,6 +467,7 @@ class Ring:
         self._rows: deque[tuple[Track, int, Payload, int | None, int]] = deque()
         self._bytes = 0
         self._tracks: dict[Track, TypeStore] = {}
+        self.end: Callable[[BagFiles], object] | None = None
         self.dropped: int = 0
         self.count: int = 0
 
@@ -536,4 +538,6 @@ class Ring:
                 files.write(made[track], rows[0][1] if rows else now, *last)
             for track, stamp, data, sent, sequence in rows:
                 files.write(made[track], stamp, data, sent, sequence)
+            if self.end is not None:
+                self.end(files)
         return files.done[-1]

@@ -15,8 +15,10 @@ from network import Network, eventually
 import rosz.bags
 from rosz.bags import Channel, open_reader
 from rosz.bags.player import Player, PlayOptions, Progress
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.geometry_msgs.msg import PointStamped
 from rosz.msgs.rosgraph_msgs.msg import Clock
-from rosz.msgs.std_msgs.msg import Int32, String
+from rosz.msgs.std_msgs.msg import Header, Int32, String
 from rosz.qos import LATCHED, QoS
 
 from .ros1_files import STORE, write_bag
@@ -200,6 +202,27 @@ def test_without_waiting_only_what_is_heard_is_published(network: Network, tmp_p
     heard.wait(1000)
     assert heard.values == list(range(1, 2000, 2))
     assert (player.published, one._sequence, other._sequence) == (2000, 0, 1000)
+
+
+def test_a_topic_controls_the_rate(network: Network, tmp_path: Path) -> None:
+    bag = _bag(tmp_path / "a.mcap", [("/a", n / 2, Int32(data=n)) for n in range(9)])
+    heard = _Listener(network, "/a")
+    control = network.node("control").publisher("/done", PointStamped)
+    player = _player(
+        network, bag, rate=10.0, rate_control_topic="/done", rate_control_max_delay=0.75
+    )
+    control.wait_for_subscribers()
+    running = network.thread(player.run)
+    for second, values in ((0, [0, 1, 2]), (1, [0, 1, 2, 3, 4])):
+        control.publish(PointStamped(header=Header(stamp=Time(sec=100 + second))))
+        eventually(lambda: player._pace.held)
+        heard.wait(len(values))
+        assert heard.values == values
+        assert player._pace.now() < START + (second + 1.5) * SECOND
+    control.publish(PointStamped(header=Header(stamp=Time(sec=200))))
+    running.join(15)
+    heard.wait(9)
+    assert heard.values == list(range(9))
 
 
 def test_a_loop_begins_again(network: Network, tmp_path: Path) -> None:

@@ -367,7 +367,9 @@ def test_a_full_disk(network: Network) -> None:
 
 
 def test_snapshots_are_of_the_last_seconds(network: Network) -> None:
-    publisher = network.node("talker").publisher("/chatter", String, latch=True)
+    talker = network.node("talker")
+    talker.params.set("/rate", 5)
+    publisher = talker.publisher("/chatter", String, latch=True)
     node = network.node("record")
     ring = Ring(RecordOptions(prefix=str(network.folder / "x")), 10 * SECOND, lambda _: None)
     now = 100 * SECOND
@@ -393,6 +395,10 @@ def test_snapshots_are_of_the_last_seconds(network: Network) -> None:
         response = client.call(TriggerRequest(), timeout=TIMEOUT)
         assert response.success
         with rosz_bag(network.folder / response.message) as bag:
+            if bag.reader.metadata.get("parameters", {}).get("yaml") != "rate: 5\n":
+                return False  # the recorder has not found them yet
+            (event,) = (one.message for one in bag.messages("/parameter_events"))
+            assert [one.name for one in event.new_parameters] == ["/rate"]
             return [one.message.data for one in bag.messages("/chatter")] == ["now"]
 
     eventually(saved)
@@ -425,6 +431,30 @@ def test_a_bag_of_ros_1(network: Network) -> None:
         check=False,
     )
     assert (done.stdout, done.stderr) == (f"{sorted(MESSAGES)}\n", "")
+
+
+INTERRUPTED = """
+import os, runpy, signal, sys
+from rosz.bags import recording
+enter = recording.BagFiles.__enter__
+def interrupted(self):
+    os.kill(os.getpid(), signal.SIGINT)
+    return enter(self)
+recording.BagFiles.__enter__ = interrupted
+sys.argv[0] = "rosz"
+runpy.run_module("rosz", run_name="__main__")
+"""
+
+
+def test_a_signal_right_after_the_bag_was_opened_finishes_it(network: Network) -> None:
+    script = network.folder / "interrupted.py"
+    script.write_text(INTERRUPTED)
+    command = [sys.executable, str(script), "bag", "record", "-a", "-O", "x"]
+    program = network._keep(Program(command, network.variables(), network.folder))
+    assert program.exit_code() == 0, program.output
+    assert [one.name for one in network.folder.glob("x*")] == ["x.mcap"]
+    with open_reader(network.folder / "x.mcap") as reader:
+        assert not reader.problems
 
 
 def test_the_node_of_launch_files(network: Network) -> None:

@@ -96,6 +96,13 @@ def play_command(
     pause_topics: Annotated[
         list[str] | None, Option("--pause-topics TOPIC", "Pause at messages of these topics.")
     ] = None,
+    rate_control_topic: Annotated[
+        str,
+        Option("--rate-control-topic TOPIC", "Wait while the stamps of this topic lag behind."),
+    ] = "",
+    rate_control_max_delay: Annotated[
+        float, Option("--rate-control-max-delay SECONDS", "Time by which they may lag behind.")
+    ] = 1.0,
     try_future: Annotated[bool, Option("--try-future-version")] = False,  # noqa: ARG001  # rosbag's
 ) -> int:
     """Publish the messages of bags again, merged by time.
@@ -110,6 +117,7 @@ def play_command(
     no_less_than_zero("--delay", delay)
     no_less_than_zero("--duration", duration)
     no_less_than_zero("--skip-empty", skip_empty)
+    no_less_than_zero("--rate-control-max-delay", rate_control_max_delay)
     from rosz.bags import open_reader
     from rosz.bags.player import Player, PlayOptions
     from rosz.node import Node
@@ -130,6 +138,8 @@ def play_command(
         delay=delay,
         queue=queue,
         skip_empty=skip_empty,
+        rate_control_topic=rate_control_topic,
+        rate_control_max_delay=rate_control_max_delay,
     )
     sys.setswitchinterval(_SWITCH_SECONDS)
     screen = _Screen(quiet=quiet)
@@ -217,7 +227,7 @@ class _Screen:
         width = 20
         share = min(progress.elapsed / progress.duration, 1.0) if progress.duration > 0 else 1.0
         bar = ("#" * round(share * width)).ljust(width, ".")
-        state = "PAUSED " if progress.paused else "RUNNING"
+        state = "DELAYED" if progress.delayed else "PAUSED " if progress.paused else "RUNNING"
         sys.stdout.write(
             f"\r\033[K[{state}]  Bag Time: {progress.stamp / 1e9:13.6f}"
             f"   Duration: {progress.elapsed:.6f} / {progress.duration:.6f}"

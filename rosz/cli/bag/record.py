@@ -34,6 +34,9 @@ _FLUSH_SECONDS = 0.5
 _SECOND = 1_000_000_000
 _UNITS = {"": 1, "s": 1, "m": 60, "h": 3600}
 _LITTLE_DISK = 1 << 30
+_SAME_REQUEST_SECONDS = 1.0
+"""A second signal within this time is the same one, since a terminal and a launch may both send it.
+A later one ends the process at once, and leaves the bag for ``rosz bag reindex``."""
 
 
 @app.command("record")
@@ -181,12 +184,13 @@ def _record(
     from rosz.bags.recording import BagFiles
 
     with ExitStack() as stack:
+        ended = stack.enter_context(_end_by_signal())
         files = stack.enter_context(BagFiles(options, report))
         if publish:
             _publish_name(node, files)
         parameters = stack.enter_context(ParameterRecord(node, files, report))
         files.begin = parameters.begin
-        recorder = stack.enter_context(Recorder(node, selection, files, report, limit))
+        recorder = stack.enter_context(Recorder(node, selection, files, report, limit, ended))
         _run(node, recorder, files, options, report, finished=files.finished)
         if recorder.error is not None:
             raise recorder.error
@@ -206,6 +210,7 @@ def _keep_last(
     report: Callable[[str], None],
     limit: int,
 ) -> None:
+    from rosz.bags.parameters import ParameterRecord
     from rosz.bags.recorder import Recorder
     from rosz.bags.recording import Ring
     from rosz.msgs.std_srvs.srv import Trigger, TriggerResponse
@@ -224,10 +229,13 @@ def _keep_last(
             return TriggerResponse(success=False, message=str(error))
 
     with (
-        Recorder(node, selection, ring, report, limit) as recorder,
+        _end_by_signal() as ended,
+        ParameterRecord(node, ring, report) as parameters,
+        Recorder(node, selection, ring, report, limit, ended) as recorder,
         node.service("~snapshot", Trigger, serve),
         _on_signal() as signalled,
     ):
+        ring.end = parameters.begin
         report(f"Keeping the last {duration / _SECOND:g} s; SIGUSR1 writes them to a bag.")
 
         def look() -> None:
@@ -251,6 +259,30 @@ def _on_signal() -> Iterator[threading.Event]:
         yield signalled
     finally:
         signal.signal(signal.SIGUSR1, before)
+
+
+@contextmanager
+def _end_by_signal() -> Iterator[threading.Event]:
+    """Set an event on Ctrl-C or SIGTERM, so that no exception comes between a bag and its end."""
+    ended = threading.Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    first: list[float] = []
+
+    def handle(number: int, _frame: FrameType | None) -> None:
+        ended.set()
+        first.append(time.monotonic())
+        if time.monotonic() - first[0] > _SAME_REQUEST_SECONDS:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(number, handle)
+    try:
+        yield ended
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _run(
