@@ -16,6 +16,7 @@ from rosz.cli.declare import Argument, Option, at_least, no_less_than_zero, per_
 from rosz.errors import ClosedError
 
 if TYPE_CHECKING:
+    from rosz.bags import BagReader
     from rosz.bags.player import Player, Progress
 
 __all__ = ("list_topics",)
@@ -118,7 +119,6 @@ def play_command(
     no_less_than_zero("--duration", duration)
     no_less_than_zero("--skip-empty", skip_empty)
     no_less_than_zero("--rate-control-max-delay", rate_control_max_delay)
-    from rosz.bags import open_reader
     from rosz.bags.player import Player, PlayOptions
     from rosz.node import Node
 
@@ -144,10 +144,7 @@ def play_command(
     sys.setswitchinterval(_SWITCH_SECONDS)
     screen = _Screen(quiet=quiet)
     with ExitStack() as stack:
-        readers = []
-        for bag in bags:
-            screen.show(f"Opening {bag}")
-            readers.append(stack.enter_context(open_reader(bag)))
+        readers = [stack.enter_context(one) for one in _open(bags, screen)]
         node = stack.enter_context(Node(_TOOL, anonymous=True, argv=call.argv))
         player = Player(node, readers, options, screen.warn, screen.update)
         for reader in readers:
@@ -163,6 +160,14 @@ def play_command(
             pass
         screen.end()
     return int(bool(player.problems or screen.problems))
+
+
+def _open(bags: list[str], screen: _Screen) -> Iterator[BagReader]:
+    from rosz.bags import open_reader
+
+    for bag in bags:
+        screen.show(f"Opening {bag}")
+        yield open_reader(bag)
 
 
 @contextmanager
