@@ -9,7 +9,8 @@ from __future__ import annotations
 import heapq
 import os
 import sqlite3
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
 from itertools import chain
@@ -102,20 +103,51 @@ class SqliteReader:
         self.size: int = self.path.stat().st_size
         address = f"file:{quote(str(self.path.absolute()))}?mode=ro"
         self._database = sqlite3.connect(address, uri=True, check_same_thread=False)
+        self._damage: list[tuple[int, int, int]] | None = None
         try:
-            self._channels = self._read_channels()
-            self._counts: dict[int, int] = dict(
-                self._rows("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
-            )
-            ((first, last),) = self._rows("SELECT MIN(timestamp), MAX(timestamp) FROM messages")
-            self.indexed = bool(
-                self._rows("SELECT 1 FROM sqlite_master WHERE name = 'timestamp_idx'")
-            )
+            self._read()
         except BaseException:
             self._database.close()
             raise
+
+    def _read(self) -> None:
+        try:
+            self._channels = self._read_channels()
+            counts = self._rows("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
+            ((first, last),) = self._rows("SELECT MIN(timestamp), MAX(timestamp) FROM messages")
+            indexes = self._rows("SELECT 1 FROM sqlite_master WHERE name = 'timestamp_idx'")
+        except BagError as error:
+            # With this, SQLite reads a file that has less pages than its header says.
+            self._database.execute("PRAGMA writable_schema = ON")
+            try:
+                self._channels = self._read_channels()
+            except BagError:
+                raise error from None
+            self.problems = (error,)
+            self._damage = self._find_rows()
+            stamps = [stamp for stamp, _, _ in self._damage]
+            counts = list(Counter(key for _, key, _ in self._damage).items())
+            first, last, indexes = min(stamps, default=0), max(stamps, default=0), []
+        self._counts: dict[int, int] = dict(counts)
         self.start: int = first or 0
         self.end: int = last or 0
+        self.indexed = bool(indexes)
+
+    def _find_rows(self) -> list[tuple[int, int, int]]:
+        """Return stamp, topic and place of the messages before and after what is damaged."""
+        found: set[tuple[int, int, int]] = set()
+        for order in ("ASC", "DESC"):
+            query = (
+                "SELECT timestamp, topic_id, id FROM messages NOT INDEXED"  # noqa: S608  # no values
+                f" ORDER BY id {order}"
+            )
+            try:
+                for row in self._database.execute(query):
+                    if all(isinstance(one, int) for one in row) and row[1] in self._channels:
+                        found.add(row)
+            except sqlite3.Error:
+                continue  # the problem has been noted
+        return sorted(found)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -178,13 +210,18 @@ class SqliteReader:
             BagError: The file is damaged.
         """
         keys = [key for key, one in self._channels.items() if topics is None or one.topic in topics]
+        limits = (start or 0, (1 << 63) - 1 if end is None else end)
+        if self._damage is not None:
+            rows = [row for row in self._damage if limits[0] <= row[0] <= limits[1]]
+            chosen = [row for row in rows if row[1] in keys]
+            yield from self._fetch(reversed(chosen) if reverse else chosen, damaged)
+            return
         order = "DESC" if reverse else "ASC"
         query = (
             "SELECT topic_id, timestamp, data FROM messages"  # noqa: S608  # values are parameters
             f" WHERE topic_id IN ({','.join('?' * len(keys))}) AND timestamp BETWEEN ? AND ?"
             f" ORDER BY timestamp {order}, id {order}"
         )
-        limits = (start or 0, (1 << 63) - 1 if end is None else end)
         try:
             for key, stamp, data in self._database.execute(query, (*keys, *limits)):
                 yield Entry(self._channels[key], stamp, data)
@@ -193,6 +230,22 @@ class SqliteReader:
             if damaged is None:
                 raise problem from error
             damaged(problem)
+
+    def _fetch(
+        self, rows: Iterable[tuple[int, int, int]], damaged: DamageReport | None
+    ) -> Iterator[Entry]:
+        """Yield messages one by one, of a file that is damaged."""
+        for stamp, key, place in rows:
+            try:
+                query = "SELECT data FROM messages WHERE id = ?"
+                ((data,),) = self._database.execute(query, (place,))
+            except (sqlite3.Error, ValueError) as error:
+                problem = BagError(f"damaged: message {place}: {error}", str(self.path))
+                if damaged is None:
+                    raise problem from error
+                damaged(problem)
+            else:
+                yield Entry(self._channels[key], stamp, data)
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield nothing: the format has no files within."""

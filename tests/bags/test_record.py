@@ -191,11 +191,11 @@ def test_npm_reads_the_same(network: Network) -> None:
     if done.returncode:
         pytest.skip(f"npm cannot install @mcap/core: {done.stderr[-200:]}")
     node = network.node("talker")
-    topics = ["/string", "/image", "/cloud"]
+    topics = [*MESSAGES]
     for topic in topics:
         node.publisher(topic, type(MESSAGES[topic]), latch=True).publish(MESSAGES[topic])
     with recording(network, "a.mcap", *topics) as made:
-        made.wait_for_count(3)
+        made.wait_for_count(len(topics))
     (folder / "read.js").write_text(NODE_SCRIPT)
     read = subprocess.run(
         ["node", "read.js", str(made.files.done[0])],
