@@ -149,10 +149,6 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros2.rclpy.program": "get_default_context get_rmw_implementation_identifier ok"
         " remove_ros_args shutdown try_shutdown"
     },
-    "rosbag.bag": {
-        "ros1.rosbag": "Bag BagMessage BagMessageWithConnectionHeader Compression ROSBagException"
-        " ROSBagFormatException ROSBagUnindexedException"
-    },
     "rosgraph.rosenv": {
         "ros1.rosgraph.names": "DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP ROS_IPV6"
         " ROS_MASTER_URI ROS_NAMESPACE get_master_uri"
@@ -248,7 +244,6 @@ _NEEDS_TCPROS = (
     " set_topic_manager TCPROSHandler TCPROSTransport"
 )
 _REASONS = {
-    "rosbagmain": "run 'rosz bag'",
     "start_node": "use rospy.init_node()",
     **dict.fromkeys(_NEEDS_MASTER.split(), _NO_MASTER),
     **dict.fromkeys(_NEEDS_TCPROS.split(), _NO_TCPROS),

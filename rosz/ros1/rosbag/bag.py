@@ -1,8 +1,7 @@
-"""rosbag: bags for ROS 1's scripts (ROS wiki, rosbag/Code API).
+"""rosbag.bag: bags for ROS 1's scripts (ROS wiki, rosbag/Code API).
 
 Bags of MCAP and rosbag2 are read as well; a name that ends in ``.mcap`` is written as MCAP. The
-position in a raw message is None, and ``rosbag.migration`` is missing: messages are converted to
-the types here as they are read, where the fields fit.
+position in a raw message is None. Bags are neither encrypted nor decrypted.
 """
 
 from __future__ import annotations
@@ -27,6 +26,14 @@ from rosz.errors import BagError, BagUnindexed, UsageError
 from rosz.names import short_type
 from rosz.qos import LATCHED
 from rosz.ros1.importer import type_store
+from rosz.ros1.rosbag.exceptions import (
+    Compression,
+    ROSBagEncryptException,
+    ROSBagEncryptNotSupportedException,
+    ROSBagException,
+    ROSBagFormatException,
+    ROSBagUnindexedException,
+)
 from rosz.ros1.rosgraph.names import canonicalize_name
 from rosz.ros1.rospy import Time
 
@@ -35,6 +42,8 @@ __all__ = (
     "BagMessage",
     "BagMessageWithConnectionHeader",
     "Compression",
+    "ROSBagEncryptException",
+    "ROSBagEncryptNotSupportedException",
     "ROSBagException",
     "ROSBagFormatException",
     "ROSBagUnindexedException",
@@ -43,45 +52,12 @@ __all__ = (
 _CHUNK = 768 * 1024
 _CLOSED = "I/O operation on closed bag"
 _MODES = ("r", "w", "a")
+_NO_ENCRYPTOR = "rosbag/NoEncryptor"
 
 BagMessage = namedtuple("BagMessage", "topic message timestamp")  # noqa: PYI024  # as in ROS 1
 BagMessageWithConnectionHeader = namedtuple(  # noqa: PYI024  # as in ROS 1
     "BagMessageWithConnectionHeader", "topic message timestamp connection_header"
 )
-
-
-class ROSBagException(Exception):
-    """A bag cannot be read or written.
-
-    Attributes:
-        value: The reason.
-    """
-
-    def __init__(self, value: str | None = None) -> None:
-        super().__init__(value)
-        self.value = value
-
-    def __str__(self) -> str:
-        return str(self.value)
-
-
-class ROSBagFormatException(ROSBagException):
-    """A bag is damaged."""
-
-
-class ROSBagUnindexedException(ROSBagException):
-    """A bag has no index."""
-
-    def __init__(self, *_args: object) -> None:
-        super().__init__("Unindexed bag")
-
-
-class Compression:
-    """Names of compressions."""
-
-    NONE = "none"
-    BZ2 = "bz2"
-    LZ4 = "lz4"
 
 
 _COMPRESSIONS = (Compression.NONE, Compression.BZ2, Compression.LZ4)
@@ -113,6 +89,8 @@ def _translated() -> Iterator[None]:
     except BagUnindexed as error:
         raise ROSBagUnindexedException from error
     except BagError as error:
+        if error.reason.startswith("encrypted"):
+            raise ROSBagEncryptNotSupportedException(str(error)) from error
         kind = ROSBagFormatException if error.reason.startswith("damaged") else ROSBagException
         raise kind(str(error)) from error
 
@@ -163,6 +141,7 @@ class Bag:
         self._writer: BagWriter | None = None
         self._handles: dict[str, tuple[int, bool]] = {}
         self._temporary: Path | None = None
+        self._stream: Any = None
         self._closed = False
         self._filename: str | None = os.fspath(f) if isinstance(f, str | os.PathLike) else None
         path = Path(self._filename) if self._filename is not None else self._spool(f)
@@ -174,15 +153,18 @@ class Bag:
                 self._open_writer(allow_unindexed)
 
     def _spool(self, stream: Any) -> Path:
-        """Return a file with the contents of a stream."""
-        if self._mode != "r" or isinstance(stream, io.TextIOBase):
-            raise ROSBagException("In Python 3 the bag file must be opened in binary mode, to read")
+        """Return a file with the contents of a stream, or for what is written to one."""
+        if self._mode == "a" or isinstance(stream, io.TextIOBase):
+            raise ROSBagException("In Python 3 the bag file must be opened in binary mode")
         name = getattr(stream, "name", None)
-        if isinstance(name, str) and Path(name).is_file():
+        if self._mode == "r" and isinstance(name, str) and Path(name).is_file():
             self._filename = name
             return Path(name)
         with tempfile.NamedTemporaryFile(prefix="rosz-bag-", suffix=".bag", delete=False) as file:
-            shutil.copyfileobj(stream, file)
+            if self._mode == "r":
+                shutil.copyfileobj(stream, file)
+            else:
+                self._stream = stream
         self._temporary = Path(file.name)
         return self._temporary
 
@@ -284,8 +266,15 @@ class Bag:
                 yield self._reader
                 return
             self.flush()
-            with open_reader(self._written) as reader:
-                yield reader
+            if self._written.stat().st_size:
+                with open_reader(self._written) as reader:
+                    yield reader
+                return
+            # Nothing has been written, so there is no file header either.
+            with tempfile.TemporaryDirectory(prefix="rosz-bag-") as folder:
+                create_file(Path(folder, "empty.bag")).close()
+                with open_reader(Path(folder, "empty.bag")) as reader:
+                    yield reader
 
     @property
     def _written(self) -> Path:
@@ -504,6 +493,22 @@ class Bag:
         )
         return self._writer.add(channel), cdr
 
+    def set_encryptor(self, encryptor: str | None = None, param: str | None = None) -> None:
+        """Choose no encryption; there is no other choice.
+
+        Args:
+            encryptor: ``rosbag/NoEncryptor``, or None.
+            param: Ignored.
+
+        Raises:
+            ROSBagEncryptNotSupportedException: Another encryption is chosen.
+        """
+        del param
+        if encryptor not in {None, _NO_ENCRYPTOR}:
+            raise ROSBagEncryptNotSupportedException(
+                f"rosz does not encrypt bags, got '{encryptor}'; 'rosbag encrypt' of ROS 1 does"
+            )
+
     def flush(self) -> None:
         """Write everything so far to the file.
 
@@ -530,7 +535,11 @@ class Bag:
         if self._writer is not None:
             with _translated():
                 self._writer.close()
-            if self._temporary is not None:
+            if self._stream is not None:
+                with self._path.open("rb") as file, self._stream:
+                    shutil.copyfileobj(file, self._stream)
+                self._path.unlink()
+            elif self._temporary is not None:
                 self._temporary.replace(self._path)
         elif self._temporary is not None:
             self._temporary.unlink()
