@@ -22,6 +22,7 @@ COMMANDS = {
     "bag": "record and play bags, show, change and repair them",
     "service": "list and call services",
     "action": "list actions, and send goals to them",
+    "tf": "list, print, watch and publish transforms",
     "node": "list, inspect, ping and kill nodes",
     "msg": "show message types",
     "srv": "show service types",

@@ -1,11 +1,28 @@
 """Transforms between coordinate frames, from ``/tf`` and ``/tf_static`` (REP 105).
 
 `poses` is the arithmetic and `buffer` the tree of frames over time; both are pure. `topics`
-connects them to a node. May import nodes and everything below them.
+connects them to a node, and `monitor` keeps account of what arrives. May import nodes and
+everything below them.
 """
 
 from rosz.transforms.buffer import Buffer
-from rosz.transforms.poses import IDENTITY, Pose, compose, invert, rotate
+from rosz.transforms.monitor import (
+    BroadcasterReport,
+    FrameReport,
+    Monitor,
+    tree_as_dot,
+    tree_as_text,
+)
+from rosz.transforms.poses import (
+    IDENTITY,
+    Pose,
+    compose,
+    describe_pose,
+    from_rpy,
+    invert,
+    rotate,
+    to_rpy,
+)
 from rosz.transforms.topics import (
     StaticTransformBroadcaster,
     TransformBroadcaster,
@@ -15,13 +32,21 @@ from rosz.transforms.topics import (
 
 __all__ = (
     "IDENTITY",
+    "BroadcasterReport",
     "Buffer",
+    "FrameReport",
+    "Monitor",
     "Pose",
     "StaticTransformBroadcaster",
     "TransformBroadcaster",
     "TransformListener",
     "compose",
+    "describe_pose",
+    "from_rpy",
     "invert",
     "pose_of",
     "rotate",
+    "to_rpy",
+    "tree_as_dot",
+    "tree_as_text",
 )

@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
-__all__ = ("IDENTITY", "Pose", "Quaternion", "Vector", "compose", "interpolate", "invert", "rotate")
+__all__ = (
+    "IDENTITY",
+    "Pose",
+    "Quaternion",
+    "Vector",
+    "compose",
+    "describe_pose",
+    "from_rpy",
+    "interpolate",
+    "invert",
+    "rotate",
+    "to_rpy",
+)
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -83,3 +96,52 @@ def interpolate(before: Pose, after: Pose, fraction: float) -> Pose:
     late = sign * math.sin(fraction * angle) / math.sin(angle)
     x, y, z, w = (early * p + late * q for p, q in zip(one, two, strict=True))
     return Pose(middle, (x, y, z, w))
+
+
+def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Return the rotation about the fixed axes x, y and z, in this order; angles in radians."""
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def to_rpy(rotation: Quaternion) -> tuple[float, float, float]:
+    """Return the angles about the fixed axes x, y and z, in radians.
+
+    Where the pitch is a right angle, only the sum of roll and yaw is known, and the yaw is 0.
+    """
+    x, y, z, w = rotation
+    sine = 2.0 * (w * y - z * x)
+    if abs(sine) >= _NEARLY_ONE:
+        return (2.0 * math.atan2(x, w), math.copysign(math.pi / 2, sine), 0.0)
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return roll, math.asin(sine), yaw
+
+
+def describe_pose(pose: Pose, stamp: int, precision: int = 3) -> list[str]:
+    """Return the lines that tf_echo prints about a pose.
+
+    Args:
+        pose: The pose.
+        stamp: Its time in nanoseconds.
+        precision: Number of digits behind the point.
+    """
+
+    def listed(numbers: Iterable[float]) -> str:
+        return f"[{', '.join(f'{number:.{precision}f}' for number in numbers)}]"
+
+    angles = to_rpy(pose.rotation)
+    return [
+        f"At time {stamp / 1e9:.{precision}f}",
+        f"- Translation: {listed(pose.translation)}",
+        f"- Rotation: in Quaternion {listed(pose.rotation)}",
+        f"            in RPY (radian) {listed(angles)}",
+        f"            in RPY (degree) {listed(map(math.degrees, angles))}",
+    ]

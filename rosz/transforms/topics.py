@@ -5,16 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 from copy import deepcopy
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from rosz.errors import TransformArgument
+from rosz.graph import View
 from rosz.msgs.tf2_msgs.msg import TFMessage
-from rosz.node import Node
+from rosz.node import MessageInfo, Node
 from rosz.qos import QoS
 from rosz.transforms.buffer import Buffer
 from rosz.transforms.poses import Pose
+from rosz.wire import format_token, gid
 
-__all__ = ("StaticTransformBroadcaster", "TransformBroadcaster", "TransformListener", "pose_of")
+__all__ = (
+    "Observe",
+    "StaticTransformBroadcaster",
+    "TransformBroadcaster",
+    "TransformListener",
+    "pose_of",
+)
 
 _QUEUE = QoS(depth=100)
 _STATIC_PUBLISHER = QoS(depth=1, durability="transient_local")
@@ -64,6 +72,13 @@ def pose_of(transform: Any) -> Pose:
     return Pose((t.x, t.y, t.z), (r.x, r.y, r.z, r.w))
 
 
+class Observe(Protocol):
+    """A function that is called with the transforms of each message, after they are stored."""
+
+    def __call__(self, transforms: list[Any], authority: str, /, *, static: bool) -> object:
+        """Take the transforms, and the full name of the node that published them."""
+
+
 class TransformListener:
     """Receive transforms and put them into a buffer, until closed.
 
@@ -72,18 +87,26 @@ class TransformListener:
     Args:
         buffer: Buffer to fill.
         node: Node of the subscriptions.
+        observe: Function called with the transforms that come.
     """
 
-    def __init__(self, buffer: Buffer, node: Node) -> None:
+    def __init__(self, buffer: Buffer, node: Node, observe: Observe | None = None) -> None:
         self.buffer: Buffer = buffer
         self._node = node
+        self._observe = observe
+        self._topics = tuple(map(node.resolve, ("/tf", "/tf_static")))
+        self._authorities: dict[bytes, str] = {}
+        self._view: View | None = None
         self._remove_hook = node.clock.on_jump(lambda _: buffer.clear())
         self._subscriptions = [
-            node.subscription(topic, TFMessage, partial(self._receive, static=static), qos=qos)
+            node.subscription(
+                topic, TFMessage, partial(self._receive, static=static), qos=qos, with_info=True
+            )
             for topic, static, qos in (("/tf", False, _QUEUE), ("/tf_static", True, _STATIC_QUEUE))
         ]
 
-    def _receive(self, message: TFMessage, *, static: bool) -> None:
+    def _receive(self, message: TFMessage, info: MessageInfo, *, static: bool) -> None:
+        authority = self._authority(info.gid)
         for one in message.transforms:
             stamp = one.header.stamp.sec * 10**9 + one.header.stamp.nanosec
             try:
@@ -93,9 +116,24 @@ class TransformListener:
                     stamp,
                     pose_of(one.transform),
                     static=static,
+                    authority=authority,
                 )
             except TransformArgument as error:
                 self._node.log.warning("%s", error, throttle_identical=10.0)
+        if self._observe is not None:
+            self._observe(message.transforms, authority, static=static)
+
+    def _authority(self, publisher: bytes) -> str:
+        """Return the full name of the node of a publisher; empty if it is not known."""
+        authority = self._authorities.get(publisher)
+        if authority is not None:
+            return authority
+        view = self._node.context.graph.view()
+        if view is not self._view:  # a GID is computed from a token, which takes time
+            self._view = view
+            tokens = (token for topic in self._topics for token in view.publishers(topic))
+            self._authorities = {gid(format_token(token)): token.node_name for token in tokens}
+        return self._authorities.get(publisher, "")
 
     def close(self) -> None:
         """Close the subscriptions."""

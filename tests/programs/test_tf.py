@@ -1,0 +1,139 @@
+"""The programs of tf, tf2_ros and tf2_tools, and rosz tf."""
+
+from __future__ import annotations
+
+import math
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from network import TIMEOUT, Network, Program, eventually
+
+from rosz.errors import UsageError
+from rosz.msgs.tf2_msgs.msg import TFMessage
+from rosz.programs.tf import parse_transform
+from rosz.qos import QoS
+from rosz.transforms import (
+    Buffer,
+    FrameReport,
+    Monitor,
+    TransformListener,
+    from_rpy,
+    to_rpy,
+    tree_as_dot,
+    tree_as_text,
+)
+
+ANGLES = st.floats(-3.1, 3.1)
+
+
+def start(network: Network, *words: str) -> Program:
+    return network.run("-P", "-m", "rosz", *words)
+
+
+@given(ANGLES, st.floats(-1.5, 1.5), ANGLES)
+def test_angles_and_back(roll: float, pitch: float, yaw: float) -> None:
+    back = to_rpy(from_rpy(roll, pitch, yaw))
+    assert back == pytest.approx((roll, pitch, yaw), abs=1e-6)
+
+
+def test_an_upright_pitch() -> None:
+    roll, pitch, yaw = to_rpy(from_rpy(0.25, math.pi / 2, 0.0))
+    assert math.isclose(roll, 0.25, abs_tol=1e-6)
+    assert math.isclose(pitch, math.pi / 2)
+    assert yaw == 0.0
+
+
+def test_both_forms_of_a_transform() -> None:
+    euler = parse_transform(["1", "2", "3", "1.5707963", "0", "0", "map", "base"])
+    given_ = parse_transform(["1", "2", "3", "0", "0", "0.70710678", "0.70710678", "map", "base"])
+    for one in (euler, given_):
+        assert (one.header.frame_id, one.child_frame_id) == ("map", "base")
+        assert one.transform.translation.z == 3.0
+        assert math.isclose(one.transform.rotation.z, math.sqrt(0.5), abs_tol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["1", "2"], "got 2 arguments, expected 8 or 9"),
+        (["1", "2", "x", "0", "0", "0", "a", "b"], "expected a number"),
+        (["1", "2", "3", "0", "0", "0", "a", "a"], "both 'a'"),
+    ],
+)
+def test_what_is_no_transform(words: list[str], text: str) -> None:
+    with pytest.raises(UsageError, match=text):
+        parse_transform(words)
+
+
+def report(frame: str, parent: str, **more: Any) -> FrameReport:
+    values = {"node": "/n", "static": True, "rate": 0.0, "mean_delay": 0.0, "max_delay": 0.0}
+    return FrameReport(frame, parent, **{**values, **more})
+
+
+def test_trees() -> None:
+    frames = [report("odom", "map"), report("base", "odom"), report("arm", "base")]
+    assert tree_as_text(frames) == ["map", "  odom", "    base", "      arm"]
+    assert tree_as_text([report("a", "b"), report("b", "a")]) == ["a (in a loop)", "b (in a loop)"]
+    assert '"map" -> "odom" [label="Broadcaster: /n' in tree_as_dot(frames, 5.0)
+
+
+def test_publishers_listeners_and_commands(network: Network) -> None:
+    words = ["0", "0", "0.5", "0", "0", "0.1", "base", "laser"]
+    static = start(network, "run", "tf2_ros", "static_transform_publisher", *words)
+    words = ["1", "0", "0", "1.5707963", "0", "0", "map", "base", "20"]
+    moving = start(network, "run", "tf", "static_transform_publisher", *words, "__name:=mover")
+    monitor = Monitor(network.node("watcher"))
+    eventually(lambda: not monitor.buffer.why_not("map", "laser"), "the transforms")
+    eventually(lambda: all(one.node for one in monitor.frames()), "the names of the broadcasters")
+    found = {one.frame: one for one in monitor.frames()}
+    assert found["laser"].static
+    assert found["laser"].node.startswith("/static_transform_publisher_")
+    assert not found["base"].static
+    assert found["base"].node == "/mover"
+    pose, _ = monitor.buffer.lookup("map", "laser")
+    assert all(map(math.isclose, pose.translation, (1.0, 0.0, 0.5)))
+
+    echo = start(network, "run", "tf", "tf_echo", "map", "laser", "50")
+    echo.wait_for("- Translation: [1.000, 0.000, 0.500]")
+    echo.wait_for("            in RPY (degree) [5.730, 0.000, 90.000]")
+    command = start(network, "tf", "echo", "-n", "1", "map", "laser")
+    assert command.exit_code() == 0, command.output
+    assert command.lines[1] == "- Translation: [1.000, 0.000, 0.500]"
+    tree = start(network, "tf", "tree")
+    assert tree.exit_code() == 0, tree.output
+    assert tree.lines == ["map", "  base", "    laser"]
+    watch = start(network, "run", "tf", "tf_monitor")
+    watch.wait_for("Frame: base published by /mover Average Delay: ")
+    for program in (static, moving):
+        assert program.process.poll() is None, program.output
+
+
+def test_publish_command_reaches_late_listeners(network: Network) -> None:
+    late = network.node("late")
+    program = start(network, "tf", "publish", "1", "2", "3", "0", "0", "0", "map", "camera")
+    program.wait_for("publishing camera in map")
+    buffer = Buffer()
+    listener = TransformListener(buffer, late)
+    eventually(lambda: not buffer.why_not("map", "camera"), "the transform")
+    assert buffer.lookup("map", "camera")[0].translation == (1.0, 2.0, 3.0)
+    listener.close()
+
+
+def test_the_program_of_tf_dates_ahead(network: Network) -> None:
+    node = network.node("watcher")
+    seen: SimpleQueue[TFMessage] = SimpleQueue()
+    node.subscription("/tf", TFMessage, seen.put, qos=QoS(depth=100))
+    words = ["0", "0", "0", "0", "0", "0", "a", "b", "60000"]
+    start(network, "run", "tf", "static_transform_publisher", *words)
+    stamp = seen.get(timeout=TIMEOUT).transforms[0].header.stamp.to_nsec()
+    assert stamp > node.now() + 20 * 10**9
+
+
+def test_wrong_words(network: Network) -> None:
+    for words in (["tf", "static_transform_publisher", "1"], ["tf", "tf_echo", "a", "b", "0"]):
+        program = start(network, "run", *words)
+        assert program.exit_code() == 1
+        assert "usage: " in program.output
