@@ -73,7 +73,6 @@ _PACKAGES = {
     "joint_state_publisher_gui": "publish sensor_msgs/JointState, or use 'rosz topic pub'",
     "move_base": _of_ros2("nav2_bringup"),
     "nodelet": "write the nodes as nodes: those of one machine can share memory (ROSZ_SHM)",
-    "robot_state_publisher": _of_ros2("robot_state_publisher"),
     "roscpp": "rosz has no C++ API; " + _of_ros2("rclcpp"),
     "roscpp_tutorials": "'rosz run rosz_tutorials publisher.py' is a talker in Python",
     "rospy_tutorials": "'rosz run rosz_tutorials publisher.py' and subscriber.py talk and listen",

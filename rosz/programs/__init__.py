@@ -5,6 +5,13 @@ them. They are public modules, because each is loaded alone. May import everythi
 line.
 """
 
-PUBLIC_MODULES = ("joint_state_publisher", "map_server", "teleop_twist_keyboard", "tf", "xacro")
+PUBLIC_MODULES = (
+    "joint_state_publisher",
+    "map_server",
+    "robot_state_publisher",
+    "teleop_twist_keyboard",
+    "tf",
+    "xacro",
+)
 
 __all__ = ()
