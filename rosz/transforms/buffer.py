@@ -90,25 +90,27 @@ class History:
         """The newest place."""
         return self._places[-1]
 
-    def at(self, stamp: int) -> Place:
-        """Return the place at a time, interpolated if necessary.
+    def at(self, stamp: int) -> tuple[str, Pose]:
+        """Return the parent and the pose at a time, interpolated if necessary.
 
         Raises:
             ExtrapolationNeeded: The time is before or after all known places.
         """
         if self.static:
             return self._places[0]
-        after = bisect_right(self._stamps, stamp)
-        if after and self._stamps[after - 1] == stamp:
-            return self._places[after - 1]
-        if after in {0, len(self._stamps)}:
+        stamps, places = self._stamps, self._places
+        after = bisect_right(stamps, stamp)
+        if after and stamps[after - 1] == stamp:
+            return places[after - 1]
+        if after in {0, len(stamps)}:
             raise ExtrapolationNeeded(self._beyond(stamp))
-        before = after - 1
-        one, two = self._places[before], self._places[after]
-        if one.parent != two.parent:
-            return one
-        began, ended = self._stamps[before], self._stamps[after]
-        return Place(one.parent, interpolate(one.pose, two.pose, (stamp - began) / (ended - began)))
+        parent, pose = places[after - 1]
+        parent_after, pose_after = places[after]
+        if parent != parent_after:
+            return parent, pose
+        began = stamps[after - 1]
+        fraction = (stamp - began) / (stamps[after] - began)
+        return parent, interpolate(pose, pose_after, fraction)
 
     def _beyond(self, stamp: int) -> str:
         first, last = self._stamps[0], self._stamps[-1]
@@ -264,14 +266,15 @@ class Buffer:
             if target == source:
                 history = self._frames.get(target)
                 return 0 if history is None else history.latest
-            up = list(self._upwards(source))
-            above = {frame: number for number, (frame, _) in enumerate(up)}
-            stamps: list[int] = []
-            for frame, latest in self._upwards(target):
-                if frame in above:
-                    stamps += [stamp for _, stamp in up[: above[frame]]]
-                    return min((stamp for stamp in stamps if stamp), default=0)
-                stamps.append(latest)
+            # Each frame from the source upwards, with the latest time of what is below it.
+            below: dict[str, int] = {}
+            for frame, latest in self._latest_upwards(source):
+                if frame == target:
+                    return latest
+                below[frame] = latest
+            for frame, latest in self._latest_upwards(target):
+                if frame in below:
+                    return min(filter(None, (latest, below[frame])), default=0)
             raise _unconnected(target, source)
 
     def why_not(self, target: str, source: str, stamp: int = 0) -> str:
@@ -337,6 +340,23 @@ class Buffer:
                 f'"{name}" passed to lookupTransform argument {role} does not exist. '
             )
 
+    def _latest_upwards(self, frame: str) -> Iterator[tuple[str, int]]:
+        """Yield the frames from a frame up to the root, each with the latest known time.
+
+        That is the latest one at which the pose of the first frame in it is known; 0 for any time.
+        """
+        frames, latest = self._frames, 0
+        for _ in range(_MAX_DEPTH):
+            yield frame, latest
+            history = frames.get(frame)
+            if history is None:
+                return
+            newest = history.latest
+            if newest and (newest < latest or not latest):
+                latest = newest
+            frame = history.newest.parent
+        raise TransformError(_LOOP)
+
     def _upwards(self, frame: str) -> Iterator[tuple[str, int]]:
         """Yield the frames from a frame up to the root with their latest times; 0 for the root."""
         for _ in range(_MAX_DEPTH):
@@ -348,31 +368,35 @@ class Buffer:
             frame = history.newest.parent
         raise TransformError(_LOOP)
 
+    def _poses_upwards(self, frame: str, stamp: int) -> Iterator[tuple[str, Pose]]:
+        """Yield the frames from a frame up to the root, each with the pose of the first in it."""
+        frames, pose = self._frames, IDENTITY
+        for _ in range(_MAX_DEPTH):
+            yield frame, pose
+            history = frames.get(frame)
+            if history is None:
+                return
+            frame, step = history.at(stamp)
+            pose = step if pose is IDENTITY else compose(step, pose)
+        raise TransformError(_LOOP)
+
     def _walk(self, target: str, source: str, stamp: int) -> Pose:
         """Go up from both frames to their common ancestor."""
         below: dict[str, Pose] = {}
         beyond = ""
-        for way, start, end in ((0, source, target), (1, target, source)):
-            frame, pose = start, IDENTITY
-            for _ in range(_MAX_DEPTH):
-                if way and frame in below:
+        try:
+            for frame, pose in self._poses_upwards(source, stamp):
+                if frame == target:
+                    return pose
+                below[frame] = pose
+        except ExtrapolationNeeded as error:
+            beyond = str(error)
+        try:
+            for frame, pose in self._poses_upwards(target, stamp):
+                if frame in below:
                     return compose(invert(pose), below[frame])
-                if not way:
-                    below[frame] = pose
-                    if frame == end:
-                        return pose
-                history = self._frames.get(frame)
-                if history is None:
-                    break
-                try:
-                    place = history.at(stamp)
-                except ExtrapolationNeeded as error:
-                    beyond = str(error)  # the last one counts, as in tf2
-                    break
-                pose = compose(place.pose, pose)
-                frame = place.parent
-            else:
-                raise TransformError(_LOOP)
+        except ExtrapolationNeeded as error:
+            beyond = str(error)  # the last one counts, as in tf2
         if beyond:
             raise ExtrapolationNeeded(
                 f"{beyond}, when looking up transform from frame [{source}] to frame [{target}]"

@@ -34,18 +34,10 @@ class Pose(NamedTuple):
     rotation: Quaternion
 
 
+_new_pose = tuple.__new__
+"""Makes a pose without the checks of its class."""
+
 IDENTITY = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-
-
-def _multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
 
 
 def rotate(rotation: Quaternion, vector: Vector) -> Vector:
@@ -63,9 +55,26 @@ def rotate(rotation: Quaternion, vector: Vector) -> Vector:
 
 def compose(outer: Pose, inner: Pose) -> Pose:
     """Return the pose that applies the inner one first, then the outer one."""
-    ox, oy, oz = outer.translation
-    ix, iy, iz = rotate(outer.rotation, inner.translation)
-    return Pose((ox + ix, oy + iy, oz + iz), _multiply(outer.rotation, inner.rotation))
+    # `rotate` and the product of quaternions, written out: look-ups call this for each frame.
+    (px, py, pz), (ax, ay, az, aw) = outer
+    (vx, vy, vz), (bx, by, bz, bw) = inner
+    tx, ty, tz = 2.0 * (ay * vz - az * vy), 2.0 * (az * vx - ax * vz), 2.0 * (ax * vy - ay * vx)
+    return _new_pose(
+        Pose,
+        (
+            (
+                px + vx + aw * tx + ay * tz - az * ty,
+                py + vy + aw * ty + az * tx - ax * tz,
+                pz + vz + aw * tz + ax * ty - ay * tx,
+            ),
+            (
+                aw * bx + ax * bw + ay * bz - az * by,
+                aw * by - ax * bz + ay * bw + az * bx,
+                aw * bz + ax * by - ay * bx + az * bw,
+                aw * bw - ax * bx - ay * by - az * bz,
+            ),
+        ),
+    )
 
 
 def invert(pose: Pose) -> Pose:
@@ -84,18 +93,23 @@ def interpolate(before: Pose, after: Pose, fraction: float) -> Pose:
         after: Pose at fraction 1.
         fraction: Position between the two.
     """
-    (ax, ay, az), (bx, by, bz) = before.translation, after.translation
+    (ax, ay, az), (px, py, pz, pw) = before
+    (bx, by, bz), (qx, qy, qz, qw) = after
     middle = (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)
-    one, two = before.rotation, after.rotation
-    cosine = sum(p * q for p, q in zip(one, two, strict=True))
-    sign = 1.0 if cosine >= 0.0 else -1.0
-    if abs(cosine) > _NEARLY_ONE:
-        return Pose(middle, one)
+    cosine = px * qx + py * qy + pz * qz + pw * qw
+    if not -_NEARLY_ONE <= cosine <= _NEARLY_ONE:
+        return _new_pose(Pose, (middle, before.rotation))
     angle = math.acos(abs(cosine))
-    early = math.sin((1.0 - fraction) * angle) / math.sin(angle)
-    late = sign * math.sin(fraction * angle) / math.sin(angle)
-    x, y, z, w = (early * p + late * q for p, q in zip(one, two, strict=True))
-    return Pose(middle, (x, y, z, w))
+    sine = math.sin(angle)
+    early = math.sin((1.0 - fraction) * angle) / sine
+    late = math.sin(fraction * angle) / (sine if cosine >= 0.0 else -sine)
+    rotation = (
+        early * px + late * qx,
+        early * py + late * qy,
+        early * pz + late * qz,
+        early * pw + late * qw,
+    )
+    return _new_pose(Pose, (middle, rotation))
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
