@@ -375,6 +375,25 @@ def _rospy_log(level: int) -> Callable[..., None]:
 rospydebug, rospyinfo, rospywarn, rospyerr = (_rospy_log(level) for level in _ALL[:-1])
 
 
+_FROM_PYTHON = "rosz_from_python"
+
+
+class _ProgramHandlers(logging.Handler):
+    """Passes what rospy logs to handlers that the program adds to Python's logger ``rosout``."""
+
+    def handle(self, record: logging.LogRecord) -> bool:
+        """Pass a record on, unless Python's logger has done so; those handlers lock themselves."""
+        if hasattr(record, _FROM_PYTHON):
+            return False
+        logger: logging.Logger | None = logging.getLogger(record.name)
+        while logger is not None:
+            for handler in logger.handlers:
+                if record.levelno >= handler.level and not isinstance(handler, PythonLogHandler):
+                    handler.handle(record)
+            logger = logger.parent if logger.propagate else None
+        return True
+
+
 class PythonLogHandler(logging.Handler):
     """Passes what the program logs to Python's logger ``rosout`` to the log of the node."""
 
@@ -386,12 +405,15 @@ class PythonLogHandler(logging.Handler):
         child = record.name.removeprefix(_BASE).strip(".")
         log = node.log.child(child) if child else node.log
         if log.isEnabledFor(record.levelno):
+            setattr(record, _FROM_PYTHON, True)
             log.handle(record)
 
     @classmethod
     def install(cls, level: int) -> None:
         """Add a handler to the logger ``rosout``, with the level of the node."""
         python = logging.getLogger(_BASE)
+        if state.node is not None:
+            state.node.log.addHandler(_ProgramHandlers())
         if not any(isinstance(handler, cls) for handler in python.handlers):
             python.addHandler(cls())
             python.propagate = False

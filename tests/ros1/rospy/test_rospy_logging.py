@@ -180,3 +180,32 @@ def test_log_messages_name_the_topics_of_their_node(printed: Printed) -> None:
         """)[-1]
         == "complete"
     )
+
+
+def test_handlers_of_the_program(printed: Printed) -> None:
+    lines = printed("""
+        import logging
+        import sys
+        import rospy
+        rospy.init_node("logged")
+        rosout = logging.getLogger("rosout")
+        own = logging.StreamHandler(sys.stdout)
+        own.setFormatter(logging.Formatter("own %(name)s %(levelname)s %(message)s"))
+        own.setLevel(logging.WARNING)
+        rosout.addHandler(own)
+        rospy.logwarn("hot %s", 5)
+        rospy.loginfo("below its level")
+        rospy.logwarn("part", logger_name="arm")
+        logging.getLogger("rosout.leg").error("by Python")
+        for _ in range(2):
+            rospy.logwarn_once("once")
+        rosout.removeHandler(own)
+        rospy.logwarn("without it")
+        """)
+    assert [line for line in lines if line.startswith("own")] == [
+        "own rosout WARNING hot 5",
+        "own rosout.arm WARNING part",
+        "own rosout.leg ERROR by Python",
+        "own rosout WARNING once",
+    ]
+    assert len(lines) == 10
