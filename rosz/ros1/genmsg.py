@@ -21,6 +21,7 @@ __all__ = (
     "MsgNotFound",
     "is_legal_resource_base_name",
     "is_legal_resource_name",
+    "msgs",
     "names",
     "package_resource_name",
     "resource_name",
@@ -28,7 +29,8 @@ __all__ = (
     "resource_name_package",
 )
 
-names: ModuleType  # built by the importer
+msgs: ModuleType  # built by the importer, as the next one
+names: ModuleType
 
 SEP = PRN_SEPARATOR = "/"
 EXT_MSG = ".msg"

@@ -111,6 +111,12 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.dynamic_reconfigure": "DynamicReconfigureCallbackException"
         " DynamicReconfigureException DynamicReconfigureParameterException"
     },
+    "genmsg.msgs": {
+        "ros1.roslib.msg_types": "BUILTIN_TYPES COMMENTCHAR CONSTCHAR DURATION PRIMITIVE_TYPES TIME"
+        " bare_msg_type=base_msg_type is_builtin is_header_type is_valid_constant_type"
+        " is_valid_msg_field_name is_valid_msg_type parse_type resolve_type",
+        "ros1.genmsg": "EXT_MSG HEADER SEP InvalidMsgSpec",
+    },
     "genmsg.names": {"ros1.genmsg": f"PRN_SEPARATOR normalize_package_context {_NAMES}"},
     "genpy.dynamic": {"ros1.genpy": "generate_dynamic"},
     "genpy.message": {

@@ -1,4 +1,4 @@
-"""Names of field types as definitions spell them, for ``roslib.msgs`` (ROS wiki, roslib)."""
+"""Names of field types as definitions spell them, for ``roslib.msgs`` and ``genmsg.msgs``."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ RESERVED_TYPES = [*BUILTIN_TYPES, HEADER]
 _ARRAY = re.compile(r"(\[\d*\])*")
 
 
-class MsgSpecException(Exception):
+class MsgSpecException(ValueError):
     """A type of a field is not well-formed."""
 
 

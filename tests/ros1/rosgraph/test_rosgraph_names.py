@@ -106,6 +106,33 @@ def test_names_of_resources() -> None:
 
 
 @pytest.mark.ros1
+def test_types_of_fields() -> None:
+    same(
+        """
+        from genmsg import msgs
+        types = ["a", "int8[]", "p/T[3]", "Header", "Header[]", "time", "a[", "a[x]", "a[1][2]", ""]
+        def parsed(text):
+            try:
+                return msgs.parse_type(text)
+            except ValueError as error:
+                return str(error)
+        result = [
+            [parsed(text) for text in types],
+            [msgs.bare_msg_type(text) for text in types],
+            [msgs.resolve_type(text, "p") for text in types if text],
+            [msgs.is_valid_msg_type(text) for text in types + ["a[1]b", "a b"]],
+            [msgs.is_builtin(text) for text in types],
+            [msgs.is_header_type(text) for text in types],
+            [msgs.is_valid_constant_type(text) for text in types + ["string"]],
+            sorted(msgs.BUILTIN_TYPES),
+        ]
+        """,
+        "genmsg",
+        "python3-genmsg",
+    )
+
+
+@pytest.mark.ros1
 def test_addresses() -> None:
     assert network.get_local_addresses()
     assert network.is_local_address("127.0.0.1")
