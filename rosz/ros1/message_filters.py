@@ -181,10 +181,10 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             return
         with self.lock:
             self._reset_after_jump(my_queue, my_queue_index)
-            self._reset_all_after_jump()
             own = stamp.to_nsec()
             self._put(my_queue, own, msg)
-            if own not in my_queue:  # older than all that wait
+            self._reset_all_after_jump()  # as in ROS 1, with the message that shows the jump
+            if own not in my_queue:  # older than all that wait, or before a jump
                 return
             index = next(i for i, queue in enumerate(self.queues) if queue is my_queue)
             found = self._match(own, index)

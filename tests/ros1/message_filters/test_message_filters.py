@@ -130,6 +130,28 @@ result += heard + [
     )
 
 
+@pytest.mark.ros1
+def test_a_jump_of_time_clears_the_queues(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    same(
+        _SETUP
+        + """
+sync = message_filters.ApproximateTimeSynchronizer(sources[:2], 5, 0.1)
+sync.registerCallback(callback)
+kept = []
+for number, now in enumerate((10, 11, 10.5, 12)):
+    rospy.rostime._set_rostime(Time.from_sec(now))
+    for source in sources[:2]:
+        source.signalMessage(Stamped(str(number), number))
+        kept.append([len(queue) for queue in sync.queues])
+rospy.rostime.switch_to_wallclock()
+result = [heard, kept]
+""",
+        "message_filters, rospy",
+        "python3-message-filters",
+    )
+
+
 def test_subscribers(network: Network) -> None:
     program = network.program(
         """
