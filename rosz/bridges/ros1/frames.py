@@ -85,7 +85,7 @@ class FrameReader:
 
     def __init__(self, limit: int = MAX_HEADER) -> None:
         self.limit = limit
-        self._storage = bytearray(_PIECE)
+        self._storage = bytearray()
         self._begin = 0
         self._end = 0
 
@@ -130,6 +130,6 @@ class FrameReader:
         """Move what is left to the beginning of a storage with space."""
         left = self._end - self._begin
         size = len(self._storage) if left <= len(self._storage) // 2 else 2 * left
-        storage = bytearray(size)
+        storage = bytearray(max(size, _PIECE))
         storage[:left] = memoryview(self._storage)[self._begin : self._end]
         self._storage, self._begin, self._end = storage, 0, left

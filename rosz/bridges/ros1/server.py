@@ -56,6 +56,8 @@ class Server:
 
     def __init__(self, loop: SocketLoop, host: str, port: int) -> None:
         self.loop = loop
+        # For all connections: one at a time is read, and nothing of it stays there.
+        self.piece = bytearray(_PIECE)
         self.dispatch: Dispatch
         self.connect: Callable[[Incoming, dict[str, str]], object]
         self.calls: Worker[Callable[[], object]] = Worker(
@@ -140,7 +142,6 @@ class Incoming:
 
     def __init__(self, server: Server, sock: socket.socket) -> None:
         self._server = server
-        self._piece = bytearray(_PIECE)
         self._first = b""
         self._calls: CallReader | None = None
         self._frames: FrameReader | None = None
@@ -150,11 +151,11 @@ class Incoming:
 
     def space(self) -> memoryview:
         """Return where the next bytes belong."""
-        return memoryview(self._piece)
+        return memoryview(self._server.piece)
 
     def received(self, count: int) -> None:
         """Read calls, or the header."""
-        data = memoryview(self._piece)[:count]
+        data = memoryview(self._server.piece)[:count]
         if self._calls is None and self._frames is None:
             self._first += data
             if len(self._first) < len(_POST):
