@@ -344,19 +344,27 @@ class Player:
 
     def _rush(self, entries: Iterable[Entry]) -> None:
         """Publish messages at once; those that nobody would receive are only counted."""
-        heard: dict[int, bool] = {}
+        # The publisher of each channel, None where nobody would receive it, and its conversion.
+        known: dict[int, tuple[Callable[[bytes], None] | None, Callable[[Payload], bytes]]] = {}
+        stamp, count = self._last, 0
         for entry in entries:
             key = id(entry.channel)
-            if key not in heard:
+            if key not in known:
                 output = self._output(entry.channel)
-                heard[key] = output is None or output[1].heard
-            if not heard[key]:
-                self.published += 1
-                continue
-            item = self._convert(entry)
-            if item is not None:
-                self._send(item)
-            self._last = entry.stamp
+                if output is not None and output[1].heard:
+                    known[key] = output[1].publish_raw, output[2].convert or bytes
+                else:
+                    known[key] = None, bytes
+            publish, convert = known[key]
+            stamp = entry.stamp
+            try:
+                if publish is not None:
+                    publish(convert(entry.data))
+                count += 1
+            except MessageError as error:
+                self._leave_out(entry.channel, error)
+        self._last = stamp
+        self.published += count
 
     def _entries(
         self, reader: BagReader, start: int, end: int, topics: Collection[str] | None = None
@@ -373,18 +381,19 @@ class Player:
         output = self._output(entry.channel)
         if output is None:
             return None
-        channel, publisher, conversion = output
-        data: Payload = entry.data
-        if conversion.convert is not None:
-            try:
-                data = conversion.convert(data)
-            except MessageError as error:
-                self.problems += 1
-                if id(channel) not in self._failed:
-                    self._failed.add(id(channel))
-                    self._warn(f"messages of '{channel.topic}' are left out: {error} (told once)")
-                return None
-        return entry.stamp, publisher, bytes(data)
+        _, publisher, conversion = output
+        try:
+            return entry.stamp, publisher, (conversion.convert or bytes)(entry.data)
+        except MessageError as error:
+            self._leave_out(entry.channel, error)
+            return None
+
+    def _leave_out(self, channel: Channel, error: MessageError) -> None:
+        """Count a message that cannot be published, and tell the first of a channel."""
+        self.problems += 1
+        if id(channel) not in self._failed:
+            self._failed.add(id(channel))
+            self._warn(f"messages of '{channel.topic}' are left out: {error} (told once)")
 
     def _publish(self, items: Iterable[_Item]) -> bool:
         """Publish messages when they are due; return False at the end of the node."""

@@ -2,6 +2,8 @@
 
 Both play one bag of 100 000 messages in turn, to nobody and to an unmodified node of rospy. Each
 line is one run: seconds from the start of the program to its end, CPU time, messages received.
+Then both play 5 seconds of the bag at its times, 1000 messages of each topic per second, and a line
+says by how many milliseconds the messages came late, measured from the earliest one.
 """
 
 from __future__ import annotations
@@ -32,14 +34,19 @@ from rosz.typestore import TypeStore
 
 COUNT = 33_334
 ROUNDS = 5
+SECONDS = 5
 LISTEN = """
 import rospy, sys, time
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Imu
 from tf2_msgs.msg import TFMessage
 rospy.init_node("listener")
-found = []
-for name, kind in (("/cmd_vel", Twist), ("/imu", Imu), ("/tf", TFMessage)):
+found, times = [], []
+def time_of(message):
+    found.append(1)
+    times.append(time.monotonic())
+rospy.Subscriber("/cmd_vel", Twist, time_of)
+for name, kind in (("/imu", Imu), ("/tf", TFMessage)):
     rospy.Subscriber(name, kind, lambda message: found.append(1))
 print("ready", flush=True)
 sys.stdin.readline()
@@ -47,6 +54,10 @@ last = -1
 while last != len(found):
     last = len(found)
     time.sleep(1)
+late = [moment - number / 1000 for number, moment in enumerate(times)]
+first = min(late)
+late = sorted((one - first) * 1000 for one in late)
+print(" ".join(f"{late[int(len(late) * share)]:.2f}" for share in (0.5, 0.95, 0.99, 0.999)))
 print(len(found), flush=True)
 """
 
@@ -68,8 +79,10 @@ def make(path: Path) -> None:
                 writer.write(handle, 10**18 + number * 1_000_000, data)
 
 
-def play(side: RealSide | RoszSide, bag: Path, *, heard: bool) -> dict[str, Any]:
-    """Play the bag once."""
+def play(
+    side: RealSide | RoszSide, bag: Path, *, heard: bool, timed: bool = False
+) -> dict[str, Any]:
+    """Play the bag once, as fast as possible or a part of it at its times."""
     script = bag.with_name("listen.py")
     script.write_text(LISTEN)
     listener = Program([*side.script(), str(script)], side.variables) if heard else None
@@ -82,17 +95,24 @@ def play(side: RealSide | RoszSide, bag: Path, *, heard: bool) -> dict[str, Any]
             listener.wait_for("ready")
             time.sleep(1)
         before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-        words = [*command, "-q", "-i", str(bag)]
+        words = [*command, "-q", *(["-u", str(SECONDS)] if timed else ["-i"]), str(bag)]
         subprocess.run(words, env=side.variables, check=True, stdout=subprocess.DEVNULL)
         elapsed, after = time.monotonic() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
-        received = 0
+        received, late = 0, ""
         if listener is not None:
             listener.say("")
             listener.exit_code()
-            received = int(listener.lines[-1])
+            late, received = listener.lines[-2], int(listener.lines[-1])
     finally:
         if listener is not None:
             listener.close()
+    if timed:
+        return {
+            "system": type(side).__name__,
+            "late ms (50, 95, 99, 99.9 %)": late,
+            "received": received,
+            "load": round(os.getloadavg()[0], 1),
+        }
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return {
         "system": type(side).__name__,
@@ -115,6 +135,9 @@ def main() -> None:
                 for _ in range(ROUNDS):
                     for side in (RoszSide(network), RealSide(ros)):
                         print(json.dumps(play(side, bag, heard=heard)), flush=True)
+            for _ in range(ROUNDS):
+                for side in (RoszSide(network), RealSide(ros)):
+                    print(json.dumps(play(side, bag, heard=True, timed=True)), flush=True)
         finally:
             ros.close()
             network.close()
