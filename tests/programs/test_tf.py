@@ -102,7 +102,7 @@ def test_publishers_listeners_and_commands(network: Network) -> None:
     command = start(network, "tf", "echo", "-n", "1", "map", "laser")
     assert command.exit_code() == 0, command.output
     assert command.lines[1] == "- Translation: [1.000, 0.000, 0.500]"
-    tree = start(network, "tf", "tree")
+    tree = start(network, "tf", "tree", "--wait", "4")
     assert tree.exit_code() == 0, tree.output
     assert tree.lines == ["map", "  base", "    laser"]
     watch = start(network, "run", "tf", "tf_monitor")
