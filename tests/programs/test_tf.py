@@ -137,3 +137,23 @@ def test_wrong_words(network: Network) -> None:
         program = start(network, "run", *words)
         assert program.exit_code() == 1
         assert "usage: " in program.output
+
+
+CLIENT = """
+    import rosz.ros1, rospy, tf2_ros
+    rospy.init_node("user")
+    client = tf2_ros.BufferClient("/tf_buffer")
+    assert client.wait_for_server(rospy.Duration(15))
+    found = client.lookup_transform("map", "camera", rospy.Time(0), rospy.Duration(10))
+    print(found.transform.translation.x)
+    rospy.signal_shutdown("done")
+"""
+
+
+def test_buffer_server(network: Network) -> None:
+    words = ["4", "0", "0", "0", "0", "0", "map", "camera"]
+    start(network, "run", "tf2_ros", "static_transform_publisher", *words)
+    start(network, "run", "tf2_ros", "buffer_server")
+    client = network.program(CLIENT)
+    assert client.exit_code(40) == 0, client.output
+    assert client.lines[-1] == "4.0"
