@@ -63,12 +63,21 @@ def from_error(fault: Exception, path: Path) -> Problem:
     # Several launch files may include the wrong one.
     reason = fault.plain_reason if isinstance(fault, LaunchFileError) else fault.reason
     absent = _ABSENT.match(reason)
-    if absent is None or _MISTYPED in reason:
+    if absent is None:
         return Problem(fault.path, fault.line, fault.column, "error", reason)
+    if _MISTYPED in reason:
+        text = _mistyped(absent[1], reason)
+        return Problem(fault.path, fault.line, fault.column, "error", text)
     return Problem(fault.path, fault.line, fault.column, "warning", reason, absent[1])
 
 
 def from_absence(fault: PackageNotFound, path: Path, node: str, place: tuple[int, int]) -> Problem:
     """Return the problem of a node whose package is not there."""
-    missing = "" if _MISTYPED in str(fault) else fault.package
-    return Problem(str(path), *place, "warning", f"node '{node}': {fault}", missing)
+    if _MISTYPED in str(fault):
+        return Problem(str(path), *place, "warning", _mistyped(fault.package, str(fault)))
+    return Problem(str(path), *place, "warning", f"node '{node}': {fault}", fault.package)
+
+
+def _mistyped(package: str, reason: str) -> str:
+    """Return a text that is the same wherever the package is needed."""
+    return f"package '{package}' not found; {_MISTYPED}{reason.partition(_MISTYPED)[2]}"

@@ -181,7 +181,7 @@ class Worker:
         """End the process."""
         with contextlib.suppress(BrokenPipeError):
             _pipe(self._process.stdin).close()
-        self._process.wait(10)
+        self._process.wait(60)
         _pipe(self._process.stdout).close()
 
 

@@ -268,6 +268,16 @@ def test_compiled_programs_of_nodes_are_named_as_such(workspace: Path) -> None:
     ]
 
 
+def test_a_misspelt_package_has_one_text(workspace: Path) -> None:
+    node = '<node pkg="demoo" type="talker" name="{}"/>'
+    put(workspace, "launch/a.launch", f"<launch>{node.format('x')}\n{node.format('y')}</launch>")
+    text = "warning: package 'demoo' not found; did you mean 'demo'?"
+    assert problems(workspace) == [
+        f"demo/launch/a.launch:1:9: {text}",
+        f"demo/launch/a.launch:2:1: {text}",
+    ]
+
+
 def test_a_misspelt_type_gets_one_hint(workspace: Path) -> None:
     put(workspace, "msg/Strings.msg", "string[] data\n")
     put(workspace, "msg/A.msg", "Strng x\nflot64 y\n")
