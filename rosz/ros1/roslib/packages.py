@@ -83,10 +83,16 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:  #
     if package_name in _PROVIDED:
         return
     packs = RosPack()
-    packs.get_path(package_name)
+    needed: list[str] = []
+    rest = [package_name]
+    while rest:
+        name = rest.pop(0)
+        if name not in needed and name not in _PROVIDED:
+            needed.append(name)
+            rest += [depend.name for depend in packs.get_manifest(name).depends]
     folders = [
         str(folder)
-        for name in (package_name, *packs.get_depends(package_name))
+        for name in needed
         for folder in (Path(packs.get_path(name), "src"), Path(packs.get_path(name), "lib"))
         if folder.is_dir()
     ]

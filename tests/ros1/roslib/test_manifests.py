@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from oracle import ours, real
 
 from rosz.ros1.roslib import rosenv, stacks
 from rosz.ros1.roslib.manifestlib import Depend, Platform, StackDepend
-from rosz.ros1.roslib.packages import ROSEnvException
+from rosz.ros1.roslib.packages import ROSEnvException, load_manifest
 
 _MANIFESTS = '''
 from roslib import manifest, manifestlib, stack_manifest
@@ -96,3 +97,14 @@ def test_required_variables() -> None:
         rosenv.get_ros_package_path(required=True, env={})
     with pytest.raises(ROSEnvException, match="__master"):
         rosenv.get_master_uri(required=False, env={}, argv=["__master:="])
+
+
+def test_load_manifest_of_rosbuild(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    depends = '<depend package="rospy"/><depend package="roscpp"/><depend package="other_of_it"/>'
+    for name, text in (("load_it", depends), ("other_of_it", "")):
+        (tmp_path / name / "src").mkdir(parents=True)
+        (tmp_path / name / "manifest.xml").write_text(f"<package>{text}</package>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    load_manifest("load_it")
+    assert sys.path[:2] == [str(tmp_path / name / "src") for name in ("load_it", "other_of_it")]
