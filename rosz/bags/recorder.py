@@ -19,11 +19,11 @@ from rosz.errors import BagError, ClosedError, MessageError, RoszError
 from rosz.node import Subscription
 from rosz.node.type_description import request_definition
 from rosz.qos import QoS
-from rosz.wire import NO_HASH, Token, format_token, gid
+from rosz.wire import NO_HASH, Kind, Token, format_token, gid
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
-    from rosz.graph import View
+    from rosz.graph import Followed, View
     from rosz.node import MessageInfo, Node
 
 __all__ = ("Recorder",)
@@ -98,6 +98,7 @@ class Recorder:
         self._limit = limit
         self._lock = threading.Lock()
         self._subscribed: dict[str, Subscription[bytes]] = {}
+        self._publishers: dict[str, Followed] = {}
         self._sources: dict[bytes, _Source] = {}
         self._unknown: dict[tuple[str, str, str], tuple[View, _Source]] = {}
         self._counts: Counter[str] = Counter()
@@ -108,7 +109,8 @@ class Recorder:
         self.error: BagError | None = None
         for name in selection.at_once:
             self._subscribe(name)
-        self._listener = node.listen(self._follow)
+        # Topics that are named are subscribed to already.
+        self._listener = None if selection.named else node.listen(self._follow)
 
     @property
     def topics(self) -> list[str]:
@@ -125,7 +127,10 @@ class Recorder:
             if topic in self._subscribed or self._worker.closed:
                 return
             self._report(f"Subscribing to {topic}")
+            graph = self._node.context.graph
             try:
+                publishers = graph.follow_entities(Kind.PUBLISHER, topic)
+                self._publishers[topic] = self._node.keep(publishers)
                 subscription: Subscription[bytes] = Subscription(
                     self._node,
                     topic,
@@ -203,7 +208,7 @@ class Recorder:
 
     def _source(self, topic: str, info: MessageInfo) -> _Source:
         """Return the publisher of a message; one without a token as long as that is not there."""
-        view = self._node.context.graph.view()
+        view = self._publishers[topic].view()
         key = (topic, info.type_name, info.type_hash)
         known = self._unknown.get(key)
         if known is not None and known[0] is view:
@@ -267,7 +272,8 @@ class Recorder:
 
     def close(self) -> None:
         """Stop receiving; a second call has no effect."""
-        self._listener.close()
+        if self._listener is not None:
+            self._listener.close()
         self._worker.close()
         with self._lock:
             for subscription in self._subscribed.values():

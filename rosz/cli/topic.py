@@ -211,7 +211,7 @@ def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
     from rosz.introspect.subscribe import find_token, resolve_field, wait_for_target
 
     target = wait_for_target(node.context, resolve_field(name, node.resolve), warn)
-    return target, find_token(node.context.graph.view(), target.topic, target.type_name)
+    return target, find_token(node.context.graph.refresh(), target.topic, target.type_name)
 
 
 def _text(

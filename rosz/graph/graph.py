@@ -1,5 +1,9 @@
 """The live view of a domain: its nodes and their entities.
 
+Somebody who needs to know of some names follows the tokens of these alone (`Graph.follow`), because
+the tokens of all would grow with the square of the number of nodes. `Graph.view`, `Graph.listen`
+and `Graph.wait_for` follow the whole domain: the first for good, the others while they need it.
+
 Zenoh only queues the tokens that appear and disappear. One thread of the graph applies them, wakes
 waiters and calls listeners. A listener that waits for the graph applies further tokens itself, so
 it may call anything. But listeners hear of these only after it has returned, so that each is told
@@ -8,24 +12,27 @@ of changes in their order. Long work therefore belongs on another thread.
 
 from __future__ import annotations
 
-import itertools
 import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from rosz.errors import ClosedError, DecodeError, WaitTimeout, near_miss
+from rosz.graph.followed import COMPLETE_BY, Followed, GraphListener, Interest, ProcessListener
 from rosz.graph.view import View
 from rosz.lifecycle import Lifecycle
 from rosz.session import clamp_timeout
 from rosz.wire import (
     OWN_SPACE,
+    Kind,
     ProcessToken,
     Token,
+    entities_key,
+    node_key,
     parse_process,
     parse_token,
     processes_key,
@@ -35,18 +42,15 @@ from rosz.wire import (
 if TYPE_CHECKING:
     from rosz.session import Session
 
-__all__ = ("Graph", "GraphListener", "ProcessListener")
-
-GraphListener = Callable[[Token, bool], None]
-"""Function called with a token, and whether it appeared (true) or disappeared (false)."""
-
-ProcessListener = Callable[[ProcessToken, bool], None]
-"""Function called with a rosz node as a process, and whether it appeared or disappeared."""
+__all__ = ("Graph",)
 
 _Report = Callable[[], object]
 """Function that tells listeners of one change."""
 
-_QUERY_TIMEOUT = 2.0
+_Task = Callable[[], _Report | None]
+"""Function that runs on the thread of the graph."""
+
+_HINT_TIMEOUT = 1.0
 _POLL_SECONDS = 0.1
 _log = logging.getLogger("rosz.graph")
 
@@ -60,79 +64,89 @@ class Graph:
 
     Attributes:
         domain: The ROS domain.
+        changed: Condition that is notified of each change.
     """
 
     def __init__(self, session: Session, domain: int) -> None:
         self.domain = domain
+        self.changed: threading.Condition = threading.Condition()
         self._session = session
-        self._tokens: dict[str, Token] = {}
-        self._processes: dict[str, ProcessToken] = {}
-        self._view: View | None = None
-        self._changed = threading.Condition()
-        self._numbers = itertools.count()
-        self._listeners: dict[int, GraphListener] = {}
-        self._process_listeners: dict[int, ProcessListener] = {}
+        self._version = 0
+        self._interests: dict[str, Interest] = {}
+        self._whole: Followed | None = None
         self._reported_damage: set[str] = set()
-        self._events: SimpleQueue[tuple[str, bool] | Callable[[], _Report | None] | None]
-        self._events = SimpleQueue()
+        self._events: SimpleQueue[tuple[Interest, str, bool] | _Task | None] = SimpleQueue()
         self._reports: deque[_Report] = deque()
         self._reporting = False
         self._lifecycle = Lifecycle("the graph", log=_log, on_fork=self._replace_lock)
         self._thread = threading.Thread(target=self._run, name="rosz-graph", daemon=True)
         self._thread.start()
-        # In this order: once tokens are watched, Zenoh replies from what the watch has seen so far.
-        for space in (tokens_key(domain), processes_key(domain)):
-            for key in session.live_tokens(space, _QUERY_TIMEOUT):
-                self._apply(key, alive=True)
-        self._watches = [
-            session.watch_tokens(key, lambda key, alive: self._events.put((key, alive)))
-            for key in (tokens_key(domain), processes_key(domain))
-        ]
+
+    def follow(self, *keys: str) -> Followed:
+        """Follow the tokens that match some key expressions, such as `rosz.wire.entities_key`.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
+        """
+        self._lifecycle.check_open("follow anything more")
+        interests: list[Interest] = []
+        try:
+            interests.extend(map(self._acquire, keys))
+        except BaseException:
+            self.release(interests)
+            raise
+        return Followed(self, interests)
+
+    def follow_entities(self, kind: Kind, name: str) -> Followed:
+        """Follow one kind of entity of a topic or service.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
+        """
+        return self.follow(entities_key(self.domain, kind, name))
+
+    def follow_all(self) -> Followed:
+        """Follow the whole domain, which costs each node as much as there are entities in all.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
+        """
+        return self.follow(*self._all_keys())
 
     def view(self) -> View:
-        """Return what is known at this moment."""
-        known = self._view  # replaced whole, so that reading it needs no lock
-        if known is not None:
-            return known
-        with self._changed:
-            if self._view is None:
-                self._view = View(self._tokens.values(), self._processes.values())
-            return self._view
+        """Return all that is known at this moment, and follow the whole domain from now on.
 
-    def processes(self) -> list[ProcessToken]:
-        """Return the rosz nodes with their processes, sorted by name; ROS 2 announces none."""
-        return self.view().processes()
+        The first call waits, at most 2 seconds, until everything is known that exists.
+
+        Raises:
+            ClosedError: The graph was closed before the first call.
+        """
+        if self._whole is None:
+            self._whole = self.follow_all()  # of two threads, both may: that costs no other watch
+        followed = self._whole
+        if not followed.complete:
+            self.wait_until(lambda: followed.complete, time.monotonic() + COMPLETE_BY)
+        return followed.view()
 
     def refresh(self, timeout: float = 2.0) -> View:
-        """Query the network for all tokens, for callers that cannot wait until these arrive.
+        """Query the network for all tokens, for callers that need them just once.
 
         Args:
             timeout: Time limit in seconds.
 
         Returns:
-            What is known, with what the replies add.
+            All nodes and entities.
 
         Raises:
             ClosedError: The session is closed.
             UsageError: The timeout is not a number.
         """
-        timeout = clamp_timeout(timeout)
-        found = [
-            *self._session.live_tokens(tokens_key(self.domain), timeout),
-            *self._session.live_tokens(processes_key(self.domain), timeout),
-        ]
-        self._apply_pending(timeout)
-        with self._changed:
-            tokens, processes = dict(self._tokens), dict(self._processes)
-        # Only in the result: nothing may report the end of a token that was never watched.
-        for key in found:
-            known: dict[str, Any] = processes if key.startswith(OWN_SPACE) else tokens
-            if key not in known and (token := self._parse(key)) is not None:
-                known[key] = token
-        return View(tokens.values(), processes.values())
+        with self.changed:
+            interests = list(self._interests.values())
+        return self.query(interests, self._all_keys(), timeout)
 
     def listen(self, listener: GraphListener, *, history: bool = True) -> Callable[[], None]:
-        """Call a function for every change, in order, on the graph's thread.
+        """Call a function for every change in the whole domain, in order, on the graph's thread.
 
         Args:
             listener: Function called with each token that appears or disappears; exceptions are
@@ -141,8 +155,11 @@ class Graph:
 
         Returns:
             A function that unregisters the listener.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
         """
-        return self._register(self._listeners, listener, self._tokens if history else {})
+        return self._listen(tokens_key(self.domain), listener, history=history)
 
     def listen_to_processes(self, listener: ProcessListener) -> Callable[[], None]:
         """Call a function for every rosz node that exists, appears or disappears.
@@ -152,63 +169,210 @@ class Graph:
 
         Returns:
             A function that unregisters the listener.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
         """
-        return self._register(self._process_listeners, listener, self._processes)
+        return self._listen(processes_key(self.domain), listener, history=True)
 
-    def _register(
-        self,
-        listeners: dict[int, Any],
-        listener: Callable[[Any, bool], None],
-        known: dict[str, Any],
+    def _listen(
+        self, key: str, listener: Callable[[Any, bool], None], *, history: bool
     ) -> Callable[[], None]:
-        number = next(self._numbers)
+        followed = self.follow(key)
+        unregister = followed.listen(listener, history=history)
 
-        def begin(tokens: list[Any]) -> None:
-            listeners[number] = listener
-            for token in tokens:
-                self._notify(listeners, number, token, alive=True)
+        def stop() -> None:
+            unregister()
+            followed.close()
 
-        self._events.put(lambda: partial(begin, list(known.values())))
-        return lambda: self._events.put(lambda: partial(listeners.pop, number, None))
+        return stop
 
     def wait_for(
         self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
     ) -> View:
-        """Wait until the graph meets a condition.
+        """Wait until the graph meets a condition, following the whole domain meanwhile.
 
-        Args:
-            condition: Function that tells whether a view meets it.
-            timeout: Time limit in seconds.
-            what: Name of the condition, for the error.
-            hint: Advice at the end of the error text.
-
-        Returns:
-            The view that met the condition.
-
-        Raises:
-            WaitTimeout: The time limit was reached.
-            ClosedError: The graph was closed meanwhile.
-            UsageError: The timeout is not a number.
+        See `Followed.wait_for`.
         """
-        deadline = time.monotonic() + clamp_timeout(timeout)
-        wait = self._apply_next if threading.current_thread() is self._thread else self._sleep
-        while not condition(view := self.view()):
-            left = deadline - time.monotonic()
-            if self._lifecycle.closing:
-                raise ClosedError(f"the wait for {what} ended: shutting down")
-            if left <= 0:
-                raise WaitTimeout(what, timeout, hint)
-            wait(view, left)
-        return view
+        with self.follow_all() as followed:
+            return followed.wait_for(condition, timeout, what, hint)
 
-    def _sleep(self, seen: View, timeout: float) -> None:
-        """Wait until there is another view than the one that was seen."""
-        with self._changed:
-            self._changed.wait_for(
-                lambda: self._view is not seen or self._lifecycle.closing, timeout
+    def wait_for_node(self, name: str, timeout: float) -> View:
+        """Wait for the node of a full name; the errors are those of `wait_for`."""
+        with self.follow(node_key(self.domain, name)) as followed:
+            return self._wait_for_name(
+                followed,
+                lambda view: name in view.nodes(),
+                timeout,
+                f"node '{name}'",
+                name,
+                View.nodes,
             )
 
-    def _apply_next(self, _seen: View, timeout: float) -> None:
+    def wait_for_topic(self, name: str, timeout: float) -> View:
+        """Wait for a publisher of a topic; the errors are those of `wait_for`."""
+        with self.follow_entities(Kind.PUBLISHER, name) as followed:
+            return self._wait_for_name(
+                followed,
+                lambda view: bool(view.publishers(name)),
+                timeout,
+                f"publisher of '{name}'",
+                name,
+                View.topics,
+            )
+
+    def wait_for_service(self, name: str, timeout: float) -> View:
+        """Wait for a server of a service; the errors are those of `wait_for`."""
+        with self.follow_entities(Kind.SERVICE, name) as followed:
+            return self._wait_for_name(
+                followed,
+                lambda view: bool(view.servers(name)),
+                timeout,
+                f"service '{name}'",
+                name,
+                View.services,
+            )
+
+    def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> View:
+        """Wait for a number of subscriptions of a topic; the errors are those of `wait_for`."""
+        with self.follow_entities(Kind.SUBSCRIPTION, topic) as followed:
+            return followed.wait_for(
+                lambda view: len(view.subscriptions(topic)) >= count,
+                timeout,
+                f"{count} subscriber(s) of '{topic}'",
+            )
+
+    def _wait_for_name(
+        self,
+        followed: Followed,
+        condition: Callable[[View], bool],
+        timeout: float,
+        what: str,
+        name: str,
+        names: Callable[[View], Iterable[str]],
+    ) -> View:
+        try:
+            return followed.wait_for(condition, timeout, what)
+        except WaitTimeout as error:
+            known = names(self.refresh(_HINT_TIMEOUT))
+            raise WaitTimeout(what, timeout, near_miss(name, known).removeprefix("; ")) from error
+
+    # What a `Followed` needs.
+
+    @property
+    def closing(self) -> bool:
+        """Whether the graph is closed, or being closed."""
+        return self._lifecycle.closing
+
+    def query(self, interests: Sequence[Interest], keys: Iterable[str], timeout: float) -> View:
+        """Return what is known of some interests, with what a query for some keys adds."""
+        timeout = clamp_timeout(timeout)
+        # What a watch is told of while the query runs is missing in the replies.
+        self.wait_until(lambda: all(one.settled for one in interests), time.monotonic() + timeout)
+        found = [token for key in keys for token in self._session.live_tokens(key, timeout)]
+        self._apply_pending(timeout)
+        with self.changed:
+            known = {key: token for one in interests for key, token in one.tokens.items()}
+        # Only in the result: nothing may report the end of a token that was never watched.
+        for key in found:
+            if key not in known and (token := self._parse(key)) is not None:
+                known[key] = token
+        return View.of(known.values())
+
+    def register(
+        self,
+        interest: Interest,
+        number: int,
+        listener: Callable[[Any, bool], None],
+        *,
+        history: bool,
+    ) -> None:
+        """Call a listener for what is known of an interest, and for each change of it."""
+
+        def begin(tokens: list[Any]) -> None:
+            interest.listeners[number] = listener, history
+            for token in tokens:
+                self._notify(interest, number, token, alive=True)
+
+        def register() -> _Report:
+            return partial(begin, list(interest.tokens.values()) if history else [])
+
+        self._events.put(register)
+
+    def unregister(self, interest: Interest, number: int) -> None:
+        """Call a listener of an interest no longer."""
+        self._events.put(lambda: partial(interest.listeners.pop, number, None))
+
+    def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
+        """Wait until a condition holds, which is checked after each change.
+
+        Args:
+            condition: The condition.
+            deadline: Time to give up, by the monotonic clock in seconds.
+
+        Returns:
+            Whether it holds; false if the time is up, or the graph closed.
+        """
+        wait = self._apply_next if threading.current_thread() is self._thread else self._sleep
+        while True:
+            version = self._version
+            if condition():
+                return True
+            left = deadline - time.monotonic()
+            if self._lifecycle.closing or left <= 0:
+                return False
+            wait(version, min(left, COMPLETE_BY))
+
+    def release(self, interests: Iterable[Interest]) -> None:
+        """Close the watches of interests that nobody follows any more."""
+        unused = []
+        with self.changed:
+            for interest in interests:
+                interest.users -= 1
+                if not interest.users and self._interests.get(interest.key) is interest:
+                    unused.append(self._interests.pop(interest.key))
+        for interest in unused:
+            if interest.watch is not None:
+                interest.watch.close()
+
+    # The rest.
+
+    def _all_keys(self) -> tuple[str, str]:
+        return tokens_key(self.domain), processes_key(self.domain)
+
+    def _acquire(self, key: str) -> Interest:
+        with self.changed:
+            interest = self._interests.get(key)
+            if interest is not None:
+                interest.users += 1
+                return interest
+            interest = self._interests[key] = Interest(key)
+            interest.users = 1
+        try:
+            interest.watch = self._session.watch_tokens(
+                key,
+                lambda token, alive: self._events.put((interest, token, alive)),
+                lambda: self._events.put(partial(self._set_complete, interest)),
+            )
+        except BaseException:
+            self.release([interest])
+            raise
+        if self._lifecycle.closing:  # perhaps too late for the thread that closes the graph
+            interest.watch.close()
+        return interest
+
+    def _set_complete(self, interest: Interest) -> None:
+        with self.changed:
+            interest.complete = True
+            self._version += 1
+            self.changed.notify_all()
+
+    def _sleep(self, seen: int, timeout: float) -> None:
+        """Wait until there is another version than the one that was seen."""
+        with self.changed:
+            self.changed.wait_for(lambda: self._version != seen or self._lifecycle.closing, timeout)
+
+    def _apply_next(self, _seen: int, timeout: float) -> None:
         """Handle an event on the graph's thread, while a listener on that thread waits."""
         try:
             event = self._events.get(timeout=timeout)
@@ -219,61 +383,13 @@ class Graph:
         else:
             self._handle(event)
 
-    def wait_for_node(self, name: str, timeout: float) -> View:
-        """Wait for the node of a full name; the errors are those of `wait_for`."""
-        return self._wait_for_name(
-            lambda view: name in view.nodes(), timeout, f"node '{name}'", name, View.nodes
-        )
-
-    def wait_for_topic(self, name: str, timeout: float) -> View:
-        """Wait for a publisher of a topic; the errors are those of `wait_for`."""
-        return self._wait_for_name(
-            lambda view: bool(view.publishers(name)),
-            timeout,
-            f"publisher of '{name}'",
-            name,
-            View.topics,
-        )
-
-    def wait_for_service(self, name: str, timeout: float) -> View:
-        """Wait for a server of a service; the errors are those of `wait_for`."""
-        return self._wait_for_name(
-            lambda view: bool(view.servers(name)),
-            timeout,
-            f"service '{name}'",
-            name,
-            View.services,
-        )
-
-    def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> View:
-        """Wait for a number of subscriptions of a topic; the errors are those of `wait_for`."""
-        return self.wait_for(
-            lambda view: len(view.subscriptions(topic)) >= count,
-            timeout,
-            f"{count} subscriber(s) of '{topic}'",
-        )
-
-    def _wait_for_name(
-        self,
-        condition: Callable[[View], bool],
-        timeout: float,
-        what: str,
-        name: str,
-        names: Callable[[View], Iterable[str]],
-    ) -> View:
-        try:
-            return self.wait_for(condition, timeout, what)
-        except WaitTimeout as error:
-            hint = near_miss(name, names(self.view())).removeprefix("; ")
-            raise WaitTimeout(what, timeout, hint) from error
-
     def _run(self) -> None:
         while (event := self._events.get()) is not None:
             self._handle(event)
 
-    def _handle(self, event: tuple[str, bool] | Callable[[], _Report | None]) -> None:
+    def _handle(self, event: tuple[Interest, str, bool] | _Task) -> None:
         """Apply an event, and report it unless a listener is running that was told of another."""
-        report = self._apply(event[0], alive=event[1]) if isinstance(event, tuple) else event()
+        report = self._apply(*event) if isinstance(event, tuple) else event()
         if report is None:
             return
         self._reports.append(report)
@@ -295,25 +411,23 @@ class Graph:
             if timeout <= 0:
                 return
 
-    def _apply(self, key: str, *, alive: bool) -> _Report | None:
+    def _apply(self, interest: Interest, key: str, alive: bool) -> _Report | None:
         """Add or remove a token, and return the report of it if that is a change."""
-        ours = key.startswith(OWN_SPACE)
-        known: dict[str, Any] = self._processes if ours else self._tokens
+        known = interest.tokens
         if alive == (key in known):
             return None
         token = self._parse(key) if alive else known[key]
         if token is None:
             return None
-        with self._changed:
+        with self.changed:
             if alive:
                 known[key] = token
             else:
                 del known[key]
-            self._view = None
-            self._changed.notify_all()
-        return partial(
-            self._notify_all, self._process_listeners if ours else self._listeners, token, alive
-        )
+            interest.version += 1
+            self._version += 1
+            self.changed.notify_all()
+        return partial(self._notify_all, interest, token, alive, alive and not interest.settled)
 
     def _parse(self, key: str) -> Token | ProcessToken | None:
         """Parse a token; each kind of damage is logged once."""
@@ -330,20 +444,16 @@ class Graph:
             return None
 
     def _notify_all(
-        self, listeners: dict[int, Any], token: Token | ProcessToken, alive: bool
+        self, interest: Interest, token: Token | ProcessToken, alive: bool, existed: bool
     ) -> None:
-        for number in list(listeners):
-            self._notify(listeners, number, token, alive=alive)
+        for number, (_, history) in list(interest.listeners.items()):
+            if history or not existed:
+                self._notify(interest, number, token, alive=alive)
 
     def _notify(
-        self,
-        listeners: dict[int, Callable[[Any, bool], None]],
-        number: int,
-        token: Token | ProcessToken,
-        *,
-        alive: bool,
+        self, interest: Interest, number: int, token: Token | ProcessToken, *, alive: bool
     ) -> None:
-        listener = listeners.get(number)
+        listener, _ = interest.listeners.get(number, (None, True))
         if listener is None:
             return
         try:
@@ -360,12 +470,14 @@ class Graph:
         self._lifecycle.close(self._finish)
 
     def _finish(self) -> None:
-        with self._changed:
-            self._changed.notify_all()
-        for watch in self._watches:
-            watch.close()
+        with self.changed:
+            self.changed.notify_all()
+            interests = list(self._interests.values())
+        for interest in interests:
+            if interest.watch is not None:
+                interest.watch.close()
         self._events.put(None)
 
     def _replace_lock(self) -> None:
         """Replace the lock in a forked child: a thread of the parent may hold it for ever."""
-        self._changed = threading.Condition()
+        self.changed = threading.Condition()

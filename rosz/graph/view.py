@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable
 from functools import cached_property
+from typing import Self
 
 from rosz.wire import Kind, ProcessToken, Token
 
@@ -12,7 +13,7 @@ __all__ = ("View",)
 
 
 class View:
-    """The nodes and entities of one domain at one moment.
+    """Nodes and entities of one domain at one moment: all, or what is followed of them.
 
     Args:
         tokens: The live tokens; several may describe one node.
@@ -22,6 +23,15 @@ class View:
     def __init__(self, tokens: Iterable[Token], processes: Iterable[ProcessToken] = ()) -> None:
         self.tokens: tuple[Token, ...] = tuple(tokens)
         self._processes = tuple(processes)
+
+    @classmethod
+    def of(cls, tokens: Iterable[Token | ProcessToken]) -> Self:
+        """Return the view of live tokens of both kinds."""
+        found = list(tokens)
+        return cls(
+            (one for one in found if isinstance(one, Token)),
+            (one for one in found if isinstance(one, ProcessToken)),
+        )
 
     def nodes(self) -> list[str]:
         """Return the full names of all nodes, sorted; two nodes of one name appear twice."""
@@ -39,14 +49,6 @@ class View:
             (p for p in self._processes if node is None or p.node == node),
             key=lambda p: (p.node, p.started, p.zid, p.node_id),
         )
-
-    def is_rosz(self, zid: str) -> bool:
-        """Tell whether a session belongs to rosz nodes."""
-        return zid in self._hosts
-
-    def host(self, zid: str) -> str | None:
-        """Return the host of a session of rosz nodes; ``None`` if it has none."""
-        return self._hosts.get(zid)
 
     def entities(self, *kinds: Kind, name: str | None = None) -> list[Token]:
         """Return the entities of some kinds, sorted by name, node and number.
@@ -91,10 +93,6 @@ class View:
         for token in self.tokens:
             found[token.name].append(token)
         return dict(found)
-
-    @cached_property
-    def _hosts(self) -> dict[str, str]:
-        return {process.zid: process.host for process in self._processes}
 
     def _types(self, *kinds: Kind) -> dict[str, list[str]]:
         found: defaultdict[str, set[str]] = defaultdict(set)

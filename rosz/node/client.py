@@ -146,9 +146,8 @@ class Client(Entity):
         return response
 
     def _late(self, limit: float) -> WaitTimeout:
-        context = self.node.context
-        servers = [token.zid for token in context.graph.view().servers(self.name)]
-        stopped = context.session.why_silent(*servers)
+        servers = [token.zid for token in self.others.view().servers(self.name)]
+        stopped = self.node.context.session.why_silent(*servers)
         hint = "the server is busy, stopped or out of reach"
         return WaitTimeout(
             f"answer of service '{self.name}'", limit, f"{hint}; {stopped}" if stopped else hint
@@ -156,7 +155,7 @@ class Client(Entity):
 
     def _is_served(self) -> bool:
         """Return whether the service is served with this type, looking once at each view."""
-        view = self.node.context.graph.view()
+        view = self.others.view()
         seen, served = self._known
         if seen is not view:
             served = any(map(self.matches, view.servers(self.name)))
@@ -170,17 +169,23 @@ class Client(Entity):
         context.mesh.ready.wait(min(limit, _GRACE))
         if self._is_served():
             return
-        view = context.graph.refresh(min(limit, _GRACE))
+        view = self.others.refresh(min(limit, _GRACE))
         if not any(map(self.matches, view.servers(self.name))):
-            why = self._why_not_served(view) or "; nobody serves that name"
+            why = self._why_not_served() or "; nobody serves that name"
             raise ServiceNotFound(f"service [{self.name}] is not available{why}")
 
-    def _why_not_served(self, view: View) -> str:
+    def _why_not_served(self) -> str:
         """Return the end of an error text, with its ``: `` or ``; ``; empty if nothing is known."""
+        view = self.node.context.graph.refresh(_GRACE)
         others = view.servers(self.name)
         if others:
             return f": {explain_incompatible(self.token, others[0])}"
         return near_miss(self.name, view.services())
+
+    @property
+    def served(self) -> bool:
+        """Whether a node serves the service with this type, as far as it is known."""
+        return self._is_served()
 
     def wait_for_service(self, timeout: float = 10.0) -> None:
         """Wait until a node serves the service with this type.
@@ -194,14 +199,13 @@ class Client(Entity):
             UsageError: The timeout is not a number.
         """
         self.check_open("wait")
-        graph = self.node.context.graph
         what = f"service '{self.name}' of type '{self.token.type_name}'"
         try:
-            graph.wait_for(
+            self.others.wait_for(
                 lambda view: any(map(self.matches, view.servers(self.name))), timeout, what
             )
         except WaitTimeout as error:
-            why = self._why_not_served(graph.view())
+            why = self._why_not_served()
             raise WaitTimeout(what, timeout, why[2:]) from error
 
     def _finish(self) -> None:

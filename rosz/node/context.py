@@ -19,7 +19,6 @@ from rosz.lifecycle import Lifecycle
 from rosz.node.clock import Clock
 from rosz.node.direct_delivery import DirectDelivery
 from rosz.node.dropped import DroppedSamples
-from rosz.node.incompatible import IncompatibleEntities
 from rosz.session import (
     Dialling,
     LocalPeers,
@@ -56,7 +55,6 @@ class Context:
         mesh: Readiness of the session: whether it is linked to all its neighbours.
         direct_delivery: Samples for single subscriptions of this process.
         dropped: Counts of dropped samples.
-        incompatible: Warnings about entities that cannot reach each other.
         passing: Whether this is a command, which holds no parameters, rather than a node.
         permissions: Permissions of this machine on others; None without rules.
         cooperative: Whether the program is known to check for the shutdown.
@@ -108,7 +106,6 @@ class Context:
 
     def _join_network(self, config: SessionConfig, *, alone: bool, expected: bool) -> None:
         self.graph: Graph = Graph(self.session, self.domain)
-        self.incompatible: IncompatibleEntities = IncompatibleEntities(self.graph, self.session.zid)
         self.direct_delivery: DirectDelivery = DirectDelivery(self.session, self.domain)
         self.dropped: DroppedSamples = DroppedSamples(self.session, self.domain)
         self.mesh: MeshReadiness = MeshReadiness(

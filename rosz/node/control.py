@@ -12,10 +12,11 @@ import msgspec
 
 from rosz.errors import RoszError
 from rosz.node.core import NodeCore
-from rosz.wire import own_key
+from rosz.wire import nodes_key, own_key, parse_token
 from rosz.worker import Worker, start_thread
 
 if TYPE_CHECKING:
+    from rosz.node.context import Context
     from rosz.session import Query
 
 __all__ = ("NodeInfo", "Request", "control_key", "serve_control")
@@ -23,6 +24,7 @@ __all__ = ("NodeInfo", "Request", "control_key", "serve_control")
 _log = logging.getLogger("rosz.control")
 
 _THREADS = 4
+_TOKENS_TIMEOUT = 0.5
 
 
 class NodeInfo(msgspec.Struct, frozen=True):
@@ -133,5 +135,11 @@ def _info(node: NodeCore) -> NodeInfo:
         process.started,
         time.monotonic() - node.began,
         time.time_ns(),
-        sorted({token.zid for token in node.context.graph.view().tokens}),
+        _visible_sessions(node.context),
     )
+
+
+def _visible_sessions(context: Context) -> list[str]:
+    """Return the ids of the sessions whose nodes the session of a context sees."""
+    keys = context.session.live_tokens(nodes_key(context.domain), _TOKENS_TIMEOUT)
+    return sorted({parse_token(key).zid for key in keys})

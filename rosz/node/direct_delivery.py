@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from rosz.lifecycle import Closable, Registration
 from rosz.session import Sample, Session
-from rosz.wire import Token, own_key
-
-if TYPE_CHECKING:
-    from rosz.graph import View
+from rosz.wire import Token, is_rosz_id, own_key
 
 __all__ = ("DirectDelivery", "announcement_key", "direct_key", "own_direct_key")
 
@@ -19,11 +15,9 @@ _SPACE = "inbox"
 _LARGE = "large"
 
 
-def direct_key(subscription: Token, view: View) -> str | None:
-    """Return the key that only one subscription receives; ``None`` if its process is not rosz."""
-    if not view.is_rosz(subscription.zid):
-        return None
-    return own_direct_key(subscription)
+def direct_key(subscription: Token) -> str | None:
+    """Return the key that only one subscription receives; ``None`` if its session is not rosz's."""
+    return own_direct_key(subscription) if is_rosz_id(subscription.zid) else None
 
 
 def own_direct_key(subscription: Token) -> str:

@@ -8,12 +8,13 @@ import msgspec
 
 from rosz import names
 from rosz.errors import UsageError
-from rosz.lifecycle import Closable, Lifecycle
+from rosz.lifecycle import Closable, Lifecycle, Registration
 from rosz.node.core import NodeCore
-from rosz.node.incompatible import COUNTERPARTS
+from rosz.node.incompatible import COUNTERPARTS, IncompatibleEntities
 from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid
 
 if TYPE_CHECKING:
+    from rosz.graph import Followed
     from rosz.qos import QoS
 
 __all__ = ("ANY", "Entity")
@@ -79,12 +80,25 @@ class Entity:
         self._token_key = format_token(self.token)
         self.gid: bytes = gid(self._token_key)
         what = f"the {kind.name.lower()} of '{name}'"
+        self._others: Followed | None = None
         self._lifecycle = Lifecycle(what, log=node.log, on_fork=self._forked)
 
     @property
     def closed(self) -> bool:
         """Whether the entity has been closed, or is being closed."""
         return self._lifecycle.closing
+
+    @property
+    def others(self) -> Followed:
+        """The entities of its name that it may exchange data with, followed from the first use.
+
+        Raises:
+            ClosedError: The entity or its context was closed before the first use.
+        """
+        if self._others is None:
+            graph, kind = self.node.context.graph, COUNTERPARTS[self.token.kind]
+            self._others = self.keep(graph.follow_entities(kind, self.name))
+        return self._others
 
     def announce(self, *, watch: bool = True) -> None:
         """Make the entity known to others; declare what they need of it before.
@@ -100,7 +114,8 @@ class Entity:
         if rules and (objection := rules.describe_objection(self.token.kind, self.name)):
             node.log.warning("%s", objection)
         if watch:
-            context.incompatible.watch(self.token, node.log)
+            incompatible = IncompatibleEntities(self.token, node.log)
+            self.keep(Registration(self.others.listen(incompatible.changed)))
         self.keep(context.session.token(self._token_key))
 
     def keep(self, part: P) -> P:
@@ -135,15 +150,9 @@ class Entity:
     def close(self) -> None:
         """Undeclare the entity, its token first; a second call has no effect."""
         try:
-            self._lifecycle.close(self._undeclare)
+            self._lifecycle.close(self._finish)
         finally:  # also where Ctrl-C interrupts it
             self.node.forget(self)
-
-    def _undeclare(self) -> None:
-        try:
-            self._finish()
-        finally:
-            self.node.context.incompatible.unwatch(self.token)
 
     def _finish(self) -> None:
         """End what the entity runs, before its parts are closed."""

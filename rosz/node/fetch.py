@@ -23,6 +23,7 @@ import msgspec
 from rosz.errors import ClosedError, TransportError
 from rosz.node.direct_delivery import announcement_key, direct_key, own_direct_key
 from rosz.session import Cancellation
+from rosz.wire import host_number
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
@@ -49,8 +50,6 @@ _RETURN_SECONDS = 60.0
 _ARRIVAL_SECONDS = 0.1
 """Seconds in which a sample that was published arrives over a link that is fast enough."""
 _POLL_SECONDS = 0.02
-_TOKEN_SECONDS = 2.0
-"""Seconds in which the token of a process comes that has others already."""
 _TIMEOUT = 5.0
 _SILENT_SECONDS = 2.0
 _CLOSE_SECONDS = 8.0
@@ -138,8 +137,8 @@ class FetchableSamples:
         self._view: View | None = None
         self._near: list[str] = []
         self._far: dict[str, Token] = {}
+        self._foreign = False
         self._gone: dict[str, float] = {}
-        self._unknown: dict[str, float] = {}
         self._last = 0
         self._published = False
         self._kept: dict[int, tuple[bytes, bytes]] = {}
@@ -169,13 +168,8 @@ class FetchableSamples:
 
     @property
     def undecided(self) -> bool:
-        """Whether it is not known yet if some subscription is one of rosz or of ROS 2.
-
-        The token of a process may come after those of its subscriptions.
-        """
-        self._look()
-        now = time.monotonic()
-        return any(now - seen < _TOKEN_SECONDS for seen in self._unknown.values())
+        """Whether the subscriptions that existed before the publisher are not known yet."""
+        return not self._publisher.others.complete
 
     def when_decided(self, callback: Callable[[], object]) -> None:
         """Call a function, on another thread, once that is known."""
@@ -191,10 +185,11 @@ class FetchableSamples:
     @property
     def to_publish(self) -> bool:
         """Whether there are subscriptions of ROS 2, which receive only what is published."""
-        return bool(self._unknown)
+        self._look()
+        return self._foreign
 
     def _look(self) -> None:
-        view = self._context.graph.view()
+        view = self._publisher.others.view()
         if view is not self._view:
             with self._lock:
                 self._sort(view)
@@ -202,19 +197,19 @@ class FetchableSamples:
     def _sort(self, view: View) -> None:
         """Sort the subscriptions into those of this machine and those of others."""
         publisher = self._publisher
-        here = view.host(publisher.token.zid)
+        here = host_number(publisher.token.zid)
         near: list[str] = []
         far: dict[str, Token] = {}
-        unknown: dict[str, float] = {}
+        foreign = False
         for token in filter(publisher.matches, view.subscriptions(publisher.name)):
-            key = direct_key(token, view)
+            key = direct_key(token)
             if key is None:
-                unknown[token.zid] = self._unknown.get(token.zid, time.monotonic())
-            elif view.host(token.zid) == here:
+                foreign = True
+            elif host_number(token.zid) == here:
                 near.append(key)
             else:
                 far[key] = token
-        self._unknown = unknown
+        self._foreign = foreign
         gone = dict.fromkeys(self._far.keys() - far.keys(), time.monotonic())
         self._gone = {key: t for key, t in (self._gone | gone).items() if key not in far}
         for key in gone:
@@ -427,8 +422,9 @@ class Fetcher:
         source.announced(announcement)
 
     def _forget_ended(self) -> None:
-        view = self._subscription.node.context.graph.view()
-        alive = {(t.zid, t.entity_id) for t in view.publishers(self._subscription.name)}
+        subscription = self._subscription
+        publishers = subscription.others.view().publishers(subscription.name)
+        alive = {(t.zid, t.entity_id) for t in publishers}
         for place in self._sources.keys() - alive:
             self._sources.pop(place).close()
 

@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import logging
-import threading
-from typing import TYPE_CHECKING
 
 from rosz.wire import NO_HASH, Kind, Token
-
-if TYPE_CHECKING:
-    from rosz.graph import Graph
 
 __all__ = ("COUNTERPARTS", "IncompatibleEntities", "explain_incompatible")
 
@@ -46,14 +41,14 @@ def explain_incompatible(own: Token, other: Token) -> str:
     Returns:
         A sentence; empty if they do reach each other.
     """
+    if (other.name, other.type_name, other.type_hash) == (own.name, own.type_name, own.type_hash):
+        return ""
     doing = f"'{other.node_name}' {_VERBS[other.kind]} {_NOUNS[other.kind]} '{own.name}'"
     if other.type_name != own.type_name:
         return (
             f"node {doing} with type '{other.type_name}', but here it has type"
             f" '{own.type_name}': they do not reach each other"
         )
-    if other.type_hash == own.type_hash:
-        return ""
     if other.type_hash == NO_HASH:
         return (
             f"node {doing} without a type hash, as ROS 2 Humble does: they do not reach each"
@@ -72,59 +67,23 @@ def explain_incompatible(own: Token, other: Token) -> str:
 
 
 class IncompatibleEntities:
-    """Log a warning, once for each other node, about entities that cannot reach each other.
+    """Log a warning, once for each other node, about entities that one cannot reach.
 
     Args:
-        graph: The graph of the domain.
-        zid: Id of the session of this process.
+        own: Token of the entity of this process.
+        log: Logger for the warnings.
     """
 
-    def __init__(self, graph: Graph, zid: str) -> None:
-        self._graph = graph
-        self._zid = zid
-        self._lock = threading.RLock()  # a signal handler may declare or close an entity
-        self._own: dict[str, dict[int, tuple[Token, logging.Logger]]] = {}
-        self._warned: dict[int, set[str]] = {}
-        graph.listen(self._changed)
+    def __init__(self, own: Token, log: logging.Logger) -> None:
+        self._own = own
+        self._log = log
+        self._warned: set[str] = set()
 
-    def watch(self, token: Token, log: logging.Logger) -> None:
-        """Begin to watch an entity of this process; call it before the entity is announced.
-
-        Args:
-            token: Token of the entity.
-            log: Logger for the warnings.
-        """
-        with self._lock:
-            known = self._own.get(token.name, {})
-            self._own[token.name] = {**known, token.entity_id: (token, log)}
-
-    def unwatch(self, token: Token) -> None:
-        """Stop watching an entity of this process; not an error if it is not watched."""
-        with self._lock:
-            known = self._own.get(token.name, {})
-            rest = {number: entry for number, entry in known.items() if number != token.entity_id}
-            if rest:
-                self._own[token.name] = rest
-            else:
-                self._own.pop(token.name, None)
-            self._warned.pop(token.entity_id, None)
-
-    def _changed(self, token: Token, alive: bool) -> None:
-        own = self._own.get(token.name)
-        if not alive or not own:
+    def changed(self, other: Token, alive: bool) -> None:
+        """Compare with an entity that exchanges data with this kind, when it appears."""
+        if not alive or other.node_name in self._warned:
             return
-        newcomer = own.get(token.entity_id) if token.zid == self._zid else None
-        if newcomer is not None:
-            # An own entity appears like all others do, and is compared with those before it.
-            for other in self._graph.view().entities(COUNTERPARTS[token.kind], name=token.name):
-                self._compare(*newcomer, other)
-        for entry in own.values():
-            if entry is not newcomer and token.kind is COUNTERPARTS[entry[0].kind]:
-                self._compare(*entry, token)
-
-    def _compare(self, own: Token, log: logging.Logger, other: Token) -> None:
-        warned = self._warned.get(own.entity_id, ())
-        text = "" if other.node_name in warned else explain_incompatible(own, other)
+        text = explain_incompatible(self._own, other)
         if text:
-            self._warned.setdefault(own.entity_id, set()).add(other.node_name)
-            log.warning("%s", text)
+            self._warned.add(other.node_name)
+            self._log.warning("%s", text)

@@ -240,7 +240,7 @@ class Publisher(Entity, Generic[M]):
         """
         self.check_open("publish")
         context = self.node.context
-        key = direct_key(subscription, context.graph.view())
+        key = direct_key(subscription)
         if key is None:
             self.publish(message)
             return
@@ -293,8 +293,8 @@ class Publisher(Entity, Generic[M]):
 
     def subscribers(self) -> list[Token]:
         """Return the subscriptions that this publisher reaches: same topic, type and hash."""
-        view = self.node.context.graph.view()
-        return [token for token in view.subscriptions(self.name) if self.matches(token)]
+        found = self.others.view().subscriptions(self.name)
+        return [token for token in found if self.matches(token)]
 
     @property
     def heard(self) -> bool:
@@ -320,7 +320,7 @@ class Publisher(Entity, Generic[M]):
             ClosedError: The context was shut down meanwhile.
             UsageError: The timeout is not a number.
         """
-        self.node.context.graph.wait_for(
+        self.others.wait_for(
             lambda view: sum(map(self.matches, view.subscriptions(self.name))) >= count,
             timeout,
             f"{count} subscriber(s) of '{self.name}' with type '{self.token.type_name}'",
@@ -364,7 +364,7 @@ class Publisher(Entity, Generic[M]):
                 changes.submit((token, alive))
 
         self.keep(Registration(lambda: changes.close(0)))
-        self.keep(self.node.listen(changed))
+        self.keep(Registration(self.others.listen(changed)))
 
     def _forked(self) -> None:
         self._ordered = threading.RLock()

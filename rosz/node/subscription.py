@@ -20,6 +20,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosz.errors import ClosedError, DecodeError, RoszError, WaitTimeout
+from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
 from rosz.node.decoder import AnySample, Decoder, Received
 from rosz.node.entity import ANY, Entity
@@ -123,7 +124,7 @@ class Subscription(Entity, Generic[M]):
             self._receive_directly(self, self._decoder)
             self.announce()
         if not (typed and latched):
-            self.keep(self.node.listen(self._follow))
+            self.keep(Registration(self.others.listen(self._follow)))
 
     def _subscribe(self, *, history: int, recover: bool) -> None:
         session = self.node.context.session
@@ -149,8 +150,8 @@ class Subscription(Entity, Generic[M]):
 
     def publishers(self) -> list[Token]:
         """Return the publishers that this subscription receives from."""
-        view = self.node.context.graph.view()
-        return [token for token in view.publishers(self.name) if self.matches(token)]
+        found = self.others.view().publishers(self.name)
+        return [token for token in found if self.matches(token)]
 
     # Receiving.
 

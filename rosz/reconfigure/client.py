@@ -228,12 +228,12 @@ class Client:
                 return
             if self._closed:
                 raise ClosedError(f"the client of '{self.name}' is closed")
-        if self.name not in find_servers(self.node.context.graph.view()):
+        if self.name not in find_servers(self.node.context.graph.refresh()):
             raise self._no_server(limit)
         raise WaitTimeout(f"{what} from '{self.name}'", limit, _BUSY)
 
     def _no_server(self, timeout: float) -> WaitTimeout:
-        known = find_servers(self.node.context.graph.view())
+        known = find_servers(self.node.context.graph.refresh())
         listing = f"there are {', '.join(known)}" if known else "no node has any on this network"
         hint = near_miss(self.name, known).removeprefix("; ") or listing
         return WaitTimeout(f"node with settings under '{self.name}'", timeout, hint)

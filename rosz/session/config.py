@@ -22,7 +22,7 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import UsageError
-from rosz.wire import Endpoint
+from rosz.wire import Endpoint, id_prefix
 
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
@@ -72,10 +72,10 @@ _ONE_DIALS = {"autoconnect_strategy": {"peer": {"to_router": "always", "to_peer"
 """Of two peers that hear of each other, the one with the greater id connects. If both did, their
 links would disturb each other, and of eighty peers that start at once some would never be linked.
 """
-_GREATEST = b"\xff\xff"
+_GREATEST = "ffff"
 """The end of the ids of sessions that stay on the machine, which Zenoh compares first. A session
 that reaches beyond the machine may be unreachable for these, so it connects to them."""
-_COUNTDOWN_BYTES, _RANDOM_BYTES = 6, 8
+_ID_DIGITS, _COUNTDOWN_DIGITS = 32, 12
 _EPHEMERAL_EVERYWHERE = "tcp/0.0.0.0:0"
 """Endpoint at which a peer listens that others find by multicast."""
 
@@ -186,17 +186,22 @@ def keys_of(env: Environment) -> KeyFolder | None:
 
 
 def new_id(config: SessionConfig) -> str:
-    """Return the id for a session; empty if any will do.
+    """Return the id for a session, which tells that it is rosz's, and its host (`rosz.wire`).
 
-    A later id is smaller. So existing sessions connect to new ones: one that is stopped does so
-    when it resumes, and nobody waits for its answer meanwhile.
+    A later id of a peer is smaller. So existing sessions connect to new ones: one that is stopped
+    does so when it resumes, and nobody waits for its answer meanwhile.
     """
+    start = id_prefix(socket.gethostname())
     if config.mode != "peer" or config.reaches_beyond:
-        return ""
-    left = (1 << 8 * _COUNTDOWN_BYTES) - time.time_ns() // 1_000_000
-    random = bytearray(os.urandom(_RANDOM_BYTES))
-    random[0] |= 0x10  # an id cannot begin with 0
-    return (random + left.to_bytes(_COUNTDOWN_BYTES, "little") + _GREATEST).hex()
+        return start + _random_digits(_ID_DIGITS - len(start))
+    left = f"{-(time.time_ns() // 1_000_000) % 10**_COUNTDOWN_DIGITS:0{_COUNTDOWN_DIGITS}d}"
+    countdown = "".join(left[at : at + 2] for at in range(_COUNTDOWN_DIGITS - 2, -1, -2))
+    random = _random_digits(_ID_DIGITS - len(start) - _COUNTDOWN_DIGITS - len(_GREATEST))
+    return start + random + countdown + _GREATEST
+
+
+def _random_digits(count: int) -> str:
+    return f"{int.from_bytes(os.urandom(count)) % 10**count:0{count}d}"
 
 
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:

@@ -143,9 +143,16 @@ class CallbackThread(Declared):
         what: The name of the declaration in error texts.
         entity: The object of Zenoh that was declared with `open_channel`.
         callback: Function called with each item on the thread; exceptions are logged.
+        begin: Function called once on the thread, before it receives the first item.
     """
 
-    def __init__(self, what: str, entity: Any, callback: Callable[[Any], None]) -> None:
+    def __init__(
+        self,
+        what: str,
+        entity: Any,
+        callback: Callable[[Any], None],
+        begin: Callable[[], None] | None = None,
+    ) -> None:
         super().__init__(what, entity)
         # The thread must not refer to this object, else it would not be undeclared. The items
         # must not leave this package, not even as arguments: see `rosz.session.at_exit`.
@@ -153,7 +160,10 @@ class CallbackThread(Declared):
         item: Any = None
 
         def receive() -> bool | None:
-            nonlocal item
+            nonlocal begin, item
+            first, begin = begin, None
+            if first is not None:
+                first()
             if ENDING.is_set():
                 return None
             try:

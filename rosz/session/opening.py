@@ -176,8 +176,8 @@ def outlasted_silence(config: SessionConfig) -> float:
 
 
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
-    if "id" not in overrides(config.override) and (zid := new_id(config)):
-        settings.insert_json5("id", json.dumps(zid))
+    if settings.get_json("id") == "null":
+        settings.insert_json5("id", json.dumps(new_id(config)))
     return zenoh.open(settings)
 
 

@@ -59,6 +59,8 @@ __all__ = ("Session",)
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 """Congestion control for a full link, by whether to wait for it."""
 _HEARTBEAT_SECONDS = 0.5
+_TOKENS_SECONDS = 2.0
+"""Seconds in which the tokens come that exist when a watch begins."""
 
 _log = logging.getLogger("rosz.session")
 
@@ -314,14 +316,38 @@ class Session:
         self._tokens[key] = token
         return token
 
-    def watch_tokens(self, key: str, callback: Callable[[str, bool], None]) -> Closable:
+    def watch_tokens(
+        self,
+        key: str,
+        callback: Callable[[str, bool], None],
+        complete: Callable[[], None] | None = None,
+    ) -> Closable:
         """Watch liveliness tokens, beginning with those that exist already.
 
         Args:
             key: The key expression that the tokens match.
             callback: Function called on the watch's thread with the key of a token, and with
                 whether it appeared (true) or disappeared (false).
+            complete: Function called there once the tokens that existed at the beginning have
+                been reported; never, if one of them disappears at that very moment.
         """
+        existing: Replies | None = None
+        missing: set[str] = set()
+
+        def begin() -> None:
+            nonlocal existing, missing
+            if existing is not None:
+                replies, existing = existing, None
+                missing = {reply.key for reply in replies if reply.ok}
+                del replies
+            check()
+
+        def check() -> None:
+            nonlocal complete
+            report = None if missing else complete
+            if report is not None:
+                complete = None
+                report()
 
         def deliver(raw: zenoh.Sample) -> None:
             token, alive = str(raw.key_expr), raw.kind == zenoh.SampleKind.PUT
@@ -329,10 +355,18 @@ class Session:
             # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
             if alive or own is None or own.closed:
                 callback(token, alive)
+            if missing:
+                missing.discard(token)
+                check()
 
         with translate_errors(f"watch tokens '{key}'"):
-            entity = self._raw.liveliness().declare_subscriber(key, open_channel(), history=True)
-        return CallbackThread(f"watch of tokens '{key}'", entity, deliver)
+            liveliness = self._raw.liveliness()
+            if complete is not None:
+                # Before the watch: Zenoh replies with nothing that a watch has been told of.
+                handler = liveliness.get(key, open_channel(), timeout=_TOKENS_SECONDS)
+                existing = Replies(handler)
+            entity = liveliness.declare_subscriber(key, open_channel(), history=True)
+        return CallbackThread(f"watch of tokens '{key}'", entity, deliver, begin)
 
     def query(
         self,

@@ -3,6 +3,7 @@
 from rosz.wire.attachment import pack_attachment, read_attachment
 from rosz.wire.endpoint import Endpoint
 from rosz.wire.gid import gid
+from rosz.wire.session_ids import FOREIGN_DIGITS, host_number, id_prefix, is_rosz_id
 from rosz.wire.tokens import (
     NO_HASH,
     OWN_SPACE,
@@ -10,12 +11,16 @@ from rosz.wire.tokens import (
     Kind,
     ProcessToken,
     Token,
+    clients_below_key,
     dds_type,
     dropped_key,
+    entities_key,
     entity_key,
     format_process,
     format_qos,
     format_token,
+    node_key,
+    nodes_key,
     own_key,
     parse_process,
     parse_qos,
@@ -26,6 +31,7 @@ from rosz.wire.tokens import (
 )
 
 __all__ = (
+    "FOREIGN_DIGITS",
     "NO_HASH",
     "OWN_SPACE",
     "SPACE",
@@ -33,13 +39,20 @@ __all__ = (
     "Kind",
     "ProcessToken",
     "Token",
+    "clients_below_key",
     "dds_type",
     "dropped_key",
+    "entities_key",
     "entity_key",
     "format_process",
     "format_qos",
     "format_token",
     "gid",
+    "host_number",
+    "id_prefix",
+    "is_rosz_id",
+    "node_key",
+    "nodes_key",
     "own_key",
     "pack_attachment",
     "parse_process",

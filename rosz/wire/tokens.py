@@ -30,12 +30,16 @@ __all__ = (
     "Kind",
     "ProcessToken",
     "Token",
+    "clients_below_key",
     "dds_type",
     "dropped_key",
+    "entities_key",
     "entity_key",
     "format_process",
     "format_qos",
     "format_token",
+    "node_key",
+    "nodes_key",
     "own_key",
     "parse_process",
     "parse_qos",
@@ -57,6 +61,7 @@ _NODE_CHUNKS = 9
 _ENTITY_CHUNKS = 13
 _PROCESS_CHUNKS = 9
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+_FORBIDDEN = re.compile(r"[*$?#]")
 _DEFAULT_DEPTH = 42
 _SECOND = 1_000_000_000
 _FOREVER = divmod(FOREVER, _SECOND)
@@ -155,6 +160,37 @@ def tokens_key(domain: int | Literal["*"], zid: str = "*") -> str:
     return f"{SPACE}/{domain}/{zid}/**"
 
 
+def entities_key(domain: int, kind: Kind, name: str) -> str:
+    """Return the key expression of the tokens of one kind of entity of a topic or service."""
+    return f"{SPACE}/{domain}/*/*/*/{kind.value}/*/*/*/{_chunk(name)}/**"
+
+
+def clients_below_key(domain: int, node: str) -> str:
+    """Return the key expression of the tokens of clients of services in a node's namespace."""
+    return f"{SPACE}/{domain}/*/*/*/{Kind.CLIENT.value}/*/*/*/{_chunk(node)}%$*/**"
+
+
+def node_key(domain: int, node: str) -> str:
+    """Return the key expression of all tokens of the nodes of a full name."""
+    namespace, _, base = node.rpartition("/")
+    return f"{SPACE}/{domain}/*/*/*/*/*/{_chunk(namespace or '/')}/{_chunk(base)}/**"
+
+
+def nodes_key(domain: int, zid: str = "*") -> str:
+    """Return the key expression of the tokens of nodes, without those of their entities.
+
+    Args:
+        domain: The ROS domain.
+        zid: The session of the nodes; it may have wildcards.
+    """
+    return f"{SPACE}/{domain}/{zid}/*/*/{Kind.NODE.value}/**"
+
+
+def _chunk(name: str) -> str:
+    """Return a chunk that matches a name; what no token can have becomes something else."""
+    return _FORBIDDEN.sub("_", name.replace("/", "%")) or "%"
+
+
 def format_token(token: Token) -> str:
     """Return the key of a token in canonical form, which leaves out default QoS values."""
     chunks = [
@@ -251,9 +287,11 @@ def dropped_key(domain: int, zid: str = "*") -> str:
     return own_key(domain, "dropped", zid)
 
 
-def processes_key(domain: int) -> str:
-    """Return the key expression that matches all process tokens of a domain."""
-    return own_key(domain, "node", "**")
+def processes_key(domain: int, node: str | None = None) -> str:
+    """Return the key expression of all process tokens of a domain, or of nodes of a full name."""
+    if node is None:
+        return own_key(domain, "node", "**")
+    return own_key(domain, "node", *"*****", _chunk(node))
 
 
 def format_process(token: ProcessToken) -> str:

@@ -269,7 +269,7 @@ def test_damaged_tokens(
         for key in keys:
             session.token(key)
         network.node("robot")
-        view = graph.wait_for_node("/robot", TIMEOUT)
+        view = graph.wait_for(lambda view: "/robot" in view.nodes(), TIMEOUT, "the node")
     assert view.nodes() == ["/robot"]
     told = [record.getMessage() for record in caplog.records if record.name == "rosz.graph"]
     assert len(set(told)) == 1

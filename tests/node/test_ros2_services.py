@@ -24,7 +24,6 @@ from rosz.msgs.rcl_interfaces.srv import (
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
 from rosz.node import Client, Node
-from rosz.node.ros2_detector import Ros2PeerDetector
 from rosz.node.ros2_parameters import from_ros2, to_ros2
 from rosz.wire import Kind, Token, format_token
 
@@ -270,10 +269,6 @@ def test_nobody_asks_no_services(network: Network, talker: Node) -> None:
     other.client("/other/something/else", SetBool)
     graph = talker.context.graph
     graph.wait_for(lambda view: bool(view.clients("/other/something/else")), TIMEOUT, "a client")
-    eventually(
-        lambda: "rosz-ros2/robot/talker" not in {t.name for t in threading.enumerate()},
-        "the talker has had a look",
-    )
     assert graph.view().services() == {}
 
 
@@ -287,43 +282,6 @@ def test_a_foreign_node_brings_them(network: Network, talker: Node) -> None:
     assert server.qos is not None
     assert server.qos.depth == 1000
     kept.close()
-
-
-def test_wanted_while_it_has_a_look(
-    network: Network, talker: Node, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A process that turns out to be rosz does not undo a request of another one."""
-    looking, go_on = threading.Event(), threading.Event()
-
-    def look_long(lookout: Ros2PeerDetector, _suspects: set[str]) -> bool:
-        if lookout._node is not talker:
-            return False
-        looking.set()
-        return not go_on.wait(TIMEOUT)
-
-    monkeypatch.setattr(Ros2PeerDetector, "_is_foreign", look_long)
-    asker = network.node("asker")
-    assert looking.wait(TIMEOUT)
-    monkeypatch.setattr(Ros2PeerDetector, "_declare", lambda _: None)
-    lists = asker.client("/robot/talker/list_parameters", ListParameters)
-    graph = talker.context.graph
-    graph.wait_for(lambda view: bool(view.clients(lists.name)), TIMEOUT, "a client")
-    monkeypatch.undo()
-    go_on.set()
-    lists.wait_for_service(TIMEOUT)
-
-
-def test_who_came_and_went_is_forgotten(network: Network, talker: Node) -> None:
-    lookout = Ros2PeerDetector(talker)
-    graph = talker.context.graph
-    for _ in range(3):
-        guest = network.node("guest")
-        graph.wait_for(lambda view: "/guest" in view.nodes(), TIMEOUT, "a guest")
-        zid = guest.context.session.zid
-        eventually(lambda zid=zid: zid in lookout._tokens, "it is seen")  # type: ignore[misc]
-        guest.context.close()
-        eventually(lambda zid=zid: zid not in lookout._tokens, "it is forgotten")  # type: ignore[misc]
-    lookout.close()
 
 
 def test_humble_has_no_type_descriptions(network: Network) -> None:

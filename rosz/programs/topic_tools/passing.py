@@ -74,7 +74,8 @@ class Input:
 
     def is_latched(self, info: MessageInfo) -> bool:
         """Return whether the publishers of a type latch their messages."""
-        publishers = self._node.context.graph.view().publishers(self.name)
+        subscription = self._subscription
+        publishers = [] if subscription is None else subscription.publishers()
         return any(
             token.qos is not None and token.qos.latched
             for token in publishers

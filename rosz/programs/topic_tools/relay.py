@@ -12,6 +12,7 @@ from typing import NoReturn
 
 from rosz.node import MessageInfo, Node, TimerEvent, serve_loggers
 from rosz.programs.topic_tools.passing import Input, Output, base_name, words
+from rosz.wire import Kind
 
 __all__ = ("ByteLimit", "PeriodLimit", "Relay", "Share", "drop", "relay", "throttle")
 
@@ -140,6 +141,8 @@ class Relay:
             sys.exit(f"relay: the input and the output are both '{self._input.name}'")
         if self._stealth:
             self._monitored = node.resolve(params.get("~monitor_topic", source, type=str))
+            graph = node.context.graph
+            self._followed = node.keep(graph.follow_entities(Kind.SUBSCRIPTION, self._monitored))
             node.timer(params.get("~monitor_rate", 1.0, type=float), self._monitor)
         self._input.open()
 
@@ -165,7 +168,7 @@ class Relay:
     def _monitor(self, _: TimerEvent) -> None:
         if not self._output.advertised:
             return
-        others = self._node.context.graph.view().subscriptions(self._monitored)
+        others = self._followed.view().subscriptions(self._monitored)
         if any(token.node_name != self._node.name for token in others):
             self._input.open()
         else:

@@ -20,7 +20,7 @@ from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
 from rosz.ros1.state import context, has_node, state, unnamed_node, when_ready
 from rosz.ros1.state import is_shutdown as node_is_shutdown
 from rosz.time import DurationValue
-from rosz.wire import format_token, gid
+from rosz.wire import Kind, format_token, gid
 
 __all__ = ("Service", "ServiceException", "ServiceProxy", "wait_for_service")
 
@@ -160,9 +160,10 @@ class Service(_ServiceBase):
             timeout: Seconds to wait for the token of the client, which a request may precede.
         """
         name = self._name_of(caller)
-        if not name and timeout:
+        service = self._service
+        if not name and timeout and service is not None:
             with suppress(WaitTimeout, ClosedError):
-                context().graph.wait_for(
+                service.others.wait_for(
                     lambda _: bool(self._name_of(caller)), timeout, "the caller"
                 )
             name = self._name_of(caller)
@@ -177,7 +178,7 @@ class Service(_ServiceBase):
         """Return the name of the node of a client; empty while it is unknown."""
         if self._service is None:
             return ""
-        known = self._service.node.context.graph.view().clients(self.resolved_name)
+        known = self._service.others.view().clients(self.resolved_name)
         names = (token.node_name for token in known if gid(format_token(token)) == caller)
         return next(names, "")
 
@@ -306,12 +307,12 @@ def wait_for_service(service: str, timeout: float | DurationValue | None = None)
     name = resolve_name(service)
     check_running()
     deadline = deadline_of(timeout)
-    while (left := deadline - time.monotonic()) > 0:
-        try:
-            context().graph.wait_for_service(name, min(left, SLICE))
-        except WaitTimeout:
-            continue
-        except ClosedError as error:
-            raise ROSInterruptException(SHUT_DOWN) from error
-        return
+    try:
+        with context().graph.follow_entities(Kind.SERVICE, name) as servers:
+            while (left := deadline - time.monotonic()) > 0:
+                with suppress(WaitTimeout):
+                    servers.wait_for(lambda view: bool(view.servers(name)), min(left, SLICE), name)
+                    return
+    except ClosedError as error:
+        raise ROSInterruptException(SHUT_DOWN) from error
     raise ROSException(f"timeout exceeded while waiting for service {name}")

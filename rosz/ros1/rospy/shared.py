@@ -430,9 +430,10 @@ class SharedSubscription(_Shared):
             timeout: Seconds to wait for the token of the publisher, which a message may precede.
         """
         origin = self._origin(info.gid)
-        if origin is None and timeout:
+        subscription = self._subscription
+        if origin is None and timeout and subscription is not None:
             with suppress(WaitTimeout, ClosedError):
-                context().graph.wait_for(
+                subscription.others.wait_for(
                     lambda _: self._origin(info.gid) is not None, timeout, "the publisher"
                 )
             origin = self._origin(info.gid)

@@ -268,7 +268,7 @@ class Client:
 
     def service_is_ready(self) -> bool:
         """Return whether a node serves the service."""
-        return self.wait_for_service(0.0)
+        return self._client.served
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until a node serves the service.

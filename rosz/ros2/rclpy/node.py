@@ -23,6 +23,7 @@ from rosz.ros2.rclpy.logging import RcutilsLogger, write_as_rclpy
 from rosz.ros2.rclpy.parameter import NodeParameters, Parameter
 from rosz.ros2.rclpy.qos import QoSProfile, to_qos
 from rosz.ros2.rclpy.time import Clock, Rate, ROSClock
+from rosz.wire import Kind, Token
 
 __all__ = ("Node",)
 
@@ -370,16 +371,22 @@ class Node(NodeParameters):
 
     def count_publishers(self, topic_name: str) -> int:
         """Return the number of publishers of a topic."""
-        return len(self._rosz_view().publishers(self.resolve_topic_name(topic_name)))
+        return len(self._rosz_entities(Kind.PUBLISHER, topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
         """Return the number of subscriptions of a topic."""
-        return len(self._rosz_view().subscriptions(self.resolve_topic_name(topic_name)))
+        return len(self._rosz_entities(Kind.SUBSCRIPTION, topic_name))
+
+    def _rosz_entities(self, kind: Kind, topic: str) -> list[Token]:
+        name = self.resolve_topic_name(topic)
+        with self.rosz_node.context.graph.follow_entities(kind, name) as followed:
+            return followed.refresh(_QUERY_TIMEOUT).entities(kind, name=name)
 
     def _rosz_view(self) -> Any:
         return self.rosz_node.context.graph.view()
 
 
+_QUERY_TIMEOUT = 2.0
 _OPTIONS = frozenset({
     "allow_undeclared_parameters", "automatically_declare_parameters_from_overrides", "cli_args",
     "enable_logger_service", "enable_rosout", "start_parameter_services", "use_global_arguments",

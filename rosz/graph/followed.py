@@ -1,0 +1,183 @@
+"""A part of the graph that is followed: live tokens, listeners, and waiting for a condition."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, Self
+
+from rosz.errors import ClosedError, WaitTimeout
+from rosz.graph.view import View
+from rosz.lifecycle import Closable
+from rosz.session import clamp_timeout
+from rosz.wire import ProcessToken, Token
+
+if TYPE_CHECKING:
+    from rosz.graph.graph import Graph
+
+__all__ = ("COMPLETE_BY", "Followed", "GraphListener", "Interest", "ProcessListener")
+
+GraphListener = Callable[[Token, bool], None]
+"""Function called with a token, and whether it appeared (true) or disappeared (false)."""
+
+ProcessListener = Callable[[ProcessToken, bool], None]
+"""Function called with a rosz node as a process, and whether it appeared or disappeared."""
+
+COMPLETE_BY = 2.0
+"""Seconds after which what is followed counts as complete in any case."""
+
+_numbers = itertools.count()
+
+
+class Interest:
+    """The live tokens that match one key expression, for all who follow it.
+
+    Only the graph changes it, on its thread.
+
+    Args:
+        key: The key expression.
+
+    Attributes:
+        key: The key expression.
+        tokens: The tokens by their keys.
+        version: Number that grows with each change of the tokens.
+        began: Time when it was made, by the monotonic clock in seconds.
+        complete: Whether it has the tokens that existed when it began.
+        users: Number of those who follow it.
+        listeners: Functions called with each change, and whether they get what existed before.
+        watch: The watch of the session, once it is declared.
+    """
+
+    def __init__(self, key: str) -> None:
+        self.key = key
+        self.tokens: dict[str, Any] = {}
+        self.version: int = 0
+        self.began: float = time.monotonic()
+        self.complete: bool = False
+        self.users: int = 0
+        self.listeners: dict[int, tuple[Callable[[Any, bool], None], bool]] = {}
+        self.watch: Closable | None = None
+
+    @property
+    def settled(self) -> bool:
+        """Whether it has what existed when it began, or that takes too long."""
+        return self.complete or time.monotonic() - self.began > COMPLETE_BY
+
+
+class Followed:
+    """The tokens that match some key expressions, followed until this is closed.
+
+    Args:
+        graph: The graph.
+        interests: The tokens of each key expression.
+    """
+
+    def __init__(self, graph: Graph, interests: Iterable[Interest]) -> None:
+        self._graph = graph
+        self._interests = tuple(interests)
+        self._known: tuple[int, View] | None = None
+        self._closed = False
+
+    @property
+    def complete(self) -> bool:
+        """Whether all is known that existed when it began, or that takes too long."""
+        return all(interest.settled for interest in self._interests)
+
+    def view(self) -> View:
+        """Return what is known at this moment; it is not all there is before `complete`."""
+        known = self._known  # replaced whole, so that reading it needs no lock
+        if known is not None and known[0] == self._version():
+            return known[1]
+        with self._graph.changed:
+            version = self._version()
+            view = View.of(token for one in self._interests for token in one.tokens.values())
+            self._known = version, view
+            return view
+
+    def refresh(self, timeout: float) -> View:
+        """Return what is known, with what a query adds; for callers that cannot wait for tokens.
+
+        Args:
+            timeout: Time limit in seconds.
+
+        Raises:
+            ClosedError: The session is closed.
+            UsageError: The timeout is not a number.
+        """
+        return self._graph.query(self._interests, [one.key for one in self._interests], timeout)
+
+    def listen(
+        self, listener: Callable[[Any, bool], None], *, history: bool = True
+    ) -> Callable[[], None]:
+        """Call a function for every change, in order, on the graph's thread.
+
+        Args:
+            listener: Function called with each token that appears or disappears; exceptions are
+                logged.
+            history: Whether to call it for existing tokens first.
+
+        Returns:
+            A function that unregisters the listener.
+        """
+        number = next(_numbers)
+        for interest in self._interests:
+            self._graph.register(interest, number, listener, history=history)
+
+        def unregister() -> None:
+            for interest in self._interests:
+                self._graph.unregister(interest, number)
+
+        return unregister
+
+    def wait_for(
+        self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
+    ) -> View:
+        """Wait until what is followed meets a condition.
+
+        Args:
+            condition: Function that tells whether a view meets it.
+            timeout: Time limit in seconds.
+            what: Name of the condition, for the error.
+            hint: Advice at the end of the error text.
+
+        Returns:
+            The view that met the condition.
+
+        Raises:
+            WaitTimeout: The time limit was reached.
+            ClosedError: The graph was closed meanwhile.
+            UsageError: The timeout is not a number.
+        """
+        found: list[View] = []
+
+        def is_met() -> bool:
+            # A part of what exists could meet a condition that all of it does not.
+            if not self.complete and time.monotonic() < deadline:
+                return False
+            view = self.view()
+            if condition(view):
+                found.append(view)
+            return bool(found)
+
+        deadline = time.monotonic() + clamp_timeout(timeout)
+        if self._graph.wait_until(is_met, deadline):
+            return found[0]
+        if self._graph.closing:
+            raise ClosedError(f"the wait for {what} ended: shutting down")
+        raise WaitTimeout(what, timeout, hint)
+
+    def close(self) -> None:
+        """Follow it no longer; a second call has no effect."""
+        closed, self._closed = self._closed, True
+        if not closed:
+            self._graph.release(self._interests)
+
+    def _version(self) -> int:
+        return sum(interest.version for interest in self._interests)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
