@@ -146,13 +146,3 @@ def test_sentences(own: Token, other: Token, part: str) -> None:
     text = explain_incompatible(own, other)
     assert part in text
     assert bool(text) == bool(part)
-
-
-def test_what_was_told_of_an_endpoint_ends_with_it(network: Network) -> None:
-    talker, listener = network.node("talker"), network.node("listener")
-    publisher = talker.publisher("chatter", String)
-    told = talker.context.incompatible._warned
-    with listener.subscription("chatter", Int32):
-        eventually(lambda: bool(told), "it is told")
-        publisher.close()
-    assert not told
