@@ -1,8 +1,9 @@
 """Crowds of 10 to 200 nodes, joined in several ways: ``python -m tests.bench.scale``.
 
 Each node is a process, all start at once, and nothing else is on their network. On one host:
-``mesh``, peers that link to each other, as nodes are by themselves, and ``star``, clients of one
-core, as a launch of many nodes makes them. Over several hosts (``--hosts``, needs privileges):
+``mesh``, peers that link to each other, as nodes are by themselves, ``star``, clients of one core,
+as a launch of many nodes makes them, and ``bare``, the same with nothing but Zenoh. Over several
+hosts (``--hosts``, needs privileges):
 
 - ``mesh``: peers that find each other by multicast, linked across hosts;
 - ``star``: clients of the core of the first host;
@@ -30,7 +31,7 @@ from .plot import plot
 HEAD = (
     "nodes",
     "",
-    "graph complete, s",
+    "all heard, s",
     "core seconds each",
     "traffic each, kB",
     "MB each",
@@ -61,7 +62,11 @@ def options() -> Namespace:
     given = parser.parse_args()
     given.counts = [int(word) for word in given.counts.split(",")]
     several = given.hosts > 1
-    given.modes = given.modes.split(",") if given.modes else list(TOPOLOGIES)[: 4 if several else 2]
+    given.modes = (
+        given.modes.split(",")
+        if given.modes
+        else [mode for mode, one in TOPOLOGIES.items() if several or one.cores != "each"]
+    )
     for mode in given.modes:
         if mode not in TOPOLOGIES:
             parser.error(f"'{mode}' is none of {', '.join(TOPOLOGIES)}")

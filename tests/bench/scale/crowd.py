@@ -17,7 +17,7 @@ from .site import Site, sites
 
 __all__ = ("TOPOLOGIES", "Sight", "Topology", "measure")
 
-_WORKER = str(Path(__file__).with_name("worker.py"))
+_FOLDER = Path(__file__).parent
 _IDLE_SECONDS = 4.0
 _FIRST = "tcp/h0:7447"
 
@@ -28,10 +28,17 @@ class Topology(msgspec.Struct, frozen=True):
     Attributes:
         cores: Where cores are; those of other hosts are linked to that of the first.
         mode: What the nodes are, by ``ROSZ_MODE``.
+        worker: The program of the nodes.
     """
 
     cores: Literal["none", "first", "each"]
     mode: Literal["peer", "client"]
+    worker: str = "worker.py"
+
+    @property
+    def bare(self) -> bool:
+        """Whether there is nothing of rosz in it."""
+        return self.worker == "bare.py"
 
     def core(self, site: int, count: int) -> Sequence[str] | None:
         """Return the arguments of the core of a host out of so many, if it has one."""
@@ -54,6 +61,7 @@ class Topology(msgspec.Struct, frozen=True):
 TOPOLOGIES = {
     "mesh": Topology("none", "peer"),
     "star": Topology("first", "client"),
+    "bare": Topology("first", "client", "bare.py"),
     "cores": Topology("each", "peer"),
     "stars": Topology("each", "client"),
 }
@@ -65,14 +73,15 @@ class Sight(msgspec.Struct):
     Attributes:
         mode: Name of the topology.
         count: Nodes.
-        complete: Seconds from the first start until everybody sees everybody.
+        complete: Seconds from the first start until everybody has heard its neighbour.
         busy: Seconds of a core that this takes for each node.
         traffic: Kilobytes for each node over the links between the hosts, or over the loopback
             of the only one, until all is complete.
         memory: Megabytes for each node.
         idle: Percent of a core that is taken for each node when nothing happens.
         set_ms: Milliseconds of a set that all acknowledge.
-        newcomer: Seconds from the start of one more node until it sees all and all have heard it.
+        newcomer: Seconds from the start of one more node until it has heard its neighbour and all
+            have heard it.
         trouble: Why there is no more.
         late: Whether that is because it took too long.
     """
@@ -132,14 +141,18 @@ class _Crowd:
         """
         self._start_cores()
         self._measure_start(sight)
-        self._measure_rest(sight)
-        self._measure_newcomer(sight)
+        if not self._topology.bare:
+            self._measure_rest(sight)
+            self._measure_newcomer(sight)
 
     def _start_cores(self) -> None:
         for number, site in enumerate(self._sites):
             words = self._topology.core(number, len(self._sites))
             if words is not None:
-                self._start(f"core{number}", site, ("-m", "rosz", "core", *words), {})
+                command = ("-m", "rosz", "core", *words)
+                if self._topology.bare:
+                    command = (str(_FOLDER / self._topology.worker), "router")
+                self._start(f"core{number}", site, command, {})
                 self._wait("started", 1)
 
     def _measure_start(self, sight: Sight) -> None:
@@ -169,7 +182,7 @@ class _Crowd:
     def _start_node(self, number: int, count: int, *words: str) -> None:
         place = number % len(self._sites)
         variables = self._topology.variables(place, len(self._sites))
-        command = [_WORKER, str(number), str(count), *words]
+        command = [str(_FOLDER / self._topology.worker), str(number), str(count), *words]
         self._start(f"s{number}", self._sites[place], command, variables)
 
     def _start(

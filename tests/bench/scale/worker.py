@@ -1,7 +1,8 @@
 """One node of a crowd: ``worker.py NUMBER COUNT [hail]``.
 
-Tells when it sees so many of its kind and when it is first hailed, sets a parameter when told to,
-and ends with its standard input. A newcomer, which hails, tells nothing but the former.
+Publishes one topic, once to each subscription, and tells when it first hears that of its neighbour
+and when it is first hailed. It sets a parameter when told to, and ends with its standard input. A
+newcomer, which hails, tells nothing but the former.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ import statistics
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 import rosz
 from rosz.msgs.std_msgs.msg import String
-from rosz.wire import Kind, Token
 
 SPACE = "/crowd/"
 HAIL = "/hail"
@@ -25,26 +26,6 @@ SETS = 20
 def tell(word: str, value: float) -> None:
     """Say something on the pipe that all write to: whole lines, which do not mix."""
     os.write(1, f"{word} {value}\n".encode())
-
-
-class Census:
-    """Tells when it has seen enough.
-
-    Args:
-        count: How many.
-    """
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._seen: set[str] = set()
-
-    def take(self, token: Token, alive: bool) -> None:
-        """Count a node by the topic that it publishes."""
-        if alive and token.kind is Kind.PUBLISHER and token.name.startswith(SPACE):
-            known = len(self._seen)
-            self._seen.add(token.name)
-            if known < len(self._seen) == self._count:
-                tell("complete", time.monotonic())
 
 
 def median_set(node: rosz.Node, others: int) -> float:
@@ -59,23 +40,29 @@ def median_set(node: rosz.Node, others: int) -> float:
     return statistics.median(taken)
 
 
-def main() -> None:
-    number, count = sys.argv[1], int(sys.argv[2])
-    hailed = threading.Event()
+def once(word: str) -> Callable[[String], None]:
+    """Return a callback that tells of its first message."""
+    heard = threading.Event()
 
     def hear(_message: String) -> None:
-        if not hailed.is_set():
-            hailed.set()
-            tell("heard", time.monotonic())
+        if not heard.is_set():
+            heard.set()
+            tell(word, time.monotonic())
 
+    return hear
+
+
+def main() -> None:
+    number, count = int(sys.argv[1]), int(sys.argv[2])
     with rosz.Node(f"s{number}") as node:
-        node.context.graph.listen(Census(count).take)
-        node.publisher(f"{SPACE}t{number}", String)
+        node.subscription(f"{SPACE}t{(number + 1) % count}", String, once("complete"))
+        own = node.publisher(f"{SPACE}t{number}", String)
+        own.on_connection(lambda _: own.publish(String("here")))
         if "hail" in sys.argv[3:]:
             hail = node.publisher(HAIL, String)
             node.timer(PERIOD, lambda _: hail.publish(String("here")))
         else:
-            node.subscription(HAIL, String, hear)
+            node.subscription(HAIL, String, once("heard"))
         for line in sys.stdin:
             if line.strip() == "set":
                 tell("set", median_set(node, count - 1))
