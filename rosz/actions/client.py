@@ -15,7 +15,7 @@ from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
-from rosz.wire import Kind, entities_key
+from rosz.wire import Kind
 
 __all__ = ("ActionClient", "ClientGoal", "CommState")
 
@@ -245,9 +245,8 @@ class ActionClient:
             )
 
         graph = self.node.context.graph
-        keys = (entities_key(graph.domain, Kind.PUBLISHER, topic) for topic in topics)
         try:
-            with graph.follow(*keys) as publishers:
+            with graph.follow_entities(Kind.PUBLISHER, *topics) as publishers:
                 what = f"action server '{self.name}'"
                 publishers.wait_for(is_connected, timeout or _FOREVER, what)
         except WaitTimeout:

@@ -37,9 +37,11 @@ class Interest:
 
     Args:
         key: The key expression.
+        name: The topic or service that the tokens must have; any if empty.
 
     Attributes:
         key: The key expression.
+        name: The topic or service that the tokens must have; any if empty.
         tokens: The tokens by their keys.
         version: Number that grows with each change of the tokens.
         began: Time when it was made, by the monotonic clock in seconds.
@@ -49,8 +51,9 @@ class Interest:
         watch: The watch of the session, once it is declared.
     """
 
-    def __init__(self, key: str) -> None:
+    def __init__(self, key: str, name: str = "") -> None:
         self.key = key
+        self.name = name
         self.tokens: dict[str, Any] = {}
         self.version: int = 0
         self.began: float = time.monotonic()

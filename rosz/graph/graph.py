@@ -83,27 +83,30 @@ class Graph:
         self._thread.start()
 
     def follow(self, *keys: str) -> Followed:
-        """Follow the tokens that match some key expressions, such as `rosz.wire.entities_key`.
+        """Follow the tokens that match some key expressions, such as `rosz.wire.nodes_key`.
 
         Raises:
             ClosedError: The graph or its session is closed.
         """
+        return self._follow((key, "") for key in keys)
+
+    def follow_entities(self, kind: Kind, *names: str) -> Followed:
+        """Follow one kind of entity of some topics or services.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
+        """
+        return self._follow((entities_key(self.domain, kind, name), name) for name in names)
+
+    def _follow(self, keys: Iterable[tuple[str, str]]) -> Followed:
         self._lifecycle.check_open("follow anything more")
         interests: list[Interest] = []
         try:
-            interests.extend(map(self._acquire, keys))
+            interests.extend(self._acquire(*key) for key in keys)
         except BaseException:
             self.release(interests)
             raise
         return Followed(self, interests)
-
-    def follow_entities(self, kind: Kind, name: str) -> Followed:
-        """Follow one kind of entity of a topic or service.
-
-        Raises:
-            ClosedError: The graph or its session is closed.
-        """
-        return self.follow(entities_key(self.domain, kind, name))
 
     def follow_all(self) -> Followed:
         """Follow the whole domain, which costs each node as much as there are entities in all.
@@ -340,13 +343,13 @@ class Graph:
     def _all_keys(self) -> tuple[str, str]:
         return tokens_key(self.domain), processes_key(self.domain)
 
-    def _acquire(self, key: str) -> Interest:
+    def _acquire(self, key: str, name: str) -> Interest:
         with self.changed:
             interest = self._interests.get(key)
             if interest is not None:
                 interest.users += 1
                 return interest
-            interest = self._interests[key] = Interest(key)
+            interest = self._interests[key] = Interest(key, name)
             interest.users = 1
         try:
             interest.watch = self._session.watch_tokens(
@@ -417,7 +420,7 @@ class Graph:
         if alive == (key in known):
             return None
         token = self._parse(key) if alive else known[key]
-        if token is None:
+        if token is None or (interest.name and token.name != interest.name):
             return None
         with self.changed:
             if alive:

@@ -51,10 +51,12 @@ _LEASE_MS = 60_000
 _LEASE_BEYOND_MS = 8_000
 """The same beyond the machine. A link that was cut is opened again after this time. TCP by itself
 pauses longer after each attempt, so after a minute without connection it may wait another one."""
-_LOCAL_LINKS = {"open_timeout": 10_000, "accept_timeout": 60_000, "accept_pending": 1000}
-"""Time limits for opening a link in milliseconds, and how many may be opened at a time. Answers
-take long when many processes start at once, and Zenoh tries each peer that it heard of only once.
-"""
+_ACCEPTING = {"accept_timeout": 60_000, "accept_pending": 1000, "max_sessions": 10_000}
+"""The time limit in milliseconds for others to open a link, how many may do so at a time, and how
+many links there may be. When many processes start at once, each takes long to open its link."""
+_OPEN_MS = 10_000
+"""Time limit in milliseconds for opening a link on the machine. Answers take long when many
+processes start at once, and Zenoh tries each peer that it heard of only once."""
 _OPEN_BEYOND_MS = 3_000
 """The same beyond the machine, where an attempt that the network lost should soon be repeated."""
 _LOCAL_QUEUE = 16
@@ -241,7 +243,7 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             "shared_memory": {"enabled": True, "transport_optimization": sharing}
             if config.shared_memory
             else {"enabled": False},
-            "unicast": _LOCAL_LINKS if local else {"open_timeout": _OPEN_BEYOND_MS},
+            "unicast": _ACCEPTING | {"open_timeout": _OPEN_MS if local else _OPEN_BEYOND_MS},
             "link": {
                 "tx": {
                     "lease": _LEASE_MS if local else _LEASE_BEYOND_MS,

@@ -161,8 +161,11 @@ def tokens_key(domain: int | Literal["*"], zid: str = "*") -> str:
 
 
 def entities_key(domain: int, kind: Kind, name: str) -> str:
-    """Return the key expression of the tokens of one kind of entity of a topic or service."""
-    return f"{SPACE}/{domain}/*/*/*/{kind.value}/*/*/*/{_chunk(name)}/**"
+    """Return a key expression for the tokens of one kind of entity of a topic or service.
+
+    It matches other names that end alike, too, because some participants leave the first slash out.
+    """
+    return f"{SPACE}/{domain}/*/*/*/{kind.value}/*/*/*/$*{_chunk(name).lstrip('%')}/**"
 
 
 def clients_below_key(domain: int, node: str) -> str:

@@ -182,7 +182,8 @@ def test_our_view_of_it(sdk: Partner, node: Node) -> None:
     sdk("serve", "/add")
     graph = node.context.graph
     graph.wait_for_service("/add", TIMEOUT)
-    view = graph.wait_for_topic("/back", TIMEOUT)
+    graph.wait_for_topic("/back", TIMEOUT)
+    view = graph.view()
     assert {"/sdk_echo", "/sdk_server", "/rosz_side"} <= set(view.nodes())
     (publisher,) = view.publishers("/back")
     assert publisher.type_name == "std_msgs/msg/String"

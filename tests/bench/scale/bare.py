@@ -24,6 +24,10 @@ def tell(word: str, value: float) -> None:
     os.write(1, f"{word} {value}\n".encode())
 
 
+def ignore(_sample: zenoh.Sample) -> None:
+    """Take a token and do nothing."""
+
+
 def open_session(mode: str) -> zenoh.Session:
     """Open the session of a client, or of the router, at the rendezvous."""
     meeting = {"endpoints": [os.environ.get("ROSZ_RENDEZVOUS", "tcp/localhost:7447")]}
@@ -56,7 +60,7 @@ def main() -> None:
 
     kept: list[object] = [
         session.liveliness().declare_subscriber(
-            f"@bare/0/*/*/*/MP/*/*/*/n{(number + 1) % count}k{key}/**", print, history=True
+            f"@bare/0/*/*/*/MP/*/*/*/n{(number + 1) % count}k{key}/**", ignore, history=True
         )
         for key in range(KEYS)
     ]
