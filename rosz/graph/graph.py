@@ -420,7 +420,7 @@ class Graph:
         if alive == (key in known):
             return None
         token = self._parse(key) if alive else known[key]
-        if token is None or (interest.name and token.name != interest.name):
+        if token is None or interest.name not in {"", getattr(token, "name", "")}:
             return None
         with self.changed:
             if alive:

@@ -144,6 +144,7 @@ class CallbackThread(Declared):
         entity: The object of Zenoh that was declared with `open_channel`.
         callback: Function called with each item on the thread; exceptions are logged.
         begin: Function called once on the thread, before it receives the first item.
+        idle: Function called on the thread whenever there is no item, before it waits for one.
     """
 
     def __init__(
@@ -152,11 +153,12 @@ class CallbackThread(Declared):
         entity: Any,
         callback: Callable[[Any], None],
         begin: Callable[[], None] | None = None,
+        idle: Callable[[], None] | None = None,
     ) -> None:
         super().__init__(what, entity)
         # The thread must not refer to this object, else it would not be undeclared. The items
         # must not leave this package, not even as arguments: see `rosz.session.at_exit`.
-        recv = entity.handler.recv
+        recv, try_recv = entity.handler.recv, entity.handler.try_recv
         item: Any = None
 
         def receive() -> bool | None:
@@ -167,6 +169,11 @@ class CallbackThread(Declared):
             if ENDING.is_set():
                 return None
             try:
+                if idle is not None:
+                    item = try_recv()
+                    if item is not None:
+                        return True
+                    idle()
                 item = recv()
             except zenoh.ZError:  # undeclared, or the session is closed
                 return None

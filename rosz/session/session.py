@@ -329,9 +329,10 @@ class Session:
             callback: Function called on the watch's thread with the key of a token, and with
                 whether it appeared (true) or disappeared (false).
             complete: Function called there once the tokens that existed at the beginning have
-                been reported; never, if one of them disappears at that very moment.
+                been reported.
         """
         existing: Replies | None = None
+        seen: set[str] = set()
         missing: set[str] = set()
 
         def begin() -> None:
@@ -340,33 +341,33 @@ class Session:
                 replies, existing = existing, None
                 missing = {reply.key for reply in replies if reply.ok}
                 del replies
-            check()
 
-        def check() -> None:
+        def idle() -> None:
             nonlocal complete
-            report = None if missing else complete
-            if report is not None:
+            report = complete
+            if report is not None and missing <= seen:
                 complete = None
+                seen.clear()
                 report()
 
         def deliver(raw: zenoh.Sample) -> None:
             token, alive = str(raw.key_expr), raw.kind == zenoh.SampleKind.PUT
+            if complete is not None:
+                seen.add(token)
             own = self._tokens.get(token)
             # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
             if alive or own is None or own.closed:
                 callback(token, alive)
-            if missing:
-                missing.discard(token)
-                check()
 
         with translate_errors(f"watch tokens '{key}'"):
             liveliness = self._raw.liveliness()
+            entity = liveliness.declare_subscriber(key, open_channel(), history=True)
             if complete is not None:
-                # Before the watch: Zenoh replies with nothing that a watch has been told of.
+                # After the watch: when the last reply has come, its channel has what existed, but
+                # for what another watch was told of before, which the replies name.
                 handler = liveliness.get(key, open_channel(), timeout=_TOKENS_SECONDS)
                 existing = Replies(handler)
-            entity = liveliness.declare_subscriber(key, open_channel(), history=True)
-        return CallbackThread(f"watch of tokens '{key}'", entity, deliver, begin)
+        return CallbackThread(f"watch of tokens '{key}'", entity, deliver, begin, idle)
 
     def query(
         self,
