@@ -20,6 +20,7 @@ WORDS = {
     "entity": "a publisher, subscription, service or client of a node (rmw_zenoh)",
     "GID": "16 bytes that identify an entity",
     "handover": "what a core leaves to itself when it starts afresh",
+    "interest": "the tokens of one key expression, followed as long as somebody needs them",
     "key expression": "a Zenoh key, maybe with wildcards",
     "latch": "keeping the last message for subscribers that come later",
     "launch": "the run of a plan",
