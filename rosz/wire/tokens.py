@@ -165,7 +165,7 @@ def entities_key(domain: int, kind: Kind, name: str) -> str:
 
     It matches other names that end alike, too, because some participants leave the first slash out.
     """
-    return f"{SPACE}/{domain}/*/*/*/{kind.value}/*/*/*/$*{_chunk(name).lstrip('%')}/**"
+    return f"{SPACE}/{domain}/*/*/*/{kind.value}/*/*/*/$*{_chunk(name).lstrip('%') or '_'}/**"
 
 
 def clients_below_key(domain: int, node: str) -> str:
