@@ -5,18 +5,15 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from rosz.errors import ClosedError, WaitTimeout
+from rosz.graph.interests import Interest, Interests
 from rosz.graph.view import View
-from rosz.lifecycle import Closable
 from rosz.session import clamp_timeout
 from rosz.wire import ProcessToken, Token
 
-if TYPE_CHECKING:
-    from rosz.graph.graph import Graph
-
-__all__ = ("COMPLETE_BY", "Followed", "GraphListener", "Interest", "ProcessListener")
+__all__ = ("Followed", "GraphListener", "ProcessListener")
 
 GraphListener = Callable[[Token, bool], None]
 """Function called with a token, and whether it appeared (true) or disappeared (false)."""
@@ -24,61 +21,23 @@ GraphListener = Callable[[Token, bool], None]
 ProcessListener = Callable[[ProcessToken, bool], None]
 """Function called with a rosz node as a process, and whether it appeared or disappeared."""
 
-COMPLETE_BY = 2.0
-"""Seconds after which what is followed counts as complete in any case."""
-
 _numbers = itertools.count()
-
-
-class Interest:
-    """The live tokens that match one key expression, for all who follow it.
-
-    Only the graph changes it, on its thread.
-
-    Args:
-        key: The key expression.
-        name: The topic or service that the tokens must have; any if empty.
-
-    Attributes:
-        key: The key expression.
-        name: The topic or service that the tokens must have; any if empty.
-        tokens: The tokens by their keys.
-        version: Number that grows with each change of the tokens.
-        began: Time when it was made, by the monotonic clock in seconds.
-        complete: Whether it has the tokens that existed when it began.
-        users: Number of those who follow it.
-        listeners: Functions called with each change, and whether they get what existed before.
-        watch: The watch of the session, once it is declared.
-    """
-
-    def __init__(self, key: str, name: str = "") -> None:
-        self.key = key
-        self.name = name
-        self.tokens: dict[str, Any] = {}
-        self.version: int = 0
-        self.began: float = time.monotonic()
-        self.complete: bool = False
-        self.users: int = 0
-        self.listeners: dict[int, tuple[Callable[[Any, bool], None], bool]] = {}
-        self.watch: Closable | None = None
-
-    @property
-    def settled(self) -> bool:
-        """Whether it has what existed when it began, or that takes too long."""
-        return self.complete or time.monotonic() - self.began > COMPLETE_BY
 
 
 class Followed:
     """The tokens that match some key expressions, followed until this is closed.
 
     Args:
-        graph: The graph.
-        interests: The tokens of each key expression.
+        interests: The interests of the graph.
+        keys: The key expressions, each with the name that the tokens must have, or none.
+
+    Raises:
+        ClosedError: The graph or its session is closed.
     """
 
-    def __init__(self, graph: Graph, interests: Iterable[Interest]) -> None:
-        self._graph = graph
-        self._interests = tuple(interests)
+    def __init__(self, interests: Interests, keys: Iterable[tuple[str, str]]) -> None:
+        self._all = interests
+        self._interests: tuple[Interest, ...] = tuple(interests.acquire(keys))
         self._known: tuple[int, View] | None = None
         self._closed = False
 
@@ -92,7 +51,7 @@ class Followed:
         known = self._known  # replaced whole, so that reading it needs no lock
         if known is not None and known[0] == self._version():
             return known[1]
-        with self._graph.changed:
+        with self._all.changed:
             version = self._version()
             view = View.of(token for one in self._interests for token in one.tokens.values())
             self._known = version, view
@@ -108,7 +67,7 @@ class Followed:
             ClosedError: The session is closed.
             UsageError: The timeout is not a number.
         """
-        return self._graph.query(self._interests, [one.key for one in self._interests], timeout)
+        return self._all.query(self._interests, [one.key for one in self._interests], timeout)
 
     def listen(
         self, listener: Callable[[Any, bool], None], *, history: bool = True
@@ -125,11 +84,11 @@ class Followed:
         """
         number = next(_numbers)
         for interest in self._interests:
-            self._graph.register(interest, number, listener, history=history)
+            self._all.register(interest, number, listener, history=history)
 
         def unregister() -> None:
             for interest in self._interests:
-                self._graph.unregister(interest, number)
+                self._all.unregister(interest, number)
 
         return unregister
 
@@ -164,9 +123,9 @@ class Followed:
             return bool(found)
 
         deadline = time.monotonic() + clamp_timeout(timeout)
-        if self._graph.wait_until(is_met, deadline):
+        if self._all.wait_until(is_met, deadline):
             return found[0]
-        if self._graph.closing:
+        if self._all.closing:
             raise ClosedError(f"the wait for {what} ended: shutting down")
         raise WaitTimeout(what, timeout, hint)
 
@@ -174,7 +133,7 @@ class Followed:
         """Follow it no longer; a second call has no effect."""
         closed, self._closed = self._closed, True
         if not closed:
-            self._graph.release(self._interests)
+            self._all.release(self._interests)
 
     def _version(self) -> int:
         return sum(interest.version for interest in self._interests)

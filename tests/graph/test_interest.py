@@ -15,7 +15,7 @@ from rosz.wire import Kind, Token, format_token, is_rosz_id
 
 def followed_names(graph: Graph) -> set[str]:
     """Return the names of all tokens that a graph has received."""
-    tokens = [token for one in graph._interests.values() for token in one.tokens.values()]
+    tokens = [token for one in graph._interests.all() for token in one.tokens.values()]
     return {token.name if isinstance(token, Token) else token.node for token in tokens}
 
 
@@ -54,12 +54,12 @@ def test_the_watch_ends_with_its_last_user(network: Network) -> None:
     graph = network.context().graph
     one = graph.follow_entities(Kind.SERVICE, "/reset")
     other = graph.follow_entities(Kind.SERVICE, "/reset")
-    (key,) = graph._interests
+    (interest,) = graph._interests.all()
     one.close()
     one.close()
-    assert key in graph._interests
+    assert graph._interests.all() == [interest]
     other.close()
-    assert not graph._interests
+    assert not graph._interests.all()
 
 
 def test_who_follows_later_finds_what_came_meanwhile(network: Network) -> None:

@@ -1,0 +1,338 @@
+"""What is followed of a graph: the tokens of key expressions, and the thread that applies them."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+from rosz.errors import ClosedError, DecodeError
+from rosz.graph.view import View
+from rosz.lifecycle import Closable, Lifecycle
+from rosz.session import clamp_timeout
+from rosz.wire import OWN_SPACE, ProcessToken, Token, parse_process, parse_token
+
+if TYPE_CHECKING:
+    from rosz.session import Session
+
+__all__ = ("COMPLETE_BY", "Interest", "Interests")
+
+COMPLETE_BY = 2.0
+"""Seconds after which what is followed counts as complete in any case."""
+
+_Report = Callable[[], object]
+"""Function that tells listeners of one change."""
+
+_Task = Callable[[], _Report | None]
+"""Function that runs on the thread of the graph."""
+
+_POLL_SECONDS = 0.1
+_log = logging.getLogger("rosz.graph")
+
+
+class Interest:
+    """The live tokens that match one key expression, for all who follow it.
+
+    Only the graph changes it, on its thread.
+
+    Args:
+        key: The key expression.
+        name: The topic or service that the tokens must have; any if empty.
+
+    Attributes:
+        key: The key expression.
+        name: The topic or service that the tokens must have; any if empty.
+        tokens: The tokens by their keys.
+        version: Number that grows with each change of the tokens.
+        began: Time when it was made, by the monotonic clock in seconds.
+        complete: Whether it has the tokens that existed when it began.
+        users: Number of those who follow it.
+        listeners: Functions called with each change, and whether they get what existed before.
+        watch: The watch of the session, once it is declared.
+    """
+
+    def __init__(self, key: str, name: str = "") -> None:
+        self.key = key
+        self.name = name
+        self.tokens: dict[str, Any] = {}
+        self.version: int = 0
+        self.began: float = time.monotonic()
+        self.complete: bool = False
+        self.users: int = 0
+        self.listeners: dict[int, tuple[Callable[[Any, bool], None], bool]] = {}
+        self.watch: Closable | None = None
+
+    @property
+    def settled(self) -> bool:
+        """Whether it has what existed when it began, or that takes too long."""
+        return self.complete or time.monotonic() - self.began > COMPLETE_BY
+
+
+class Interests:
+    """All interests of one graph, by their key expressions.
+
+    Args:
+        session: The session to watch tokens with.
+
+    Attributes:
+        changed: Condition that is notified of each change.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.changed: threading.Condition = threading.Condition()
+        self._session = session
+        self._version = 0
+        self._interests: dict[str, Interest] = {}
+        self._reported_damage: set[str] = set()
+        self._events: SimpleQueue[tuple[Interest, str, bool] | _Task | None] = SimpleQueue()
+        self._reports: deque[_Report] = deque()
+        self._reporting = False
+        self._lifecycle = Lifecycle("the graph", log=_log, on_fork=self._replace_lock)
+        self._thread = threading.Thread(target=self._run, name="rosz-graph", daemon=True)
+        self._thread.start()
+
+    def all(self) -> list[Interest]:
+        """Return all that somebody follows now."""
+        with self.changed:
+            return list(self._interests.values())
+
+    def acquire(self, keys: Iterable[tuple[str, str]]) -> list[Interest]:
+        """Follow what matches some key expressions, until `release`.
+
+        Args:
+            keys: The key expressions, each with the name that the tokens must have, or none.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
+        """
+        self._lifecycle.check_open("follow anything more")
+        interests: list[Interest] = []
+        try:
+            interests.extend(self._acquire(*key) for key in keys)
+        except BaseException:
+            self.release(interests)
+            raise
+        return interests
+
+    @property
+    def closing(self) -> bool:
+        """Whether the graph is closed, or being closed."""
+        return self._lifecycle.closing
+
+    def query(self, interests: Sequence[Interest], keys: Iterable[str], timeout: float) -> View:
+        """Return what is known of some interests, with what a query for some keys adds."""
+        timeout = clamp_timeout(timeout)
+        # What a watch is told of while the query runs is missing in the replies.
+        self.wait_until(lambda: all(one.settled for one in interests), time.monotonic() + timeout)
+        found = [token for key in keys for token in self._session.live_tokens(key, timeout)]
+        self._apply_pending(timeout)
+        with self.changed:
+            known = {key: token for one in interests for key, token in one.tokens.items()}
+        # Only in the result: nothing may report the end of a token that was never watched.
+        for key in found:
+            if key not in known and (token := self._parse(key)) is not None:
+                known[key] = token
+        return View.of(known.values())
+
+    def register(
+        self,
+        interest: Interest,
+        number: int,
+        listener: Callable[[Any, bool], None],
+        *,
+        history: bool,
+    ) -> None:
+        """Call a listener for what is known of an interest, and for each change of it."""
+
+        def begin(tokens: list[Any]) -> None:
+            interest.listeners[number] = listener, history
+            for token in tokens:
+                self._notify(interest, number, token, alive=True)
+
+        def register() -> _Report:
+            return partial(begin, list(interest.tokens.values()) if history else [])
+
+        self._events.put(register)
+
+    def unregister(self, interest: Interest, number: int) -> None:
+        """Call a listener of an interest no longer."""
+        self._events.put(lambda: partial(interest.listeners.pop, number, None))
+
+    def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
+        """Wait until a condition holds, which is checked after each change.
+
+        Args:
+            condition: The condition.
+            deadline: Time to give up, by the monotonic clock in seconds.
+
+        Returns:
+            Whether it holds; false if the time is up, or the graph closed.
+        """
+        wait = self._apply_next if threading.current_thread() is self._thread else self._sleep
+        while True:
+            version = self._version
+            if condition():
+                return True
+            left = deadline - time.monotonic()
+            if self._lifecycle.closing or left <= 0:
+                return False
+            wait(version, min(left, COMPLETE_BY))
+
+    def release(self, interests: Iterable[Interest]) -> None:
+        """Close the watches of interests that nobody follows any more."""
+        unused = []
+        with self.changed:
+            for interest in interests:
+                interest.users -= 1
+                if not interest.users and self._interests.get(interest.key) is interest:
+                    unused.append(self._interests.pop(interest.key))
+        for interest in unused:
+            if interest.watch is not None:
+                interest.watch.close()
+
+    def _acquire(self, key: str, name: str) -> Interest:
+        with self.changed:
+            interest = self._interests.get(key)
+            if interest is not None:
+                interest.users += 1
+                return interest
+            interest = self._interests[key] = Interest(key, name)
+            interest.users = 1
+        try:
+            interest.watch = self._session.watch_tokens(
+                key,
+                lambda token, alive: self._events.put((interest, token, alive)),
+                lambda: self._events.put(partial(self._set_complete, interest)),
+            )
+        except BaseException:
+            self.release([interest])
+            raise
+        if self._lifecycle.closing:  # perhaps too late for the thread that closes the graph
+            interest.watch.close()
+        return interest
+
+    def _set_complete(self, interest: Interest) -> None:
+        with self.changed:
+            interest.complete = True
+            self._version += 1
+            self.changed.notify_all()
+
+    def _sleep(self, seen: int, timeout: float) -> None:
+        """Wait until there is another version than the one that was seen."""
+        with self.changed:
+            self.changed.wait_for(lambda: self._version != seen or self._lifecycle.closing, timeout)
+
+    def _apply_next(self, _seen: int, timeout: float) -> None:
+        """Handle an event on the graph's thread, while a listener on that thread waits."""
+        try:
+            event = self._events.get(timeout=timeout)
+        except Empty:
+            return
+        if event is None:
+            self._events.put(None)
+        else:
+            self._handle(event)
+
+    def _run(self) -> None:
+        while (event := self._events.get()) is not None:
+            self._handle(event)
+
+    def _handle(self, event: tuple[Interest, str, bool] | _Task) -> None:
+        """Apply an event, and report it unless a listener is running that was told of another."""
+        report = self._apply(*event) if isinstance(event, tuple) else event()
+        if report is None:
+            return
+        self._reports.append(report)
+        if self._reporting:
+            return
+        self._reporting = True
+        while self._reports:
+            self._reports.popleft()()
+        self._reporting = False
+
+    def _apply_pending(self, timeout: float) -> None:
+        """Wait until the events that are queued now have been applied."""
+        if threading.current_thread() is self._thread:
+            return  # in a listener, which is told of changes in their order
+        applied = threading.Event()
+        self._events.put(applied.set)
+        while not (self._lifecycle.closing or applied.wait(min(timeout, _POLL_SECONDS))):
+            timeout -= _POLL_SECONDS
+            if timeout <= 0:
+                return
+
+    def _apply(self, interest: Interest, key: str, alive: bool) -> _Report | None:
+        """Add or remove a token, and return the report of it if that is a change."""
+        known = interest.tokens
+        if alive == (key in known):
+            return None
+        token = self._parse(key) if alive else known[key]
+        if token is None or interest.name not in {"", getattr(token, "name", "")}:
+            return None
+        with self.changed:
+            if alive:
+                known[key] = token
+            else:
+                del known[key]
+            interest.version += 1
+            self._version += 1
+            self.changed.notify_all()
+        return partial(self._notify_all, interest, token, alive, alive and not interest.settled)
+
+    def _parse(self, key: str) -> Token | ProcessToken | None:
+        """Parse a token; each kind of damage is logged once."""
+        try:
+            return parse_process(key) if key.startswith(OWN_SPACE) else parse_token(key)
+        except DecodeError as error:
+            if error.type_name not in self._reported_damage:
+                self._reported_damage.add(error.type_name)
+                _log.warning(
+                    "ignoring foreign tokens with a damaged %s (told once): %.300s",
+                    error.type_name,
+                    error.reason,
+                )
+            return None
+
+    def _notify_all(
+        self, interest: Interest, token: Token | ProcessToken, alive: bool, existed: bool
+    ) -> None:
+        for number, (_, history) in list(interest.listeners.items()):
+            if history or not existed:
+                self._notify(interest, number, token, alive=alive)
+
+    def _notify(
+        self, interest: Interest, number: int, token: Token | ProcessToken, *, alive: bool
+    ) -> None:
+        listener, _ = interest.listeners.get(number, (None, True))
+        if listener is None:
+            return
+        try:
+            listener(token, alive)
+        except ClosedError as error:
+            # A listener cannot know that the graph is being closed.
+            if not self._lifecycle.closing:
+                _log.exception("a graph listener failed", exc_info=error)
+        except BaseException:  # noqa: BLE001  # the graph outlives what a listener raises
+            _log.exception("a graph listener failed on %s", token)
+
+    def close(self) -> None:
+        """Stop following, and wake waiters with `ClosedError`; a second call has no effect."""
+        self._lifecycle.close(self._finish)
+
+    def _finish(self) -> None:
+        with self.changed:
+            self.changed.notify_all()
+            interests = list(self._interests.values())
+        for interest in interests:
+            if interest.watch is not None:
+                interest.watch.close()
+        self._events.put(None)
+
+    def _replace_lock(self) -> None:
+        """Replace the lock in a forked child: a thread of the parent may hold it for ever."""
+        self.changed = threading.Condition()
