@@ -89,10 +89,7 @@ def wait_for_server(context: Context, name: str, warn: Callable[[str], object]) 
         return find_server(view, name)
     except NotFoundError as error:
         warn(f"service [{name}] is not there yet ({error})")
-    view = context.graph.wait_for(
-        lambda view: bool(view.servers(name)), threading.TIMEOUT_MAX / 2, f"service '{name}'"
-    )
-    return find_server(view, name)
+    return find_server(context.graph.wait_for_service(name, threading.TIMEOUT_MAX / 2), name)
 
 
 def call_service(client: Client, values: Sequence[Any], now: int) -> tuple[Any, Any]:
