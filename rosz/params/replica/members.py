@@ -69,6 +69,10 @@ class Members:
         """Return the replicas, oldest first."""
         return sorted(self._found.copy().values())
 
+    def oldest(self) -> Member | None:
+        """Return the oldest replica; ``None`` if there is none."""
+        return min(self._found.copy().values(), default=None)
+
     def label(self, zid: str) -> str:
         """Return the process of a replica, as shown to users."""
         member = self._found.get(zid)

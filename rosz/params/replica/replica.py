@@ -334,7 +334,8 @@ class Replica(_Copy):
                 self._on_member(member, True)
 
     def _on_member(self, member: Member, alive: bool) -> None:
-        self._worker.submit(self._serve_parameter_keys)
+        if member < self._own:  # a younger one changes nothing, and many may come at once
+            self._worker.submit(self._serve_parameter_keys)
         if not alive:
             self._broadcaster.drop_peer(member.zid)
             self._sync.drop_peer(member.zid)
@@ -346,7 +347,8 @@ class Replica(_Copy):
         self._parameter_keys.serve(lambda: self._keys.scoped or self._is_oldest())
 
     def _is_oldest(self) -> bool:
-        return all(self._own < other for other in self._members.all())
+        oldest = self._members.oldest()
+        return oldest is None or self._own < oldest
 
     def _restore(self, handover: bytes) -> bool:
         """Restore what is handed over or stored; return whether the storage differs from it."""
