@@ -45,7 +45,8 @@ _DAMAGED_COMPARISON: Final = "a replica sent a damaged comparison"
 _DAMAGED_WRITES: Final = "a replica sent damaged writes"
 _TIMEOUT: Final = 5.0
 _NEXT_AFTER: Final = 0.3
-"""Seconds after which a joining replica asks the next replica as well."""
+"""Seconds after which a joining replica asks the next replica as well; twice as many each time, as
+many that start at once would else keep all others busy."""
 
 _JOIN_TIMEOUT: Final = 30.0
 _WARN_AFTER: Final = 5.0
@@ -113,7 +114,7 @@ class Synchroniser:
             if not open_requests:
                 break
             try:
-                if results.get(timeout=_NEXT_AFTER):
+                if results.get(timeout=min(_NEXT_AFTER * 2 ** (len(asked) - 1), _WARN_AFTER)):
                     break
                 open_requests -= 1
             except Empty:
