@@ -205,5 +205,6 @@ def test_threads_end_with_the_service(server: Node) -> None:
     client = server.client("add", AddTwoInts)
     client.wait_for_service()
     client(0, 0)
+    client.close()  # it follows the servers
     service.close()
     eventually(lambda: threading.active_count() <= before, "its threads ended")
