@@ -46,7 +46,7 @@ def test_what_existed_is_known_once_it_is_complete(network: Network) -> None:
     for _ in range(5):
         graph = network.context().graph
         with graph.follow_entities(Kind.PUBLISHER, "/scan") as followed:
-            eventually(lambda followed=followed: followed.complete, "it is complete")
+            followed.wait_for(bool, TIMEOUT, "all that existed")
             assert len(followed.view().publishers("/scan")) == 50
 
 
