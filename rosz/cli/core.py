@@ -70,6 +70,9 @@ def core_command(
             "Address of --ros1, instead of 127.0.0.1; 0.0.0.0 for programs on other machines.",
         ),
     ] = "",
+    print_config: Annotated[
+        bool, Option("--print-config", "Print the configuration for zenohd instead.")
+    ] = False,
     owner: Annotated[int, Option("--owner PID")] = 0,
 ) -> None:
     """Run a meeting point with a copy of the parameters, until it is stopped.
@@ -83,7 +86,7 @@ def core_command(
     from rosz.cli.core_restart import CoreWatch, Handover
     from rosz.environment import Environment
     from rosz.params.replica import Replica
-    from rosz.session.router import Router
+    from rosz.session.router import Router, zenoh_configuration
     from rosz.wire import Endpoint
 
     environment = Environment.read()
@@ -91,6 +94,9 @@ def core_command(
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     listen_at = [str(Endpoint.parse(text, "--listen")) for text in listen or ()]
     connect_to = [str(Endpoint.parse(text, "--connect")) for text in connect or ()]
+    if print_config:
+        print(zenoh_configuration(environment, listen_at, connect_to))
+        return
     file = Path(store).absolute() if store else None
     logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
     with logging, until_stopped() as ready, ExitStack() as stack:

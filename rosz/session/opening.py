@@ -40,7 +40,7 @@ from rosz.wire import Endpoint
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
 
-__all__ = ("open_raw", "outlasted_silence", "places_of", "why_refused_by_keys")
+__all__ = ("open_raw", "outlasted_silence", "places_of", "settings_text", "why_refused_by_keys")
 
 _NOBODY = "Unable to connect to any of"
 _NO_SEGMENT = "Unable to create POSIX shm segment"
@@ -173,6 +173,23 @@ def outlasted_silence(config: SessionConfig) -> float:
     sending = json.loads(_settings(config).get_json("transport/link/tx"))
     # The last message may be as old as the period in which an idle link sends one.
     return float(sending["lease"] * (1 - 1 / sending["keep_alive"]) / 1000)
+
+
+def settings_text(config: SessionConfig) -> str:
+    """Return the whole configuration as JSON, without the values that are left to Zenoh.
+
+    Raises:
+        TransportError: A configuration value is refused.
+        UsageError: The override text is malformed, or a protocol cannot use keys.
+    """
+    return json.dumps(_given(json.loads(str(_settings(config)))), indent=2)
+
+
+def _given(value: Any) -> Any:
+    """Return a value of JSON without the members that are null."""
+    if isinstance(value, dict):
+        return {key: _given(one) for key, one in value.items() if one is not None}
+    return value
 
 
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:

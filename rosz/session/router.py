@@ -21,12 +21,12 @@ from rosz.lifecycle import Lifecycle
 from rosz.session.config import EPHEMERAL, SessionConfig
 from rosz.session.dialling import Dialling, who_answers
 from rosz.session.local_peers import CoreLock, LocalPeers, describe_process, find_holder
-from rosz.session.opening import outlasted_silence, places_of
+from rosz.session.opening import outlasted_silence, places_of, settings_text
 from rosz.session.probe import is_listening
 from rosz.session.session import Session
 from rosz.wire import Endpoint
 
-__all__ = ("Router",)
+__all__ = ("Router", "zenoh_configuration")
 
 _OCCUPIED: Final = re.compile(
     r"bound to (\S+?): \[.*address already in use|listener on (\S+) - unable to acquire lock",
@@ -66,14 +66,7 @@ class Router:
     def __init__(
         self, environment: Environment, listen: Sequence[str] = (), connect: Sequence[str] = ()
     ) -> None:
-        listen = (*environment.listen, *listen)
-        if environment.multicast and all(Endpoint(text).is_local for text in listen):
-            # Sessions that find this router by multicast have to reach it.
-            meeting = Endpoint(environment.rendezvous)
-            if meeting.protocol == "tcp" and meeting.port is not None:
-                listen += (f"tcp/0.0.0.0:{meeting.port}",)
-        both = (*environment.connect, *connect)
-        config = SessionConfig.of(environment, mode="router", listen=listen, connect=both)
+        config = _config(environment, listen, connect)
         self.endpoints: tuple[str, ...]
         self.has_rules: bool = config.keys is not None and config.keys.rules is not None
         self.outlasted_silence: float = outlasted_silence(config)
@@ -124,6 +117,36 @@ class Router:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def zenoh_configuration(
+    environment: Environment, listen: Sequence[str] = (), connect: Sequence[str] = ()
+) -> str:
+    """Return the Zenoh configuration of a router, as JSON, such as zenohd reads.
+
+    Args:
+        environment: The settings of the process.
+        listen: Further endpoints to listen at.
+        connect: Further endpoints to connect to.
+
+    Raises:
+        TransportError: A configuration value is refused.
+        UsageError: The override text is malformed, or a protocol cannot use keys.
+    """
+    return settings_text(_config(environment, listen, connect))
+
+
+def _config(
+    environment: Environment, listen: Sequence[str], connect: Sequence[str]
+) -> SessionConfig:
+    listen = (*environment.listen, *listen)
+    if environment.multicast and all(Endpoint(text).is_local for text in listen):
+        # Sessions that find this router by multicast have to reach it.
+        meeting = Endpoint(environment.rendezvous)
+        if meeting.protocol == "tcp" and meeting.port is not None:
+            listen += (f"tcp/0.0.0.0:{meeting.port}",)
+    both = (*environment.connect, *connect)
+    return SessionConfig.of(environment, mode="router", listen=listen, connect=both)
 
 
 class _NewInterfaces:

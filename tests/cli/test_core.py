@@ -38,6 +38,14 @@ def test_core_prints_where_it_listens(core: Program, network: Network) -> None:
     ]
 
 
+def test_the_configuration_for_zenohd(shell: Shell, network: Network) -> None:
+    further = f"tcp/127.0.0.1:{free_port()}"
+    there = ["tcp/10.0.0.1:7447"]
+    found = shell("core", "--print-config", "--listen", further, "--connect", there[0]).json
+    assert (found["mode"], found["connect"]["endpoints"]) == ("router", there)
+    assert found["listen"]["endpoints"] == [network.rendezvous, further]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_core_ends_at_once(core: Program, number: signal.Signals) -> None:
     core.send(number)
