@@ -95,7 +95,7 @@ def core_command(
     listen_at = [str(Endpoint.parse(text, "--listen")) for text in listen or ()]
     connect_to = [str(Endpoint.parse(text, "--connect")) for text in connect or ()]
     if print_config:
-        print(zenoh_configuration(environment, listen_at, connect_to))
+        print_lines([zenoh_configuration(environment, listen_at, connect_to)])
         return
     file = Path(store).absolute() if store else None
     logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
