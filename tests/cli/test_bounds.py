@@ -54,6 +54,7 @@ LINES = {
     "bag play --delay {} a.bag": TIMES[1:],
     "bag play --duration {} a.bag": TIMES[1:],
     "bag play --skip-empty {} a.bag": TIMES[1:],
+    "bag play --rate-control-max-delay {} a.bag": TIMES[1:],
     "bag filter --start {} a.bag b.bag": TIMES[1:],
     "bag filter --end {} a.bag b.bag": TIMES[1:],
     "bag cat --start {} a.bag": TIMES[1:],
