@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -73,7 +74,8 @@ def test_on_two_machines(world: World) -> None:
     listener = laptop.program(LISTENER)
     listener.wait_for("heard")
     for host in (robot, laptop):
-        eventually(lambda host=host: host.lists("/talker") and host.lists("/listener"), "a graph")
+        for node in ("/talker", "/listener"):
+            eventually(partial(host.lists, node), f"{node} on {host.name}")
     laptop.ask("param", "set", "/speed", "7")
     assert robot.ask("param", "get", "/speed").strip() == "7"
     first.kill()
