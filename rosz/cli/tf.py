@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_json_line, print_lines, print_result
-from rosz.cli.declare import Argument, Json, Option, seconds, values_last
-from rosz.errors import TransformError, UsageError
+from rosz.cli.declare import Argument, Json, Option, at_least, per_second, seconds, values_last
+from rosz.errors import TransformError
 
 if TYPE_CHECKING:
     from rosz.node import Node
@@ -28,7 +28,6 @@ def _monitored(node: Node, wait: float) -> Monitor:
     """Return a monitor that has listened for a time."""
     from rosz.transforms import Monitor
 
-    seconds("--wait", wait)
     monitor = Monitor(node)
     time.sleep(wait)
     return monitor
@@ -37,6 +36,7 @@ def _monitored(node: Node, wait: float) -> Monitor:
 @app.command("list")
 def list_command(call: Call, *, wait: _Wait = 1.0, json: Json = False) -> int:
     """List frames with their parents, and by whom and how often they are published."""
+    seconds("--wait", wait)
     with call.lasting_node(_TOOL) as node:
         found = _monitored(node, wait).frames()
         lines = (
@@ -58,6 +58,7 @@ def tree_command(
     dot: Annotated[bool, Option("--dot", "Print it in the language of Graphviz.")] = False,
 ) -> int:
     """Print the tree of frames."""
+    seconds("--wait", wait)
     from rosz.transforms import tree_as_dot, tree_as_text
 
     with call.lasting_node(_TOOL) as node:
@@ -74,7 +75,7 @@ def echo_command(
     source: _Source,
     *,
     rate: Annotated[float, Option("-r --rate HZ", "Lines per second.")] = 1.0,
-    count: Annotated[int, Option("-n COUNT", "End after so many transforms.")] = 0,
+    count: Annotated[int | None, Option("-n COUNT", "End after so many transforms.")] = None,
     timeout: Annotated[
         float, Option("--timeout SECONDS", "How long to wait for the first transform.")
     ] = 3600.0,
@@ -82,8 +83,8 @@ def echo_command(
 ) -> int:
     """Print the pose of a frame in another one, again and again."""
     seconds("--timeout", timeout)
-    if not 0 < rate <= 1000:  # noqa: PLR2004
-        raise UsageError(f"--rate is {rate:g}; expected above 0, at most 1000")
+    per_second("--rate", rate)
+    at_least("-n", count, 1, "transforms")
     from rosz.transforms import Buffer, TransformListener, describe_pose
 
     with call.lasting_node(_TOOL) as node:
@@ -113,11 +114,12 @@ def monitor_command(
     call: Call,
     *,
     period: Annotated[float, Option("--period SECONDS", "Time between two reports.")] = 1.0,
-    count: Annotated[int, Option("-n COUNT", "End after so many reports.")] = 0,
+    count: Annotated[int | None, Option("-n COUNT", "End after so many reports.")] = None,
     json: Json = False,
 ) -> int:
     """Print again and again how often and how late transforms arrive."""
     seconds("--period", period)
+    at_least("-n", count, 1, "reports")
     from rosz.transforms import Monitor
 
     with call.lasting_node(_TOOL) as node:
