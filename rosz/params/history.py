@@ -20,7 +20,8 @@ its path or below, because a forgotten deletion that is newer than the write wou
 one too. Two sets with different horizons become one by `History.merge`: of the writes up to the
 other's horizon, those that the other neither holds nor proves are dropped. So a bounded memory
 never brings back what was deleted. It only loses parameters that are new to the other set and older
-than its horizon.
+than its horizon. What is proven depends on what was merged before, so sets with horizons that
+are merged in another order may differ; those that merge each other become the same.
 
 A digest is `BUCKETS` numbers. Each write belongs to the bucket of its path and is folded into its
 number by exclusive or, so adding and removing cost the same, and equal sets have equal digests.

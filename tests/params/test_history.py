@@ -1,10 +1,11 @@
 from __future__ import annotations
 
 import random
+from itertools import combinations
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rosz.errors import ParamError
@@ -156,24 +157,37 @@ def test_an_older_write_proves_that_nothing_was_deleted_since() -> None:
     assert history.root == {"a": "set"}
 
 
-@given(shared(3), st.lists(st.integers(0, 4), min_size=3, max_size=3))
-def test_merging_whole_sets_is_a_join(seen: list[list[Write]], keeps: list[int]) -> None:
-    def forgetful(index: int) -> History:
-        history = of(seen[index])
-        history.forget(keeps[index])
-        return history
-
-    def joined(*order: int) -> History:
-        history = forgetful(order[0])
-        for index in order[1:]:
-            other = forgetful(index)
-            history.merge(other.writes(), other.horizon)
-        return history
-
-    first, *others = (joined(0, 1, 2), joined(2, 1, 0), joined(1, 2, 0, 1, 2))
+@given(
+    shared(3),
+    st.lists(st.integers(0, 4), min_size=3, max_size=3),
+    st.permutations(list(combinations(range(3), 2))),
+)
+@example(
+    # The first set proves the third one's write, until the second one removes the proof.
+    [
+        [put((), (9, "a"), {}), put(("b",), (19, "a"), DELETED)],
+        [put(("b",), (17, "a"), DELETED)],
+        [put((), (18, "a"), {})],
+    ],
+    [0, 0, 1],
+    [(0, 2), (0, 1), (1, 2)],
+)
+def test_sets_that_merge_each_other_become_one(
+    seen: list[list[Write]], keeps: list[int], pairs: list[tuple[int, int]]
+) -> None:
+    sets = [of(batch) for batch in seen]
+    for history, keep in zip(sets, keeps, strict=True):
+        history.forget(keep)
+    for left, right in pairs * 2:
+        one, other = sets[left], sets[right]
+        ours = list(one.writes()), one.horizon
+        one.merge(other.writes(), other.horizon)
+        other.merge(*ours)
+        assert is_same(one, other)
+        assert one.horizon == other.horizon
+    first, *others = sets
     for other in others:
         assert is_same(first, other)
-        assert first.horizon == other.horizon
     assert first.root == replay(first.writes())
 
 
