@@ -14,7 +14,15 @@ from rosz.node import Client, Node
 from rosz.node import Service as NodeService
 from rosz.qos import SERVICES
 from rosz.ros1.exceptions import ROSException, ROSInterruptException
-from rosz.ros1.rospy.core import NO_LIMIT, SHUT_DOWN, SLICE, check_running, deadline_of, is_shutdown
+from rosz.ros1.rospy.core import (
+    NO_LIMIT,
+    SHUT_DOWN,
+    SLICE,
+    check_running,
+    deadline_of,
+    get_node_uri,
+    is_shutdown,
+)
 from rosz.ros1.rospy.msg import args_kwds_to_message, encode, in_words_of_genpy
 from rosz.ros1.rospy.names import resolve_name, resolve_name_without_node_name
 from rosz.ros1.state import context, has_node, state, unnamed_node, when_ready
@@ -147,6 +155,11 @@ class Service(_ServiceBase):
                 raise ServiceException(f"service [{self.resolved_name}] already registered")
             state.services[self.resolved_name] = self
         when_ready(self._open)
+
+    @property
+    def uri(self) -> str | None:
+        """The URI of the node, as ``lookupService`` gives it; None before ``init_node``."""
+        return get_node_uri()
 
     def _open(self, node: Node) -> None:
         if not self._shut_down.is_set():

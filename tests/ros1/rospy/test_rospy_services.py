@@ -246,3 +246,12 @@ def test_the_header_of_a_request_names_its_caller(printed: Printed) -> None:
     print([headers[0][key] for key in ("callerid", "service", "type", "md5sum")])
 """)
     assert lines == ["['/services', '/s', 'std_srvs/SetBool', '09fb03525b03e7ea1fd3992bafd87e16']"]
+
+
+def test_a_service_knows_its_uri(printed: Printed) -> None:
+    assert printed("""
+    import rosgraph
+    service = rospy.Service("s", Empty, lambda request: [])
+    rospy.wait_for_service("s")
+    print(service.uri == rosgraph.Master("/services").lookupService("/s"))
+""") == ["True"]
