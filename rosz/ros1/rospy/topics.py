@@ -27,7 +27,7 @@ from rosz.ros1.state import has_node, state
 
 __all__ = ("DEFAULT_BUFF_SIZE", "Publisher", "SubscribeListener", "Subscriber", "Topic")
 
-_TAKEN = re.compile(r"(/[A-Za-z0-9_.~+=-]+)+")
+_TAKEN = re.compile(r"(/[^/%*$#?\x00-\x1f\x7f]+)+")
 _NO_QUEUE_SIZE = (
     "The publisher should be created with an explicit keyword argument 'queue_size'. Please see"
     " http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers for more information."
@@ -35,10 +35,10 @@ _NO_QUEUE_SIZE = (
 
 
 def _check(name: str) -> str:
-    """Return a full name that ROS 1 takes, legal or not, if Zenoh has such keys.
+    """Return a full name that ROS 1 takes, legal or not, if keys can hold it.
 
     Raises:
-        InvalidName: It has not.
+        InvalidName: They cannot: Zenoh and the tokens use ``%*$#?`` themselves.
     """
     return name if _TAKEN.fullmatch(name) else check(name)
 

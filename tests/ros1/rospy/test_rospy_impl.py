@@ -210,8 +210,8 @@ def test_names_that_are_not_legal(printed: Printed) -> None:
         rospy.init_node("motor driver")
         print(rospy.get_name())
         heard = threading.Event()
-        rospy.Subscriber("~left-wheel", String, lambda message: heard.set())
-        out = rospy.Publisher("~left-wheel", String, queue_size=1)
+        rospy.Subscriber("~left-wheel (1)", String, lambda message: heard.set())
+        out = rospy.Publisher("~left-wheel (1)", String, queue_size=1)
         while not heard.wait(0.05):
             out.publish("on")
         print(out.name)
@@ -225,7 +225,7 @@ def test_names_that_are_not_legal(printed: Printed) -> None:
         "The node is named 'node_3d'.",
         "namespaces are not allowed in node names",
         "/motor_driver",
-        "/motor_driver/left-wheel",
+        "/motor_driver/left-wheel (1)",
         "'/left*' is not a valid name: character '*' at position 6; expected letters, digits,"
         " '_' or '/'",
     ]
