@@ -24,6 +24,7 @@ __all__ = (
     "join",
     "namespace",
     "resolve",
+    "ros1_type",
     "short_type",
 )
 
@@ -161,6 +162,13 @@ def short_type(name: str) -> str:
     if kind == "srv":
         base = re.sub(r"_(Request|Response)$", r"\1", base)
     return f"{package}/{base}"
+
+
+def ros1_type(topic: str, type_name: str) -> str:
+    """Return the name in ROS 1 of a topic's type; ``/rosout`` has another type there."""
+    name = short_type(type_name)
+    is_log = (topic, name) == ("/rosout", "rcl_interfaces/Log")
+    return "rosgraph_msgs/Log" if is_log else name
 
 
 def anonymous(base: str, host: str, pid: int, moment: int) -> str:

@@ -26,6 +26,7 @@ from rosz.bridges.ros1.sockets import log
 from rosz.environment import Environment
 from rosz.errors import DecodeError, EncodeError, ParamNotFound, RoszError, TransportError
 from rosz.lifecycle import Registration
+from rosz.names import ros1_type
 from rosz.node import BridgedNode, Context
 from rosz.params import leaves, normalise, split
 from rosz.params.replica import Changed
@@ -275,10 +276,9 @@ class AttachedBridge:
         own, uri = self._shared.name, self._uri
         topics = self._offered(Kind.PUBLISHER, self._choice.topics)
         published, _, served = state
-        codecs = self._shared.codecs
         for topic, type_name in topics.items():
             if own not in published.get(topic, ()):
-                kind = codecs.ros1_type(topic, type_name)
+                kind = ros1_type(topic, type_name)
                 self._call("registerPublisher", topic, kind, uri)
         for topic, nodes in published.items():
             if own in nodes and topic not in topics:

@@ -14,7 +14,6 @@ import msgspec
 
 from rosz.errors import TypeNotFound
 from rosz.message.transcode import compile_from_cdr, compile_transcoder
-from rosz.names import short_type
 from rosz.qos import ROSOUT, QoS
 
 if TYPE_CHECKING:
@@ -109,11 +108,6 @@ class Codecs:
             if (topic, cls._type) == (_ROSOUT, _LOG_OF_ROS2):
                 return self._make(self._types.message(_LOG), cls)
             return self._make(cls, cls)
-
-    def ros1_type(self, topic: str, type_name: str) -> str:
-        """Return the name in ROS 1 of a type that a token names."""
-        name = short_type(type_name)
-        return _LOG if (topic, name) == (_ROSOUT, _LOG_OF_ROS2) else name
 
     def _make(self, ros1: type[Message], network: type[Message]) -> Codec:
         made = self._made.get((ros1, network))

@@ -317,7 +317,7 @@ class Master:
         return self._shared.foreign(self._shared.context.graph.view().entities(*kinds))
 
     def _type(self, token: Token) -> str:
-        return self._shared.codecs.ros1_type(token.name, token.type_name)
+        return names.ros1_type(token.name, token.type_name)
 
     # Parameters.
 

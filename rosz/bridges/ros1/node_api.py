@@ -12,6 +12,7 @@ from rosz.bridges.ros1.shared import Shared
 from rosz.bridges.ros1.sockets import Stream
 from rosz.errors import RoszError, ServiceError
 from rosz.introspect.nodes import kill
+from rosz.names import ros1_type
 from rosz.wire import Kind, Token
 
 __all__ = ("NodeApi",)
@@ -94,8 +95,7 @@ class NodeApi:
         return 1, "subscriptions", self._topics(node, Kind.SUBSCRIPTION)
 
     def _topics(self, node: str, kind: Kind) -> list[list[str]]:
-        codecs = self._shared.codecs
-        found = {t.name: codecs.ros1_type(t.name, t.type_name) for t in self._tokens(node, kind)}
+        found = {t.name: ros1_type(t.name, t.type_name) for t in self._tokens(node, kind)}
         return [[name, kind] for name, kind in found.items()]
 
     def _get_bus_stats(self, _node: str, _: Stream, *_args: Any) -> Answer:

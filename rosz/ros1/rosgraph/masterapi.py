@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Any, NoReturn
 
 from rosz.errors import ParamError, ParamNotFound, RoszError, TransportError
-from rosz.names import short_type
+from rosz.names import ros1_type
 from rosz.params.api import Params
 from rosz.ros1.rosgraph.names import get_master_uri, make_caller_id
 from rosz.ros1.state import params_of, ready_context, survey, token_uri
@@ -206,7 +206,7 @@ class Master:
 
 
 def _types(tokens: Iterable[Token]) -> Pairs:
-    found = {token.name: short_type(token.type_name) for token in tokens}
+    found = {token.name: ros1_type(token.name, token.type_name) for token in tokens}
     return [[name, type_name] for name, type_name in sorted(found.items())]
 
 

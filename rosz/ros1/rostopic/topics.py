@@ -12,7 +12,7 @@ from rosz.errors import NotFoundError, RoszError, TypeNotFound, UsageError
 from rosz.introspect.fields import FieldPath, find_target
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import format_topic, list_topics, topics_of_type
-from rosz.names import short_type
+from rosz.names import ros1_type
 from rosz.ros1.genpy import get_message_class
 from rosz.ros1.importer import type_store
 from rosz.ros1.rosgraph.masterapi import Master
@@ -112,7 +112,7 @@ def _find(topic: str) -> Found:
         raise
     except NotFoundError:
         return None, None, None
-    return short_type(target.type_name), target.topic, msgevalgen(target.path.text)
+    return ros1_type(target.topic, target.type_name), target.topic, msgevalgen(target.path.text)
 
 
 def get_topic_class(
@@ -155,7 +155,7 @@ def get_topic_list(master: Master | None = None) -> tuple[list[Any], list[Any]]:
 def _with_nodes(found: Survey, kind: Kind) -> list[Any]:
     topics: dict[str, tuple[str, dict[str, None]]] = {}
     for token in found.view.entities(kind):
-        _, nodes = topics.setdefault(token.name, (short_type(token.type_name), {}))
+        _, nodes = topics.setdefault(token.name, (ros1_type(token.name, token.type_name), {}))
         nodes[token.node_name] = None
     return [[name, type_name, list(nodes)] for name, (type_name, nodes) in topics.items()]
 

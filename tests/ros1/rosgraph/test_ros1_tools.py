@@ -56,9 +56,9 @@ def test_master(network: Network) -> None:
         result = [
             rosgraph.is_master_online(), master.is_online(), master.getPid() > 0, master.getUri(),
             [[name, nodes] for kind in state for name, nodes in kind if name != "/rosout"],
-            [pair for pair in master.getPublishedTopics("") if pair[0] != "/rosout"],
+            master.getPublishedTopics(""),
             master.getPublishedTopics("/ns"),
-            [pair for pair in master.getTopicTypes() if pair[0] != "/rosout"],
+            [pair for pair in master.getTopicTypes() if pair[0] != "/chatter"],
             master.lookupNode("/robot").startswith("rosz://"),
             master.lookupService("/switch").startswith("rosz://"),
             tried(master.lookupNode, "/nobody"), tried(master.lookupService, "/nothing"),
@@ -71,9 +71,9 @@ def test_master(network: Network) -> None:
     assert ["/chatter", ["/robot"]] in found[4]
     assert ["/orders", ["/robot"]] in found[4]
     assert ["/switch", ["/robot"]] in found[4]
-    assert found[5] == [["/chatter", "std_msgs/String"]]
+    assert found[5] == [["/chatter", "std_msgs/String"], ["/rosout", "rosgraph_msgs/Log"]]
     assert found[6] == []
-    assert found[7] == [["/chatter", "std_msgs/String"], ["/orders", "std_msgs/String"]]
+    assert found[7] == [["/orders", "std_msgs/String"], ["/rosout", "rosgraph_msgs/Log"]]
     assert found[8:10] == [True, True]
     assert found[10] == ["MasterError", "unknown node [/nobody]"]
     assert found[11] == ["MasterError", "no provider"]
@@ -250,6 +250,7 @@ def test_rostopic(network: Network) -> None:
             ["/orders", "std_msgs/String", ["/robot"]] in subscribers,
             rostopic.get_info_text("/chatter").splitlines()[0],
             tried(rostopic.get_info_text, "/nothing"),
+            rostopic.get_topic_class("/rosout")[0]._type,
             rostopic.msgevalgen("/a/b")(cls()), rostopic.msgevalgen(""),
             tried(rostopic.create_publisher, "x", "std_msgs/Nothing", False)[0],
             tried(rostopic.create_publisher, "x", "Nothing", False)[0],
@@ -260,7 +261,7 @@ def test_rostopic(network: Network) -> None:
     assert found[2:6] == ["std_msgs/String", "/chatter", "x", ["/chatter", "/orders"]]
     assert found[6:9] == [True, True, "Type: std_msgs/String"]
     assert found[9] == ["ROSTopicException", "Unknown topic /nothing"]
-    assert found[10:] == [None, None, "ROSTopicException", "ROSTopicException"]
+    assert found[10:] == ["rosgraph_msgs/Log", None, None, "ROSTopicException", "ROSTopicException"]
 
 
 def test_publish_by_type_name(network: Network, robot: Node) -> None:
