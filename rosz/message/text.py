@@ -102,9 +102,17 @@ class _Writer:
             wanted = set(self._filter(value))
             names = tuple(name for name in names if name in wanted)
         lines = (
-            f"{indent}{name}: {self.value(getattr(value, name), '  ' + indent)}" for name in names
+            f"{indent}{name}: {self.value(_field(value, name), '  ' + indent)}" for name in names
         )
         return ("\n" if indent else "") + "\n".join(lines)
+
+
+def _field(value: Any, name: str) -> Any:
+    """Return a field; bytes that are held as text, as in Python 2, become numbers."""
+    held = getattr(value, name)
+    if isinstance(held, str) and (name, "uint8") in {each[:2] for each in value._schema}:
+        return [ord(letter) for letter in held]
+    return held
 
 
 def _quoted(value: str) -> str:

@@ -52,7 +52,10 @@ def write_stubs(environment: Environment) -> Stubs:
     folder = editor_folder(environment)
     index = package_index(environment)
     faults: dict[str, str] = {}
-    files = dict([*_of_rosz(), *_of_shipped(), *_of_packages(index, faults)])
+    files: dict[str, str] = {}
+    # Packages such as tf have both messages and modules: the texts of a file are joined.
+    for path, text in (*_of_shipped(), *_of_packages(index, faults), *_of_rosz()):
+        files[path] = files.get(path, "") + text
     links = dict(_of_offers(index, environment))
     for path in links:
         top = path.split("/")[0]

@@ -14,7 +14,10 @@ __all__ = ("link",)
 _DEBIAN = Path("/usr/lib/python3/dist-packages")
 _PLAIN = frozenset({"catkin_pkg"})
 """Modules whose Debian package is named as ROS's are, and that are distributions of PyPI."""
-_SAME = frozenset({"PIL", "_cffi_backend", "cryptography", "cv2", "lz4", "numpy", "serial"})
+_SAME = frozenset(
+    {"PIL", "_cffi_backend", "cryptography", "cv2", "lz4", "numpy", "serial"}
+    | {"matplotlib", "mpl_toolkits"}  # PyPI's ones need a newer numpy than Debian's
+)
 """Modules that are taken from Debian though the interpreter of rosz has them, too."""
 _INSTALLERS = frozenset({"_distutils_hack", "pip", "pkg_resources", "setuptools", "wheel"})
 

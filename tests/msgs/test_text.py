@@ -96,6 +96,13 @@ def test_fields_can_be_left_out(genpy: Worker) -> None:
     assert strify_message(Twist(), field_filter=lambda _: ["angular", "x"]) == theirs["value"]
 
 
+def test_bytes_held_as_text_are_numbers(genpy: Worker) -> None:
+    theirs = genpy.call("text", "std_msgs/UInt8MultiArray", [{"data": "\x02\x03"}])
+    message = STORE.message("std_msgs/UInt8MultiArray")()
+    message.data = "\x02\x03"
+    assert strify_message(message) == theirs["value"]
+
+
 def test_printing_a_message_shows_its_text() -> None:
     assert str(Twist()).startswith("linear: \n  x: 0.0\n")
     assert f"{String('é')}" == 'data: "\\xE9"'

@@ -10,9 +10,12 @@ from pathlib import Path
 from cli.command import rosz
 
 CODE = """\
+import actionlib
+import dynamic_reconfigure
 import rospy
 import rospy.core
-import tf.transformations
+import sensor_msgs.msg
+import tf
 import tf2_ros
 from demo.msg import Number
 from demo.tools import help
@@ -22,6 +25,17 @@ reveal_type(Twist().linear.x)
 reveal_type(Number().name)
 reveal_type(help)
 reveal_type(rospy.Publisher("x", Twist, queue_size=1).get_num_connections())
+reveal_type(actionlib.GoalStatus().status)
+reveal_type(tf.msg.tfMessage().transforms[0].child_frame_id)
+reveal_type(sensor_msgs.msg.Image().width)
+actionlib.SimpleActionClient
+actionlib.action
+dynamic_reconfigure.client.Client
+dynamic_reconfigure.msg.Config
+sensor_msgs.point_cloud2.read_points
+tf.ConnectivityException, tf.Exception, tf.TransformBroadcaster, tf.TransformerROS
+tf.listener.TransformListener is tf.TransformListener
+tf.transformations.quaternion_from_euler(0.0, 0.0, 0.0)
 Twist().linear.nope
 """
 
@@ -57,6 +71,9 @@ def test_type_checkers_know_the_names(tmp_path: Path) -> None:
         '"float"',
         '"str"',
         '"float"',
+        '"int"',
+        '"int"',
+        '"str"',
         '"int"',
     ]
     errors = [one["message"] for one in found if one["severity"] == "error"]
