@@ -98,7 +98,7 @@ def test_fields_can_be_left_out(genpy: Worker) -> None:
 
 def test_bytes_held_as_text_are_numbers(genpy: Worker) -> None:
     theirs = genpy.call("text", "std_msgs/UInt8MultiArray", [{"data": "\x02\x03"}])
-    message = STORE.message("std_msgs/UInt8MultiArray")()
+    message: Any = STORE.message("std_msgs/UInt8MultiArray")()
     message.data = "\x02\x03"
     assert strify_message(message) == theirs["value"]
 

@@ -18,6 +18,11 @@ Error = Any
 """What ``sys.exc_info()`` returns, as unittest passes it on."""
 
 
+def _seconds_since(began: float) -> float:
+    """Return a time with four digits; readers do not expect exponents."""
+    return round(time.monotonic() - began, 4)
+
+
 class _Result(unittest.TestResult):
     """Results of tests as they run."""
 
@@ -37,7 +42,7 @@ class _Result(unittest.TestResult):
     def stopTest(self, test: unittest.TestCase) -> None:  # noqa: N802
         """End a test."""
         super().stopTest(test)
-        self._case.time = time.monotonic() - self._began
+        self._case.time = _seconds_since(self._began)
         self.found.add_test_case_result(self._case)
 
     def addError(self, test: unittest.TestCase, err: Error) -> None:  # noqa: N802
@@ -70,7 +75,7 @@ class XMLTestRunner:
         with redirect_stdout(out), redirect_stderr(err):
             test(result)
         found = result.found
-        found.time = time.monotonic() - began
+        found.time = _seconds_since(began)
         found.num_tests = result.testsRun
         found.num_errors, found.num_failures = len(result.errors), len(result.failures)
         found.system_out, found.system_err = out.getvalue(), err.getvalue()
