@@ -201,8 +201,9 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
     "rospkg.distro": {"ros1.os_detect": "InvalidDistro current_distro_codename"},
     "rospkg.os_detect": {"ros1.os_detect": "OsDetect OsNotDetected"},
     "rospkg.environment": {
-        "ros1.rospkg": "get_etc_ros_dir get_log_dir get_ros_home get_ros_package_path get_ros_paths"
-        " get_ros_root get_test_results_dir on_ros_path"
+        "ros1.rospkg": "ROS_ETC_DIR ROS_HOME ROS_LOG_DIR ROS_PACKAGE_PATH ROS_ROOT"
+        " ROS_TEST_RESULTS_DIR get_etc_ros_dir get_log_dir get_ros_home get_ros_package_path"
+        " get_ros_paths get_ros_root get_test_results_dir on_ros_path"
     },
     "rospkg.manifest": {
         "ros1.rospkg": "MANIFEST_FILE PACKAGE_FILE Depend Export InvalidManifest Manifest"

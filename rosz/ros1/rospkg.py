@@ -20,6 +20,12 @@ from rosz.ros1.importer import package_path
 __all__ = (
     "MANIFEST_FILE",
     "PACKAGE_FILE",
+    "ROS_ETC_DIR",
+    "ROS_HOME",
+    "ROS_LOG_DIR",
+    "ROS_PACKAGE_PATH",
+    "ROS_ROOT",
+    "ROS_TEST_RESULTS_DIR",
     "STACK_FILE",
     "InvalidManifest",
     "Manifest",
@@ -42,6 +48,13 @@ __all__ = (
 MANIFEST_FILE = "manifest.xml"
 PACKAGE_FILE = "package.xml"
 STACK_FILE = "stack.xml"
+
+ROS_ETC_DIR = "ROS_ETC_DIR"
+ROS_HOME = "ROS_HOME"
+ROS_LOG_DIR = "ROS_LOG_DIR"
+ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
+ROS_ROOT = "ROS_ROOT"
+ROS_TEST_RESULTS_DIR = "ROS_TEST_RESULTS_DIR"
 
 _DEPENDS = (
     "depend",
@@ -88,7 +101,7 @@ def _get(env: Variables, name: str, default: str) -> str:
 
 def get_ros_root(env: Variables = None) -> str | None:
     """Return ``ROS_ROOT``, or None if it is not set."""
-    return (os.environ if env is None else env).get("ROS_ROOT")
+    return (os.environ if env is None else env).get(ROS_ROOT)
 
 
 def get_ros_package_path(env: Variables = None) -> str:
@@ -114,17 +127,17 @@ def get_ros_home(env: Variables = None) -> str:
 
 def get_log_dir(env: Variables = None) -> str:
     """Return ``ROS_LOG_DIR`` or ``log`` in ROS's home."""
-    return _get(env, "ROS_LOG_DIR", str(Path(get_ros_home(env), "log")))
+    return _get(env, ROS_LOG_DIR, str(Path(get_ros_home(env), "log")))
 
 
 def get_test_results_dir(env: Variables = None) -> str:
     """Return ``ROS_TEST_RESULTS_DIR`` or ``test_results`` in ROS's home."""
-    return _get(env, "ROS_TEST_RESULTS_DIR", str(Path(get_ros_home(env), "test_results")))
+    return _get(env, ROS_TEST_RESULTS_DIR, str(Path(get_ros_home(env), "test_results")))
 
 
 def get_etc_ros_dir(env: Variables = None) -> str:
     """Return ``ROS_ETC_DIR`` or ``/etc/ros``."""
-    return _get(env, "ROS_ETC_DIR", "/etc/ros")
+    return _get(env, ROS_ETC_DIR, "/etc/ros")
 
 
 def on_ros_path(p: str, env: Variables = None) -> bool:

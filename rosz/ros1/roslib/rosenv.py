@@ -9,7 +9,15 @@ from rosz.ros1.rosgraph import names
 from rosz.ros1.rosgraph.names import ROS_HOSTNAME, ROS_IP, ROS_MASTER_URI, ROS_NAMESPACE
 from rosz.ros1.rosgraph.roslogging import makedirs_with_parent_perms
 from rosz.ros1.roslib.packages import ROSEnvException
-from rosz.ros1.rospkg import get_log_dir, get_ros_home, get_test_results_dir
+from rosz.ros1.rospkg import (
+    ROS_HOME,
+    ROS_LOG_DIR,
+    ROS_PACKAGE_PATH,
+    ROS_ROOT,
+    get_log_dir,
+    get_ros_home,
+    get_test_results_dir,
+)
 
 __all__ = (
     "ROS_HOME",
@@ -29,11 +37,6 @@ __all__ = (
     "get_test_results_dir",
     "makedirs_with_parent_perms",
 )
-
-ROS_ROOT = "ROS_ROOT"
-ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
-ROS_HOME = "ROS_HOME"
-ROS_LOG_DIR = "ROS_LOG_DIR"
 
 Variables = Mapping[str, str] | None
 """Environment variables; None for those of the process."""

@@ -137,11 +137,14 @@ def test_folders_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     same(
         """
         import rospkg
+        from rospkg import environment
         env = {"ROS_HOME": "/h", "ROS_ROOT": "/r"}
         result = [
             rospkg.get_ros_home(env), rospkg.get_log_dir(env), rospkg.get_test_results_dir(env),
             rospkg.get_ros_root(env), rospkg.get_etc_ros_dir(env),
             rospkg.get_log_dir({"ROS_LOG_DIR": "/l"}),
+            sorted(name for name in vars(environment) if name.startswith("ROS_")),
+            environment.get_ros_root({environment.ROS_ROOT: "/r"}),
         ]
         """,
         "rospkg",
