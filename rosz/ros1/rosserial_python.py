@@ -1,30 +1,231 @@
 """rosserial_python: clients of devices in scripts (ROS wiki, rosserial_python).
 
-May import rospy's state and `rosz.programs.rosserial`.
+May import rospy and `rosz.programs.rosserial`.
 """
 
 from __future__ import annotations
 
+import io
+import queue
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
-from rosz.programs.rosserial import FilePort, Link, Packet, Port, TcpServer, open_serial
-from rosz.ros1 import state
+from rosz.errors import ServiceError
+from rosz.msgs.rosserial_msgs.msg import TopicInfo
+from rosz.programs.rosserial import (
+    FilePort,
+    Link,
+    Packet,
+    Port,
+    TcpServer,
+    TypeMismatch,
+    open_serial,
+)
+from rosz.ros1 import rospy, state
 
-__all__ = ("RosSerialServer", "SerialClient")
+__all__ = (
+    "Publisher",
+    "RosSerialServer",
+    "SerialClient",
+    "ServiceClient",
+    "ServiceServer",
+    "Subscriber",
+    "load_message",
+    "load_pkg_module",
+    "load_service",
+)
 
 _RETRY_SECONDS = 3.0
+_RESPONSE_SECONDS = 30.0
+
+
+def load_pkg_module(package: str, directory: str) -> ModuleType:
+    """Import ``msg`` or ``srv`` of a package, and return the package.
+
+    Raises:
+        ImportError: There is no such package.
+    """
+    import_module(f"{package}.{directory}")
+    return sys.modules[package]
+
+
+def load_message(package: str, message: str) -> Any:
+    """Return the class of a message.
+
+    Raises:
+        ImportError: There is no such package.
+        AttributeError: The package has no such message.
+    """
+    return getattr(load_pkg_module(package, "msg").msg, message)
+
+
+def load_service(package: str, service: str) -> tuple[Any, Any, Any]:
+    """Return the classes of a service, its request and its response.
+
+    Raises:
+        ImportError: There is no such package.
+        AttributeError: The package has no such service.
+    """
+    srv = load_pkg_module(package, "srv").srv
+    names = service, f"{service}Request", f"{service}Response"
+    found, request, response = (getattr(srv, name) for name in names)
+    return found, request, response
+
+
+def _message_of(info: Any) -> Any:
+    """Return the class of the messages of a topic that a device has announced.
+
+    Raises:
+        TypeMismatch: The device has another definition.
+    """
+    package, message = info.message_type.split("/")
+    found = load_message(package, message)
+    if found._md5sum != info.md5sum:
+        raise TypeMismatch(info, found._md5sum)
+    return found
+
+
+def _encoded(message: Any) -> bytes:
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+class Publisher:
+    """Publishes what a device sends.
+
+    Args:
+        topic_info: The announcement of the device, a ``rosserial_msgs/TopicInfo``.
+
+    Raises:
+        TypeMismatch: The device has another definition of the type.
+    """
+
+    def __init__(self, topic_info: Any) -> None:
+        self.topic = topic_info.topic_name
+        self.message = _message_of(topic_info)
+        self.publisher = rospy.Publisher(self.topic, self.message, queue_size=10)
+
+    def handlePacket(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Publish a message of the device."""
+        self.publisher.publish(self.message().deserialize(data))
+
+
+class Subscriber:
+    """Sends the messages of a topic to a device.
+
+    Args:
+        topic_info: The announcement of the device, a ``rosserial_msgs/TopicInfo``.
+        parent: The client, which has ``send``.
+
+    Raises:
+        TypeMismatch: The device has another definition of the type.
+    """
+
+    def __init__(self, topic_info: Any, parent: Any) -> None:
+        self.topic = topic_info.topic_name
+        self.id = topic_info.topic_id
+        self.parent = parent
+        self.message = _message_of(topic_info)
+        self.subscriber = rospy.Subscriber(self.topic, self.message, self.callback)
+
+    def callback(self, msg: Any) -> None:
+        """Send a message to the device."""
+        self.parent.send(self.id, _encoded(msg))
+
+    def unregister(self) -> None:
+        """Unregister from the topic."""
+        self.subscriber.unregister()
+
+
+class ServiceServer:
+    """Offers a service of a device.
+
+    Args:
+        topic_info: An announcement of the device, a ``rosserial_msgs/TopicInfo``.
+        parent: The client, which has ``send``.
+
+    Attributes:
+        id: ID of the requests, which the user of the class sets.
+    """
+
+    def __init__(self, topic_info: Any, parent: Any) -> None:
+        self.topic = topic_info.topic_name
+        self.id = topic_info.topic_id
+        self.parent = parent
+        self._responses: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        srv, self.mreq, self.mres = load_service(*topic_info.message_type.split("/"))
+        self.service = rospy.Service(self.topic, srv, self.callback)
+
+    def callback(self, req: Any) -> Any:
+        """Send a request to the device, and return its response.
+
+        Raises:
+            ServiceError: The device did not respond in time.
+        """
+        self.parent.send(self.id, _encoded(req))
+        try:
+            return self._responses.get(timeout=_RESPONSE_SECONDS)
+        except queue.Empty:
+            text = f"the device did not respond to '{self.topic}' within {_RESPONSE_SECONDS:g} s"
+            raise ServiceError(text) from None
+
+    def handlePacket(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Take a response of the device."""
+        self._responses.put(self.mres().deserialize(data))
+
+    def unregister(self) -> None:
+        """Offer the service no longer."""
+        self.service.shutdown()
+
+
+class ServiceClient:
+    """Calls a service for a device; waits until there is a node that offers it.
+
+    Args:
+        topic_info: An announcement of the device, a ``rosserial_msgs/TopicInfo``.
+        parent: The client, which has ``send``.
+
+    Attributes:
+        id: ID of the responses, which the user of the class sets.
+    """
+
+    def __init__(self, topic_info: Any, parent: Any) -> None:
+        self.topic = topic_info.topic_name
+        self.id = topic_info.topic_id
+        self.parent = parent
+        srv, self.mreq, self.mres = load_service(*topic_info.message_type.split("/"))
+        rospy.wait_for_service(self.topic)
+        self.proxy = rospy.ServiceProxy(self.topic, srv)
+
+    def handlePacket(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Call the service with a request of the device, and send the response."""
+        self.parent.send(self.id, _encoded(self.proxy(self.mreq().deserialize(data))))
 
 
 class SerialClient:
     """A device on a port.
 
-    It needs ``rospy.init_node``, and waits until the port can be opened.
+    It needs ``rospy.init_node``, and waits until the port can be opened. Derived classes may handle
+    what the device announces and requests themselves: the methods with ``data``, its bytes.
 
     Args:
         port: Path of a serial line, or an object with the methods of pyserial's ``Serial``.
         baud: Bits per second of the line.
         timeout: A third of the seconds after which a silent device has lost sync.
         fix_pyserial_for_test: Whether to use RTS/CTS and DSR/DTR.
+
+    Attributes:
+        callbacks: Functions that handle what the device sends, by topic IDs.
+        publishers: For derived classes: what they publish, by topic IDs.
+        subscribers: For derived classes: what they subscribe to, by topics.
+        services: For derived classes: their services, by names.
+        buffer_in: Size of the device's buffer for messages to it, the first that a derived class
+            has set; -1 before.
+        buffer_out: That for messages from it.
 
     Raises:
         ROSInitException: ``init_node`` has not been called.
@@ -41,6 +242,11 @@ class SerialClient:
         if port is None:
             raise TypeError("port is None; expected a path, such as '/dev/ttyUSB0', or an object")
         node = state.node()
+        self.publishers: dict[int, Any] = {}
+        self.subscribers: dict[str, Any] = {}
+        self.services: dict[str, Any] = {}
+        self.callbacks: dict[int, Callable[[bytes], object]] = {}
+        self.buffer_in = self.buffer_out = -1
         self._link: Link | None = None
         opened: Port | None = FilePort(port) if hasattr(port, "read") else None
         while opened is None and not node.is_shutdown:
@@ -51,6 +257,20 @@ class SerialClient:
                 node.context.wait_for_shutdown(_RETRY_SECONDS)
         if opened is not None:
             self._link = Link(node, opened, timeout=timeout)
+            self.callbacks = self._link.device.callbacks
+        self._own = self.callbacks.copy()
+        server, client = TopicInfo.ID_SERVICE_SERVER, TopicInfo.ID_SERVICE_CLIENT
+        self.callbacks |= {
+            TopicInfo.ID_PUBLISHER: self.setupPublisher,
+            TopicInfo.ID_SUBSCRIBER: self.setupSubscriber,
+            server + TopicInfo.ID_PUBLISHER: self.setupServiceServerPublisher,
+            server + TopicInfo.ID_SUBSCRIBER: self.setupServiceServerSubscriber,
+            client + TopicInfo.ID_PUBLISHER: self.setupServiceClientPublisher,
+            client + TopicInfo.ID_SUBSCRIBER: self.setupServiceClientSubscriber,
+            TopicInfo.ID_PARAMETER_REQUEST: self.handleParameterRequest,
+            TopicInfo.ID_LOG: self.handleLoggingRequest,
+            TopicInfo.ID_TIME: self.handleTimeRequest,
+        }
 
     def run(self) -> None:
         """Exchange messages with the device until the node is shut down.
@@ -72,14 +292,63 @@ class SerialClient:
             self._link.request_stop()
 
     def send(self, topic: int, msg: bytes) -> None:
-        """Send a message to the device.
+        """Send a message to the device; one that is longer than ``buffer_in`` is dropped.
 
         Args:
             topic: ID of the topic.
             msg: The message in ROS 1's layout.
         """
-        if self._link is not None:
+        if 0 < self.buffer_in < len(msg):
+            text = "dropped a message of topic %d: it has %d bytes, the device's buffer %d"
+            rospy.logerr(text, topic, len(msg), self.buffer_in)
+        elif self._link is not None:
             self._link.send(Packet(topic, msg))
+
+    def setupPublisher(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Publish what the device announces."""
+        self._own[TopicInfo.ID_PUBLISHER](data)
+
+    def setupSubscriber(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Subscribe to what the device announces."""
+        self._own[TopicInfo.ID_SUBSCRIBER](data)
+
+    def setupServiceServerPublisher(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Take the responses of a service of the device."""
+        self._own[TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_PUBLISHER](data)
+
+    def setupServiceServerSubscriber(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Send the requests for a service of the device."""
+        self._own[TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_SUBSCRIBER](data)
+
+    def setupServiceClientPublisher(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Take the device's requests for a service."""
+        self._own[TopicInfo.ID_SERVICE_CLIENT + TopicInfo.ID_PUBLISHER](data)
+
+    def setupServiceClientSubscriber(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Send the responses of a service to the device."""
+        self._own[TopicInfo.ID_SERVICE_CLIENT + TopicInfo.ID_SUBSCRIBER](data)
+
+    def handleTimeRequest(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Send the time to the device."""
+        self._own[TopicInfo.ID_TIME](data)
+
+    def handleParameterRequest(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Send a parameter to the device."""
+        self._own[TopicInfo.ID_PARAMETER_REQUEST](data)
+
+    def handleLoggingRequest(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
+        """Log a line of the device."""
+        self._own[TopicInfo.ID_LOG](data)
+
+    def setPublishSize(self, size: int) -> None:  # noqa: N802  # ROS 1's name
+        """Set ``buffer_out``, if it is not set yet."""
+        if self.buffer_out < 0:
+            self.buffer_out = size
+
+    def setSubscribeSize(self, size: int) -> None:  # noqa: N802  # ROS 1's name
+        """Set ``buffer_in``, if it is not set yet."""
+        if self.buffer_in < 0:
+            self.buffer_in = size
 
 
 class RosSerialServer:

@@ -360,6 +360,90 @@ def test_a_script_with_a_client_of_its_own(network: Network, line: Line, tmp_pat
     assert "Traceback" not in program.output
 
 
+DERIVED = """
+import sys, rospy
+from rosserial_msgs.msg import TopicInfo
+from rosserial_python import Publisher, SerialClient, ServiceClient, ServiceServer, Subscriber
+from rosserial_python import load_message, load_service
+
+class Client(SerialClient):
+    def setupSubscriber(self, data):
+        info = TopicInfo()
+        info.deserialize(data)
+        self.subscribers[info.topic_name] = Subscriber(info, self)
+        self.setSubscribeSize(info.buffer_size)
+    def setupPublisher(self, data):
+        info = TopicInfo().deserialize(data)
+        if info.topic_name == "plain":
+            return super().setupPublisher(data)
+        try:
+            self.publishers[info.topic_id] = Publisher(info)
+            self.callbacks[info.topic_id] = self.publishers[info.topic_id].handlePacket
+        except Exception as error:
+            print(error, flush=True)
+    def setupServiceServerSubscriber(self, data):
+        info = TopicInfo().deserialize(data)
+        self.services[info.topic_name] = ServiceServer(info, self)
+    def setupServiceServerPublisher(self, data):
+        info = TopicInfo().deserialize(data)
+        self.callbacks[info.topic_id] = self.services[info.topic_name].handlePacket
+    def setupServiceClientPublisher(self, data):
+        info = TopicInfo().deserialize(data)
+        made = self.services[info.topic_name] = ServiceClient(info, self)
+        self.callbacks[info.topic_id] = made.handlePacket
+    def setupServiceClientSubscriber(self, data):
+        info = TopicInfo().deserialize(data)
+        self.services[info.topic_name].id = info.topic_id
+
+print(load_message("std_msgs", "String")._type)
+print([one._type for one in load_service("std_srvs", "SetBool")])
+rospy.init_node("script")
+Client(sys.argv[1], 115200).run()
+"""
+
+
+def test_a_client_derived_in_a_script(network: Network, line: Line, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(DERIVED)
+    user, board = network.node("user"), line.board
+    messages, plain = heard(user, "/chatter"), heard(user, "/plain")
+    user.service("switch", SetBool, lambda request: [request.data, "switched"])
+    publisher = user.publisher("/orders", String)
+    program = start(network, "rosz.ros1", str(script), line.path)
+    assert board.receive(TopicInfo.ID_PUBLISHER) == b""
+    board.announce(0, 124, "chatter", "std_msgs/String", "0" * 32)
+    board.announce(0, 125, "chatter", "std_msgs/String", String._md5sum)
+    board.announce(0, 126, "plain", "std_msgs/String", String._md5sum)
+    board.send(125, text("hello"))
+    board.send(126, text("plain hello"))
+    assert messages.get(timeout=TIMEOUT).data == "hello"
+    assert plain.get(timeout=TIMEOUT).data == "plain hello"
+    board.announce(1, 101, "orders", "std_msgs/String", String._md5sum, 20)
+    publisher.wait_for_subscribers(timeout=TIMEOUT)
+    publisher.publish(data="x" * 20)  # longer than the device's buffer
+    publisher.publish(data="go")
+    assert board.receive(101) == text("go")
+    board.announce(3, 102, "start", "std_srvs/Trigger", Trigger.Request._md5sum)
+    board.announce(2, 127, "start", "std_srvs/Trigger", Trigger.Response._md5sum)
+    client = user.client("start", Trigger)
+    client.wait_for_service(timeout=TIMEOUT)
+    responses: SimpleQueue[Any] = SimpleQueue()
+    network.thread(lambda: responses.put(client(timeout=TIMEOUT)))
+    assert board.receive(102) == b""
+    board.send(127, b"\x01" + text("started"))
+    assert responses.get(timeout=TIMEOUT).message == "started"
+    board.announce(4, 128, "switch", "std_srvs/SetBool", SetBool.Request._md5sum)
+    board.announce(5, 103, "switch", "std_srvs/SetBool", SetBool.Response._md5sum)
+    board.send(128, b"\x01")
+    assert board.receive(103) == b"\x01" + text("switched")
+    program.send(signal.SIGTERM)
+    program.exit_code()
+    assert "['std_srvs/SetBool', 'std_srvs/SetBoolRequest'" in program.output
+    assert f"has MD5 '{'0' * 32}', expected '{String._md5sum}'" in program.output
+    assert "it has 24 bytes, the device's buffer 20" in program.output
+    assert "Traceback" not in program.output
+
+
 @pytest.mark.parametrize(
     ("word", "reason"),
     [("_baud:=fast", "invalid literal"), ("_tcp_port:=70000", "cannot listen at TCP port 70000")],

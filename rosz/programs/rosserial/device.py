@@ -136,6 +136,10 @@ class Device:
     Args:
         node: The node that stands for the device.
         send: Function that sends a packet to the device.
+
+    Attributes:
+        callbacks: Functions that handle what comes from the device, by topic IDs. They come before
+            those for the topics and services that it has announced.
     """
 
     def __init__(self, node: Node, send: Callable[[Packet], object]) -> None:
@@ -150,7 +154,7 @@ class Device:
         self._calls: Worker[Callable[[], object]] = Worker("rosz-rosserial", threads=_CALLS)
         self._handlers: dict[int, Callable[[bytes], object]] = {}
         server, client = TopicInfo.ID_SERVICE_SERVER, TopicInfo.ID_SERVICE_CLIENT
-        self._fixed: dict[int, Callable[[bytes], object]] = {
+        self.callbacks: dict[int, Callable[[bytes], object]] = {
             TopicInfo.ID_PUBLISHER: self._announced(self._publish),
             TopicInfo.ID_SUBSCRIBER: self._announced(self._subscribe),
             server + _ID_OF_RESPONSES: self._announced(self._serve_response),
@@ -168,7 +172,7 @@ class Device:
         Raises:
             UnknownTopic: The device has not announced its topic.
         """
-        handler = self._fixed.get(packet.topic) or self._handlers.get(packet.topic)
+        handler = self.callbacks.get(packet.topic) or self._handlers.get(packet.topic)
         if handler is None:
             raise UnknownTopic(packet.topic)
         try:
