@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -162,24 +163,29 @@ class Rosz(Side):
             _end(core)
 
     def run_launch(self, file: Path) -> dict[str, Outcome]:
-        """Start the nodes of a launch file, then run its tests one after the other, as rostest."""
+        """Run each test of a launch file with a core and nodes of its own, as rostest does."""
         environ = {**os.environ, **self._environ}
         environment = Environment.read(environ, package_of(file))
         packages = package_index(environment)
         whole = plan([str(file)], {}, SystemContext(packages, environ, Path.cwd(), _names()))
         place = Workplace(packages, environment, self._environ, str(package_of(file)))
-        core = self._core()
         log = self.folder / f"{file.stem}.log"
+        found: dict[str, Outcome] = {}
+        for test in whole.tests:
+            with self._launched(file, log, len(whole.nodes)):
+                found |= self._test(place, test, log)
+        return found
+
+    @contextmanager
+    def _launched(self, file: Path, log: Path, nodes: int) -> Iterator[None]:
+        core = self._core()
         try:
             with log.open("w") as out:
                 command = [sys.executable, "-P", "-m", "rosz", "launch", "-v", str(file)]
                 launch = _start(command, self._environ, out)
                 try:
-                    self._wait_for_nodes(launch, log, len(whole.nodes))
-                    found: dict[str, Outcome] = {}
-                    for test in whole.tests:
-                        found |= self._test(place, test, log)
-                    return found
+                    self._wait_for_nodes(launch, log, nodes)
+                    yield
                 finally:
                     _end(launch)
         finally:
