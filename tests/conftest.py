@@ -18,6 +18,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from network import Network
 
+from rosz.message import Ros2Default
+
 # Tests give the same result on a busy machine. ROSZ_EXAMPLES=20000 takes a night.
 settings.register_profile(
     "rosz",
@@ -26,6 +28,16 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 settings.load_profile("rosz")
+
+
+@pytest.fixture(autouse=True)
+def defaults_of_ros2(request: pytest.FixtureRequest) -> Iterator[None]:
+    """ROS 2's defaults for all tests but those of ROS 1's names, which change them as imported."""
+    before = Ros2Default.ros1
+    if "ros1" not in request.path.parts:
+        Ros2Default.ros1 = False
+    yield
+    Ros2Default.ros1 = before or Ros2Default.ros1
 
 
 def pytest_configure() -> None:

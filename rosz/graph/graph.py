@@ -87,6 +87,10 @@ class Graph:
             self._interests.wait_until(lambda: followed.complete, deadline)
         return followed.view()
 
+    def known(self) -> View:
+        """Return what is known of all that is followed, also after the graph was closed."""
+        return self._interests.known()
+
     def refresh(self, timeout: float = 2.0) -> View:
         """Query the network for all tokens, for callers that need them just once.
 

@@ -131,13 +131,20 @@ class Interests:
         self.wait_until(lambda: all(one.settled for one in interests), time.monotonic() + timeout)
         found = [token for key in keys for token in self._session.live_tokens(key, timeout)]
         self._apply_pending(timeout)
-        with self.changed:
-            known = {key: token for one in interests for key, token in one.tokens.items()}
+        known = self._known(interests)
         # Only in the result: nothing may report the end of a token that was never watched.
         for key in found:
             if key not in known and (token := self._parse(key)) is not None:
                 known[key] = token
         return View.of(known.values())
+
+    def known(self) -> View:
+        """Return what is known of all interests, or was when the graph was closed."""
+        return View.of(self._known(self.all()).values())
+
+    def _known(self, interests: Iterable[Interest]) -> dict[str, Any]:
+        with self.changed:
+            return {key: token for one in interests for key, token in one.tokens.items()}
 
     def register(
         self,

@@ -217,7 +217,7 @@ def survey() -> Survey:
     try:
         view = opened.graph.refresh()
     except ClosedError:  # threads of a program look at the graph while it ends
-        view = opened.graph.view()
+        view = opened.graph.known()
     return Survey(opened.domain, view, {(p.zid, p.node_id): p for p in view.processes()})
 
 

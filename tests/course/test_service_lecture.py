@@ -134,7 +134,7 @@ def test_parameters_at_the_prompt(desk: Desk) -> None:
     assert two.type("rosparam get /our_own_param") == "learning ROS params\n"
     usage = two.type("rosparam -h")
     for command in ("set", "get", "load", "dump", "delete", "list"):
-        assert re.search(rf"(?m)^  {command} ", usage)
+        assert re.search(rf"(?m)^  rosparam {command} ", usage)
     for line in ("my_integer 7", "my_float 3.14", 'my_string "hello"'):
         assert two.type(f"rosparam set {line}") == ""
     assert two.type("rosparam list").startswith("/my_float\n/my_integer\n/my_string\n")

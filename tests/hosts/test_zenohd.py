@@ -43,7 +43,8 @@ def router(host: Host, *options: str, **variables: str) -> HostProgram:
 
 
 def hears(host: Host, topic: str = "/chatter") -> None:
-    """See that a newcomer hears a topic."""
+    """See that a newcomer hears a topic, once the nodes have linked to a new router."""
+    eventually(lambda: topic in host.ask("topic", "list").split(), f"'{topic}' on {host.name}")
     assert "data:" in host.ask("topic", "echo", "-n", "1", topic)
 
 
