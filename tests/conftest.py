@@ -30,14 +30,18 @@ settings.register_profile(
 settings.load_profile("rosz")
 
 
+_ROS1_DEFAULTS = pytest.StashKey[bool]()
+
+
 @pytest.fixture(autouse=True)
 def defaults_of_ros2(request: pytest.FixtureRequest) -> Iterator[None]:
-    """ROS 2's defaults for all tests but those of ROS 1's names, which change them as imported."""
-    before = Ros2Default.ros1
-    if "ros1" not in request.path.parts:
-        Ros2Default.ros1 = False
+    """ROS 2's defaults for all tests but those of ROS 1's names, whose import changes them."""
+    stash = request.config.stash
+    if "ros1" in request.path.parts:
+        Ros2Default.ros1 = Ros2Default.ros1 or stash.get(_ROS1_DEFAULTS, False)
     yield
-    Ros2Default.ros1 = before or Ros2Default.ros1
+    stash[_ROS1_DEFAULTS] = Ros2Default.ros1 or stash.get(_ROS1_DEFAULTS, False)
+    Ros2Default.ros1 = False
 
 
 def pytest_configure() -> None:

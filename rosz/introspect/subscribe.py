@@ -70,6 +70,7 @@ def wait_for_target(context: Context, name: str, warn: Callable[[str], object]) 
         return find_target(name, topic_types(context.graph.refresh()), load)
     except NotFoundError as error:
         warn(f"topic [{name}] does not appear to be published yet ({error})")
+    context.graph.view()  # from now on, later looks know what this one finds
     found: list[Target] = []
 
     def look(view: View) -> bool:

@@ -18,7 +18,7 @@ from weakref import WeakValueDictionary
 import zenoh
 import zenoh.ext
 
-from rosz.errors import ClosedError
+from rosz.errors import ClosedError, TransportError
 from rosz.lifecycle import Closable, Lifecycle
 from rosz.session.at_exit import ENDING, ClosedSession
 from rosz.session.config import SessionConfig
@@ -72,6 +72,38 @@ def _runtime() -> Lifecycle:
     They never end, and a forked child does not have them: a session would never be open there.
     """
     return Lifecycle("the network")
+
+
+class _Beginning:
+    """What a watch of tokens is told until it has reported what existed.
+
+    Seen with eclipse-zenoh 1.10.2: a watch that begins while tokens disappear may be told of the
+    end of some of these first, and then that they exist. `tests/interop/test_hostile.py` shows it;
+    it is not reported upstream yet.
+
+    Attributes:
+        seen: All tokens that it was told of.
+        missing: The tokens that a query of that time found.
+    """
+
+    def __init__(self) -> None:
+        self.seen: set[str] = set()
+        self.missing: set[str] = set()
+        self._gone: set[str] = set()
+        self._live: set[str] = set()
+
+    def add(self, token: str, *, alive: bool) -> None:
+        """Note that a token appeared or disappeared."""
+        self.seen.add(token)
+        if alive:
+            self._live.add(token)
+        else:
+            self._live.discard(token)
+            self._gone.add(token)
+
+    def doubtful(self) -> set[str]:
+        """Return the tokens that may have disappeared unnoticed."""
+        return self._live & self._gone
 
 
 class Session:
@@ -332,28 +364,28 @@ class Session:
                 been reported.
         """
         existing: Replies | None = None
-        seen: set[str] = set()
-        missing: set[str] = set()
+        beginning = _Beginning()
 
         def begin() -> None:
-            nonlocal existing, missing
+            nonlocal existing
             if existing is not None:
                 replies, existing = existing, None
-                missing = {reply.key for reply in replies if reply.ok}
+                beginning.missing = {reply.key for reply in replies if reply.ok}
                 del replies
 
         def idle() -> None:
             nonlocal complete
             report = complete
-            if report is not None and missing <= seen:
+            if report is not None and beginning.missing <= beginning.seen:
+                for token in self._vanished(key, beginning.doubtful()):
+                    callback(token, False)
                 complete = None
-                seen.clear()
                 report()
 
         def deliver(raw: zenoh.Sample) -> None:
             token, alive = str(raw.key_expr), raw.kind == zenoh.SampleKind.PUT
             if complete is not None:
-                seen.add(token)
+                beginning.add(token, alive=alive)
             own = self._tokens.get(token)
             # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
             if alive or own is None or own.closed:
@@ -368,6 +400,15 @@ class Session:
                 handler = liveliness.get(key, open_channel(), timeout=_TOKENS_SECONDS)
                 existing = Replies(handler)
         return CallbackThread(f"watch of tokens '{key}'", entity, deliver, begin, idle)
+
+    def _vanished(self, key: str, tokens: set[str]) -> set[str]:
+        """Return those of some tokens that are not alive."""
+        if not tokens:
+            return tokens
+        try:
+            return tokens.difference(self.live_tokens(key, _TOKENS_SECONDS))
+        except (ClosedError, TransportError):
+            return set()  # the watch ends with its session
 
     def query(
         self,
