@@ -63,6 +63,9 @@ CLIENT = """
         def __init__(self):
             super().__init__("client")
             self.client = ActionClient(self, Fibonacci, "fib")
+            self.handle = None
+            self.heard = False
+            self.left = 1 + ("cancel" in sys.argv)
 
         def send_goal(self, order):
             goal = Fibonacci.Goal()
@@ -78,17 +81,31 @@ CLIENT = """
                 rclpy.shutdown()
                 return
             handle.get_result_async().add_done_callback(self.ended)
-            if "cancel" in sys.argv:
-                handle.cancel_goal_async().add_done_callback(
-                    lambda future: print("canceling", len(future.result().goals_canceling)))
+            self.handle = handle
+            self.cancel()
+
+        def cancel(self):
+            if "cancel" in sys.argv and self.handle and self.heard:
+                self.handle.cancel_goal_async().add_done_callback(self.canceling)
+
+        def canceling(self, future):
+            print("canceling", len(future.result().goals_canceling))
+            self.end()
+
+        def end(self):
+            self.left -= 1
+            if not self.left:
+                rclpy.shutdown()
 
         def ended(self, future):
             response = future.result()
             print("result", response.status, list(response.result.sequence))
-            rclpy.shutdown()
+            self.end()
 
         def feedback(self, message):
             print("feedback", list(message.feedback.sequence))
+            self.heard = True
+            self.cancel()
 
     rclpy.init()
     client = Client()
