@@ -24,15 +24,16 @@ pytestmark = pytest.mark.skipif(
     shutil.which("roslaunch") is None, reason="roslaunch is not installed (python3-roslaunch)"
 )
 
+# roslaunch prints a message and its line end apart: what a node says begins and ends a line.
 SCRIPTS = {
-    "quick": "#!/bin/sh\necho quick $*\n",
+    "quick": "#!/bin/sh\nprintf '\\nquick %s\\n' \"$*\"\n",
     "broken": "#!/bin/sh\nsleep 0.3\nexit 3\n",
     "crashing": "#!/bin/sh\nsleep 0.3\nkill -SEGV $$\n",
-    "lasting": "#!/bin/sh\necho lasting\nexec sleep 600\n",
+    "lasting": "#!/bin/sh\nprintf '\\nlasting\\n'\nexec sleep 600\n",
     "stubborn": "#!/usr/bin/python3 -S\n"
     "import signal, time\n"
     "for s in (signal.SIGINT, signal.SIGTERM): signal.signal(s, signal.SIG_IGN)\n"
-    "print('stubborn', flush=True)\n"
+    "print('\\nstubborn', flush=True)\n"
     "time.sleep(600)\n",
 }
 
