@@ -301,10 +301,10 @@ class ActionServer:
         with self._lock:
             if goal.done:
                 return False
-            waits = goal.status is GoalState.ACCEPTED
+            waits = goal.status is GoalState.ACCEPTED and self._policy != "parallel"
             if goal.status is not GoalState.CANCELING:
                 goal.move(GoalState.CANCELING)
-        if waits:  # nobody executes it
+        if waits:  # its turn would come too late
             self.end(goal, GoalState.CANCELED, None)
         else:
             self._publish_status()
@@ -327,9 +327,10 @@ class ActionServer:
 
     def _run(self, goal: ServerGoal) -> None:
         with self._lock:
-            if goal.status is not GoalState.ACCEPTED or self._lifecycle.closing:
-                return  # cancelled before its turn
-            goal.move(GoalState.EXECUTING)
+            if goal.done or self._lifecycle.closing:
+                return
+            if goal.status is GoalState.ACCEPTED:
+                goal.move(GoalState.EXECUTING)
         self._publish_status()
         log = self._node.log
         try:

@@ -27,6 +27,7 @@ from rosz.msgs.action_msgs.srv import CancelGoal
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.unique_identifier_msgs.msg import UUID
+from rosz.node import action_server
 from rosz.node.action_client import ActionClient, ClientGoal
 from rosz.node.action_server import ActionServer, ServerGoal
 from rosz.node.goals import GoalState
@@ -225,6 +226,25 @@ def test_one_goal_after_the_other(world: World) -> None:
     assert goal.id == third.id
     goal.succeed()
     assert third.wait(TIMEOUT) is GoalState.SUCCEEDED
+
+
+def test_a_goal_may_be_cancelled_before_it_is_executed(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(action_server, "_MOST_AT_ONCE", 1)
+    world.server()
+    client = world.client()
+    client.send(Goal(1))
+    first = world.next()
+    handle = client.send(Goal(2))
+    assert handle.cancel()
+    first.succeed()
+    second = world.next()  # its function decides on the result, as in rclpy
+    assert second.cancel_requested
+    second.canceled(Result([7]))
+    with pytest.raises(GoalFailed, match="was canceled") as failed:
+        handle.result(TIMEOUT)
+    assert list(failed.value.result.sequence) == [7]
 
 
 def test_a_newer_goal_preempts(world: World) -> None:

@@ -224,8 +224,9 @@ class ActionServer:
         return self._ask(self._on_goal, request) is GoalResponse.ACCEPT
 
     def _ask_cancel(self, goal: ServerGoal) -> bool:
-        handle = self._handles.get(goal.id)
-        return handle is not None and self._ask(self._on_cancel, handle) is CancelResponse.ACCEPT
+        # The thread that executes the goal may not have begun.
+        handle = self._handles.get(goal.id) or ServerGoalHandle(self, goal)
+        return self._ask(self._on_cancel, handle) is CancelResponse.ACCEPT
 
     def _ask(self, callback: Callable[[Any], Any], value: Any) -> Any:
         """Return what a callback returns, which the executor calls."""

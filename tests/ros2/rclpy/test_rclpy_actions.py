@@ -63,8 +63,6 @@ CLIENT = """
         def __init__(self):
             super().__init__("client")
             self.client = ActionClient(self, Fibonacci, "fib")
-            self.handle = None
-            self.heard = False
             self.left = 1 + ("cancel" in sys.argv)
 
         def send_goal(self, order):
@@ -81,12 +79,8 @@ CLIENT = """
                 rclpy.shutdown()
                 return
             handle.get_result_async().add_done_callback(self.ended)
-            self.handle = handle
-            self.cancel()
-
-        def cancel(self):
-            if "cancel" in sys.argv and self.handle and self.heard:
-                self.handle.cancel_goal_async().add_done_callback(self.canceling)
+            if "cancel" in sys.argv:
+                handle.cancel_goal_async().add_done_callback(self.canceling)
 
         def canceling(self, future):
             print("canceling", len(future.result().goals_canceling))
@@ -104,8 +98,6 @@ CLIENT = """
 
         def feedback(self, message):
             print("feedback", list(message.feedback.sequence))
-            self.heard = True
-            self.cancel()
 
     rclpy.init()
     client = Client()
