@@ -106,7 +106,7 @@ class JointStatePublisher:
         description = self._param("robot_description", None)
         if not isinstance(description, str):
             raise DescriptionError(
-                "parameter 'robot_description' is not set, or is no text: it is the URDF of the"
+                "parameter 'robot_description' is not set, or is not a text: it is the URDF of the"
                 ' robot, such as <param name="robot_description" command="xacro FILE"/>'
             )
         try:
@@ -191,7 +191,7 @@ class JointStatePublisher:
                 found.offset + found.factor * above.offset,
             )
         if found.parent not in self.joints:
-            raise DescriptionError(f"joint '{name}' follows '{found.parent}', which is no joint")
+            raise DescriptionError(f"joint '{name}' follows '{found.parent}', which is not a joint")
         return found
 
     def hear(self, message: JointState) -> None:

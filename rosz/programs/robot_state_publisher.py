@@ -112,7 +112,9 @@ def _read(joint: ET.Element, names: set[str]) -> Link:
         element = joint.find(role)
         ends[role] = "" if element is None else element.get("link", "")
         if ends[role] not in names:
-            raise RobotError(f"joint '{name}': its {role} '{ends[role]}' is no link of the robot")
+            raise RobotError(
+                f"joint '{name}': its {role} '{ends[role]}' is not a link of the robot"
+            )
     origin, axis, mimic = (joint.find(tag) for tag in ("origin", "axis", "mimic"))
     try:
         roll, pitch, yaw = _numbers(origin, "rpy", "0 0 0")
@@ -182,7 +184,7 @@ class RobotStatePublisher:
         if isinstance(value, str):
             return value
         raise RobotError(
-            f"parameter '{name}' is not set, or is no text: it is the URDF of the robot, such as"
+            f"parameter '{name}' is not set, or is not a text: it is the URDF of the robot, such as"
             ' <param name="robot_description" command="xacro FILE"/>'
         )
 

@@ -106,7 +106,7 @@ def test_it_moves_joints(network: Network) -> None:
         ),
         (
             '<robot><joint name="a" type="continuous"><mimic joint="x"/></joint></robot>',
-            "joint 'a' follows 'x', which is no joint",
+            "joint 'a' follows 'x', which is not a joint",
         ),
     ],
 )

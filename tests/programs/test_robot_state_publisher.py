@@ -48,7 +48,7 @@ def test_links_of_a_description() -> None:
         (
             '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
             '<child link="b"/></joint></robot>',
-            "joint 'j': its child 'b' is no link",
+            "joint 'j': its child 'b' is not a link",
         ),
         (
             '<robot><link name="a"/><link name="b"/><joint name="j" type="fixed">'

@@ -36,7 +36,7 @@ class Packet(NamedTuple):
 
 
 class Damage(NamedTuple):
-    """Bytes that are no packet.
+    """Bytes that are not a packet.
 
     Attributes:
         reason: What is wrong with them.
@@ -106,7 +106,7 @@ class PacketReader:
         if start:
             skipped = len(buffer) if start < 0 else start
             del buffer[:skipped]
-            return "skipped bytes that are no packet" if skipped else None
+            return "skipped bytes that are not a packet" if skipped else None
         if len(buffer) > 1 and buffer[1] != _VERSION:
             return self._skip(_other_version(buffer[1]))
         if len(buffer) < _HEAD:

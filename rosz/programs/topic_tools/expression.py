@@ -99,7 +99,7 @@ def _compile(parser: argparse.ArgumentParser, expression: str) -> Any:
 
 
 def _evaluate(fields: Any, part: Any) -> Any:
-    """Return fields with their texts evaluated; a text that is no expression stays as it is."""
+    """Return fields with their texts evaluated; a text that is not an expression stays as it is."""
     if isinstance(fields, dict):
         return {name: _evaluate(value, part) for name, value in fields.items()}
     if not isinstance(fields, str):

@@ -103,7 +103,7 @@ class Bag:
         mode: ``r`` to read, ``w`` to write, ``a`` to write behind what is there.
         compression: Compression of what is written.
         chunk_threshold: Bytes of messages that are compressed together.
-        allow_unindexed: Whether a bag without an index is no error.
+        allow_unindexed: Whether a bag without an index may be opened.
         options: ``compression`` and ``chunk_threshold`` as a dictionary.
         skip_index: Whether frequencies are left out of what is told of topics.
 
