@@ -28,7 +28,7 @@ IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 _Image: TypeAlias = Any
 _NS = 1_000_000_000
 _DEPTH_HEADER = struct.Struct("<iff")
-"""What image_transport's compressedDepth writes before the PNG: its format, and two numbers."""
+"""What image_transport's compressedDepth writes before the PNG: a format and two numbers."""
 _MILLIMETRES = 1000.0
 _ALPHA = 4
 _DEEP_BITS = 16
@@ -76,7 +76,7 @@ class Pictures:
             stamp: When it was received; the name has the stamp of its header, if it has one.
 
         Raises:
-            MessageError: The message is no image, or not one that such a file can hold.
+            MessageError: The message is not an image, or such a file cannot hold it.
             BagError: The file cannot be written.
         """
         seconds, rest = divmod(message.header.stamp.to_nsec() or stamp, _NS)
@@ -108,12 +108,12 @@ def pixels(message: Any, *, deep: bool) -> _Image:
         deep: Whether it may have 16 bits and alpha; else it has 8 bits and no alpha.
 
     Raises:
-        MessageError: The message is no image, or has a number of channels that no file has.
+        MessageError: The message is not an image, or files cannot hold its number of channels.
     """
     try:
         image = _decompressed(message) if hasattr(message, "format") else _raw(message, deep=deep)
     except (CvBridgeError, RuntimeError, cv2.error) as error:
-        raise MessageError(f"it is no image: {error}") from error
+        raise MessageError(f"the message is not an image: {error}") from error
     channels = 1 if image.ndim == 2 else image.shape[2]  # noqa: PLR2004  # rows and columns
     if channels not in _DRAWN or not image.size:
         raise MessageError(f"an image of shape {image.shape} cannot be a picture")
@@ -143,7 +143,7 @@ def _decompressed(message: Any) -> _Image:
     array_ = np.frombuffer(data, np.uint8)
     image = cv2.imdecode(array_, cv2.IMREAD_UNCHANGED) if data else None
     if image is None:
-        raise MessageError(f"its data of format '{message.format}' are no image that OpenCV reads")
+        raise MessageError(f"OpenCV cannot read its data of format '{message.format}'")
     if depth and message.format.startswith("32FC1"):
         _, first, second = _DEPTH_HEADER.unpack_from(bytes(message.data))
         with np.errstate(divide="ignore"):
@@ -245,7 +245,7 @@ class Video:
         """Write the next image.
 
         Raises:
-            MessageError: The message is no image, or has another size than the first one.
+            MessageError: The message is not an image, or its size is not that of the first one.
             BagError: The video cannot be written.
         """
         stamp = self._stamps[self._next]

@@ -116,7 +116,7 @@ def create_writer(
     if kind == "rosbag2":
         return Rosbag2Writer(path, storage=storage, compression=compression)
     if kind not in _WRITERS:
-        raise UsageError(f"there is no format '{kind}'; known are {', '.join(FORMATS)}")
+        raise UsageError(f"format '{kind}' is not known; expected one of {', '.join(FORMATS)}")
     return _WRITERS[kind](path, compression=compression, replace=replace)
 
 

@@ -92,7 +92,7 @@ def find_curves(
         load: Function that returns the class of a type.
 
     Raises:
-        NotFoundError: There is no such topic or field.
+        NotFoundError: The bag has no such topic or field.
         UsageError: A field has no numbers.
     """
     return [
@@ -181,7 +181,7 @@ def draw(axes: Sequence[Sequence[Curve]], file: Path, start: int, title: str = "
     """
     check_format(file)
     if not any(curve.lines for axis in axes for curve in axis):
-        raise NotFoundError("there is no message with such a field at that time")
+        raise NotFoundError("no message of that time has such a field")
     try:
         from matplotlib.figure import Figure
     except ImportError as error:

@@ -269,7 +269,7 @@ class Rosbag2Reader:
         path: The folder.
 
     Raises:
-        BagError: The folder is no bag, or a file in it cannot be read.
+        BagError: The folder is not a bag, or a file in it cannot be read.
         UsageError: The bag is compressed, and the library for it is not installed.
     """
 
@@ -358,7 +358,7 @@ class Rosbag2Reader:
 
     @property
     def storage(self) -> Storage:
-        """What the files are written by."""
+        """The storage plugin that reads the files."""
         return "mcap" if self._parts[0].format == "mcap" else "sqlite3"
 
     @property

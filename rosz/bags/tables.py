@@ -168,7 +168,7 @@ class _Errors:
 
 
 class _Leaf(msgspec.Struct, frozen=True):
-    """A column: a field that is no message of its own.
+    """A column: a field whose type is not a message.
 
     Attributes:
         name: Its dotted name.
@@ -344,7 +344,7 @@ class _Column:
         if self._flat is None:
             try:
                 made = pa.array(self._values, self.type)
-            except UnicodeEncodeError:  # octets in a string of ROS 1 that are no UTF-8
+            except UnicodeEncodeError:  # octets of ROS 1 that are not UTF-8
                 made = pa.array([*map(_unicode, self._values)], self.type)
         else:
             kind, flat, count = self.type.value_type, self._flat, len(self._ends) - 1
@@ -398,7 +398,7 @@ def _plain(slot: Slot) -> Callable[[Any], Any] | None:
 
 
 def _unicode(value: Any) -> Any:
-    """Return a value with question marks in place of octets that are no text."""
+    """Return a value with question marks in place of octets that are not text."""
     if isinstance(value, dict):
         return {name: _unicode(one) for name, one in value.items()}
     if isinstance(value, list):

@@ -428,5 +428,5 @@ class _Ros1Reader(_Reader):
         return super()._text(slot, path)
 
     def _text_of(self, packed: bytes) -> str:
-        # roscpp sends any bytes as a string, and genpy replaces those that are no UTF-8.
+        # roscpp sends any bytes as a string, and genpy replaces those that are not UTF-8.
         return packed.decode(errors="replace")

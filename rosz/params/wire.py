@@ -449,7 +449,7 @@ def read_time(message: memoryview) -> int:
     """Return the time of an encoded `Batch`, without reading all of it.
 
     Raises:
-        DecodeError: The bytes are no batch.
+        DecodeError: The bytes are not a batch.
     """
     return decode(message, _BatchStart).time
 

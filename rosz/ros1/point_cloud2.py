@@ -51,7 +51,7 @@ def read_points(
         uvs: Columns and rows of the points to read; all when empty.
 
     Raises:
-        AssertionError: What was given is no PointCloud2.
+        AssertionError: The argument is not a PointCloud2.
         struct.error: The data end before a point.
     """
     _check(cloud)

@@ -122,7 +122,7 @@ def _upload(name: str, value: Any) -> None:
 
 
 def print_params(params: Any, ns: str) -> None:
-    """Write names and values to stdout, one per line; what is no dict is written alone."""
+    """Write names and values to stdout, one per line, or a value that is not a dict alone."""
     if not isinstance(params, dict):
         sys.stdout.write(f"{params}\n")
         return

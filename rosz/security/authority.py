@@ -32,7 +32,7 @@ __all__ = ("Authority", "excluded_names", "own_name", "read_certificate")
 _HOME = "authority"
 _REVOKED = "revoked"
 _OWN_DOMAIN = ".key.invalid"
-"""End of the own names of certificates, which are no names of hosts (RFC 2606)."""
+"""End of the own names of certificates, which are not names of hosts (RFC 2606)."""
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?")
 _LONGEST_NAME = 64
 """The longest common name of a certificate, in characters (RFC 5280, appendix A.1)."""
@@ -104,7 +104,7 @@ class Authority:
         reserved = name in {_HOME, _REVOKED}
         if not _NAME.fullmatch(name) or reserved or len(name) > _LONGEST_NAME:
             raise UsageError(
-                f"'{name}' is no name for a holder of keys; expected at most {_LONGEST_NAME}"
+                f"'{name}' is not a name for a holder of keys; expected at most {_LONGEST_NAME}"
                 " letters, digits, '.', '_', '-'"
             )
         folder = self.folder / name
@@ -208,7 +208,7 @@ def _sign(
     try:
         end = now + dt.timedelta(days=days)
     except OverflowError as error:
-        raise UsageError(f"{days:g} days from now is no date; expected fewer") from error
+        raise UsageError(f"{days:g} days from now is not a date; expected fewer") from error
     usage = x509.KeyUsage(
         digital_signature=not authority,
         content_commitment=False,
@@ -249,7 +249,7 @@ def read_certificate(file: Path) -> Certificate:
     try:
         certificate: Certificate = x509.load_pem_x509_certificate(file.read_bytes())
     except ValueError as error:
-        raise UsageError(f"'{file}' is no certificate: {error}") from error
+        raise UsageError(f"'{file}' is not a certificate: {error}") from error
     return certificate
 
 
@@ -260,7 +260,7 @@ def _read_key(file: Path) -> EllipticCurvePrivateKey:
     try:
         key = load_pem_private_key(file.read_bytes(), None)
     except (ValueError, TypeError) as error:
-        raise UsageError(f"'{file}' is no private key: {error}") from error
+        raise UsageError(f"'{file}' is not a private key: {error}") from error
     if not isinstance(key, EllipticCurvePrivateKey):
         raise UsageError(f"'{file}' is another kind of key than rosz makes; expected one on P-256")
     return key
@@ -288,7 +288,7 @@ def _general_name(text: str) -> GeneralName:
         return x509.IPAddress(ipaddress.ip_address(text))
     except ValueError:
         if not _NAME.fullmatch(text):
-            raise UsageError(f"'{text}' is no IP address and no host name") from None
+            raise UsageError(f"'{text}' is not an IP address or a host name") from None
         return x509.DNSName(text)
 
 

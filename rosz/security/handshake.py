@@ -48,7 +48,7 @@ def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
             link.recv(1)
     except TimeoutError as error:
         if "handshake" in str(error):
-            return "it speaks no TLS: 'ROSZ_KEYS' is missing there, or it is no Zenoh"
+            return "it does not speak TLS: 'ROSZ_KEYS' is missing there, or it is not Zenoh"
         return "" if "read" in str(error) else f"no answer within {timeout:g} s"
     except ssl.SSLCertVerificationError as error:
         reason = f"its certificate is refused here: {error.verify_message}"

@@ -163,7 +163,7 @@ class _Reader:
             else:
                 known = (*NAME_VERBS, *_FLAGS)
                 hint = f"{near_miss(verb, known)}; expected one of {', '.join(known)}"
-                raise self._error(key, f"'{verb}' is no permission{hint}")
+                raise self._error(key, f"'{verb}' is not a permission{hint}")
         return msgspec.convert(given, Permit)
 
     def _patterns(self, node: yaml.Node) -> tuple[str, ...]:
@@ -177,7 +177,7 @@ class _Reader:
         if not _PATTERN.fullmatch(text):
             raise self._error(
                 node,
-                f"'{text}' is no pattern of global names; expected such as /cmd_vel, /arm/* or /**",
+                f"'{text}' is not a pattern of global names; expected one like /arm/**",
             )
         return text
 

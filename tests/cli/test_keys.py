@@ -47,7 +47,7 @@ def test_check_reports_what_is_wrong(tmp_path: Path) -> None:
     (keys / "robot" / "key.pem").chmod(0o644)
     checked = rosz(tmp_path, "keys", "check", str(keys))
     assert checked.returncode == 1
-    assert f"WRONG: {keys}/rules.yaml:1:9: 'fly' is no permission" in checked.stdout
+    assert f"WRONG: {keys}/rules.yaml:1:9: 'fly' is not a permission" in checked.stdout
     assert "WRONG: others may read" in checked.stdout
     started = rosz(tmp_path, "topic", "list", variables={"ROSZ_KEYS": str(keys / "robot")})
     assert started.returncode == 2

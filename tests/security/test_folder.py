@@ -87,7 +87,7 @@ def test_rules_that_cannot_be_read(authority: Authority, kind: str) -> None:
 
 
 def test_impossible_lifetimes(authority: Authority) -> None:
-    with pytest.raises(UsageError, match=r"1e\+07 days from now is no date"):
+    with pytest.raises(UsageError, match=r"1e\+07 days from now is not a date"):
         authority.add("robot", days=1e7)
     assert not (authority.folder / "robot").exists()
 
@@ -119,7 +119,7 @@ def test_half_a_copy(authority: Authority) -> None:
 def test_invalid_rules_prevent_the_start(authority: Authority) -> None:
     home = authority.add("robot")
     (home / "rules.yaml").write_text("a: {drive: true}\n")
-    with pytest.raises(YamlError, match=r"rules.yaml:1:5: 'drive' is no permission"):
+    with pytest.raises(YamlError, match=r"rules.yaml:1:5: 'drive' is not a permission"):
         KeyFolder.find(home, "robot")
 
 
@@ -134,7 +134,7 @@ def test_nothing_is_overwritten(authority: Authority) -> None:
 
 @pytest.mark.parametrize("name", ["../up", "", "authority", "revoked", "a b", "-x", "a" * 65])
 def test_names_of_holders(authority: Authority, name: str) -> None:
-    with pytest.raises(UsageError, match="is no name for a holder of keys"):
+    with pytest.raises(UsageError, match="is not a name for a holder of keys"):
         authority.add(name)
 
 

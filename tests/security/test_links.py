@@ -265,7 +265,7 @@ def test_the_other_end_has_no_keys(pair: Pair) -> None:
     pair.start()
     listing = pair.laptop.rosz("topic", "list")
     assert listing.exit_code(30) == 1
-    assert "it speaks no TLS: 'ROSZ_KEYS' is missing there" in listing.output
+    assert "it does not speak TLS: 'ROSZ_KEYS' is missing there" in listing.output
 
 
 def test_a_key_for_another_name(pair: Pair) -> None:

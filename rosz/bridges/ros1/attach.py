@@ -393,7 +393,7 @@ def _own_address(address: Address) -> str:
     """Return the address of this machine on the way to another one.
 
     Raises:
-        TransportError: The host is not known, or there is no way.
+        TransportError: The host is not known, or cannot be reached.
     """
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

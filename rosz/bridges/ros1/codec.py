@@ -77,7 +77,7 @@ class Codecs:
             definition: Full text of the definition, if the program has sent it.
 
         Raises:
-            TypeNotFound: The type is not known, and there is no definition.
+            TypeNotFound: The type is not known, and no definition was given.
             DefinitionError: The definition is not well-formed.
         """
         with self._lock:

@@ -122,7 +122,7 @@ class CvBridge:
             header: Header of the message.
 
         Raises:
-            TypeError: What was given is no array.
+            TypeError: The argument is not an array.
             CvBridgeError: The array is none of the encoding.
         """
         _check(cvim)
@@ -147,7 +147,7 @@ class CvBridge:
     def compressed_imgmsg_to_cv2(
         self, cmprs_img_msg: Any, desired_encoding: str = "passthrough"
     ) -> Image:
-        """Return the array of a CompressedImage; None if the data are no image that OpenCV reads.
+        """Return the array of a CompressedImage; None if OpenCV cannot read the data.
 
         Args:
             cmprs_img_msg: The message.
@@ -169,7 +169,7 @@ class CvBridge:
             dst_format: Format of the data, such as ``jpg`` or ``png``, and of the message.
 
         Raises:
-            TypeError: What was given is no array.
+            TypeError: The argument is not an array.
             CvBridgeError: OpenCV does not write such an array in that format.
         """
         _check(cvim)

@@ -49,7 +49,7 @@ def parse(name: str) -> Encoding:
     generic = _GENERIC.fullmatch(name)
     if generic is None:
         raise RuntimeError(
-            f"'{name}' is no encoding; expected one such as 'bgr8', 'mono16', 'bayer_rggb8',"
+            f"'{name}' is not an encoding; expected one such as 'bgr8', 'mono16', 'bayer_rggb8',"
             " 'yuv422' or '32FC1'"
         )
     return Encoding(name, "", int(generic[2] or 1), int(generic[1][:-1]))

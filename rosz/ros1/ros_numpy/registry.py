@@ -21,7 +21,7 @@ def converts_to_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F]
     """Declare that a function makes arrays of messages, or of lists of them.
 
     Raises:
-        TypeError: The type is no message class.
+        TypeError: The type is not a message class.
     """
     return _declaring(_to_numpy, msgtype, plural)
 
@@ -30,7 +30,7 @@ def converts_from_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_
     """Declare that a function makes messages of arrays, or lists of them.
 
     Raises:
-        TypeError: The type is no message class.
+        TypeError: The type is not a message class.
     """
     return _declaring(_from_numpy, msgtype, plural)
 

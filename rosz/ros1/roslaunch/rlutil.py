@@ -75,7 +75,7 @@ def check_roslaunch(
     Args:
         f: Its path.
         use_test_depends: Ignored.
-        ignore_unset_args: Whether args without a value are no error.
+        ignore_unset_args: Whether args without a value are allowed.
     """
     try:
         config = load_config_default([(f, [])], None, ignore_unset_args=ignore_unset_args)

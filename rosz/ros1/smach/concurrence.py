@@ -263,7 +263,7 @@ class Concurrence(Container):
         """
         for outcome, label, _ in self.get_internal_edges():
             if label not in self._states:
-                raise InvalidStateError(f"the outcome map names '{label}', which is no state")
+                raise InvalidStateError(f"the outcome map names '{label}', which is not a state")
             known = self._states[label].get_registered_outcomes()
             if outcome not in known:
                 raise InvalidTransitionError(
