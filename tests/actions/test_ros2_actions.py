@@ -307,10 +307,13 @@ def test_results_are_forgotten_in_time(world: World) -> None:
 
 
 def test_a_server_that_closes_tells_those_who_wait(world: World) -> None:
-    server = world.server()
+    def execute(goal: ServerGoal) -> None:
+        world.started.put(goal)
+        goal.wait_for_cancel(TIMEOUT)
+
+    server = world.server(execute)
     handles = [world.client().send(Goal(order)) for order in range(2)]
     goals = [world.next() for _ in handles]
-    world.over.set()
     server.close()
     for handle in handles:
         with pytest.raises(ActionError, match="the server of action '/fib' ends"):
