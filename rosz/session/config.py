@@ -59,10 +59,19 @@ _OPEN_MS = 10_000
 processes start at once, and Zenoh tries each peer that it heard of only once."""
 _OPEN_BEYOND_MS = 3_000
 """The same beyond the machine, where an attempt that the network lost should soon be repeated."""
-_LOCAL_QUEUE = 16
-"""Batches of 64 kB that wait for a link of this machine, the most that Zenoh allows: some thousand
-small messages that are published at once. Zenoh drops what finds no room for a millisecond, and on
-a busy machine its own threads may not run for longer."""
+_LOCAL_QUEUE = {
+    "size": {"data": 16},
+    "congestion_control": {
+        "drop": {"wait_before_drop": 50_000, "max_wait_before_drop_fragments": 150_000}
+    },
+}
+"""What waits for a link of this machine. 16 batches of 64 kB are the most that Zenoh allows: some
+thousand small messages that are published at once, or one image.
+
+By default Zenoh drops what finds no room for a millisecond. On a busy machine, its own threads may
+not run for longer, and a second image would be lost. The times are in microseconds: for a message,
+and added for the rest of one that is larger than a batch. A subscriber that is stopped delays a
+publisher by as much once; after that, Zenoh drops for its link without waiting until it reads."""
 _ROUTER_TIMEOUT = 10.0
 """Seconds that a node waits for its router, which may have been started just before it."""
 
@@ -248,7 +257,7 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
                 "tx": {
                     "lease": _LEASE_MS if local else _LEASE_BEYOND_MS,
                     "keep_alive": 4,
-                    "queue": {"size": {"data": _LOCAL_QUEUE}} if local else {},
+                    "queue": _LOCAL_QUEUE if local else {},
                 }
             },
         },
