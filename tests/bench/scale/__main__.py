@@ -1,9 +1,9 @@
-"""Crowds of 10 to 200 nodes, joined in several ways: ``python -m tests.bench.scale``.
+"""Crowds of 10 to 500 nodes, joined in several ways: ``python -m tests.bench.scale``.
 
 Each node is a process, all start at once, and nothing else is on their network. On one host:
 ``mesh``, peers that link to each other, as nodes are by themselves, ``star``, clients of one core,
-as a launch of many nodes makes them, and ``bare``, the same with nothing but Zenoh. Over several
-hosts (``--hosts``, needs privileges):
+as a launch of many nodes makes them, ``shared``, the same with twenty nodes in each process, and
+``bare``, clients with nothing but Zenoh. Over several hosts (``--hosts``, needs privileges):
 
 - ``mesh``: peers that find each other by multicast, linked across hosts;
 - ``star``: clients of the core of the first host;
@@ -13,11 +13,15 @@ hosts (``--hosts``, needs privileges):
 
 from __future__ import annotations
 
+import json
 import math
 import signal
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+
+import msgspec
 
 from ..figures import busy  # noqa: TID252  # tests is no package
 
@@ -25,30 +29,43 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hosts.world import why_not  # found by the line above
 
-from .crowd import TOPOLOGIES, Sight, measure
+from .crowd import STEPS, TOPOLOGIES, Sight, measure
 from .plot import plot
 
 HEAD = (
     "nodes",
     "",
     "all heard, s",
-    "core seconds each",
-    "traffic each, kB",
+    "CPU each, s",
+    "of the core, s",
+    "discovery each, kB",
     "MB each",
     "idle each, %",
     "set, ms",
     "newcomer, s",
+    "death known, s",
+    "CPU each for it, ms",
 )
 
 
 def row(sight: Sight) -> str:
     """Return what was measured of a crowd as a row in Markdown."""
     figures = (
-        *(sight.complete, sight.busy, sight.traffic, sight.memory),
-        *(sight.idle, sight.set_ms, sight.newcomer),
+        *(sight.complete, sight.busy, sight.core, sight.traffic, sight.memory, sight.idle),
+        *(sight.set_ms, sight.newcomer, sight.death, sight.death_cpu),
     )
     cells = ("-" if math.isnan(figure) else f"{figure:.3g}" for figure in figures)
     return f"| {sight.count} | {sight.mode} | {' | '.join(cells)} | {sight.trouble}".rstrip()
+
+
+def split(sights: Iterable[Sight]) -> Iterator[str]:
+    """Yield a table of the processor time of each step of a start."""
+    yield f"\n| CPU of a process, ms | | {' | '.join(STEPS)} |"
+    yield "|---" * (2 + len(STEPS)) + "|"
+    for sight in sights:
+        if sight.steps:
+            cells = (f"{sight.steps[step]:.3g}" for step in STEPS)
+            yield f"| {sight.count} | {sight.mode} | {' | '.join(cells)} |"
 
 
 def options() -> Namespace:
@@ -57,7 +74,9 @@ def options() -> Namespace:
     parser.add_argument("--counts", default="10,20,40,80,140,200")
     parser.add_argument("--hosts", type=int, default=1, choices=range(1, 5), help="1 to 4")
     parser.add_argument("--modes", help=f"of {','.join(TOPOLOGIES)}; all that differ by default")
-    parser.add_argument("--timeout", type=float, default=120.0, help="seconds for each step")
+    parser.add_argument("--timeout", type=float, default=300.0, help="seconds for each step")
+    parser.add_argument("--rate", type=float, default=math.inf, help="nodes that start per second")
+    parser.add_argument("--json", type=Path, help="write the figures there")
     parser.add_argument("--plot", type=Path, help="write a picture there (SVG)")
     given = parser.parse_args()
     given.counts = [int(word) for word in given.counts.split(",")]
@@ -91,13 +110,16 @@ def main() -> None:
     for count in given.counts:
         for mode in given.modes:
             if mode in late:
-                print(f"| {count} | {mode} |{' - |' * 7} left out", flush=True)
+                print(f"| {count} | {mode} |{' - |' * 10} left out", flush=True)
                 continue
-            sight = measure(mode, count, given.hosts, given.timeout)
+            sight = measure(mode, count, given.hosts, given.timeout, given.rate)
             print(row(sight), flush=True)
             sights.append(sight)
             if sight.late:
                 late.add(mode)
+    print(*split(sights), sep="\n")
+    if given.json:
+        given.json.write_text(json.dumps(msgspec.to_builtins(sights), indent=1) + "\n")
     if given.plot:
         given.plot.write_text(plot(sights))
         print(f"wrote {given.plot}", file=sys.stderr)

@@ -1,19 +1,26 @@
-"""One client of a crowd with nothing but Zenoh: ``bare.py NUMBER COUNT``; ``bare.py router``.
+"""One client of a crowd with nothing but Zenoh: ``bare.py NUMBER COUNT 1``; ``bare.py router``.
 
 It declares as many tokens as a node of rosz and follows as many key expressions, publishes one
-topic, and tells when it first hears that of its neighbour. It ends with its standard input.
+topic, and tells when it first hears that of its neighbour, and the processor time that each step
+took until then. It ends with its standard input.
 """
 
 from __future__ import annotations
 
+import time
+
+python = time.process_time()
+
+# ruff: noqa: E402  # the time of the imports is measured
 import json
 import os
 import sys
 import threading
-import time
 from typing import Any
 
 import zenoh
+
+imports = time.process_time()
 
 TOKENS = 12
 KEYS = 36
@@ -52,12 +59,19 @@ def main() -> None:
         return
     number, count = int(sys.argv[1]), int(sys.argv[2])
     session = open_session("client")
-    heard = threading.Event()
+    marks = [0.0, python, imports, time.process_time()]
+    declared, heard = threading.Event(), threading.Event()
 
     def hear(_sample: zenoh.Sample) -> None:
         if not heard.is_set():
             heard.set()
             tell("complete", time.monotonic())
+            declared.wait()
+            steps = ("python", "imports", "session", "declares", "discovery")
+            for step, begin, end in zip(
+                steps, marks, [*marks[1:], time.process_time()], strict=True
+            ):
+                tell(step, end - begin)
 
     kept: list[object] = [
         session.liveliness().declare_subscriber(
@@ -72,6 +86,8 @@ def main() -> None:
         for key in range(TOKENS)
     ]
     own = session.declare_publisher(f"bare/t{number}")
+    marks.append(time.process_time())
+    declared.set()
     stop = threading.Event()
 
     def publish() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
@@ -15,10 +16,16 @@ import msgspec
 from .reports import Late, Reports, Trouble
 from .site import Site, sites
 
-__all__ = ("TOPOLOGIES", "Sight", "Topology", "measure")
+__all__ = ("STEPS", "TOPOLOGIES", "Sight", "Topology", "measure")
+
+STEPS = ("python", "imports", "session", "declares", "discovery")
+"""The steps of a start, from the process's beginning to the neighbour's first message."""
 
 _FOLDER = Path(__file__).parent
 _IDLE_SECONDS = 4.0
+_DEATH_SECONDS = 3.0
+_SET_OF_MOST = 200
+"""A set is measured with so many nodes at most."""
 _FIRST = "tcp/h0:7447"
 
 
@@ -29,11 +36,13 @@ class Topology(msgspec.Struct, frozen=True):
         cores: Where cores are; those of other hosts are linked to that of the first.
         mode: What the nodes are, by ``ROSZ_MODE``.
         worker: The program of the nodes.
+        nodes: How many nodes share a process.
     """
 
     cores: Literal["none", "first", "each"]
     mode: Literal["peer", "client"]
     worker: str = "worker.py"
+    nodes: int = 1
 
     @property
     def bare(self) -> bool:
@@ -62,6 +71,7 @@ TOPOLOGIES = {
     "mesh": Topology("none", "peer"),
     "star": Topology("first", "client"),
     "bare": Topology("first", "client", "bare.py"),
+    "shared": Topology("first", "client", nodes=20),
     "cores": Topology("each", "peer"),
     "stars": Topology("each", "client"),
 }
@@ -75,13 +85,17 @@ class Sight(msgspec.Struct):
         count: Nodes.
         complete: Seconds from the first start until everybody has heard its neighbour.
         busy: Seconds of a core that this takes for each node.
-        traffic: Kilobytes for each node over the links between the hosts, or over the loopback
-            of the only one, until all is complete.
+        core: Seconds of a core that the cores of rosz, or the router, take for it altogether.
+        traffic: Kilobytes of discovery for each node over the links between the hosts, or over the
+            loopback of the only one, until all is complete.
         memory: Megabytes for each node.
         idle: Percent of a core that is taken for each node when nothing happens.
         set_ms: Milliseconds of a set that all acknowledge.
         newcomer: Seconds from the start of one more node until it has heard its neighbour and all
             have heard it.
+        death: Seconds from the kill of a node until the one that it heard knows.
+        death_cpu: Milliseconds of a core that this takes for each other node.
+        steps: Milliseconds of a core that each step of the start takes for a process, medians.
         trouble: Why there is no more.
         late: Whether that is because it took too long.
     """
@@ -90,16 +104,20 @@ class Sight(msgspec.Struct):
     count: int
     complete: float = math.nan
     busy: float = math.nan
+    core: float = math.nan
     traffic: float = math.nan
     memory: float = math.nan
     idle: float = math.nan
     set_ms: float = math.nan
     newcomer: float = math.nan
+    death: float = math.nan
+    death_cpu: float = math.nan
+    steps: dict[str, float] = {}
     trouble: str = ""
     late: bool = False
 
 
-def measure(mode: str, count: int, hosts: int, timeout: float) -> Sight:
+def measure(mode: str, count: int, hosts: int, timeout: float, rate: float = math.inf) -> Sight:
     """Start a crowd on a network of its own, measure it and end it.
 
     Args:
@@ -107,6 +125,7 @@ def measure(mode: str, count: int, hosts: int, timeout: float) -> Sight:
         count: How many nodes.
         hosts: Hosts that they are spread over; 0 for this machine as it is.
         timeout: Seconds that each step may take.
+        rate: Nodes that start in a second.
     """
     sight = Sight(mode, count)
     with (
@@ -114,7 +133,7 @@ def measure(mode: str, count: int, hosts: int, timeout: float) -> Sight:
         closing(Reports(Path(folder))) as reports,
         sites(hosts, Path(folder)) as places,
     ):
-        crowd = _Crowd(TOPOLOGIES[mode], places, reports, timeout)
+        crowd = _Crowd(TOPOLOGIES[mode], places, reports, timeout, rate)
         try:
             crowd.measure(sight)
         except Trouble as trouble:
@@ -126,12 +145,19 @@ class _Crowd:
     """The processes of a crowd; what its cores take is shared out among the nodes."""
 
     def __init__(
-        self, topology: Topology, places: Sequence[Site], reports: Reports, timeout: float
+        self,
+        topology: Topology,
+        places: Sequence[Site],
+        reports: Reports,
+        timeout: float,
+        rate: float,
     ) -> None:
         self._topology = topology
         self._sites = places
         self._reports = reports
         self._timeout = timeout
+        self._pause = topology.nodes / rate
+        self._cores: list[tuple[Site, str]] = []
 
     def measure(self, sight: Sight) -> None:
         """Start all and measure, as far as that goes.
@@ -144,6 +170,7 @@ class _Crowd:
         if not self._topology.bare:
             self._measure_rest(sight)
             self._measure_newcomer(sight)
+            self._measure_death(sight)
 
     def _start_cores(self) -> None:
         for number, site in enumerate(self._sites):
@@ -153,37 +180,70 @@ class _Crowd:
                 if self._topology.bare:
                     command = (str(_FOLDER / self._topology.worker), "router")
                 self._start(f"core{number}", site, command, {})
+                self._cores.append((site, f"core{number}"))
                 self._wait("started", 1)
 
     def _measure_start(self, sight: Sight) -> None:
-        sent, busy = self._total(Site.sent), self._total(Site.cpu)
+        sent, busy, core = self._total(Site.sent), self._total(Site.cpu), self._core_cpu()
         began = time.monotonic()
-        for number in range(sight.count):
-            self._start_node(number, sight.count)
+        for turn, number in enumerate(range(0, sight.count, self._topology.nodes)):
+            time.sleep(max(0.0, began + turn * self._pause - time.monotonic()))
+            self._start_nodes(number, sight.count, min(self._topology.nodes, sight.count - number))
         sight.complete = max(self._wait("complete", sight.count)) - began
         sight.busy = (self._total(Site.cpu) - busy) / sight.count
+        sight.core = self._core_cpu() - core
         sight.traffic = (self._total(Site.sent) - sent) / sight.count / 1e3
+        processes = math.ceil(sight.count / self._topology.nodes)
+        for step in STEPS:
+            sight.steps[step] = statistics.median(self._wait(step, processes)) * 1e3
 
     def _measure_rest(self, sight: Sight) -> None:
         sight.memory = self._total(Site.memory) / sight.count / 1e6
         busy = self._total(Site.cpu)
         time.sleep(_IDLE_SECONDS)
         sight.idle = (self._total(Site.cpu) - busy) / _IDLE_SECONDS / sight.count * 100
-        self._reports.say("s0", "set")
-        (seconds,) = self._wait("set", 1)
-        sight.set_ms = seconds * 1e3
+        if sight.count <= _SET_OF_MOST:
+            self._reports.say("s0", "set")
+            (seconds,) = self._wait("set", 1)
+            sight.set_ms = seconds * 1e3
 
     def _measure_newcomer(self, sight: Sight) -> None:
         began = time.monotonic()
-        self._start_node(sight.count, sight.count + 1, "hail")
+        self._start_nodes(sight.count, sight.count + 1, 1, "hail")
         seen = [*self._wait("complete", 1), *self._wait("heard", sight.count)]
         sight.newcomer = max(seen) - began
+        process = self._reports.forget(f"s{sight.count}")
+        self._site(sight.count).kill(process)
+        process.wait()
+        self._wait("gone", 1)
 
-    def _start_node(self, number: int, count: int, *words: str) -> None:
-        place = number % len(self._sites)
+    def _measure_death(self, sight: Sight) -> None:
+        """Kill the process of some nodes, which others hear and are heard by."""
+        first = sight.count // 2 // self._topology.nodes * self._topology.nodes
+        if not first:  # it is the only process
+            return
+        site, process = self._site(first), self._reports.forget(f"s{first}")
+        busy = self._total(Site.cpu) - site.cpu(process)
+        began = time.monotonic()
+        site.kill(process)
+        sight.death = max(self._wait("gone", 1)) - began
+        time.sleep(max(0.0, began + _DEATH_SECONDS - time.monotonic()))
+        after = self._total(Site.cpu)
+        time.sleep(_DEATH_SECONDS)
+        idle = self._total(Site.cpu) - after
+        others = sight.count - self._topology.nodes
+        sight.death_cpu = (after - busy - idle) / others * 1e3
+
+    def _site(self, number: int) -> Site:
+        return self._sites[number // self._topology.nodes % len(self._sites)]
+
+    def _start_nodes(self, number: int, count: int, nodes: int, *words: str) -> None:
+        site = self._site(number)
+        place = self._sites.index(site)
         variables = self._topology.variables(place, len(self._sites))
-        command = [str(_FOLDER / self._topology.worker), str(number), str(count), *words]
-        self._start(f"s{number}", self._sites[place], command, variables)
+        program = str(_FOLDER / self._topology.worker)
+        command = [program, str(number), str(count), str(nodes), *words]
+        self._start(f"s{number}", site, command, variables)
 
     def _start(
         self, name: str, site: Site, words: Sequence[str], variables: Mapping[str, str]
@@ -196,3 +256,6 @@ class _Crowd:
 
     def _total(self, figure: Callable[[Site], float]) -> float:
         return sum(map(figure, self._sites))
+
+    def _core_cpu(self) -> float:
+        return sum(site.cpu(self._reports.process(name)) for site, name in self._cores)

@@ -11,7 +11,10 @@ __all__ = ("plot",)
 
 _WIDTH, _HEIGHT, _MARGIN = 360, 240, 46
 _COLUMNS = 4
-_COLOURS = {"mesh": "#c0392b", "star": "#2471a3", "cores": "#b9770e", "stars": "#1e8449"}
+_COLOURS = {"mesh": "#c0392b", "star": "#2471a3", "cores": "#b9770e", "stars": "#1e8449"} | {
+    "shared": "#7d3c98",
+    "bare": "#707b7c",
+}
 _PANELS = {
     "complete": "complete graph, s",
     "busy": "core seconds for it, each",

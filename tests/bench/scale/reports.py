@@ -44,6 +44,14 @@ class Reports:
         """Take note of one that must not die."""
         self._processes[name] = process
 
+    def forget(self, name: str) -> subprocess.Popen[bytes]:
+        """Return one that may die from now on."""
+        return self._processes.pop(name)
+
+    def process(self, name: str) -> subprocess.Popen[bytes]:
+        """Return one of them."""
+        return self._processes[name]
+
     def errors(self, name: str) -> Path:
         """Return the file that one of them writes its errors to."""
         return self._folder / f"{name}.err"

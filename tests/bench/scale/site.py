@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -58,9 +59,14 @@ class Site:
         """Return the bytes of all that runs here; what several share is counted once."""
         return sum(map(_memory, self._pids()))
 
-    def cpu(self) -> float:
-        """Return the seconds of a core that all that runs here has taken."""
-        return sum(map(_cpu, self._pids()))
+    def cpu(self, process: subprocess.Popen[bytes] | None = None) -> float:
+        """Return the seconds of a core that a process, or all that runs here, has taken."""
+        return sum(map(_cpu, self._pids() if process is None else self._pids_of(process)))
+
+    def kill(self, process: subprocess.Popen[bytes]) -> None:
+        """Kill a process, as a crash does."""
+        for pid in self._pids_of(process):
+            os.kill(pid, signal.SIGKILL)
 
     def sent(self) -> int:
         """Return the bytes that went out by the interface."""
@@ -70,8 +76,10 @@ class Site:
         return int(cells[_OCTETS_SENT])
 
     def _pids(self) -> list[int]:
-        pids = [process.pid for process in self._processes]
-        return [child for pid in pids for child in children(pid)] if self._host else pids
+        return [pid for process in self._processes for pid in self._pids_of(process)]
+
+    def _pids_of(self, process: subprocess.Popen[bytes]) -> list[int]:
+        return list(children(process.pid)) if self._host else [process.pid]
 
     def close(self) -> None:
         """End all that was started here."""
