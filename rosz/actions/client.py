@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from rosz.actions.comm_state import CommState, path
+from rosz.actions.ros2_client import Ros2Client
 from rosz.actions.types import RUNNING, TERMINAL, ActionTypes, publish, run_callback
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.graph import View
@@ -99,7 +100,7 @@ class ClientGoal:
 
     def cancel(self) -> None:
         """Ask the server to cancel the goal."""
-        self._client.publish_cancel(GoalID(Time(), self.id.id))
+        self._client.cancel(self)
         if not self._finished:
             self._transition((CommState.WAITING_FOR_CANCEL_ACK,))
 
@@ -114,13 +115,14 @@ class ClientGoal:
         for status in statuses:
             if status.goal_id.id == self.id.id:
                 self._listed = True
-                self._advance(status)
+                self.advance(status)
                 return
         if self._listed:  # a server that no longer knows the goal was restarted
             text = "the server does not know the goal any more"
             self.finish(GoalStatus(self.id, GoalStatus.LOST, text), None)
 
-    def _advance(self, status: GoalStatus) -> None:
+    def advance(self, status: GoalStatus) -> None:
+        """Note a state that is not the end of the goal."""
         with self._lock:
             if self._finished or status.status in TERMINAL:
                 return  # the end comes with the result message
@@ -213,10 +215,13 @@ class ActionClient:
     """
 
     def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
-        self._types = types = ActionTypes.of(action_type)
+        self._types = types = ActionTypes.of(action_type, node.context.types)
         self.node: Node = node
         self.name: str = node.resolve(name)
         self._goals: dict[str, ClientGoal] = {}
+        self._ros2: Ros2Client | None = None
+        if types.action is not None:
+            self._ros2 = Ros2Client(node, self.name, types, types.action)
         self._goal_publisher = node.publisher(f"{self.name}/goal", types.action_goal)
         self._cancel_publisher = node.publisher(f"{self.name}/cancel", GoalID)
         self._subscriptions = [
@@ -239,6 +244,8 @@ class ActionClient:
         topics = [f"{self.name}/{topic}" for topic in ("status", "feedback", "result")]
 
         def is_connected(view: View) -> bool:
+            if self._ros2 is not None and self._ros2.is_served():
+                return True
             return all(view.publishers(topic) for topic in topics) and all(
                 publisher.subscribers()
                 for publisher in (self._goal_publisher, self._cancel_publisher)
@@ -259,6 +266,8 @@ class ActionClient:
 
     def stop(self) -> None:
         """Close all topics; goals are not followed any more."""
+        if self._ros2 is not None:
+            self._ros2.close()
         for entity in (self._goal_publisher, self._cancel_publisher, *self._subscriptions):
             entity.close()
 
@@ -271,7 +280,9 @@ class ActionClient:
         on_feedback: Callable[[Any], object] | None = None,
         on_transition: Callable[[ClientGoal], object] | None = None,
     ) -> ClientGoal:
-        """Send a goal; after the shutdown of the node it goes nowhere.
+        """Send a goal, by the protocol of ROS 2 if no server has that of ROS 1.
+
+        After the shutdown of the node it goes nowhere.
 
         Args:
             goal: The goal message, such as a ``FibonacciGoal``.
@@ -288,9 +299,19 @@ class ActionClient:
         goal_id = GoalID(now, f"{self.node.name}-{number}-{now.sec}.{now.nanosec:09d}")
         sent = ClientGoal(self, goal_id, on_done, on_active, on_feedback, on_transition)
         self._goals[goal_id.id] = sent
+        if self._ros2 is not None and self._ros2.is_served(wait=True):
+            self._ros2.send(sent, goal)
+            return sent
         message = self._types.action_goal(Header(stamp=now), goal_id, goal)
         publish(self.node, self._goal_publisher, message)
         return sent
+
+    def cancel(self, goal: ClientGoal) -> None:
+        """Ask the server to cancel a goal; after the shutdown of the node do nothing."""
+        if self._ros2 is not None and self._ros2.has_sent(goal):
+            self._ros2.cancel(goal)
+        else:
+            publish(self.node, self._cancel_publisher, GoalID(Time(), goal.id.id))
 
     def publish_cancel(self, goal_id: GoalID) -> None:
         """Ask the server to cancel goals; after the shutdown of the node do nothing.
@@ -299,7 +320,10 @@ class ActionClient:
             goal_id: Identification of a goal; a time instead cancels all goals sent until then,
                 and an empty one cancels all goals, including those of other clients.
         """
-        publish(self.node, self._cancel_publisher, goal_id)
+        if self._ros2 is not None and self._ros2.is_served(wait=True):
+            self._ros2.cancel_all(goal_id)
+        else:
+            publish(self.node, self._cancel_publisher, goal_id)
 
     def forget(self, goal: ClientGoal) -> None:
         """Stop following a goal; see `ClientGoal.forget`."""

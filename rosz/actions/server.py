@@ -1,4 +1,7 @@
-"""Action servers: goals, each with a state of its own."""
+"""Action servers: goals, each with a state of its own.
+
+Clients of ROS 2 reach a server as well, if the definition of its action is found.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from rosz.actions.ros2_server import Ros2Server
 from rosz.actions.types import ActionTypes, publish, run_callback
 from rosz.errors import EncodeError
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
@@ -86,7 +90,7 @@ class ServerGoal:
             state = self._next(_ACCEPT, "accept")
             if state is not None:
                 self.status.status, self.status.text = state, text
-                self.server.publish_status()
+                self.server.update(self)
 
     def request_cancel(self) -> bool:
         """Note that a client wants the goal to end; return whether that is possible and new."""
@@ -95,7 +99,7 @@ class ServerGoal:
             if state is None:
                 return False
             self.status.status = state
-            self.server.publish_status()
+            self.server.update(self)
             return True
 
     def cancel(self, result: Any = None, text: str = "") -> None:
@@ -142,7 +146,7 @@ class ServerGoal:
                 self.status = before  # it can still be ended with a proper result
                 raise
             self.ended_at = self.server.node.now()
-            self.server.publish_status()
+            self.server.update(self, result)
 
 
 class ActionServer:
@@ -182,7 +186,7 @@ class ActionServer:
         status_timeout: float = _STATUS_TIMEOUT,
         queue_size: int = _QUEUE_SIZE,
     ) -> None:
-        self.types: ActionTypes = ActionTypes.of(action_type)
+        self.types: ActionTypes = ActionTypes.of(action_type, node.context.types)
         self.node: Node = node
         self.name: str = node.resolve(name)
         self.on_goal = on_goal
@@ -197,6 +201,7 @@ class ActionServer:
         self._cancelled_early: dict[str, int] = {}
         self._publishers: dict[str, Any] = {}
         self._others: list[Any] = []
+        self._ros2: Ros2Server | None = None
 
     def start(self) -> None:
         """Begin to receive goals; a started server does nothing."""
@@ -214,23 +219,32 @@ class ActionServer:
                 for topic, kind in kinds.items()
             }
             self._others = [
-                node.subscription(f"{self.name}/cancel", GoalID, self._receive_cancel, qos=qos),
+                node.subscription(f"{self.name}/cancel", GoalID, self.receive_cancel, qos=qos),
                 node.subscription(
-                    f"{self.name}/goal", types.action_goal, self._receive_goal, qos=qos
+                    f"{self.name}/goal", types.action_goal, self.receive_goal, qos=qos
                 ),
             ]
             if self.status_frequency > 0:
                 period = 1 / self.status_frequency
                 self._others.append(node.timer(period, lambda _: self.publish_status()))
             self.publish_status()
+            if types.action is not None:
+                self._ros2 = node.keep(Ros2Server(self, types.action))
+                self._others.append(self._ros2)
 
     def stop(self) -> None:
         """Stop receiving goals; a server that is not started does nothing."""
         with self.lock:
             entities = (*self._others, *self._publishers.values())
-            self._others, self._publishers = [], {}
+            self._others, self._publishers, self._ros2 = [], {}, None
         for entity in entities:  # which waits for callbacks, so without the lock
             entity.close()
+
+    def update(self, goal: ServerGoal, result: Any = None) -> None:
+        """Let clients know of the state of a goal, and of its result if it has ended."""
+        self.publish_status()
+        if self._ros2 is not None:
+            self._ros2.update(goal, result)
 
     def publish_status(self) -> None:
         """Publish the states of all goals."""
@@ -270,6 +284,8 @@ class ActionServer:
             EncodeError: The feedback is not one of the action.
         """
         self._publish("feedback", self.types.action_feedback(self._header(), status, feedback))
+        if self._ros2 is not None:
+            self._ros2.send_feedback(status.goal_id.id, feedback)
 
     def _publish(self, topic: str, message: Any) -> None:
         publisher = self._publishers.get(topic)
@@ -279,7 +295,8 @@ class ActionServer:
     def _header(self) -> Header:
         return Header(stamp=Time.from_nsec(self.node.now()))
 
-    def _receive_goal(self, message: Any) -> None:
+    def receive_goal(self, message: Any) -> None:
+        """Take a goal from a client."""
         with self._callback_lock:
             with self.lock:
                 name = message.goal_id.id
@@ -295,7 +312,8 @@ class ActionServer:
                     return
             run_callback(self.node, self.name, self.on_goal, goal)
 
-    def _receive_cancel(self, message: GoalID) -> None:
+    def receive_cancel(self, message: GoalID) -> None:
+        """Take the request of a client to end goals."""
         until = message.stamp.to_nsec()
         everything = not message.id and not until
         with self._callback_lock:

@@ -58,12 +58,19 @@ class ClientGoal:
     """
 
     def __init__(
-        self, client: ActionClient, goal_id: uuid.UUID, feedback: Callable[[Any], object] | None
+        self,
+        client: ActionClient,
+        goal_id: uuid.UUID,
+        feedback: Callable[[Any], object] | None,
+        on_status: Callable[[ClientGoal], object] | None,
     ) -> None:
         self.id: uuid.UUID = goal_id
         self.accepted: int = 0
         self._client = client
         self._on_feedback = feedback
+        self._on_status = on_status
+        self._notifying = threading.RLock()
+        self._notified = GoalState.UNKNOWN
         self._state = GoalState.UNKNOWN
         self._feedback: deque[Any] = deque(maxlen=_MOST_FEEDBACK)
         self._changed = threading.Condition()
@@ -177,6 +184,12 @@ class ClientGoal:
         with self._changed:
             if not self._ended and state > self._state and state not in FINAL:
                 self._state = state
+        if self._on_status is None:
+            return
+        with self._notifying:  # so that no older state comes after a newer one
+            if self._notified < self._state and not self._ended:
+                self._notified = self._state
+                self._call(self._on_status, self)
 
     def receive_feedback(self, feedback: Any) -> None:
         """Take feedback; for the client."""
@@ -288,6 +301,7 @@ class ActionClient:
         goal: Any,
         *,
         feedback: Callable[[Any], object] | None = None,
+        on_status: Callable[[ClientGoal], object] | None = None,
         timeout: float = 10.0,
         goal_id: uuid.UUID | None = None,
     ) -> ClientGoal:
@@ -297,6 +311,7 @@ class ActionClient:
             goal: The goal message.
             feedback: Function called with each feedback message, on a thread of the client. Without
                 one, iterate over the goal that is returned.
+            on_status: Function called with the goal when it has another state, before it ends.
             timeout: Time limit in seconds for the answer of the server.
             goal_id: Identification of the goal; a random one when not given.
 
@@ -313,7 +328,7 @@ class ActionClient:
             UsageError: The timeout is not a number.
         """
         self._lifecycle.check_open("send a goal")
-        sent = ClientGoal(self, goal_id or uuid.uuid4(), feedback)
+        sent = ClientGoal(self, goal_id or uuid.uuid4(), feedback, on_status)
         request = self.action_type.SendGoal.Request(UUID(sent.id.bytes), goal)
         # Before the answer, which feedback may overtake.
         self._goals[sent.id.bytes] = self._known[sent.id.bytes] = sent

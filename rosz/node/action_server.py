@@ -192,6 +192,7 @@ class ActionServer:
         self._keep_results = keep_results
         self._most_results = most_results
         self._lock = threading.RLock()
+        self._undecided: dict[bytes, list[Call]] = {}
         self._goals: dict[bytes, ServerGoal] = {}
         self._ended: deque[ServerGoal] = deque()
         self._current: ServerGoal | None = None
@@ -223,33 +224,36 @@ class ActionServer:
 
     def _receive(self, call: Call) -> None:
         goal_id = bytes(call.request.goal_id.uuid)
-        known = self._goals.get(goal_id)
-        if known is not None:  # sent twice: it is executed once
-            self._respond(call, known)
-            return
-        if not self._is_accepted(call.request.goal):
-            self._respond(call, None)
-            return
-        goal = ServerGoal(self, goal_id, call.request.goal, self._node.clock.now())
         with self._lock:
-            first = self._goals.setdefault(goal_id, goal)
-        self._respond(call, first)
-        if first is goal:
+            known = self._goals.get(goal_id)
+            calls = [] if known else self._undecided.setdefault(goal_id, [])
+            calls.append(call)
+            if len(calls) > 1:  # sent twice: it is executed once
+                return
+        goal = known or ServerGoal(self, goal_id, call.request.goal, self._node.clock.now())
+        accepted = goal is known or (not self._lifecycle.closing and self.accepts(goal))
+        with self._lock:
+            if goal is not known:
+                del self._undecided[goal_id]
+            if accepted:
+                self._goals[goal_id] = goal
+        for one in calls:
+            self._respond(one, goal if accepted else None)
+        if accepted and goal is not known:
             self._publish_status()
             self._make_room(goal)
-            self._worker.submit(goal)
+            self.start(goal)
 
     def _respond(self, call: Call, goal: ServerGoal | None) -> None:
         stamp = Time.from_nsec(goal.accepted) if goal is not None else Time()
         call.answer(self.action_type.SendGoal.Response(goal is not None, stamp).to_cdr())
 
-    def _is_accepted(self, request: Any) -> bool:
-        if self._lifecycle.closing:
-            return False
+    def accepts(self, goal: ServerGoal) -> bool:
+        """Return whether to accept a goal."""
         if self._accept is None:
             return True
         try:
-            return bool(self._accept(request))
+            return bool(self._accept(goal.request))
         except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
             self._node.log.report(f"the goal callback of action '{self.name}' failed", error)
             return False
@@ -260,7 +264,7 @@ class ActionServer:
             return
         for other in self.goals:
             if other is not goal and other.accepted <= goal.accepted:
-                self._begin_cancel(other)
+                self.begin_cancel(other)
 
     def _cancel_goals(self, call: Call) -> None:
         info = call.request.goal_info
@@ -275,8 +279,8 @@ class ActionServer:
                 for one in self._goals.values()
                 if not one.done and (everything or one is named or 0 < one.accepted <= stamp)
             ]
-        cancelled = [one for one in wanted if self._is_cancel_allowed(one)]
-        cancelled = [one for one in cancelled if self._begin_cancel(one)]
+        cancelled = [one for one in wanted if self.allows_cancel(one)]
+        cancelled = [one for one in cancelled if self.begin_cancel(one)]
         if wanted and not cancelled:
             response.return_code = response.ERROR_REJECTED
         elif not cancelled and goal_id != _NO_GOAL:
@@ -287,7 +291,8 @@ class ActionServer:
         response.goals_canceling = [one.info() for one in cancelled]
         call.answer(response.to_cdr())
 
-    def _is_cancel_allowed(self, goal: ServerGoal) -> bool:
+    def allows_cancel(self, goal: ServerGoal) -> bool:
+        """Return whether to end a goal as a client asks."""
         if self._allow_cancel is None:
             return True
         try:
@@ -296,11 +301,11 @@ class ActionServer:
             self._node.log.report(f"the cancel callback of action '{self.name}' failed", error)
             return False
 
-    def _begin_cancel(self, goal: ServerGoal) -> bool:
-        """Ask a goal to end; return whether it has not ended before."""
+    def begin_cancel(self, goal: ServerGoal) -> bool:
+        """Ask a goal to end; return whether it does, and has not ended otherwise."""
         with self._lock:
             if goal.done:
-                return False
+                return goal.status is GoalState.CANCELED
             waits = goal.status is GoalState.ACCEPTED and self._policy != "parallel"
             if goal.status is not GoalState.CANCELING:
                 goal.move(GoalState.CANCELING)
@@ -324,6 +329,20 @@ class ActionServer:
             call.answer(response)
 
     # What the execution of goals does.
+
+    def start(self, goal: ServerGoal) -> None:
+        """Execute a goal that was accepted."""
+        self._worker.submit(goal)
+
+    def begin(self, goal: ServerGoal) -> None:
+        """Note that a goal is executed.
+
+        Raises:
+            UsageError: It is executed already, or has ended.
+        """
+        with self._lock:
+            goal.move(GoalState.EXECUTING)
+        self._publish_status()
 
     def _run(self, goal: ServerGoal) -> None:
         with self._lock:

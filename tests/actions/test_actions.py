@@ -233,7 +233,7 @@ def test_waiting_has_limits(world: World) -> None:
 
 def test_only_actions_are_accepted() -> None:
     with pytest.raises(UsageError, match="String is not an action"):
-        ActionTypes.of(String)
+        ActionTypes.of(String, TypeStore())
 
 
 @pytest.mark.parametrize("quick", [True, False], ids=["quick", "slow"])

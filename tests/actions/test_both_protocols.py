@@ -1,0 +1,263 @@
+"""actionlib's clients and servers reach those of ROS 2, and each goal is executed once."""
+
+from __future__ import annotations
+
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from network import TIMEOUT, Network, eventually
+
+from rosz.actions import ActionClient, ActionServer, ClientGoal, CommState, SimpleActionServer
+from rosz.errors import ActionError, GoalFailed, GoalRejected
+from rosz.msgs.action_msgs.msg import GoalInfo
+from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
+from rosz.msgs.actionlib_tutorials.action import Fibonacci
+from rosz.msgs.unique_identifier_msgs.msg import UUID
+from rosz.node.goals import GoalState
+
+
+class World:
+    """Two nodes, each on a session of its own, and the message classes of ROS 1."""
+
+    def __init__(self, network: Network) -> None:
+        self.one, self.other = network.node("one"), network.node("other")
+        types = self.one.context.types
+        self.action: Any = types.message("actionlib_tutorials/FibonacciAction")
+        self.goal: Any = types.message("actionlib_tutorials/FibonacciGoal")
+        self.result: Any = types.message("actionlib_tutorials/FibonacciResult")
+        self.feedback: Any = types.message("actionlib_tutorials/FibonacciFeedback")
+        self.arrived: SimpleQueue[Any] = SimpleQueue()
+
+    def next(self) -> Any:
+        return self.arrived.get(timeout=TIMEOUT)
+
+    def ros2_server(self, **options: Any) -> Any:
+        """A server of ROS 2; it hands goals to the test, which ends them."""
+
+        def execute(goal: Any) -> None:
+            self.arrived.put(goal)
+            eventually(lambda: goal.done, "the end of the goal")
+
+        return self.other.action_server("fib", Fibonacci, execute, **options)
+
+    def ros1_client(self) -> ActionClient:
+        client = ActionClient(self.one, "fib", self.action)
+        assert client.wait_for_server(TIMEOUT)
+        return client
+
+    def ros1_server(self, **callbacks: Any) -> ActionServer:
+        """A server of actionlib; it hands goals to the test."""
+        callbacks = {"on_goal": self.arrived.put, **callbacks}
+        server = ActionServer(self.other, "fib", self.action, **callbacks)
+        server.start()
+        return server
+
+    def ros2_client(self) -> Any:
+        client = self.one.action_client("fib", Fibonacci)
+        client.wait_for_server(TIMEOUT)
+        return client
+
+
+@pytest.fixture
+def world(network: Network) -> World:
+    return World(network)
+
+
+def reaches(goal: ClientGoal, status: int) -> None:
+    eventually(lambda: goal.status.status == status, f"status {status}")
+
+
+ENDS = {
+    "succeed": (GoalState.SUCCEEDED, GoalStatus.SUCCEEDED),
+    "abort": (GoalState.ABORTED, GoalStatus.ABORTED),
+    "canceled": (GoalState.CANCELED, GoalStatus.PREEMPTED),
+}
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_a_server_of_ros2_executes_a_goal_of_actionlib(world: World, end: str) -> None:
+    world.ros2_server()
+    events: SimpleQueue[Any] = SimpleQueue()
+    sent = world.ros1_client().send(
+        world.goal(7),
+        on_done=lambda _: events.put("done"),
+        on_active=lambda: events.put("active"),
+        on_feedback=lambda feedback: events.put(list(feedback.sequence)),
+    )
+    goal = world.next()
+    assert goal.request.order == 7
+    assert events.get(timeout=TIMEOUT) == "active"
+    reaches(sent, GoalStatus.ACTIVE)
+    goal.feedback(Fibonacci.Feedback([0, 1]))
+    assert events.get(timeout=TIMEOUT) == [0, 1]
+    if end == "canceled":
+        sent.cancel()
+        assert goal.wait_for_cancel(TIMEOUT)
+        reaches(sent, GoalStatus.PREEMPTING)
+    getattr(goal, end)(Fibonacci.Result([3]))
+    assert sent.wait(TIMEOUT)
+    assert (goal.status, sent.status.status) == ENDS[end]
+    assert list(sent.result.sequence) == [3]
+    assert isinstance(sent.result, world.result)
+    assert sent.comm_state == CommState.DONE
+    assert events.get(timeout=TIMEOUT) == "done"
+    assert world.arrived.empty()
+
+
+def test_a_server_of_ros2_rejects_or_delays_a_goal_of_actionlib(world: World) -> None:
+    world.ros2_server(goal=lambda goal: goal.order > 0, policy="queue")
+    client = world.ros1_client()
+    rejected = client.send(world.goal(0))
+    assert rejected.wait(TIMEOUT)
+    assert rejected.status.status == GoalStatus.REJECTED
+    first, second = client.send(world.goal(1)), client.send(world.goal(2))
+    running = world.next()
+    eventually(lambda: second.comm_state == CommState.PENDING, "the wait of the second goal")
+    assert second.status.status == GoalStatus.PENDING
+    second.cancel()
+    assert second.wait(TIMEOUT)
+    assert second.status.status == GoalStatus.PREEMPTED
+    client.publish_cancel(GoalID())
+    assert running.wait_for_cancel(TIMEOUT)
+    running.canceled()
+    assert first.wait(TIMEOUT)
+    assert first.status.status == GoalStatus.PREEMPTED
+
+
+def test_the_end_of_a_server_of_ros2_loses_the_goal(world: World) -> None:
+    server = world.ros2_server()
+    sent = world.ros1_client().send(world.goal(1))
+    world.next()
+    server.close()
+    assert sent.wait(TIMEOUT)
+    assert sent.status.status == GoalStatus.LOST
+    assert "is lost" in sent.status.text
+
+
+@pytest.mark.parametrize(
+    ("end", "state"),
+    [
+        ("succeed", GoalState.SUCCEEDED),
+        ("abort", GoalState.ABORTED),
+        ("cancel", GoalState.CANCELED),
+    ],
+)
+def test_actionlib_executes_a_goal_of_ros2(world: World, end: str, state: GoalState) -> None:
+    world.ros1_server()
+    seen: SimpleQueue[Any] = SimpleQueue()
+    sent = world.ros2_client().send(
+        Fibonacci.Goal(7), feedback=lambda feedback: seen.put(list(feedback.sequence))
+    )
+    goal = world.next()
+    assert goal.id.id == str(sent.id)
+    assert goal.message.goal.order == 7
+    assert sent.status is GoalState.ACCEPTED
+    goal.accept()
+    eventually(lambda: sent.status is GoalState.EXECUTING, "the execution")
+    goal.publish_feedback(world.feedback([0, 1]))
+    assert seen.get(timeout=TIMEOUT) == [0, 1]
+    getattr(goal, end)(world.result([3]))
+    assert sent.wait(TIMEOUT) is state
+    try:
+        result = sent.result()
+    except GoalFailed as error:
+        result = error.result
+    assert list(result.sequence) == [3]
+    assert world.arrived.empty()
+
+
+def test_a_client_of_ros2_cancels_goals_of_actionlib(world: World) -> None:
+    cancelled: SimpleQueue[Any] = SimpleQueue()
+    world.ros1_server(on_cancel=cancelled.put)
+    client = world.ros2_client()
+    waiting, running = client.send(Fibonacci.Goal(1)), client.send(Fibonacci.Goal(2))
+    first, second = world.next(), world.next()
+    second.accept()
+    for sent, goal, status in (
+        (waiting, first, GoalStatus.RECALLING),
+        (running, second, GoalStatus.PREEMPTING),
+    ):
+        assert sent.cancel()
+        assert cancelled.get(timeout=TIMEOUT) is goal
+        assert goal.status.status == status
+        eventually(lambda sent=sent: sent.status is GoalState.CANCELING, "the cancellation")
+        goal.cancel(text="as you like")
+        assert sent.wait(TIMEOUT) is GoalState.CANCELED
+    assert first.status.status == GoalStatus.RECALLED
+    assert second.status.status == GoalStatus.PREEMPTED
+
+
+def test_a_goal_may_end_in_the_callback_that_cancels_it(world: World) -> None:
+    world.ros1_server(on_cancel=lambda goal: goal.cancel())
+    sent = world.ros2_client().send(Fibonacci.Goal(1))
+    world.next()
+    assert sent.cancel()
+    assert sent.wait(TIMEOUT) is GoalState.CANCELED
+
+
+def test_actionlib_rejects_goals_of_ros2(world: World) -> None:
+    def decide(goal: Any) -> None:
+        if goal.message.goal.order == 0:
+            goal.reject(text="nothing to do")
+        else:
+            world.arrived.put(goal)
+
+    world.ros1_server(on_goal=decide)
+    client = world.ros2_client()
+    with pytest.raises(GoalRejected):
+        client.send(Fibonacci.Goal(0))
+    late = client.send(Fibonacci.Goal(1))
+    world.next().reject()
+    assert late.wait(TIMEOUT) is GoalState.ABORTED
+
+
+def test_the_end_of_actionlib_loses_a_goal_of_ros2(world: World) -> None:
+    server = world.ros1_server()
+    sent = world.ros2_client().send(Fibonacci.Goal(1))
+    world.next().accept()
+    server.stop()
+    with pytest.raises(ActionError, match="is lost"):
+        sent.wait(TIMEOUT)
+
+
+def test_the_simple_server_lets_a_newer_goal_of_either_protocol_go_first(world: World) -> None:
+    def execute(goal: Any) -> None:
+        world.arrived.put(goal)
+        eventually(lambda: server.is_preempt_requested() or goal.order < 0)
+        if goal.order < 0:
+            server.set_succeeded(world.result([goal.order]))
+        else:
+            server.set_preempted(world.result([goal.order]))
+
+    server = SimpleActionServer(ActionServer(world.other, "fib", world.action), execute)
+    server.start()
+    old, new = world.ros2_client(), world.ros1_client()
+    first = old.send(Fibonacci.Goal(1))
+    assert world.next().order == 1
+    second = new.send(world.goal(2))
+    assert world.next().order == 2
+    third = old.send(Fibonacci.Goal(-3))
+    assert world.next().order == -3
+    assert first.wait(TIMEOUT) is GoalState.CANCELED
+    assert second.wait(TIMEOUT)
+    assert second.status.status == GoalStatus.PREEMPTED
+    assert third.wait(TIMEOUT) is GoalState.SUCCEEDED
+    assert list(third.result().sequence) == [-3]
+    assert world.arrived.empty()
+
+
+def test_a_goal_that_is_sent_twice_is_executed_once(world: World) -> None:
+    world.ros1_server()
+    client = world.ros2_client()
+    sent = client.send(Fibonacci.Goal(1))
+    goal = world.next()
+    request = Fibonacci.SendGoal.Request(UUID(sent.id.bytes), Fibonacci.Goal(1))
+    repeat = world.one.client("fib/_action/send_goal", Fibonacci.SendGoal)
+    assert repeat.call(request, TIMEOUT).accepted
+    goal.accept()
+    goal.succeed()
+    assert sent.wait(TIMEOUT) is GoalState.SUCCEEDED
+    assert repeat.call(request, TIMEOUT).accepted
+    assert world.arrived.empty()
+    assert not client.request_cancel(GoalInfo(UUID(sent.id.bytes)), TIMEOUT).goals_canceling
