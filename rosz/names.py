@@ -19,6 +19,7 @@ __all__ = (
     "check_base",
     "check_resource",
     "is_global",
+    "is_of_action",
     "is_private",
     "is_valid",
     "join",
@@ -169,6 +170,11 @@ def ros1_type(topic: str, type_name: str) -> str:
     name = short_type(type_name)
     is_log = (topic, name) == ("/rosout", "rcl_interfaces/Log")
     return "rosgraph_msgs/Log" if is_log else name
+
+
+def is_of_action(name: str) -> bool:
+    """Return whether a topic or service is a part of an action of ROS 2, as listings hide it."""
+    return "/_action/" in name
 
 
 def anonymous(base: str, host: str, pid: int, moment: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import uuid
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 from weakref import WeakKeyDictionary
 
 from rosz.actions.mapping import STATUSES, translate
@@ -20,7 +20,6 @@ from rosz.wire import Kind
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
-    from rosz.actions.client import ClientGoal
     from rosz.actions.types import ActionTypes
     from rosz.message import Action
     from rosz.node import Node
@@ -30,6 +29,21 @@ __all__ = ("Ros2Client",)
 
 _CANCEL_TIMEOUT = 10.0
 _KNOWN_TIMEOUT = 2.0
+
+
+class FollowedGoal(Protocol):
+    """A goal that a client of actionlib follows."""
+
+    id: GoalID
+
+    def advance(self, status: GoalStatus, /) -> None:
+        """Note a state that is not the end of the goal."""
+
+    def receive_feedback(self, feedback: Any, /) -> None:
+        """Take feedback."""
+
+    def finish(self, status: GoalStatus, result: Any, /) -> None:
+        """Note the end of the goal."""
 
 
 class Ros2Client:
@@ -50,7 +64,7 @@ class Ros2Client:
         self._name = name
         self._types = types
         self._action = action
-        self._ids: WeakKeyDictionary[ClientGoal, uuid.UUID] = WeakKeyDictionary()
+        self._ids: WeakKeyDictionary[FollowedGoal, uuid.UUID] = WeakKeyDictionary()
         self._calls: Worker[Any] = node.keep(Worker(f"rosz-action{name}"))
         self._client: NativeClient | None = None
         graph = node.context.graph
@@ -73,7 +87,7 @@ class Ros2Client:
             for token in self._servers.view().servers(f"{self._name}/{SEND}")
         )
 
-    def send(self, goal: ClientGoal, message: Any) -> None:
+    def send(self, goal: FollowedGoal, message: Any) -> None:
         """Send a goal.
 
         Args:
@@ -88,11 +102,11 @@ class Ros2Client:
         self._ids[goal] = uuid.uuid4()
         self._calls.submit(partial(self._send, goal, native))
 
-    def has_sent(self, goal: ClientGoal) -> bool:
+    def has_sent(self, goal: FollowedGoal) -> bool:
         """Return whether a goal was sent by this client."""
         return goal in self._ids
 
-    def cancel(self, goal: ClientGoal) -> None:
+    def cancel(self, goal: FollowedGoal) -> None:
         """Ask the server to cancel a goal that was sent."""
         self._calls.submit(partial(self._cancel, GoalInfo(UUID(self._ids[goal].bytes))))
 
@@ -121,7 +135,7 @@ class Ros2Client:
             self._client = self._node.action_client(self._name, self._action)
         return self._client
 
-    def _send(self, goal: ClientGoal, message: Any) -> None:
+    def _send(self, goal: FollowedGoal, message: Any) -> None:
         feedback_type = self._types.feedback
         try:
             sent = self._connect().send(
@@ -140,7 +154,7 @@ class Ros2Client:
         else:
             sent.on_done(partial(self._finish, goal))
 
-    def _finish(self, goal: ClientGoal, native: NativeGoal) -> None:
+    def _finish(self, goal: FollowedGoal, native: NativeGoal) -> None:
         try:
             result = native.result()
         except ClosedError:
@@ -152,7 +166,7 @@ class Ros2Client:
             return
         goal.finish(_status(goal, native), translate(result, self._types.result))
 
-    def _lose(self, goal: ClientGoal, error: RoszError) -> None:
+    def _lose(self, goal: FollowedGoal, error: RoszError) -> None:
         goal.finish(GoalStatus(goal.id, GoalStatus.LOST, str(error)), None)
 
     def _cancel(self, info: GoalInfo) -> None:
@@ -164,5 +178,5 @@ class Ros2Client:
             self._node.log.warning("cannot cancel a goal: %s", error)
 
 
-def _status(goal: ClientGoal, native: NativeGoal) -> GoalStatus:
+def _status(goal: FollowedGoal, native: NativeGoal) -> GoalStatus:
     return GoalStatus(goal.id, STATUSES[native.status])

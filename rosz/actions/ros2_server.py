@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rosz.actions.mapping import STATES, translate
@@ -13,8 +14,9 @@ from rosz.node.action_server import ServerGoal as NativeGoal
 from rosz.node.goals import FINAL, GoalState
 
 if TYPE_CHECKING:
-    from rosz.actions.server import ActionServer, ServerGoal
+    from rosz.actions.types import ActionTypes
     from rosz.message import Action
+    from rosz.node import Node
 
 __all__ = ("Ros2Server",)
 
@@ -26,16 +28,30 @@ class Ros2Server(NativeServer):
     """Hands goals of ROS 2's clients to a server, and lets the clients know what it does with them.
 
     Args:
-        server: The server.
+        node: Node of the server.
+        name: Full name of the action.
+        types: Message classes of the action.
         action: Class of the action.
+        receive_goal: Function that takes the message of a goal.
+        receive_cancel: Function that takes a request to end a goal.
     """
 
-    def __init__(self, server: ActionServer, action: type[Action]) -> None:
-        self._server = server
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        types: ActionTypes,
+        action: type[Action],
+        receive_goal: Callable[[Any], object],
+        receive_cancel: Callable[[GoalID], object],
+    ) -> None:
+        self._types = types
+        self._receive_goal = receive_goal
+        self._receive_cancel = receive_cancel
         self._mirrored: dict[str, NativeGoal] = {}
         super().__init__(
-            server.node,
-            server.name,
+            node,
+            name,
             action,
             lambda _: None,
             goal=None,
@@ -47,40 +63,35 @@ class Ros2Server(NativeServer):
 
     def accepts(self, goal: NativeGoal) -> bool:
         """Hand a goal to the server; return whether that has not rejected it at once."""
-        name, types, stamp = str(goal.id), self._server.types, Time.from_nsec(goal.accepted)
+        name, types, stamp = str(goal.id), self._types, Time.from_nsec(goal.accepted)
         self._mirrored[name] = goal
         request = translate(goal.request, types.goal)
-        self._server.receive_goal(
-            types.action_goal(Header(stamp=stamp), GoalID(stamp, name), request)
-        )
-        return not any(
-            one.id.id == name and one.status.status == GoalStatus.REJECTED
-            for one in list(self._server.goals)
-        )
+        self._receive_goal(types.action_goal(Header(stamp=stamp), GoalID(stamp, name), request))
+        return name in self._mirrored or goal.done
 
     def start(self, goal: NativeGoal) -> None:
         """Do nothing: the server executes the goal."""
 
     def allows_cancel(self, goal: NativeGoal) -> bool:
         """Let the server know that a client wants the goal to end."""
-        self._server.receive_cancel(GoalID(id=str(goal.id)))
+        self._receive_cancel(GoalID(id=str(goal.id)))
         return True
 
-    def update(self, changed: ServerGoal, result: Any) -> None:
+    def update(self, status: GoalStatus, result: Any) -> None:
         """Let the client of a goal know of its state.
 
         Args:
-            changed: The goal.
+            status: State of the goal.
             result: Its result if it has ended; an empty one when not given.
         """
-        goal = self._mirrored.get(changed.id.id)
+        goal = self._mirrored.get(status.goal_id.id)
         if goal is None:
             return
-        state = STATES[changed.status.status]
+        state = STATES[status.status]
         if state in FINAL:
-            del self._mirrored[changed.id.id]
-        if changed.status.status == GoalStatus.REJECTED and goal not in self.goals:
-            return  # see `accepts`
+            del self._mirrored[status.goal_id.id]
+        if status.status == GoalStatus.REJECTED and goal not in self.goals:
+            return  # it is not accepted
         if state in {GoalState.CANCELING, GoalState.CANCELED}:
             self.begin_cancel(goal)
         elif goal.status is GoalState.ACCEPTED:

@@ -219,9 +219,9 @@ class ActionServer:
                 for topic, kind in kinds.items()
             }
             self._others = [
-                node.subscription(f"{self.name}/cancel", GoalID, self.receive_cancel, qos=qos),
+                node.subscription(f"{self.name}/cancel", GoalID, self._receive_cancel, qos=qos),
                 node.subscription(
-                    f"{self.name}/goal", types.action_goal, self.receive_goal, qos=qos
+                    f"{self.name}/goal", types.action_goal, self._receive_goal, qos=qos
                 ),
             ]
             if self.status_frequency > 0:
@@ -229,7 +229,16 @@ class ActionServer:
                 self._others.append(node.timer(period, lambda _: self.publish_status()))
             self.publish_status()
             if types.action is not None:
-                self._ros2 = node.keep(Ros2Server(self, types.action))
+                self._ros2 = node.keep(
+                    Ros2Server(
+                        node,
+                        self.name,
+                        types,
+                        types.action,
+                        self._receive_goal,
+                        self._receive_cancel,
+                    )
+                )
                 self._others.append(self._ros2)
 
     def stop(self) -> None:
@@ -244,7 +253,7 @@ class ActionServer:
         """Let clients know of the state of a goal, and of its result if it has ended."""
         self.publish_status()
         if self._ros2 is not None:
-            self._ros2.update(goal, result)
+            self._ros2.update(goal.status, result)
 
     def publish_status(self) -> None:
         """Publish the states of all goals."""
@@ -295,8 +304,7 @@ class ActionServer:
     def _header(self) -> Header:
         return Header(stamp=Time.from_nsec(self.node.now()))
 
-    def receive_goal(self, message: Any) -> None:
-        """Take a goal from a client."""
+    def _receive_goal(self, message: Any) -> None:
         with self._callback_lock:
             with self.lock:
                 name = message.goal_id.id
@@ -312,8 +320,7 @@ class ActionServer:
                     return
             run_callback(self.node, self.name, self.on_goal, goal)
 
-    def receive_cancel(self, message: GoalID) -> None:
-        """Take the request of a client to end goals."""
+    def _receive_cancel(self, message: GoalID) -> None:
         until = message.stamp.to_nsec()
         everything = not message.id and not until
         with self._callback_lock:

@@ -14,7 +14,7 @@ import msgspec
 
 from rosz.errors import NotFoundError, RoszError, WaitTimeout, near_miss
 from rosz.introspect.survey import Survey, take_survey
-from rosz.names import short_type
+from rosz.names import is_of_action, short_type
 from rosz.wire import Kind, Token, tokens_key
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def _entities(survey: Survey, node: Token, *kinds: Kind) -> list[Token]:
     return [
         token
         for token in survey.view.entities(*kinds)
-        if (token.zid, token.node_id) == (node.zid, node.node_id)
+        if (token.zid, token.node_id) == (node.zid, node.node_id) and not is_of_action(token.name)
     ]
 
 

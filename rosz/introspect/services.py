@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.errors import NotFoundError, near_miss
-from rosz.names import short_type
+from rosz.names import is_of_action, short_type
 from rosz.wire import Token, entity_key
 
 if TYPE_CHECKING:
@@ -42,9 +42,11 @@ class ServiceEntry(msgspec.Struct, frozen=True):
 
 
 def list_services(view: View) -> list[ServiceEntry]:
-    """Return the services that nodes serve, sorted by name."""
+    """Return the services that nodes serve, sorted by name; without those of ROS 2's actions."""
     entries: list[ServiceEntry] = []
     for name, types in view.services().items():
+        if is_of_action(name):
+            continue
         nodes = tuple(sorted({token.node_name for token in view.servers(name)}))
         entries.append(ServiceEntry(name, tuple(map(short_type, types)), nodes))
     return entries

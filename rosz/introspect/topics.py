@@ -8,7 +8,7 @@ import msgspec
 
 from rosz.errors import NotFoundError, near_miss
 from rosz.introspect.survey import Survey
-from rosz.names import short_type
+from rosz.names import is_of_action, short_type
 from rosz.wire import Kind, Token
 
 __all__ = (
@@ -46,10 +46,10 @@ class Topic(msgspec.Struct, frozen=True):
 
 
 def list_topics(tokens: Iterable[Token]) -> list[Topic]:
-    """Return the topics of some tokens, sorted by name."""
+    """Return the topics of some tokens, sorted by name; those of actions of ROS 2 are left out."""
     found: dict[str, tuple[set[str], list[str], list[str]]] = {}
     for token in tokens:
-        if token.kind not in {Kind.PUBLISHER, Kind.SUBSCRIPTION}:
+        if token.kind not in {Kind.PUBLISHER, Kind.SUBSCRIPTION} or is_of_action(token.name):
             continue
         types, publishers, subscribers = found.setdefault(token.name, (set(), [], []))
         types.add(short_type(token.type_name))

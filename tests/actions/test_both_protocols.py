@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -10,6 +11,9 @@ from network import TIMEOUT, Network, eventually
 
 from rosz.actions import ActionClient, ActionServer, ClientGoal, CommState, SimpleActionServer
 from rosz.errors import ActionError, GoalFailed, GoalRejected
+from rosz.introspect.actions import list_actions
+from rosz.introspect.services import list_services
+from rosz.introspect.topics import list_topics
 from rosz.msgs.action_msgs.msg import GoalInfo
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
 from rosz.msgs.actionlib_tutorials.action import Fibonacci
@@ -62,6 +66,10 @@ class World:
 @pytest.fixture
 def world(network: Network) -> World:
     return World(network)
+
+
+def is_canceling(goal: Any) -> bool:
+    return goal.status is GoalState.CANCELING
 
 
 def reaches(goal: ClientGoal, status: int) -> None:
@@ -167,6 +175,17 @@ def test_actionlib_executes_a_goal_of_ros2(world: World, end: str, state: GoalSt
     assert world.arrived.empty()
 
 
+def test_listings_show_only_the_topics_of_ros1(world: World) -> None:
+    world.ros1_server()
+    world.ros2_client()
+    view = world.one.context.graph.view()
+    assert {topic.name for topic in list_topics(view.tokens) if "fib" in topic.name} == {
+        f"/fib/{part}" for part in ("goal", "cancel", "status", "feedback", "result")
+    }
+    assert not [entry for entry in list_services(view) if "fib" in entry.name]
+    assert [(entry.name, entry.servers) for entry in list_actions(view)] == [("/fib", ("/other",))]
+
+
 def test_a_client_of_ros2_cancels_goals_of_actionlib(world: World) -> None:
     cancelled: SimpleQueue[Any] = SimpleQueue()
     world.ros1_server(on_cancel=cancelled.put)
@@ -181,7 +200,7 @@ def test_a_client_of_ros2_cancels_goals_of_actionlib(world: World) -> None:
         assert sent.cancel()
         assert cancelled.get(timeout=TIMEOUT) is goal
         assert goal.status.status == status
-        eventually(lambda sent=sent: sent.status is GoalState.CANCELING, "the cancellation")
+        eventually(partial(is_canceling, sent), "the cancellation")
         goal.cancel(text="as you like")
         assert sent.wait(TIMEOUT) is GoalState.CANCELED
     assert first.status.status == GoalStatus.RECALLED

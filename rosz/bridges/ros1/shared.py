@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from rosz.bridges.ros1.codec import Codecs
 from rosz.bridges.ros1.sockets import SocketLoop, log
 from rosz.lifecycle import Lifecycle
+from rosz.names import is_of_action
 from rosz.node import Context
 from rosz.wire import Token
 from rosz.worker import Worker
@@ -66,9 +67,9 @@ class Shared:
         return name[len(self.namespace) :] if below else None
 
     def foreign(self, tokens: Iterable[Token]) -> list[Token]:
-        """Return the entities that are not those of this bridge."""
+        """Return the entities that are neither those of this bridge nor of actions of ROS 2."""
         own = self.context.session.zid
-        return [token for token in tokens if token.zid != own]
+        return [one for one in tokens if one.zid != own and not is_of_action(one.name)]
 
     def publishers(self, topic: str) -> list[Token]:
         """Return the publishers of a topic on the network."""
