@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.node.action_client import ClientGoal as NativeGoal
 
-__all__ = ("Ros2Client",)
+__all__ = ("FollowedGoal", "Ros2Client")
 
 _CANCEL_TIMEOUT = 10.0
 _KNOWN_TIMEOUT = 2.0
