@@ -309,7 +309,6 @@ class Player:
                 self._play()
                 if not self._options.loop:
                     break
-                self._pace.jump(self._start)
                 self._last = self._controlled = self._start
             while self._options.keep_alive and not self._closed:
                 self._wait(_LOOK_SECONDS)
@@ -324,7 +323,11 @@ class Player:
             return
         items = ((len(item[2]), item) for item in map(self._convert, entries) if item)
         with ReadAhead(items) as ahead:
-            for batch in ahead:
+            batches = iter(ahead)
+            some = next(batches, [])
+            # Making the publishers, waiting and reading so far do not count as time of the bag.
+            self._pace.jump(self._start)
+            for batch in chain((some,), batches):
                 if not self._publish(batch):
                     return
         self._look()

@@ -83,6 +83,18 @@ def test_messages_come_in_order_at_their_times(network: Network, tmp_path: Path)
     assert (player.published, player.problems) == (50, 0)
 
 
+def test_waiting_before_the_first_message_counts_as_no_time(
+    network: Network, tmp_path: Path
+) -> None:
+    """Else all messages of that time would be published at once."""
+    bag = _bag(tmp_path / "a.mcap", [("/a", n, Int32(data=n)) for n in (0, 1)])
+    heard = _Listener(network, "/a")
+    player = _player(network, bag, delay=1.0)
+    player.run()
+    heard.wait(2)
+    assert heard.found[1][2] - heard.found[0][2] > 0.5
+
+
 def test_a_part_of_some_topics_under_a_prefix(network: Network, tmp_path: Path) -> None:
     rows = [(f"/{name}", n / 100, Int32(data=n)) for n in range(20) for name in "ab"]
     bag = _bag(tmp_path / "a.mcap", rows)
