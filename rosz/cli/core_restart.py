@@ -68,6 +68,7 @@ class CoreWatch:
         key_watch: KeyWatch | None = None,
     ) -> None:
         self._replica = replica
+        self._router = router
         self._key_watch = key_watch
         self._splits = before.splits
         self._standstill = Standstill(router.outlasted_silence)
@@ -94,6 +95,7 @@ class CoreWatch:
         while not self._found.wait(_LOOK_SECONDS):
             if owner and os.getppid() != owner:
                 return
+            self._router.check_room()
             if seconds := self._standstill.seconds():
                 self._why = f"stood still for {seconds:.0f} s, longer than others keep its links"
                 break

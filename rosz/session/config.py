@@ -42,6 +42,8 @@ __all__ = (
 )
 
 _RETRY_MS = 200
+"""Milliseconds between attempts to connect, on average: of many sessions that lost one router, not
+all come back to it at the same moment."""
 _LONGEST_RETRY_MS = 1000
 """The longest pause between attempts to reach another machine, which may be off for days."""
 _FOREVER_MS = -1
@@ -57,8 +59,11 @@ many links there may be. When many processes start at once, each takes long to o
 _OPEN_MS = 10_000
 """Time limit in milliseconds for opening a link on the machine. Answers take long when many
 processes start at once, and Zenoh tries each peer that it heard of only once."""
+_OPEN_AT_ROUTER_MS = 60_000
+"""The same for a client on the machine, which has nobody else to connect to: its router answers one
+after the other, and would find those that had given up first."""
 _OPEN_BEYOND_MS = 3_000
-"""The same beyond the machine, where an attempt that the network lost should soon be repeated."""
+"""The time limit beyond the machine, where an attempt that the network lost is soon repeated."""
 _LOCAL_QUEUE = {
     "size": {"data": 16},
     "congestion_control": {
@@ -229,6 +234,9 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     sharing = {"enabled": True, "message_size_threshold": config.shared_memory}
     must_listen = config.mode == "router"
     must_connect = config.must_connect or config.mode == "client"
+    retry = _RETRY_MS
+    if not must_listen:
+        retry = _RETRY_MS // 2 + int.from_bytes(os.urandom(2)) % _RETRY_MS
     return {
         "mode": config.mode,
         "connect": {
@@ -236,8 +244,8 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             "exit_on_failure": must_connect,
             "timeout_ms": int(config.open_timeout * 1000) if must_connect else timeout_ms,
             "retry": {
-                "period_init_ms": _RETRY_MS,
-                "period_max_ms": _RETRY_MS if local else _LONGEST_RETRY_MS,
+                "period_init_ms": retry,
+                "period_max_ms": retry if local else _LONGEST_RETRY_MS,
                 "period_increase_factor": 1.5,
             },
         },
@@ -252,7 +260,7 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             "shared_memory": {"enabled": True, "transport_optimization": sharing}
             if config.shared_memory
             else {"enabled": False},
-            "unicast": _ACCEPTING | {"open_timeout": _OPEN_MS if local else _OPEN_BEYOND_MS},
+            "unicast": _ACCEPTING | {"open_timeout": _open_timeout_ms(config.mode, local=local)},
             "link": {
                 "tx": {
                     "lease": _LEASE_MS if local else _LEASE_BEYOND_MS,
@@ -262,6 +270,12 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             },
         },
     }
+
+
+def _open_timeout_ms(mode: str, *, local: bool) -> int:
+    if not local:
+        return _OPEN_BEYOND_MS
+    return _OPEN_AT_ROUTER_MS if mode == "client" else _OPEN_MS
 
 
 def _listen(config: SessionConfig) -> list[str]:

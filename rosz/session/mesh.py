@@ -33,6 +33,9 @@ _SPACE = "@rosz/links"
 _POLL_SECONDS = 0.002
 _LATER_POLL_SECONDS = 0.05
 _QUERY_TIMEOUT = 0.5
+_MOST_PEERS = 60
+"""The most peers that all link to each other when they start at once, measured on two cores."""
+_ADVICE = "use a core for so many nodes (run 'rosz core', and start nodes with ROSZ_MODE=client)"
 
 _log = logging.getLogger("rosz.session")
 
@@ -119,6 +122,7 @@ class MeshReadiness:
                 peers, latest = found, now
             missing = self._missing(_QUERY_TIMEOUT) if found and self._mesh else set()
             if found and not missing:
+                self._warn_of_many(len(found))
                 return
             if now - began >= self._timeout:
                 self.ready.set()
@@ -128,9 +132,19 @@ class MeshReadiness:
         if missing and self._link_timeout and not self._stop.is_set():
             _log.warning(
                 "not linked to %d other session(s) of this machine within %g s: what is published"
-                " does not reach them; use a core for so many nodes (rosz core)",
+                " does not reach them; %s",
                 len(missing),
                 self._link_timeout,
+                _ADVICE,
+            )
+
+    def _warn_of_many(self, peers: int) -> None:
+        """Advise a newcomer to a large mesh, each of whose sessions it costs a link."""
+        if self._mesh and peers >= _MOST_PEERS:
+            _log.warning(
+                "%d other sessions are here, each linked to all; more may not find each other: %s",
+                peers,
+                _ADVICE,
             )
 
     def _missing(self, timeout: float) -> set[str]:

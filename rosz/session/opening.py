@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from rosz.session.config import (
 )
 from rosz.session.declared import translate_errors
 from rosz.session.local_peers import LocalPeer, LocalPeers, direct_endpoint, is_private
-from rosz.session.probe import first_listening
+from rosz.session.probe import first_listening, is_listening, why_refused
 from rosz.session.zenoh_workarounds import (
     SEGMENTS,
     connect_to_running,
@@ -36,6 +37,7 @@ from rosz.session.zenoh_workarounds import (
     remove_abandoned_sockets,
 )
 from rosz.wire import Endpoint
+from rosz.worker import start_thread
 
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
@@ -45,11 +47,16 @@ __all__ = ("open_raw", "outlasted_silence", "places_of", "settings_text", "why_r
 _NOBODY = "Unable to connect to any of"
 _NO_SEGMENT = "Unable to create POSIX shm segment"
 _BUSY_TIMEOUT = 60.0
-"""Seconds that a node waits for a busy router."""
+"""Time limit in seconds of each attempt of a node at a busy router. To give up earlier would have
+the router begin anew."""
+_SLOW_SECONDS = 5.0
+"""Seconds after which a node says what it waits for."""
 _ATTEMPT_SECONDS = 2.0
 """Time limit of each attempt of a node that waits for other machines."""
 _LOOK_SECONDS = 0.5
 """Seconds after which a node that waits for other machines looks for Ctrl-C."""
+
+_BUSY = f"it is busy: it accepts connections, and has opened no link for {_SLOW_SECONDS:g} s"
 
 _log = logging.getLogger("rosz.session")
 
@@ -61,8 +68,8 @@ class _Unanswered(TransportError):
 def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = None) -> Any:
     """Open a session of Zenoh.
 
-    A node that was told to connect to other machines waits until one of them answers; a command,
-    which may not hold the rendezvous, does not.
+    A node that was told to connect to other machines waits until one of them answers, and one whose
+    router is busy until that does; a command, which may not hold the rendezvous, does not.
 
     Args:
         config: The configuration.
@@ -76,8 +83,10 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         UsageError: The override text is malformed.
     """
     waits = config.mode == "client" and config.hold_rendezvous and not config.must_connect
-    if not (waits and config.connect):
+    if not waits:
         return _open_once(config, peers, own)
+    if not config.connect:
+        return _open_at_router(config, peers, own)
     config = msgspec.structs.replace(config, open_timeout=_ATTEMPT_SECONDS)
     others = " or ".join(config.connect)
     waited = False
@@ -99,9 +108,38 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         return raw
 
 
+def _open_at_router(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) -> Any:
+    """Open the session of a node whose router may be busy, as when many nodes start at once."""
+    over = threading.Event()
+    reported = threading.Event()
+
+    def report() -> None:
+        if over.wait(_SLOW_SECONDS):
+            return
+        reason = why_refused(config.rendezvous)
+        reported.set()
+        _log.warning("waiting for %s: %s", config.rendezvous, reason or _BUSY)
+
+    start_thread(threading.Thread(target=report, name="rosz-waiting", daemon=True))
+    try:
+        while True:
+            try:
+                raw = _open_once(config, peers, own)
+            except _Unanswered:
+                raise_deferred()
+                peers = LocalPeers.read(config.rendezvous)
+                if not (peers.is_any_running and is_listening(config.rendezvous)):
+                    raise
+                continue
+            if reported.is_set():
+                _log.warning("connected to %s", config.rendezvous)
+            return raw
+    finally:
+        over.set()
+
+
 def _open_once(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) -> Any:
     if config.mode == "client" and not config.must_connect and peers.is_any_running:
-        # When many nodes start at once, some of them are answered late.
         longer = max(config.open_timeout, _BUSY_TIMEOUT)
         config = msgspec.structs.replace(config, open_timeout=longer)
     reachable = reachable_config(config, peers)

@@ -6,8 +6,11 @@ not move, and links to other machines.
 
 from __future__ import annotations
 
+import errno
 import logging
+import os
 import re
+import resource
 import socket
 import threading
 from collections.abc import Sequence
@@ -37,6 +40,9 @@ _POLL_SECONDS: Final = 2.0
 _ON_INTERFACE: Final = "#iface="
 _SUCCESSION_SECONDS: Final = 0.5
 _GREETING_TIMEOUT: Final = 3.0
+_FEW_FILES: Final = 1024
+"""Limit of open files below which a router says how few nodes it has room for."""
+
 _log = logging.getLogger("rosz.core")
 
 
@@ -71,6 +77,8 @@ class Router:
         self.has_rules: bool = config.keys is not None and config.keys.rules is not None
         self.outlasted_silence: float = outlasted_silence(config)
         self.holder: str = ""
+        self._is_full = False
+        _allow_open_files()
         self._lifecycle = Lifecycle("the router", log=_log)
         self.session: Session
         try:
@@ -108,6 +116,25 @@ class Router:
         """Return the endpoints that it dials, each with whether it is reached, to be printed."""
         return self._dialling.announce()
 
+    def check_room(self) -> None:
+        """Log a warning when there is no more room for links, and when there is again."""
+        try:
+            os.close(os.open(os.devnull, os.O_RDONLY))
+        except OSError as error:
+            if error.errno not in {errno.EMFILE, errno.ENFILE} or self._is_full:
+                return
+            self._is_full = True
+            limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+            _log.warning(
+                "no room for more links: %s (the limit is %d, 'ulimit -Hn'); newcomers wait",
+                error.strerror,
+                limit,
+            )
+        else:
+            if self._is_full:
+                _log.warning("there is room for links again")
+            self._is_full = False
+
     def close(self) -> None:
         """Close the router; a second call has no effect."""
         self._lifecycle.close()
@@ -117,6 +144,21 @@ class Router:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _allow_open_files() -> None:
+    """Allow this process as many open files as it may have, since each link is one."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    except ValueError:  # on macOS, what counts as unlimited is more than the system allows
+        return
+    if 0 < most < _FEW_FILES:
+        _log.warning(
+            "this core may open %d files, and has a link to each node: raise the limit for more"
+            " nodes (ulimit -Hn)",
+            most,
+        )
 
 
 def zenoh_configuration(

@@ -56,7 +56,7 @@ MESH_LIMIT: Final = 24
 """Largest number of nodes that start faster in a mesh than as clients, measured on two cores."""
 
 _MODE: Final = "ROSZ_MODE"
-_START_TIMEOUT: Final = 10.0
+_START_TIMEOUT: Final = 60.0
 _CHECK_INTERVAL: Final = 0.01
 _RESTART_DELAY: Final = 0.5
 _CLOSE_TIMEOUT: Final = 2.0
