@@ -32,6 +32,7 @@ __all__ = (
 _VALID = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*", re.ASCII)
 _BASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 _PART = re.compile(r"[A-Za-z0-9_/]", re.ASCII)
+_LOGS = ("/rosout", "/rosout_agg")
 
 
 def is_valid(name: str) -> bool:
@@ -168,7 +169,7 @@ def short_type(name: str) -> str:
 def ros1_type(topic: str, type_name: str) -> str:
     """Return the name in ROS 1 of a topic's type; ``/rosout`` has another type there."""
     name = short_type(type_name)
-    is_log = (topic, name) == ("/rosout", "rcl_interfaces/Log")
+    is_log = topic in _LOGS and name == "rcl_interfaces/Log"
     return "rosgraph_msgs/Log" if is_log else name
 
 

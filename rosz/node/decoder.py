@@ -154,8 +154,11 @@ class Decoder:
                 if sequence > 0:
                     publisher = self._publishers.get(gid) or self._publisher(gid)
                     last = publisher.last
+                    replayed = isinstance(sample, Reply)
+                    # All latching publishers of a session reply to a request for one of them.
+                    publisher.replays |= replayed
                     if publisher.replays:
-                        missing = publisher.advance(sequence, replayed=isinstance(sample, Reply))
+                        missing = publisher.advance(sequence, replayed=replayed)
                         if missing is None:
                             return None
                         lost = missing

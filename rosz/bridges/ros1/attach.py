@@ -295,7 +295,7 @@ class AttachedBridge:
         """Return names of ROS 1 with their types on the network."""
         shared = self._shared
         found = {}
-        for token in shared.foreign(shared.context.graph.view().entities(kind)):
+        for token in shared.entities(kind):
             name = shared.there(token.name)
             if name is not None and _matches(patterns, name):
                 found[name] = token.type_name

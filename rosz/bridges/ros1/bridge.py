@@ -82,7 +82,7 @@ class MasterBridge:
     ) -> None:
         environment = environment or Environment.read()
         context = Context(environment)
-        self._shared = shared = Shared(context, "")
+        self._shared = shared = Shared(context, "", is_master=True)
         self._lifecycle = shared.lifecycle
         self._lifecycle.keep(context)
         self._lifecycle.keep(Registration(shared.close))

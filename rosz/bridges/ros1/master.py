@@ -128,7 +128,7 @@ class Master:
         with self._lock:
             uris = [entry.uri for entry in self._registry.entries("publisher", topic)]
         if self._shared.publishers(topic):
-            uris.append(self.uri(host))
+            uris.append(self._node_uri(host, self._shared.standing_for(Kind.PUBLISHER, topic)))
         return uris
 
     def notify(self, topic: str) -> None:
@@ -146,6 +146,9 @@ class Master:
     def uri(self, host: str) -> str:
         """Return the URI of the bridge for those who reach it at an address."""
         return f"http://{host}:{self._port}/"
+
+    def _node_uri(self, host: str, node: str) -> str:
+        return f"{self.uri(host)[:-1]}{NODE_PATH}{node}/"
 
     def is_known(self, uri: str) -> bool:
         """Return whether a URI is that of a registered node."""
@@ -264,7 +267,7 @@ class Master:
         if uri:
             return 1, "node api", uri
         if any(token.node_name == node for token in self._tokens()):
-            return 1, "node api", f"{self.uri(stream.local_host)[:-1]}{NODE_PATH}{node}/"
+            return 1, "node api", self._node_uri(stream.local_host, node)
         return -1, f"unknown node [{node}]", ""
 
     def _lookup_service(self, _caller: str, stream: Stream, service: str) -> Answer:
@@ -314,7 +317,7 @@ class Master:
         return 1, "current system state", state
 
     def _tokens(self, *kinds: Kind) -> list[Token]:
-        return self._shared.foreign(self._shared.context.graph.view().entities(*kinds))
+        return self._shared.entities(*kinds)
 
     def _type(self, token: Token) -> str:
         return names.ros1_type(token.name, token.type_name)

@@ -16,7 +16,7 @@ from rosz.bridges.ros1.server import Incoming
 from rosz.bridges.ros1.services import Clients, ProvidedService, ServiceConnection
 from rosz.bridges.ros1.shared import Shared
 from rosz.bridges.ros1.sockets import log
-from rosz.bridges.ros1.topics import PublishedTopic, SubscribedTopic
+from rosz.bridges.ros1.topics import Connection, PublishedTopic, SubscribedTopic
 from rosz.errors import ClosedError, InvalidName, RoszError, ServiceError, UsageError
 from rosz.lifecycle import Registration
 from rosz.node import BridgedNode
@@ -95,12 +95,13 @@ class Mirror:
         """Take a connection of a program of ROS 1; any thread may call it."""
         self._shared.changes.submit(partial(self._accept, incoming, header))
 
-    def connections(self, topic: str) -> list[tuple[str, bool]]:
-        """Return the nodes of ROS 1 that are connected for a topic, and whether they publish."""
+    def connections(self, topic: str) -> list[Connection]:
+        """Return the connections to nodes of ROS 1 for a topic of the network."""
         return [
-            (part.entry.node, isinstance(part, PublishedTopic))
+            connection
             for part in list(self._by_name.get(topic, ()))
-            if isinstance(part, PublishedTopic | SubscribedTopic) and part.connected
+            if isinstance(part, PublishedTopic | SubscribedTopic)
+            for connection in part.connections()
         ]
 
     def close(self) -> None:

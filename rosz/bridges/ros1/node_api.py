@@ -76,8 +76,7 @@ class NodeApi:
         return method(node, stream, *call.args[1:])
 
     def _tokens(self, node: str, *kinds: Kind) -> list[Token]:
-        view = self._shared.context.graph.view()
-        return [t for t in self._shared.foreign(view.entities(*kinds)) if t.node_name == node]
+        return [t for t in self._shared.entities(*kinds) if t.node_name == node]
 
     def _get_pid(self, node: str, _: Stream, *_args: Any) -> Answer:
         processes = self._shared.context.graph.view().processes(node) if node else []
@@ -98,19 +97,48 @@ class NodeApi:
         found = {t.name: ros1_type(t.name, t.type_name) for t in self._tokens(node, kind)}
         return [[name, kind] for name, kind in found.items()]
 
-    def _get_bus_stats(self, _node: str, _: Stream, *_args: Any) -> Answer:
-        return 1, "bus stats", [[], [], []]
+    def _get_bus_stats(self, node: str, _: Stream, *_args: Any) -> Answer:
+        """Tell the traffic of connections to ROS 1; what is counted is that of a connection."""
+        published: list[list[Any]] = []
+        subscribed: list[list[Any]] = []
+        for token in self._tokens(node, Kind.PUBLISHER, Kind.SUBSCRIPTION):
+            outward = token.kind is Kind.PUBLISHER
+            known = self.mirror.connections(token.name) if self.mirror is not None else []
+            found = [one for one in known if one.publishes != outward]
+            numbered = list(enumerate(found, 1))
+            if outward:
+                total = sum(one.bytes for one in found)
+                rows = [[number, one.bytes, one.messages, True] for number, one in numbered]
+                published.append([token.name, total, rows])
+            else:
+                rows = [[number, one.bytes, -1, True] for number, one in numbered]
+                subscribed.append([token.name, rows])
+        return 1, "bus stats", [published, subscribed, []]
 
     def _get_bus_info(self, node: str, _: Stream, *_args: Any) -> Answer:
         info: list[list[Any]] = []
-        mirror = self.mirror
         for token in self._tokens(node, Kind.PUBLISHER, Kind.SUBSCRIPTION):
-            outward = token.kind is Kind.PUBLISHER
-            for other, publishes in mirror.connections(token.name) if mirror else ():
-                if publishes != outward:
-                    direction = "o" if outward else "i"
-                    info.append([len(info) + 1, other, direction, "TCPROS", token.name, True])
+            direction = "o" if token.kind is Kind.PUBLISHER else "i"
+            for other in self._others(token):
+                info.append([len(info) + 1, other, direction, "TCPROS", token.name, True])
         return 1, "bus info", info
+
+    def _others(self, token: Token) -> list[str]:
+        """Return the nodes on both sides that an entity is connected to."""
+        outward = token.kind is Kind.PUBLISHER
+        kind = Kind.SUBSCRIPTION if outward else Kind.PUBLISHER
+        found = [
+            other.node_name
+            for other in self._shared.entities(kind, name=token.name)
+            if other.type_name == token.type_name
+        ]
+        if self.mirror is not None:
+            found += [
+                connection.node
+                for connection in self.mirror.connections(token.name)
+                if connection.publishes != outward
+            ]
+        return found
 
     def _param_update(self, _node: str, _: Stream, *args: Any) -> Answer:
         if len(args) == 2 and isinstance(args[0], str) and self._on_param is not None:  # noqa: PLR2004  # name and value

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from rosz.bridges.ros1.codec import Codecs
+from rosz.bridges.ros1.rosout import GATHERED, LOGS, log_tokens
 from rosz.bridges.ros1.sockets import SocketLoop, log
 from rosz.lifecycle import Lifecycle
 from rosz.names import is_of_action
 from rosz.node import Context
-from rosz.wire import Token
+from rosz.wire import Kind, Token
 from rosz.worker import Worker
 
 __all__ = ("BRIDGE", "MASTER", "Shared")
@@ -31,6 +32,7 @@ class Shared:
         context: The context, which the bridge owns.
         name: Full name of the bridge, as ROS 1's programs see it.
         namespace: Namespace on the network for all names of ROS 1; empty for none.
+        is_master: Whether nodes of the network are nodes of ROS 1, too, and ``/rosout`` is.
 
     Attributes:
         context: The context.
@@ -44,7 +46,9 @@ class Shared:
         lifecycle: The lifecycle of the bridge.
     """
 
-    def __init__(self, context: Context, name: str, namespace: str = "") -> None:
+    def __init__(
+        self, context: Context, name: str, namespace: str = "", *, is_master: bool = False
+    ) -> None:
         self.context = context
         self.name = name
         self.namespace = namespace
@@ -56,6 +60,9 @@ class Shared:
         self.changes: Worker[Callable[[], object]] = Worker("rosz-ros1-changes", logger=log)
         self.gids: set[bytes] = set()
         self.lifecycle = Lifecycle("the bridge to ROS 1", log=log)
+        self._log_tokens: tuple[Token, ...] = log_tokens(context) if is_master else ()
+        self._is_master = is_master
+        self._standing: dict[tuple[Kind, str], str] = {}
 
     def here(self, name: str) -> str:
         """Return the name on the network of a name of ROS 1."""
@@ -66,22 +73,61 @@ class Shared:
         below = name.startswith(f"{self.namespace}/")
         return name[len(self.namespace) :] if below else None
 
-    def foreign(self, tokens: Iterable[Token]) -> list[Token]:
-        """Return the entities that are neither those of this bridge nor of actions of ROS 2."""
+    def entities(self, *kinds: Kind, name: str | None = None) -> list[Token]:
+        """Return the entities that are neither those of this bridge nor of actions of ROS 2.
+
+        Args:
+            kinds: Their kinds; none for all.
+            name: Name of their topic or service on the network; None for all.
+        """
         own = self.context.session.zid
-        return [one for one in tokens if one.zid != own and not is_of_action(one.name)]
+        found = self.context.graph.view().entities(*kinds, name=name)
+        return [t for t in found if t.zid != own and not is_of_action(t.name)] + [
+            t
+            for t in self._log_tokens
+            if (not kinds or t.kind in kinds) and (name is None or t.name == name)
+        ]
+
+    def source(self, topic: str) -> str:
+        """Return the topic of ROS 1 whose messages subscribers of a topic get."""
+        return LOGS if self._is_master and topic == GATHERED else topic
+
+    def standing_for(self, kind: Kind, topic: str) -> str:
+        """Return the node that ROS 1's programs see at the other end of a connection.
+
+        A connection is for all nodes of the network that publish a topic, or subscribe to it. One
+        of them stands for all, as long as it is there, so that ROS 1's tools show a node they know.
+
+        Args:
+            kind: PUBLISHER or SUBSCRIPTION.
+            topic: Name of the topic on the network.
+
+        Returns:
+            Full name of the node; that of the bridge if it is none of ROS 1.
+        """
+        if not self._is_master:
+            return self.name
+        nodes = [token.node_name for token in self.entities(kind, name=topic)]
+        if not nodes:
+            self._standing.pop((kind, topic), None)
+            return self.name
+        known = self._standing.get((kind, topic), "")
+        if known not in nodes:
+            known = LOGS if LOGS in nodes else nodes[0]
+            self._standing[kind, topic] = known
+        return known
 
     def publishers(self, topic: str) -> list[Token]:
         """Return the publishers of a topic on the network."""
-        return self.foreign(self.context.graph.view().publishers(topic))
+        return self.entities(Kind.PUBLISHER, name=topic)
 
     def subscriptions(self, topic: str) -> list[Token]:
         """Return the subscriptions of a topic on the network."""
-        return self.foreign(self.context.graph.view().subscriptions(topic))
+        return self.entities(Kind.SUBSCRIPTION, name=topic)
 
     def servers(self, service: str) -> list[Token]:
         """Return the servers of a service on the network."""
-        return self.foreign(self.context.graph.view().servers(service))
+        return self.entities(Kind.SERVICE, name=service)
 
     def close(self) -> None:
         """End all threads."""

@@ -15,6 +15,8 @@ from functools import partial
 from struct import Struct
 from typing import Any
 
+import msgspec
+
 from rosz.bridges.ros1.codec import Codec
 from rosz.bridges.ros1.frames import MAX_FRAME, FrameReader, encode_header
 from rosz.bridges.ros1.peers import Address, call, connect, exchange_headers
@@ -27,7 +29,7 @@ from rosz.node import BridgedNode, Entity, MessageInfo, Publisher, Subscription
 from rosz.qos import QoS, for_queue
 from rosz.wire import Kind, Token
 
-__all__ = ("PublishedTopic", "SubscribedTopic")
+__all__ = ("Connection", "PublishedTopic", "SubscribedTopic")
 
 _LENGTH = Struct("<I")
 _LATCHED = QoS(depth=1, durability="transient_local")
@@ -35,6 +37,22 @@ _FIRST_RETRY = 0.1
 _LAST_RETRY = 2.0
 _QUEUE = 10
 _PIECE = 1 << 10
+
+
+class Connection(msgspec.Struct, frozen=True):
+    """A connection between the bridge and a node of ROS 1 for a topic.
+
+    Attributes:
+        node: Full name of the node.
+        publishes: Whether it is the node that publishes.
+        bytes: Number of bytes that have crossed.
+        messages: Number of messages that have crossed.
+    """
+
+    node: str
+    publishes: bool
+    bytes: int
+    messages: int
 
 
 class PublishedTopic:
@@ -58,6 +76,7 @@ class PublishedTopic:
         self._closed = False
         self._delay = _FIRST_RETRY
         self._reported = ""
+        self._received = 0
         self._reader = FrameReader(MAX_FRAME)
         try:
             self._codec = shared.codecs.of_ros1(entry.name, entry.type_name)
@@ -67,10 +86,12 @@ class PublishedTopic:
             self._declare(latched=False)
         self.update()
 
-    @property
-    def connected(self) -> bool:
-        """Whether messages are received from the node."""
-        return self._stream is not None
+    def connections(self) -> list[Connection]:
+        """Return the connection to the node, if there is one."""
+        stream = self._stream
+        if stream is None:
+            return []
+        return [Connection(self.entry.node, True, stream.received_bytes, self._received)]
 
     def update(self) -> None:
         """Connect to the node if the network wants its messages, or else disconnect."""
@@ -119,8 +140,9 @@ class PublishedTopic:
     def _connect(self) -> None:
         """Connect to the node; runs on a thread for requests."""
         shared, entry = self._shared, self.entry
+        caller = shared.standing_for(Kind.SUBSCRIPTION, self._topic)
         try:
-            answer = call(entry.uri, "requestTopic", (shared.name, entry.name, [["TCPROS"]]))
+            answer = call(entry.uri, "requestTopic", (caller, entry.name, [["TCPROS"]]))
             if not isinstance(answer, list) or answer[:1] != ["TCPROS"] or len(answer) < 3:  # noqa: PLR2004
                 raise DecodeError("XML-RPC result", -1, f"{answer!r:.80}, expected TCPROS")
             sock = _connect_either(answer, entry.uri)
@@ -128,7 +150,7 @@ class PublishedTopic:
             shared.changes.submit(partial(self._failed, str(error)))
             return
         fields = {
-            "callerid": shared.name,
+            "callerid": caller,
             "topic": entry.name,
             "type": entry.type_name,
             "md5sum": ANY_TYPE,  # the answer has the definition, if it is not the one known here
@@ -213,6 +235,7 @@ class PublishedTopic:
         for frame in self._reader.take(count):
             try:
                 publisher.publish_raw(codec.to_cdr(frame))
+                self._received += 1
             except ClosedError:
                 return
             except MessageError as error:
@@ -266,10 +289,12 @@ class SubscribedTopic:
         self._closed = False
         self.update()
 
-    @property
-    def connected(self) -> bool:
-        """Whether the node is connected to the bridge."""
-        return bool(self._links)
+    def connections(self) -> list[Connection]:
+        """Return the connections of the node to the bridge."""
+        return [
+            Connection(self.entry.node, False, link.stream.sent_bytes, link.sent)
+            for link in list(self._links)
+        ]
 
     def update(self) -> None:
         """Show the node as a subscriber while it is not connected."""
@@ -295,19 +320,22 @@ class SubscribedTopic:
 
     def accept(self, incoming: Incoming, header: dict[str, str]) -> None:
         """Send what the network publishes to a connection of the node."""
-        publishers = self._shared.publishers(self._topic)
+        shared = self._shared
+        source = shared.source(self.entry.name)
+        publishers = shared.publishers(self._topic)
         try:
-            codec = _choose(self._shared, self.entry.name, publishers, header)
+            codec = _choose(shared, source, publishers, header)
         except RoszError as error:
             incoming.stream.send([encode_header({"error": str(error)})])
             incoming.refuse(str(error))
             return
-        link = _Link(self._shared, self._node, incoming.stream, codec, self._drop)
+        own = set() if source != self.entry.name else shared.gids
+        link = _Link(shared, self._node, incoming.stream, codec, own, self._drop)
         self._links.append(link)
         if self._shown is not None:
             self._shown.close()
             self._shown = None
-        link.open(self.entry.name, self._topic, publishers)
+        link.open(self.entry.name, shared.here(source), publishers)
 
     def close(self) -> None:
         """Take the topic from the network, and end the connections."""
@@ -348,7 +376,20 @@ def _choose(shared: Shared, topic: str, publishers: list[Token], header: dict[st
 
 
 class _Link:
-    """One connection of a subscriber, and the subscription that feeds it."""
+    """One connection of a subscriber, and the subscription that feeds it.
+
+    Args:
+        shared: What the bridge shares.
+        node: The node that subscribes.
+        stream: The connection.
+        codec: Type of the topic.
+        own: Ids of the publishers whose messages are left out.
+        ended: Function called with the link when the connection has ended.
+
+    Attributes:
+        stream: The connection.
+        sent: Number of messages sent on it.
+    """
 
     def __init__(
         self,
@@ -356,12 +397,15 @@ class _Link:
         node: BridgedNode,
         stream: Stream,
         codec: Codec,
+        own: set[bytes],
         ended: Callable[[_Link], object],
     ) -> None:
         self._shared = shared
         self._node = node
-        self._stream = stream
+        self.stream = stream
+        self.sent = 0
         self._codec = codec
+        self._own = own
         self._ended = ended
         self._subscription: Subscription[Any] | None = None
         self._piece = memoryview(bytearray(_PIECE))
@@ -376,9 +420,9 @@ class _Link:
             publishers: Its publishers there.
         """
         known = [token.qos for token in publishers if token.qos is not None]
-        codec, stream = self._codec, self._stream
+        codec, stream = self._codec, self.stream
         fields = {
-            "callerid": self._shared.name,
+            "callerid": self._shared.standing_for(Kind.PUBLISHER, topic),
             "latching": "1" if any(qos.latched for qos in known) else "0",
             "md5sum": codec.md5sum,
             "message_definition": codec.definition,
@@ -406,18 +450,18 @@ class _Link:
         """Unsubscribe, and end the connection."""
         if self._subscription is not None:
             self._subscription.close()
-        self._shared.loop.call(self._stream.close)
+        self._shared.loop.call(self.stream.close)
 
     def _follow(self) -> None:
         """Notice the end of the connection."""
-        if self._stream.is_closed:
+        if self.stream.is_closed:
             self.closed()
         else:
-            self._stream.handler = self
-            self._stream.pause(reading=True)
+            self.stream.handler = self
+            self.stream.pause(reading=True)
 
     def _send(self, payload: Any, info: MessageInfo) -> None:
-        if info.gid in self._shared.gids:
+        if info.gid in self._own:
             return  # from ROS 1, which delivers it itself
         sequence = (info.sequence & 0xFFFFFFFF).to_bytes(4, "little")
         try:
@@ -429,7 +473,8 @@ class _Link:
                     "dropping a message for node '%s' (told once): %.300s", self._node.name, error
                 )
             return
-        self._stream.send((_LENGTH.pack(len(data)), data))
+        self.stream.send((_LENGTH.pack(len(data)), data))
+        self.sent += 1
 
     # What the stream calls, on the thread of the loop.
 

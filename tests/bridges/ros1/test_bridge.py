@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import socket
 import struct
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import pytest
 from network import TIMEOUT, eventually
@@ -116,6 +118,13 @@ def test_topics_cross_both_ways(world: World, node: Node) -> None:
     info = world.run("rosnode", "info", "neighbour")
     assert " * /of_rosz [std_msgs/String]" in info
     assert " * to: /rospy_listener" in info
+    with ServerProxy(world.call("lookupNode", "/x", "/neighbour")[2]) as asked:
+        published, subscribed, _ = asked.getBusStats("/x")[2]
+    [[_, total, [[_, sent, messages, alive]]]] = [row for row in published if row[0] == "/of_rosz"]
+    assert (total, alive) == (sent, True)
+    assert sent > messages > 0
+    [[_, [[_, received, *_]]]] = [row for row in subscribed if row[0] == "/of_rospy"]
+    assert received > 0
     timer.close()
 
     # What nobody on the other side wants does not cross.
@@ -211,10 +220,18 @@ def test_logs_cross_both_ways(world: World, node: Node) -> None:
     assert (log.level, log.name) == (Log.WARN, "/rospy_server")
     program.send(signal.SIGINT)
     watcher = world.start("rostopic", "echo", "--noarr", "/rosout")
+    gathered = world.start("rostopic", "echo", "--noarr", "/rosout_agg")
     timer = node.timer(0.1, lambda _: node.log.error("from rosz"))
-    watcher.wait_for('msg: "from rosz"')
-    watcher.wait_for("level: 8")
+    for each in (watcher, gathered):
+        each.wait_for('msg: "from rosz"')
+        each.wait_for("level: 8")
     timer.close()
+    world.rospy(SERVER).wait_for("ready")
+    gathered.wait_for('msg: "serving"')
+    gathered.send(signal.SIGINT)
+    gathered.exit_code()
+    stamps = re.findall(r"nsecs: +(\d+)\n.*\nlevel: 4\nname: \"/rospy_server\"", gathered.output)
+    assert len(stamps) == len(set(stamps)) > 0, "nothing comes twice"
 
 
 def test_a_node_of_rosz_answers_ros_1s_questions(world: World) -> None:

@@ -26,7 +26,7 @@ _OWN = re.compile(
     re.MULTILINE | re.VERBOSE,
 )
 _PLACES = (
-    (re.compile(r"http://127\.0\.0\.1:\d+/"), "<place>"),
+    (re.compile(r"http://127\.0\.0\.1:\d+/(?:node/\w+/)?"), "<place>"),
     (re.compile(rf"{_HOST}, pid \d+"), "<place>"),
     (re.compile(rf"^(?:127\.0\.0\.1|{_HOST})$", re.MULTILINE), "<host>"),
     (re.compile(r"rosrpc://127\.0\.0\.1:\d+"), "<uri>"),

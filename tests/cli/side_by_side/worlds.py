@@ -32,7 +32,7 @@ _SOME = 3
 _PACKAGE = {
     "package.xml": (
         "<package><name>demo_pkg</name><version>0.1.0</version><description>d</description>"
-        '<maintainer email="a@b.c">m</maintainer><license>MIT</license></package>'
+        '<maintainer email="a@example.org">m</maintainer><license>MIT</license></package>'
     ),
     "msg/Reading.msg": (
         "# What a sensor says.\nint32 GOOD=1\nstring UNIT=volt # always\n\nHeader header\n"
