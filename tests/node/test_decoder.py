@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rosz.node.decoder import Decoder
+from rosz.node.decoder import Decoder, Received
 from rosz.session import Reply, Sample
 from rosz.wire import pack_attachment
 
@@ -26,6 +26,26 @@ def _sample(sequence: int, *, replayed: bool) -> Sample:
         attachment=_Bytes(pack_attachment(sequence, 0, GID)),
     )
     return Reply(SimpleNamespace(ok=raw)) if replayed else Sample(raw)  # type: ignore[arg-type]
+
+
+def _decoder(counted: list[int]) -> Decoder:
+    return Decoder(
+        "/map",
+        "std_msgs/msg/String",
+        "",
+        None,
+        logging.getLogger(),
+        counted.append,
+        has_header=False,
+        with_info=True,
+    )
+
+
+def _decode(decoder: Decoder, samples: str) -> list[Received | None]:
+    return [
+        decoder.decode(_sample(int(one.lstrip("r")), replayed=one[0] == "r"))
+        for one in samples.split()
+    ]
 
 
 @pytest.mark.parametrize(
@@ -48,21 +68,14 @@ def _sample(sequence: int, *, replayed: bool) -> Sample:
 )
 def test_replays_and_live_samples_make_one_sequence(samples: str, messages: str, lost: int) -> None:
     counted: list[int] = []
-    decoder = Decoder(
-        "/map",
-        "std_msgs/msg/String",
-        "",
-        None,
-        logging.getLogger(),
-        counted.append,
-        has_header=False,
-        with_info=True,
-    )
+    decoder = _decoder(counted)
     decoder.expect_replay(GID)
-    found = [
-        decoder.decode(_sample(int(one.lstrip("r")), replayed=one[0] == "r"))
-        for one in samples.split()
-    ]
+    found = _decode(decoder, samples)
     assert " ".join(one[0].decode() for one in found if one) == messages
     assert sum(counted) == lost
     assert sum(one[1].lost for one in found if one and one[1]) == lost
+
+
+def test_a_replay_that_was_requested_of_another_publisher_comes_once() -> None:
+    found = _decode(_decoder([]), "r3 r3 4 r4 5")
+    assert " ".join(one[0].decode() for one in found if one) == "3 4 5"

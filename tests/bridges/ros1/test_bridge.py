@@ -119,7 +119,8 @@ def test_topics_cross_both_ways(world: World, node: Node) -> None:
     assert " * /of_rosz [std_msgs/String]" in info
     assert " * to: /rospy_listener" in info
     with ServerProxy(world.call("lookupNode", "/x", "/neighbour")[2]) as asked:
-        published, subscribed, _ = asked.getBusStats("/x")[2]
+        statistics: Any = asked.getBusStats("/x")
+    published, subscribed, _ = statistics[2]
     [[_, total, [[_, sent, messages, alive]]]] = [row for row in published if row[0] == "/of_rosz"]
     assert (total, alive) == (sent, True)
     assert sent > messages > 0
