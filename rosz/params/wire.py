@@ -30,6 +30,7 @@ Under ``@rosz/<domain>/``::
     store/<zid>/ask              query to one replica: read for a client
     store/<zid>/set[/<path>]     query to one replica: write for a client
     replica/<zid>/<start>/<who>  liveliness token of a replica
+    elder/<zid>/<start>/<who>    a second one of a few replicas, which all others follow
 
 Where links need keys, the key of a write names a path that all of the write lies at or below, so
 that rules can tell who may write what. A replica accepts no write that reaches further than its
@@ -81,6 +82,8 @@ __all__ = (
     "split_path",
 )
 
+_REPLICA: Final = "replica"
+_ELDER: Final = "elder"
 _MOMENT: Final = 1
 _DATE: Final = 2
 _PLAIN: Final = frozenset({bool, int, float, str, bytes})
@@ -120,6 +123,7 @@ class Keys:
         all_params: Key expression of all parameters, including the root.
         change: Key of batches, without a path.
         tokens: Key expression of the liveliness tokens of all replicas.
+        elders: Key expression of the second tokens of elders.
     """
 
     def __init__(self, domain: int, *, scoped: bool = False) -> None:
@@ -127,7 +131,8 @@ class Keys:
         self.params: str = own_key(domain, "param")
         self.all_params: str = f"{self.params}/**"
         self.change: str = own_key(domain, "change")
-        self.tokens: str = own_key(domain, "replica", "**")
+        self.tokens: str = own_key(domain, _REPLICA, "**")
+        self.elders: str = own_key(domain, _ELDER, "**")
         self._domain = domain
 
     def param(self, path: Path) -> str:
@@ -186,20 +191,28 @@ class Keys:
 
     def token(self, member: Member) -> str:
         """Return the liveliness token of a replica."""
+        return self._token(_REPLICA, member)
+
+    def elder_token(self, member: Member) -> str:
+        """Return the second token of a replica that is an elder."""
+        return self._token(_ELDER, member)
+
+    def _token(self, kind: str, member: Member) -> str:
         label = to_key((member.label or "-",))
-        return own_key(self._domain, "replica", member.zid, str(member.start), label)
+        return own_key(self._domain, kind, member.zid, str(member.start), label)
 
     def member(self, token: str) -> Member:
-        """Return the replica that a liveliness token describes.
+        """Return the replica that one of its liveliness tokens describes.
 
         Raises:
             DecodeError: The text is not the token of a replica.
         """
-        head = own_key(self._domain, "replica") + "/"
-        chunks = token.removeprefix(head).split("/")
-        if not token.startswith(head) or len(chunks) != 3 or not chunks[1].isdecimal():  # noqa: PLR2004  # zid, start, label
+        heads = [own_key(self._domain, kind) + "/" for kind in (_REPLICA, _ELDER)]
+        head = next((one for one in heads if token.startswith(one)), "")
+        chunks = token[len(head) :].split("/")
+        if not head or len(chunks) != 3 or not chunks[1].isdecimal():  # noqa: PLR2004  # zid, start, label
             raise DecodeError(
-                "replica token", 0, f"'{token}', expected '{head}<zid>/<start>/<who>'"
+                "replica token", 0, f"'{token}', expected '{heads[0]}<zid>/<start>/<who>'"
             )
         return Member(int(chunks[1]), chunks[0], joined(from_key(chunks[2]))[1:])
 

@@ -151,7 +151,7 @@ def _services(names: Sequence[str], asked: Flow, answered: Flow) -> Iterator[_Gr
 def _reading() -> Iterator[_Grant]:
     """Yield the messages of a replica that only receives, and of a client of a replica."""
     for flow in _BOTH:
-        yield flow, _TOKEN, [f"{_OWN}/replica/**"]
+        yield flow, _TOKEN, [f"{_OWN}/replica/**", f"{_OWN}/elder/**"]
         yield flow, _DATA, [f"{_OWN}/ack/*"]
         yield flow, _LISTEN, [f"{_OWN}/ack/*", f"{_OWN}/change/**"]
         # A write that seems lost is queried again; its key says which parameter it is for.
@@ -179,7 +179,7 @@ def _setting(names: Sequence[str], *, reads: bool) -> Iterator[_Grant]:
     verbs = ("write", "set", "tell") if reads else ("write", "set")
     yield "ingress", _ASK, [f"{_OWN}/store/*/{verb}/{at}" for verb in verbs for at in places]
     if not reads:
-        yield "egress", _TOKEN, [f"{_OWN}/replica/**"]
+        yield "egress", _TOKEN, [f"{_OWN}/replica/**", f"{_OWN}/elder/**"]
         yield "egress", _LISTEN, [f"{_OWN}/change/**"]
         yield "ingress", _LISTEN, [f"{_OWN}/ack/*"]
         yield "egress", _DATA, [f"{_OWN}/ack/*"]

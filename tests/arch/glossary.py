@@ -16,6 +16,7 @@ WORDS = {
     "decoder": "what turns samples of one type into messages",
     "digest": "a hash of all writes of a replica",
     "domain": "ROS_DOMAIN_ID; domains do not see each other",
+    "elder": "one of the few replicas that follow all others, so that others need not",
     "endpoint": "a Zenoh address, such as tcp/robot1:7447",
     "entity": "a publisher, subscription, service or client of a node (rmw_zenoh)",
     "GID": "16 bytes that identify an entity",

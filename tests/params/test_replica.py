@@ -410,15 +410,6 @@ def test_those_that_meet_again_compare_unasked(network: Network) -> None:
     eventually(lambda: deaf.has("/a"))
 
 
-def test_one_that_went_before_it_could_be_watched_is_forgotten(network: Network) -> None:
-    replica = network.replica()
-    ghost = Member(1, "f0f0", "ghost")
-    replica._members._update(ghost, True)
-    assert replica.members() == [ghost]
-    eventually(lambda: replica.members() == [])
-    assert replica.set("/a", 1).slow == ()
-
-
 def test_leaving_is_seen_and_ends_writing(network: Network) -> None:
     one, other = network.replicas(2)
     with one:

@@ -40,8 +40,9 @@ _LARGE: Final = 16_384
 
 _ACK: Final = struct.Struct("<Q")
 _SEPARATOR: Final = b" "
-_MAX_PEERS: Final = 1000
-"""Writers with a publisher of their own for the acknowledgements to them."""
+_MAX_WRITERS: Final = 100
+"""Writers that are remembered, some with a publisher of their own for the acknowledgements to them;
+when there are more, all are forgotten."""
 
 _SENDERS: Final = 4
 _MAX_UNSENT: Final = 100
@@ -204,15 +205,15 @@ class WriteBroadcaster:
         self._senders: Worker[Callable[[], object]] = Worker(
             "rosz-params-send", _send, threads=_SENDERS, capacity=_MAX_UNSENT, logger=_log
         )
-        self._ack_publishers: dict[str, RawPublisher] = {}
-        self._publisher = session.publisher(keys.change, block=True)
+        self._ack_publishers: dict[str, RawPublisher | None] = {}
+        self._publisher: RawPublisher | None = None
+        self._lock = threading.RLock()
         resent_key = keys.of(session.zid, "write")
         self._declared: list[Closable] = [
             session.subscriber(keys.change, self._on_change, remote_only=True),
             session.subscriber(
                 f"{keys.scoped_change(session.zid)}/**", self._on_change, remote_only=True
             ),
-            session.subscriber(keys.ack(session.zid), self._on_ack, remote_only=True),
             session.queryable(f"{resent_key}/**", self._on_resent, complete=True),
         ]
 
@@ -250,9 +251,8 @@ class WriteBroadcaster:
         return Delivery(tuple(late), refusals)
 
     def drop_peer(self, zid: str) -> None:
-        """Stop waiting for a replica that is gone, and stop acknowledging its writes."""
+        """Stop waiting for a replica that is gone."""
         self.pending.drop_peer(zid)
-        self._worker.submit(lambda: self._close_ack_publisher(zid))
 
     def close(self) -> None:
         """Undeclare everything, and stop waiting for all replicas."""
@@ -260,9 +260,18 @@ class WriteBroadcaster:
             declared.close()
         self.pending.abandon()
         self._senders.close()
-        for zid in tuple(self._ack_publishers):
-            self._close_ack_publisher(zid)
-        self._publisher.close()
+        self._close_ack_publishers()
+        if self._publisher is not None:
+            self._publisher.close()
+
+    def _begin(self) -> RawPublisher:
+        """Declare what a replica needs that writes, as most never do."""
+        with self._lock:
+            if self._publisher is None:
+                key = self._keys.ack(self._session.zid)
+                self._declared.append(self._session.subscriber(key, self._on_ack, remote_only=True))
+                self._publisher = self._session.publisher(self._keys.change, block=True)
+            return self._publisher
 
     def _publish(self, changes: list[Change], message: bytes) -> None:
         if len(message) <= _LARGE and not self.pending.any_lagging:
@@ -272,11 +281,12 @@ class WriteBroadcaster:
             self._senders.offer(lambda: self._put(changes, message))
 
     def _put(self, changes: list[Change], message: bytes) -> None:
+        publisher = self._publisher or self._begin()
         if self._keys.scoped:
             key = self._keys.scope(self._keys.scoped_change(), (path for path, _ in changes))
             self._session.put(key, message)
         else:
-            self._publisher.put(message)
+            publisher.put(message)
 
     def _all_stopped(self, pending: PendingWrite) -> bool:
         """Tell whether all sessions waited for are stopped; they get the write when they resume."""
@@ -354,14 +364,22 @@ class WriteBroadcaster:
             _log.debug("a write is not acknowledged: %s", error)
 
     def _open_ack_publisher(self, sender: str) -> None:
-        """Declare the key of acknowledgements to a writer, which makes each put faster."""
-        if sender not in self._ack_publishers and len(self._ack_publishers) < _MAX_PEERS:
+        """Declare the key of acknowledgements to a writer, which makes each put faster.
+
+        That is worth it from the second write on.
+        """
+        if sender not in self._ack_publishers:
+            if len(self._ack_publishers) >= _MAX_WRITERS:
+                self._close_ack_publishers()
+            self._ack_publishers[sender] = None
+        elif self._ack_publishers[sender] is None:
             self._ack_publishers[sender] = self._session.publisher(self._keys.ack(sender))
 
-    def _close_ack_publisher(self, zid: str) -> None:
-        publisher = self._ack_publishers.pop(zid, None)
-        if publisher is not None:
-            publisher.close()
+    def _close_ack_publishers(self) -> None:
+        publishers, self._ack_publishers = self._ack_publishers, {}
+        for publisher in publishers.values():
+            if publisher is not None:
+                publisher.close()
 
     def _on_ack(self, sample: Sample) -> None:
         payload = sample.payload

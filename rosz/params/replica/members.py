@@ -1,8 +1,15 @@
-"""The replicas that are alive, by their liveliness tokens."""
+"""The replicas that are alive, by their liveliness tokens.
+
+A replica follows the tokens of elders, which are a few of all replicas, whatever their number: it
+joins from one of them and compares with them. Elders follow all replicas, and so does whoever
+writes, to know who has to acknowledge that. The tokens of all would cost each replica as much as
+there are others.
+"""
 
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -17,100 +24,149 @@ __all__ = ("Core", "Members")
 
 _log = logging.getLogger("rosz.params")
 
+_OnChange = Callable[[Member, bool], None]
+"""Function called with a replica that comes or goes, and whether it comes."""
+
 
 class Members:
-    """All replicas of a domain except for the one of this session.
+    """Other replicas of a domain: the elders, and all of them as long as somebody needs them.
 
     Args:
         session: Session to find them with.
         keys: Keys of the domain.
 
     Attributes:
-        zids: Zenoh ids of their sessions; the set is replaced, never changed in place.
+        zids: Zenoh ids of the sessions of those known; the set is replaced, never changed in place.
     """
 
     def __init__(self, session: Session, keys: Keys) -> None:
         self.zids: frozenset[str] = frozenset()
         self._session = session
         self._keys = keys
+        self._elders: dict[str, Member] = {}
         self._found: dict[str, Member] = {}
-        self._on_change: Callable[[Member, bool], None] | None = None
-        self._watch: Closable | None = None
-        self._watched: set[str] = set()
+        self._on_elder: _OnChange | None = None
+        self._on_member: _OnChange | None = None
+        self._watches: list[Closable] = []
+        self._complete = threading.Event()
+        self._reasons: set[str] = set()
+        # A signal handler that writes may interrupt its own thread.
+        self._lock = threading.RLock()
 
-    def follow(self, on_change: Callable[[Member, bool], None], timeout: float) -> None:
-        """Find the replicas that are alive, and watch for all that come and go from then on.
+    def follow(self, on_elder: _OnChange, on_member: _OnChange, timeout: float) -> None:
+        """Find the elders, and watch for those that come and go from then on.
 
         Args:
-            on_change: Function called on a Zenoh thread with each replica that comes or goes later,
-                and whether it came.
-            timeout: Time limit in seconds of the search for replicas that are alive.
+            on_elder: Function called on a watch's thread with each elder that comes or goes later.
+            on_member: Function called on a watch's thread with each replica that comes or goes
+                while all are followed.
+            timeout: Time limit in seconds of the search for elders that exist.
 
         Raises:
             ClosedError: The session is closed.
         """
-        # The search comes first: once tokens are watched, Zenoh answers it from what the watch has
-        # seen so far.
-        for token in self._session.live_tokens(self._keys.tokens, timeout):
-            member = self._read(token)
-            if member is not None:
-                self._update(member, True)
-        self._on_change = on_change
-        self._watch = self._session.watch_tokens(self._keys.tokens, self._on_token)
+        known = threading.Event()
+        self._on_member = on_member
+        watch = self._session.watch_tokens(self._keys.elders, self._on_elder_token, known.set)
+        self._watches.append(watch)
+        known.wait(timeout)
+        self._on_elder = on_elder
 
-    def drop_stale(self) -> None:
-        """Forget replicas that went before the watch began; call it some time after that."""
-        for zid in self.zids - self._watched:
-            member = self._found.get(zid)
-            if member is not None:
-                self._update(member, False)
+    def follow_all(self, reason: str, timeout: float = 0.0) -> None:
+        """Follow all replicas, until this is undone for each reason to do so.
+
+        Args:
+            reason: What needs them.
+            timeout: Time limit in seconds of the search for those that exist.
+
+        Raises:
+            ClosedError: The session is closed.
+        """
+        if reason not in self._reasons:
+            with self._lock:
+                first = not self._reasons
+                self._reasons.add(reason)
+                if first:
+                    self._watches.append(self._watch_all())
+        if not self._complete.is_set():
+            self._complete.wait(timeout)
+
+    def unfollow_all(self, reason: str) -> None:
+        """Undo `follow_all` for one reason."""
+        with self._lock:
+            if reason in self._reasons:
+                self._reasons.discard(reason)
+                if not self._reasons:
+                    self._watches.pop().close()
+                    self._complete = threading.Event()
+                    self._found = {}
+                    self._count()
 
     def all(self) -> list[Member]:
-        """Return the replicas, oldest first."""
-        return sorted(self._found.copy().values())
+        """Return the replicas that are known, oldest first."""
+        with self._lock:
+            return sorted(self._known().values())
 
-    def oldest(self) -> Member | None:
-        """Return the oldest replica; ``None`` if there is none."""
-        return min(self._found.copy().values(), default=None)
+    def elders(self) -> list[Member]:
+        """Return the elders, oldest first."""
+        return sorted(self._elders.copy().values())
 
     def label(self, zid: str) -> str:
         """Return the process of a replica, as shown to users."""
-        member = self._found.get(zid)
+        member = self._found.get(zid) or self._elders.get(zid)
         return member.label if member is not None else f"session {zid}"
 
     def close(self) -> None:
         """Stop watching; a second call has no effect."""
-        if self._watch is not None:
-            self._watch.close()
+        for watch in self._watches:
+            watch.close()
+
+    def _watch_all(self) -> Closable:
+        complete = self._complete
+        self._found = {}
+
+        def on_token(token: str, alive: bool) -> None:
+            if complete is self._complete:
+                self._on_token(token, alive)
+
+        def on_complete() -> None:
+            with self._lock:
+                complete.set()
+                self._count()
+
+        return self._session.watch_tokens(self._keys.tokens, on_token, on_complete)
+
+    def _on_elder_token(self, token: str, alive: bool) -> None:
+        self._update(self._elders, token, alive, self._on_elder)
 
     def _on_token(self, token: str, alive: bool) -> None:
-        member = self._read(token)
-        if member is None:
-            return
-        if alive:
-            self._watched.add(member.zid)
-        else:
-            self._watched.discard(member.zid)
-        self._update(member, alive)
+        on_change = self._on_member if self._complete.is_set() else None
+        self._update(self._found, token, alive, on_change)
 
-    def _read(self, token: str) -> Member | None:
+    def _update(
+        self, known: dict[str, Member], token: str, alive: bool, on_change: _OnChange | None
+    ) -> None:
         try:
             member = self._keys.member(token)
         except DecodeError as error:
             _log.warning("%s", error)
-            return None
-        return None if member.zid == self._session.zid else member
-
-    def _update(self, member: Member, alive: bool) -> None:
-        if alive and self._found.get(member.zid) == member:
             return
-        if alive:
-            self._found[member.zid] = member
-        else:
-            self._found.pop(member.zid, None)
-        self.zids = frozenset(self._found.copy())
-        if self._on_change is not None:
-            self._on_change(member, alive)
+        if member.zid == self._session.zid or (alive and known.get(member.zid) == member):
+            return
+        with self._lock:
+            if alive:
+                known[member.zid] = member
+            else:
+                known.pop(member.zid, None)
+            self._count()
+        if on_change is not None:
+            on_change(member, alive)
+
+    def _known(self) -> dict[str, Member]:
+        return self._found if self._complete.is_set() else self._elders | self._found
+
+    def _count(self) -> None:
+        self.zids = frozenset(self._known())
 
 
 class Core:

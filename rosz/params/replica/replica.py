@@ -52,6 +52,12 @@ NO_REPLICA: Final = (
     "'rosz core', 'rosz launch …' or any node that uses parameters"
 )
 
+_ELDERS: Final = 3
+"""Elders that there should be; each compares with one of them, and one is left if two end."""
+
+_ELDER: Final = "elder"
+_READER: Final = "reader"
+_WRITER: Final = "writer"
 _MESH_TIMEOUT: Final = 2.0
 _TOKENS_TIMEOUT: Final = 0.5
 _COMPARE_EVERY: Final = 5.0
@@ -173,11 +179,16 @@ class Replica(_Copy):
         ]
         if settled is not None:
             settled.wait(_MESH_TIMEOUT)
-        self._members.follow(self._on_member, _TOKENS_TIMEOUT)
+        self._elder: Closable | None = None
+        self._members.follow(self._on_elder, self._on_member, _TOKENS_TIMEOUT)
+        # Where rules may keep some replicas apart from others, all are elders.
+        if elder := keys.scoped or not self._members.elders():
+            self._members.follow_all(_ELDER, _TOKENS_TIMEOUT)
         self._token = session.token(keys.token(self._own))
         self._join()
-        self._serve_parameter_keys()
-        AntiEntropy(self._is_oldest, sync, self._parameter_keys, self._compact)
+        if elder:
+            self._become_elder()
+        AntiEntropy(self._is_oldest, sync, self._parameter_keys, self._compact, self._check_elders)
 
     def set(
         self, name: str | Path, value: object, *, origin: str = "", timeout: float = ACK_TIMEOUT
@@ -249,6 +260,8 @@ class Replica(_Copy):
         batch = list(changes)
         if not batch:
             return Outcome(0)
+        if timeout > 0:
+            self._members.follow_all(_WRITER, timeout)
         origin = origin or self.label
         stamp, change = self._state.write(batch, origin, stamp)
         slow, refusals = self._broadcaster.send(batch, stamp, origin, timeout)
@@ -264,7 +277,8 @@ class Replica(_Copy):
         return Outcome(stamp.time, slow)
 
     def members(self) -> list[Member]:
-        """Return the other replicas that are alive, oldest first."""
+        """Return the other replicas that are alive, oldest first, and follow all from now on."""
+        self._members.follow_all(_READER, _TOKENS_TIMEOUT)
         return self._members.all()
 
     def compare(self, timeout: float) -> bool:
@@ -277,6 +291,7 @@ class Replica(_Copy):
             Whether all of them replied in time.
         """
         timeout = clamp_timeout(timeout)
+        self._members.follow_all(_READER, timeout)
         results: SimpleQueue[bool] = SimpleQueue()
         expected = self._sync.compare_with_all(results.put)
         try:
@@ -310,6 +325,8 @@ class Replica(_Copy):
 
     def _leave(self) -> None:
         self._token.close()
+        if self._elder is not None:
+            self._elder.close()
         for declared in self._declared:
             declared.close()
         self._broadcaster.close()
@@ -329,26 +346,48 @@ class Replica(_Copy):
         else:
             self._state.restore(self._parameter_keys.load())
             self._sync.ready = True
-        for member in self._members.all():
+        for member in self._members.elders():
             if member.zid not in known:
-                self._on_member(member, True)
+                self._on_elder(member, True)
+
+    def _on_elder(self, member: Member, alive: bool) -> None:
+        self._worker.submit(self._serve_parameter_keys)
+        if alive and self._sync.ready:
+            self._sync.compare_soon(member.zid)
 
     def _on_member(self, member: Member, alive: bool) -> None:
-        if member < self._own:  # a younger one changes nothing, and many may come at once
-            self._worker.submit(self._serve_parameter_keys)
         if not alive:
             self._broadcaster.drop_peer(member.zid)
             self._sync.drop_peer(member.zid)
         elif self._sync.ready and member < self._own:
             self._sync.compare_soon(member.zid)
 
+    def _check_elders(self) -> None:
+        """Become an elder if there are too few, or be none any more if there are too many."""
+        elders = self._members.elders()
+        if self._elder is None:
+            if len(elders) < _ELDERS:
+                self._members.follow_all(_ELDER)
+                self._become_elder()
+        elif not self._keys.scoped and sum(elder < self._own for elder in elders) >= _ELDERS:
+            self._elder.close()
+            self._elder = None
+            self._members.unfollow_all(_ELDER)
+
+    def _become_elder(self) -> None:
+        self._elder = self._core.session.token(self._keys.elder_token(self._own))
+        if self._lifecycle.closing:  # perhaps too late for the thread that closes the replica
+            self._elder.close()
+        self._serve_parameter_keys()
+
     def _serve_parameter_keys(self) -> None:
         # Rules may keep replies of replicas on other machines away from this one.
         self._parameter_keys.serve(lambda: self._keys.scoped or self._is_oldest())
 
     def _is_oldest(self) -> bool:
-        oldest = self._members.oldest()
-        return oldest is None or self._own < oldest
+        return self._elder is not None and all(
+            self._own < elder for elder in self._members.elders()
+        )
 
     def _restore(self, handover: bytes) -> bool:
         """Restore what is handed over or stored; return whether the storage differs from it."""
@@ -390,6 +429,9 @@ class Replica(_Copy):
             self._parameter_keys.publish(undone)
 
 
+def _ignore(_member: Member, _alive: bool) -> None: ...
+
+
 def _refused(batch: list[Change], refusals: Mapping[str, str]) -> ParamError:
     name = joined(batch[0][0])
     more = f" and {len(batch) - 1} more" if len(batch) > 1 else ""
@@ -414,7 +456,9 @@ class Follower(_Copy):
         super().__init__(session, domain)
         self._subscriber = session.subscriber(f"{self._keys.change}/**", self._on_change)
         try:
-            self._members.follow(self._on_member, timeout)
+            self._members.follow(_ignore, self._on_member, timeout)
+            if not self._members.zids:
+                self._members.follow_all(_READER, timeout)
             self._join()
         except BaseException:
             self.close()

@@ -52,8 +52,10 @@ _JOIN_TIMEOUT: Final = 30.0
 _WARN_AFTER: Final = 5.0
 """Seconds after which a replica that cannot join warns; 100 that start at once need their time."""
 
+_JOINING: Final = "joining"
+_MORE_TIMEOUT: Final = 0.5
 _SPREAD: Final = 0.05
-"""Seconds for each ten replicas over which those that find each other spread their requests."""
+"""Seconds over which those that find each other spread their requests."""
 
 _MAX_COMPARED: Final = 8
 """Replicas to compare with, of those that appear together; with more, a large start never ends."""
@@ -96,6 +98,7 @@ class Synchroniser:
         self.refused: _RefusedWrites = _RefusedWrites()
         self.merge: Callable[[list[Write], int], object] = core.state.merge
         self._appeared: set[str] = set()
+        self._warned = False
 
     def join(self) -> None:
         """Get what the others have, from the first one that has joined and replies."""
@@ -103,30 +106,42 @@ class Synchroniser:
         asked: list[str] = []
         open_requests = 0
         began = time.monotonic()
-        warned = False
         while (passed := time.monotonic() - began) < _JOIN_TIMEOUT:
-            for member in self.members.all():
-                if member.zid not in asked:
-                    asked.append(member.zid)
-                    self.worker.submit(partial(self._compare, member.zid, results.put))
-                    open_requests += 1
+            zid = next((one.zid for one in self.members.all() if one.zid not in asked), "")
+            if zid:
+                asked.append(zid)
+                self.worker.submit(partial(self._compare, zid, results.put))
+                open_requests += 1
+            elif not open_requests:
+                if not self._find_more(asked):
                     break
-            if not open_requests:
-                break
+                continue
             try:
                 if results.get(timeout=min(_NEXT_AFTER * 2 ** (len(asked) - 1), _WARN_AFTER)):
                     break
                 open_requests -= 1
             except Empty:
-                all_stopped = self.session.out_of_reach() >= self.members.zids
-                if all_stopped or (passed > _WARN_AFTER and not warned):
-                    warned = True
-                    self._warn(asked, passed)
-                if all_stopped:
+                if self._is_hopeless(asked, passed):
                     break
         else:
             self._warn(asked, _JOIN_TIMEOUT)
+        self.members.unfollow_all(_JOINING)
         self.ready = True
+
+    def _find_more(self, asked: list[str]) -> bool:
+        """Look for replicas other than elders; return whether there are any to ask."""
+        self.members.follow_all(_JOINING, _MORE_TIMEOUT)
+        return not self.members.zids.issubset(asked)
+
+    def _is_hopeless(self, asked: list[str], passed: float) -> bool:
+        """Tell whether all replicas are stopped, and warn once when it takes long."""
+        all_stopped = self.session.out_of_reach() >= self.members.zids
+        if not (all_stopped or passed > _WARN_AFTER) or self._find_more(asked):
+            return False
+        if not self._warned:
+            self._warned = True
+            self._warn(asked, passed)
+        return all_stopped
 
     def on_sync(self, query: Query) -> None:
         """Handle a request of another replica on the ``sync`` key."""
@@ -156,8 +171,8 @@ class Synchroniser:
         self.worker.submit(lambda: self.refused.drop_peer(zid))
 
     def compare_with_one(self) -> None:
-        """Compare with a random replica."""
-        zids = sorted(self.members.zids)
+        """Compare with a random elder, or with any replica if there is none."""
+        zids = [member.zid for member in self.members.elders()] or sorted(self.members.zids)
         self.worker.submit(lambda: self.refused.trim(self.state))
         if zids:
             zid = random.choice(zids)  # noqa: S311  # not for security
@@ -183,8 +198,7 @@ class Synchroniser:
 
     def _add_appeared(self, zid: str) -> None:
         if not self._appeared:
-            spread = _SPREAD * (1 + len(self.members.zids) / 10)
-            delay = random.uniform(0, spread)  # noqa: S311  # not for security
+            delay = random.uniform(0, _SPREAD)  # noqa: S311  # not for security
             self.worker.later(delay, self._compare_with_appeared)
         self._appeared.add(zid)
 
@@ -417,7 +431,7 @@ class _RefusedWrites:
 
 
 class AntiEntropy:
-    """Compares with a random replica from time to time, and drops old tombstones.
+    """Compares with a random elder from time to time, and drops old tombstones.
 
     It also compares storages with the tree, in the oldest replica.
 
@@ -426,6 +440,7 @@ class AntiEntropy:
         sync: Synchroniser of the replica.
         parameter_keys: Keys that storages hold.
         on_forgotten: Function called when tombstones were dropped.
+        on_tick: Function called each second.
     """
 
     def __init__(
@@ -434,11 +449,13 @@ class AntiEntropy:
         sync: Synchroniser,
         parameter_keys: ParameterKeys,
         on_forgotten: Callable[[], None],
+        on_tick: Callable[[], None],
     ) -> None:
         self._is_oldest = is_oldest
         self._sync = sync
         self._parameter_keys = parameter_keys
         self._on_forgotten = on_forgotten
+        self._on_tick = on_tick
         now = time.monotonic()
         self._last = now
         self._compare_at = now + random.uniform(*_COMPARE_EVERY)  # noqa: S311  # not for security
@@ -451,7 +468,7 @@ class AntiEntropy:
         now = time.monotonic()
         late = now - self._last - _TICK
         self._last = now
-        self._sync.members.drop_stale()
+        self._on_tick()
         self._sync.state.apply_deferred()
         if late > _STOPPED or now >= self._compare_at:
             self._compare_at = now + random.uniform(*_COMPARE_EVERY)  # noqa: S311  # see above
