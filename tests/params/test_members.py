@@ -6,15 +6,21 @@ import pytest
 from network import eventually
 
 from rosz.params.replica import Replica
-from rosz.params.replica.replica import _ELDERS
+from rosz.params.replica import replica as joining
 from rosz.params.wire import Keys, Member
 from rosz.session import SessionConfig
 
-from .network import TIMEOUT, Network
+from .network import Network
 from .test_replica import Mute
 
 COUNT = 7
 KEYS = Keys(0)
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let replicas become elders as soon as there are too few."""
+    monkeypatch.setattr(joining, "_CHANCE", 1.0)
 
 
 def crowd(network: Network) -> tuple[list[Replica], list[Replica]]:
@@ -26,7 +32,7 @@ def crowd(network: Network) -> tuple[list[Replica], list[Replica]]:
 def sort_out(everyone: list[Replica]) -> tuple[list[Replica], list[Replica]]:
     def agreed() -> bool:
         chosen = {one.zid for one in everyone if one._elder is not None}
-        return len(chosen) == _ELDERS and all(
+        return len(chosen) == joining._ELDERS and all(
             {one.zid for one in replica._members.elders()} == chosen - {replica.zid}
             for replica in everyone
         )
@@ -38,12 +44,12 @@ def sort_out(everyone: list[Replica]) -> tuple[list[Replica], list[Replica]]:
 
 def test_a_replica_that_only_reads_follows_elders_alone(network: Network) -> None:
     few, others = crowd(network)
-    assert len(few) == _ELDERS
+    assert len(few) == joining._ELDERS
     eventually(lambda: all(len(one._members.zids) == COUNT - 1 for one in few), "elders know all")
     for number in range(20):
         assert few[0].set("/count", number).slow == ()
         assert {replica.get("/count") for replica in few + others} == {number}
-    assert all(len(one._members.zids) == _ELDERS for one in others)
+    assert all(len(one._members.zids) == joining._ELDERS for one in others)
     # Whoever writes first has to know all others, who acknowledge it.
     for number, replica in enumerate(others):
         assert replica.set("/mine", number).slow == ()
@@ -69,7 +75,7 @@ def test_elders_that_are_too_many_follow_no_longer(network: Network) -> None:
         replica._members.follow_all("elder")
         replica._become_elder()
     assert {one.zid for one in sort_out(few + others)[0]} == {one.zid for one in few}
-    eventually(lambda: all(len(one._members.zids) == _ELDERS for one in others), "the rest")
+    eventually(lambda: all(len(one._members.zids) == joining._ELDERS for one in others), "the rest")
 
 
 def test_what_another_than_an_elder_missed_is_found(network: Network) -> None:
@@ -83,7 +89,7 @@ def test_what_another_than_an_elder_missed_is_found(network: Network) -> None:
     eventually(lambda: deaf.has("/a") and few[-1].has("/b"))
 
 
-@pytest.mark.parametrize("count", [1, _ELDERS])
+@pytest.mark.parametrize("count", [1, joining._ELDERS])
 def test_a_newcomer_joins_whatever_becomes_of_elders(network: Network, count: int) -> None:
     network.session(SessionConfig(mode="router", rendezvous=network.rendezvous))
     replica = network.join(network.command())
@@ -91,7 +97,7 @@ def test_a_newcomer_joins_whatever_becomes_of_elders(network: Network, count: in
     for _ in range(count):
         mute = Mute(network)
         network.keep(mute.session.token(KEYS.elder_token(mute.member)))
-    if count == _ELDERS:
+    if count == joining._ELDERS:
         eventually(lambda: replica._elder is None, "it leaves that to older ones")
     assert network.join(network.command()).get("/a") == 1
 

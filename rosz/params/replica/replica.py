@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import os
+import random
 import socket
 import sys
 import threading
@@ -53,7 +54,13 @@ NO_REPLICA: Final = (
 )
 
 _ELDERS: Final = 3
-"""Elders that there should be; each compares with one of them, and one is left if two end."""
+"""Elders that there should be."""
+
+_CHANCE: Final = 0.02
+"""Chance that a replica becomes an elder in a second, if there are too few: of many that start at
+once, a few may do so before the others are told. As long as there is none, it grows each second."""
+
+_GROWTH: Final = 4
 
 _ELDER: Final = "elder"
 _READER: Final = "reader"
@@ -180,6 +187,7 @@ class Replica(_Copy):
         if settled is not None:
             settled.wait(_MESH_TIMEOUT)
         self._elder: Closable | None = None
+        self._chance = _CHANCE
         self._members.follow(self._on_elder, self._on_member, _TOKENS_TIMEOUT)
         # Where rules may keep some replicas apart from others, all are elders.
         if elder := keys.scoped or not self._members.elders():
@@ -365,14 +373,18 @@ class Replica(_Copy):
     def _check_elders(self) -> None:
         """Become an elder if there are too few, or be none any more if there are too many."""
         elders = self._members.elders()
-        if self._elder is None:
-            if len(elders) < _ELDERS:
-                self._members.follow_all(_ELDER)
-                self._become_elder()
-        elif not self._keys.scoped and sum(elder < self._own for elder in elders) >= _ELDERS:
-            self._elder.close()
-            self._elder = None
-            self._members.unfollow_all(_ELDER)
+        if self._elder is not None:
+            if not self._keys.scoped and sum(one < self._own for one in elders) >= _ELDERS:
+                self._elder.close()
+                self._elder = None
+                self._members.unfollow_all(_ELDER)
+        elif len(elders) >= _ELDERS:
+            self._chance = _CHANCE
+        elif random.random() < self._chance:  # noqa: S311  # not for security
+            self._members.follow_all(_ELDER)
+            self._become_elder()
+        elif not elders:
+            self._chance *= _GROWTH
 
     def _become_elder(self) -> None:
         self._elder = self._core.session.token(self._keys.elder_token(self._own))
