@@ -66,7 +66,9 @@ _ELDER: Final = "elder"
 _READER: Final = "reader"
 _WRITER: Final = "writer"
 _MESH_TIMEOUT: Final = 2.0
-_TOKENS_TIMEOUT: Final = 0.5
+_TOKENS_TIMEOUT: Final = 5.0
+"""Seconds of the search for replicas; it takes milliseconds, or more while many start at once."""
+
 _COMPARE_EVERY: Final = 5.0
 _MAX_WAITING: Final = 2000
 """Tasks of a worker above which requests from the network are refused."""
