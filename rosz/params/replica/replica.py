@@ -272,6 +272,7 @@ class Replica(_Copy):
             return Outcome(0)
         if timeout > 0:
             self._members.follow_all(_WRITER, timeout)
+            timeout = max(0.0, deadline - time.monotonic())
         origin = origin or self.label
         stamp, change = self._state.write(batch, origin, stamp)
         slow, refusals = self._broadcaster.send(batch, stamp, origin, timeout)

@@ -28,6 +28,8 @@ from params.fleet import Fleet, Process, until_known  # noqa: E402  # found by t
 WRITES = 300
 READS = 20_000
 PARAMS = 5_000
+MESH = 50
+"""Replicas that form a mesh; more are clients of a router."""
 ROS1 = "ROS 1"
 ROSZ = (sys.executable, "-P", "-m", "rosz", "param")
 
@@ -73,7 +75,13 @@ class Bench:
         bare = Figure(f"a put of bare Zenoh, answered by {count} other", "ms", {ROS1: ""})
         with tempfile.TemporaryDirectory(prefix="rosz") as folder:
             fleet = Fleet(Path(folder))
-            writer, *others = fleet.start_many(count + 1)
+            if count > MESH:
+                others = [fleet.start(mode="router")]
+                writer, *more = fleet.start_many(count, mode="client")
+                others += more
+                until_known([writer], count)
+            else:
+                writer, *others = fleet.start_many(count + 1)
             for other in others:
                 other.do("echo", key="bench/bare")
             writer.do("writes", name="/bench/value", count=20)
@@ -126,7 +134,7 @@ def main() -> None:
         try:
             bench = Bench(Path(folder), roscore, rounds)
             figures = bench.alone()
-            for count, limit in ((1, 1.0), (10, 2.0), (50, 5.0)):
+            for count, limit in ((1, 1.0), (10, 2.0), (50, 5.0), (200, 20.0)):
                 if count <= most:
                     figures += bench.sets(count, limit)
         finally:
