@@ -85,13 +85,14 @@ def echo_command(
     seconds("--timeout", timeout)
     per_second("--rate", rate)
     at_least("-n", count, 1, "transforms")
+    from rosz.node import Clock
     from rosz.transforms import Buffer, TransformListener, describe_pose
 
     with call.lasting_node(_TOOL) as node:
         buffer = Buffer()
         TransformListener(buffer, node)
         limit = round(timeout * 1e9)
-        if not buffer.wait(lambda: not buffer.why_not(target, source), limit, time.monotonic_ns):
+        if not buffer.wait(lambda: not buffer.why_not(target, source), limit, Clock()):
             raise TransformError(buffer.why_not(target, source))
         shown = 0
         while True:

@@ -169,7 +169,7 @@ def tf_echo() -> None:
         precision = int(node.params.get("~precision", 3))
         buffer = Buffer()
         TransformListener(buffer, node)
-        buffer.wait(lambda: not buffer.why_not(source, target), _FIRST_TIMEOUT, node.now)
+        buffer.wait(lambda: not buffer.why_not(source, target), _FIRST_TIMEOUT, node.clock)
         for _ in node.rate(rate):
             sys.stdout.write(_echoed(buffer, source, target, node, precision))
             sys.stdout.flush()

@@ -1,21 +1,24 @@
-"""The tree of coordinate frames over the last seconds. Pure: no clock, no network."""
+"""The tree of coordinate frames over the last seconds."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import threading
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from typing import NamedTuple
 
 from rosz.errors import (
     ExtrapolationNeeded,
     FrameNotFound,
     FramesNotConnected,
+    TimeMovedBackwards,
     TransformArgument,
     TransformError,
 )
-from rosz.transforms.poses import IDENTITY, Pose, compose, interpolate, invert
+from rosz.node import Clock
+from rosz.transforms.poses import IDENTITY, Pose, compose, compose_all, interpolate, invert
 
 __all__ = ("Buffer", "History", "Place")
 
@@ -25,7 +28,6 @@ _MAX_DEPTH = 1000
 
 _LOOP = "The tf tree is invalid because it contains a loop."
 _UNIT_TOLERANCE = 1e-3
-_CHECK_PERIOD = 0.05
 
 
 class Place(NamedTuple):
@@ -100,17 +102,19 @@ class History:
             return self._places[0]
         stamps, places = self._stamps, self._places
         after = bisect_right(stamps, stamp)
-        if after and stamps[after - 1] == stamp:
-            return places[after - 1]
-        if after in {0, len(stamps)}:
+        before = after - 1
+        if not after:
             raise ExtrapolationNeeded(self._beyond(stamp))
-        parent, pose = places[after - 1]
+        began = stamps[before]
+        if began == stamp:
+            return places[before]
+        if after == len(stamps):
+            raise ExtrapolationNeeded(self._beyond(stamp))
+        parent, pose = places[before]
         parent_after, pose_after = places[after]
         if parent != parent_after:
             return parent, pose
-        began = stamps[after - 1]
-        fraction = (stamp - began) / (stamps[after] - began)
-        return parent, interpolate(pose, pose_after, fraction)
+        return parent, interpolate(pose, pose_after, (stamp - began) / (stamps[after] - began))
 
     def _beyond(self, stamp: int) -> str:
         first, last = self._stamps[0], self._stamps[-1]
@@ -146,7 +150,8 @@ class Buffer:
         self._length = length_ns
         self._frames: dict[str, History] = {}
         self._parents: set[str] = set()
-        self._changed = threading.Condition(threading.RLock())
+        self._lock = threading.RLock()
+        self._waiters: list[tuple[Callable[[], bool], Clock]] = []
 
     def set(
         self,
@@ -176,7 +181,7 @@ class Buffer:
         """
         parent, child = parent.removeprefix("/"), child.removeprefix("/")
         _check(parent, child, pose)
-        with self._changed:
+        with self._lock:
             history = self._frames.get(child)
             if history is None or history.static != static:
                 history = self._frames[child] = History(self._length, static=static)
@@ -184,23 +189,25 @@ class Buffer:
             if added:
                 history.authority = authority
                 self._parents.add(parent)
-                self._changed.notify_all()
+                for known, alarm in self._waiters:
+                    if known():
+                        alarm.close()
             return added
 
     def clear(self) -> None:
         """Remove all transforms but the static ones."""
-        with self._changed:
+        with self._lock:
             self._frames = {name: one for name, one in self._frames.items() if one.static}
             self._parents = {one.newest.parent for one in self._frames.values()}
 
     def frames(self) -> list[str]:
         """Return the names of all frames, sorted."""
-        with self._changed:
+        with self._lock:
             return sorted(self._parents | self._frames.keys())
 
     def histories(self) -> dict[str, History]:
         """Return the history of each frame that has a parent, in the order of arrival."""
-        with self._changed:
+        with self._lock:
             return dict(self._frames)
 
     def has(self, frame: str) -> bool:
@@ -224,7 +231,7 @@ class Buffer:
             FramesNotConnected: The frames belong to separate trees.
             ExtrapolationNeeded: The time is before or after all known transforms.
         """
-        with self._changed:
+        with self._lock:
             self._check_frame(target, "target_frame")
             self._check_frame(source, "source_frame")
             if stamp == 0:
@@ -248,7 +255,7 @@ class Buffer:
         Raises:
             TransformError: As for `lookup`.
         """
-        with self._changed:
+        with self._lock:
             inner, _ = self.lookup(fixed, source, source_stamp)
             outer, stamp = self.lookup(target, fixed, target_stamp)
             return compose(outer, inner), stamp
@@ -260,7 +267,7 @@ class Buffer:
             FrameNotFound: A frame does not exist.
             FramesNotConnected: The frames belong to separate trees.
         """
-        with self._changed:
+        with self._lock:
             self._check_frame(target, "target_frame")
             self._check_frame(source, "source_frame")
             if target == source:
@@ -294,7 +301,7 @@ class Buffer:
         Raises:
             FramesNotConnected: The frames belong to separate trees.
         """
-        with self._changed:
+        with self._lock:
             up = [frame for frame, _ in self._upwards(source)]
             down: list[str] = []
             for frame, _ in self._upwards(target):
@@ -303,26 +310,31 @@ class Buffer:
                 down.append(frame)
             raise _unconnected(target, source)
 
-    def wait(self, known: Callable[[], bool], timeout_ns: int, now: Callable[[], int]) -> bool:
+    def wait(self, known: Callable[[], bool], timeout_ns: int, clock: Clock) -> bool:
         """Wait for a condition, which is checked whenever a transform is added.
 
         Args:
             known: Condition.
-            timeout_ns: Time limit in nanoseconds of the given clock.
-            now: Function that returns the time of that clock in nanoseconds.
+            timeout_ns: Time limit in nanoseconds of the clock.
+            clock: Clock to wait by; the wait ends when it is closed, or goes back.
 
         Returns:
             Whether the condition was met.
         """
-        began = now()
-        with self._changed:
-            while not known():
-                passed = now() - began
-                if passed >= timeout_ns or passed < 0:
-                    return False
-                left = (timeout_ns - passed) / _SECOND
-                self._changed.wait(min(left, _CHECK_PERIOD))
-        return True
+        alarm = clock.branch()
+        waiter = known, alarm
+        with self._lock:
+            if known():
+                return True
+            self._waiters.append(waiter)
+        try:
+            alarm.sleep(timeout_ns)
+        except TimeMovedBackwards:
+            pass
+        finally:
+            with self._lock:
+                self._waiters.remove(waiter)
+        return known()
 
     def _check_frame(self, name: str, role: str) -> None:
         if not name:
@@ -368,35 +380,41 @@ class Buffer:
             frame = history.newest.parent
         raise TransformError(_LOOP)
 
-    def _poses_upwards(self, frame: str, stamp: int) -> Iterator[tuple[str, Pose]]:
-        """Yield the frames from a frame up to the root, each with the pose of the first in it."""
-        frames, pose = self._frames, IDENTITY
+    def _climb(
+        self, frame: str, stamp: int, ends: Container[str]
+    ) -> tuple[dict[str, Pose], str, str]:
+        """Go up from a frame to the first of some others, or to the root.
+
+        Returns:
+            The pose of each frame on the way in its parent, the frame at which the way ends, and
+            why it ends there if it is neither.
+        """
+        frames = self._frames
+        steps: dict[str, Pose] = {}
         for _ in range(_MAX_DEPTH):
-            yield frame, pose
             history = frames.get(frame)
-            if history is None:
-                return
-            frame, step = history.at(stamp)
-            pose = step if pose is IDENTITY else compose(step, pose)
+            if history is None or frame in ends:
+                return steps, frame, ""
+            try:
+                parent, steps[frame] = history.at(stamp)
+            except ExtrapolationNeeded as error:
+                return steps, frame, str(error)
+            frame = parent
         raise TransformError(_LOOP)
 
     def _walk(self, target: str, source: str, stamp: int) -> Pose:
         """Go up from both frames to their common ancestor."""
-        below: dict[str, Pose] = {}
-        beyond = ""
-        try:
-            for frame, pose in self._poses_upwards(source, stamp):
-                if frame == target:
-                    return pose
-                below[frame] = pose
-        except ExtrapolationNeeded as error:
-            beyond = str(error)
-        try:
-            for frame, pose in self._poses_upwards(target, stamp):
-                if frame in below:
-                    return compose(invert(pose), below[frame])
-        except ExtrapolationNeeded as error:
-            beyond = str(error)  # the last one counts, as in tf2
+        up, top, beyond = self._climb(source, stamp, (target,))
+        if top == target:
+            return compose_all(up.values())
+        known = {*up, top}
+        down, shared, why = self._climb(target, stamp, known)
+        if shared in known:
+            inner = compose_all(
+                pose for _, pose in itertools.takewhile(lambda step: step[0] != shared, up.items())
+            )
+            return compose(invert(compose_all(down.values())), inner)
+        beyond = why or beyond  # the last one counts, as in tf2
         if beyond:
             raise ExtrapolationNeeded(
                 f"{beyond}, when looking up transform from frame [{source}] to frame [{target}]"

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import random
+import threading
+from queue import SimpleQueue
 
 import pytest
-from network import Network, eventually
+from network import TIMEOUT, Network, eventually
 from oracle import same
 
 from rosz.errors import (
@@ -16,7 +18,8 @@ from rosz.errors import (
     TransformError,
 )
 from rosz.msgs.geometry_msgs.msg import TransformStamped
-from rosz.msgs.rosgraph_msgs.msg import Clock
+from rosz.msgs.rosgraph_msgs.msg import Clock as ClockMessage
+from rosz.node import Clock
 from rosz.qos import CLOCK
 from rosz.transforms import (
     IDENTITY,
@@ -223,11 +226,11 @@ def test_over_the_network(network: Network) -> None:
     moving = TransformBroadcaster(robot)
     moving._publisher.wait_for_subscribers()
     moving.send(transform("map", "base", 2.0))
-    assert buffer.wait(lambda: not buffer.why_not("map", "laser"), 15 * S, viewer.now)
-    assert buffer.wait(lambda: buffer.has("arm"), 15 * S, viewer.now)
+    assert buffer.wait(lambda: not buffer.why_not("map", "laser"), 15 * S, viewer.clock)
+    assert buffer.wait(lambda: buffer.has("arm"), 15 * S, viewer.clock)
     pose, stamp = buffer.lookup("map", "laser")
     assert (pose.translation[0], stamp) == (2.5, S)
-    assert not buffer.wait(lambda: False, S // 100, viewer.now)
+    assert not buffer.wait(lambda: False, S // 100, viewer.clock)
     listener.close()
 
 
@@ -246,14 +249,14 @@ def test_static_transforms_are_copied(network: Network) -> None:
 def test_a_time_jump_back_clears_the_buffer(network: Network) -> None:
     robot = network.node("robot")
     robot.params.set("/use_sim_time", True)
-    clock = robot.publisher("/clock", Clock, qos=CLOCK)
+    clock = robot.publisher("/clock", ClockMessage, qos=CLOCK)
     viewer = network.node("viewer")
     buffer = Buffer()
     TransformListener(buffer, viewer)
     clock.wait_for_subscribers()
 
     def set_clock(seconds: int) -> None:
-        message = Clock()
+        message = ClockMessage()
         message.clock.sec = seconds
         clock.publish(message)
         eventually(lambda: viewer.now() == seconds * S, "the time")
@@ -264,3 +267,55 @@ def test_a_time_jump_back_clears_the_buffer(network: Network) -> None:
     assert buffer.has("base")
     set_clock(5)
     eventually(lambda: not buffer.has("base"), "the empty buffer")
+
+
+class Waiting:
+    """A wait for a transform on a thread of its own, which counts how often it looks."""
+
+    def __init__(self, buffer: Buffer, clock: Clock, timeout_ns: int) -> None:
+        self.looks = 0
+        self.result: SimpleQueue[bool] = SimpleQueue()
+        self.began = threading.Event()
+        self._buffer = buffer
+        work = lambda: self.result.put(buffer.wait(self._known, timeout_ns, clock))  # noqa: E731
+        threading.Thread(target=work, daemon=True).start()
+        assert self.began.wait(TIMEOUT)
+
+    def _known(self) -> bool:
+        self.looks += 1
+        self.began.set()
+        return not self._buffer.why_not("a", "b")
+
+
+def test_a_wait_ends_when_the_transform_comes() -> None:
+    buffer = Buffer()
+    waiting = Waiting(buffer, Clock(), 3600 * 10**9)
+    buffer.set("a", "other", 1, IDENTITY)
+    buffer.set("a", "b", 1, IDENTITY)
+    assert waiting.result.get(timeout=TIMEOUT)
+    assert waiting.looks <= 4  # at its begin, for each transform, at its end
+
+
+def test_a_wait_ends_by_simulated_time() -> None:
+    clock = Clock()
+    clock.enable_simulation()
+    clock.advance(5)
+    waiting = Waiting(Buffer(), clock, 10)
+    eventually(lambda: clock._source.sleepers, "the sleep")
+    clock.advance(14)
+    clock.advance(15)
+    assert not waiting.result.get(timeout=TIMEOUT)
+    assert waiting.looks == 2
+
+
+def test_a_wait_ends_when_time_goes_back_or_the_clock_closes() -> None:
+    clock = Clock()
+    clock.enable_simulation()
+    clock.advance(5)
+    back = Waiting(Buffer(), clock, 10)
+    eventually(lambda: clock._source.sleepers, "the sleep")
+    clock.advance(4)
+    assert not back.result.get(timeout=TIMEOUT)
+    closed = Waiting(Buffer(), clock, 10)
+    clock.close()
+    assert not closed.result.get(timeout=TIMEOUT)

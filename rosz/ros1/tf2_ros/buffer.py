@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
 from rosz.msgs.geometry_msgs.msg import TransformStamped
 from rosz.msgs.tf2_msgs.srv import FrameGraph, FrameGraphResponse
-from rosz.node import Node
+from rosz.node import Clock, Node
 from rosz.ros1 import rospy, state
 from rosz.ros1.tf2_py import BufferCore, nanoseconds
 from rosz.ros1.tf2_ros.buffer_interface import BufferInterface
@@ -27,12 +26,12 @@ class Buffer(BufferCore, BufferInterface):
             buffer of the node does.
 
     Attributes:
-        now: Function that returns the time in nanoseconds; that of the node of the listener.
+        clock: Clock to wait by; that of the node of the listener.
     """
 
     def __init__(self, cache_time: Any = None, debug: bool = True) -> None:
         super().__init__(cache_time)
-        self.now: Callable[[], int] = time.time_ns
+        self.clock: Clock = Clock()
         if debug:
             state.when_ready(self._serve)
 
@@ -47,8 +46,9 @@ class Buffer(BufferCore, BufferInterface):
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = None
     ) -> TransformStamped:
         """Return the transform from the source frame to the target frame."""
-        self.can_transform(target_frame, source_frame, time, timeout)
-        return self.lookup_transform_core(target_frame, source_frame, time)
+        call = target_frame, source_frame, time
+        self._wait(lambda: self.can_transform_core(*call)[0], timeout)
+        return self.lookup_transform_core(*call)
 
     def lookup_transform_full(
         self,
@@ -113,5 +113,5 @@ class Buffer(BufferCore, BufferInterface):
         return found if return_debug_tuple else found[0]
 
     def _wait(self, known: Callable[[], bool], timeout: Any) -> None:
-        if timeout is not None and nanoseconds(timeout) > 0 and not known():
-            self.frames.wait(known, nanoseconds(timeout), self.now)
+        if timeout is not None and nanoseconds(timeout) > 0:
+            self.frames.wait(known, nanoseconds(timeout), self.clock)

@@ -23,7 +23,7 @@ class TransformListener:
     def __init__(self, buffer: Buffer, node: Any = None, **_options: Any) -> None:
         self.buffer: Buffer = buffer
         listening = node_of(node)
-        buffer.now = listening.now
+        buffer.clock = listening.clock
         self._listener = _Listener(buffer.frames, listening)
 
     def unregister(self) -> None:
