@@ -1,8 +1,8 @@
 """The environment variables of this process, which are read only here.
 
 ROS's own variables keep their meaning (``ROS_DOMAIN_ID``, ``ROS_NAMESPACE``, ``ROS_PACKAGE_PATH``,
-``ROS_HOME``, ``ROS_LOG_DIR``, ``ROS_DISTRO``, rmw_zenoh's ``ZENOH_SESSION_CONFIG_URI`` and
-``ZENOH_CONFIG_OVERRIDE``); those of rosz begin with ``ROSZ_``.
+``ROS_HOME``, ``ROS_LOG_DIR``, ``ROS_DISTRO``, catkin's ``CMAKE_PREFIX_PATH``, rmw_zenoh's
+``ZENOH_SESSION_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE``); those of rosz begin with ``ROSZ_``.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ DEFAULT_RENDEZVOUS = "tcp/localhost:7447"
 """The endpoint where the sessions of one machine meet, with the port of rmw_zenoh's router."""
 
 _MAX_DOMAIN = 232
+_CATKIN_MARKER = ".catkin"
 _PRIVATE = "private"
 _USER_FOLDERS = Path("/run/user")
 """Where systemd makes a folder for each user who is logged in."""
@@ -53,6 +54,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         zenoh_config: ``ZENOH_SESSION_CONFIG_URI``, a Zenoh configuration file.
         zenoh_override: ``ZENOH_CONFIG_OVERRIDE``, ``path/to/key=json;…``.
         package_roots: The folders to search for packages, in this order.
+        prefixes: The devel and install spaces of catkin in ``CMAKE_PREFIX_PATH``.
         completion: ``ROSZ_COMPLETION_TIMEOUT``, the longest time in seconds that the TAB key waits;
             0.5 when unset.
         console_format: ``ROSCONSOLE_FORMAT``.
@@ -74,6 +76,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
     zenoh_config: str = ""
     zenoh_override: str = ""
     package_roots: tuple[Path, ...] = ()
+    prefixes: tuple[Path, ...] = ()
     completion: float = 0.5
     console_format: str = ""
     color: bool = True
@@ -110,6 +113,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
             zenoh_config=env.get("ZENOH_SESSION_CONFIG_URI", ""),
             zenoh_override=env.get("ZENOH_CONFIG_OVERRIDE", ""),
             package_roots=_package_roots(env, cwd or _working_folder()),
+            prefixes=_prefixes(env.get("CMAKE_PREFIX_PATH", "")),
             completion=_seconds("ROSZ_COMPLETION_TIMEOUT", env, 0.5),
             console_format=env.get("ROSCONSOLE_FORMAT", ""),
             color=not env.get("NO_COLOR") and env.get("TERM") != "dumb",
@@ -119,14 +123,16 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def package_index(environment: Environment) -> PackageIndex:
-    """Return the packages on the path, then those of rosz and of pip-installed packages.
+    """Return the packages on the path, then those of pip-installed packages, rosz and Debian.
 
     Installed distributions register folders of packages under the entry point group
     ``rosz.packages``: each entry names a module, and its folder is searched.
     """
     # Reading what is installed takes longer than most commands, and few need it.
     return PackageIndex(
-        lambda: [*environment.package_roots, *_registered_roots(), *_shipped_roots()]
+        lambda: [*environment.package_roots, *_registered_roots(), *_shipped_roots()],
+        prefixes=environment.prefixes,
+        system=True,
     )
 
 
@@ -159,6 +165,11 @@ def _package_roots(env: Mapping[str, str], cwd: Path) -> tuple[Path, ...]:
         if part
     ]
     return tuple(dict.fromkeys([*listed, *_workspace(cwd)]))
+
+
+def _prefixes(text: str) -> tuple[Path, ...]:
+    folders = (Path(part) for part in text.split(os.pathsep) if part)
+    return tuple(folder for folder in folders if (folder / _CATKIN_MARKER).is_file())
 
 
 def _workspace(cwd: Path) -> list[Path]:

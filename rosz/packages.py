@@ -5,6 +5,9 @@ in CMakeLists.txt, of which a build would make executable ones. A package in Pyt
 (ament_python) has them as entry points in setup.py, from which colcon would make files; they are
 found there.
 
+A build of catkin or colcon puts programs into a devel or install space, which is searched after
+the package itself.
+
 The index searches its folders in order, and the first package of a name wins, as in ``rospack``.
 Nothing is read before it is needed.
 """
@@ -38,6 +41,11 @@ ROSBUILD_MANIFEST = "manifest.xml"
 """The file of rosbuild's packages, which have the names of their folders."""
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"})
 _NO_CODE = frozenset({"__pycache__", "node_modules"})
+_SOURCES = "src"
+_SPACES = ("devel", "devel_isolated", "install", "install_isolated")
+"""Folders beside a workspace's sources that builds write to."""
+_SYSTEM = Path("/usr/share")
+"""Where Debian has its packages, side by side with those that are none of ROS."""
 _SHEBANG_BYTES = 256
 _COMMENT = re.compile(r"#.*")
 _INSTALLED = re.compile(
@@ -51,16 +59,33 @@ class Package(msgspec.Struct, frozen=True):
     Attributes:
         name: Name in its package.xml.
         path: Folder of the package.
+        prefixes: Devel and install spaces that may have its programs, besides those of its own
+            workspace.
     """
 
     name: str
     path: Path
+    prefixes: tuple[Path, ...] = ()
 
-    def _folders(self) -> list[Path]:
-        """Return the folders of files: its own, and ``lib/<name>`` of an install space."""
-        prefix = self.path.parent.parent
-        installed = prefix / "lib" / self.name
-        return [installed, self.path] if self.path.parent.name == "share" else [self.path]
+    def _folders(self) -> Iterator[Path]:
+        """Yield the folders of files: its own, and those of programs that builds put elsewhere."""
+        if self.path.parent.name == "share":
+            yield from self._programs_in(self.path.parent.parent)
+        yield self.path
+        for prefix in (*self.prefixes, *self._spaces()):
+            yield from self._programs_in(prefix)
+
+    def _spaces(self) -> Iterator[Path]:
+        """Yield the spaces of its workspace, and its own in those where each package has one."""
+        for folder in self.path.parents:
+            if folder.name == _SOURCES:
+                for space in _SPACES:
+                    yield folder.parent / space
+                    yield folder.parent / space / self.name
+
+    def _programs_in(self, prefix: Path) -> list[Path]:
+        folders = [prefix / kind / self.name for kind in ("lib", "libexec")]
+        return [folder for folder in folders if folder.is_dir()]
 
     def _files(self) -> Iterator[Path]:
         for top in self._folders():
@@ -99,11 +124,9 @@ class Package(msgspec.Struct, frozen=True):
             ExecutableNotFound: There is none, or the file is not executable.
         """
         found = self.files(name)
+        scripts = self.installed_scripts() if found else []
         for file in found:
-            if _is_executable(file):
-                return file
-        for file in self.installed_scripts() if found else ():
-            if file.name == name:
+            if _is_executable(file) or file in scripts:
                 return file
         entry = self._entry_points().get(name)
         if entry is not None:
@@ -114,8 +137,8 @@ class Package(msgspec.Struct, frozen=True):
             )
         known = self.executables()
         listing = f"; it has {', '.join(known[:8])}" if known else "; it has no executables"
-        scripts = [file.name for file in self._files() if file.suffix == ".py"]
-        hint = near_miss(name, known) or near_miss(name, scripts) or listing
+        sources = [file.name for file in self._files() if file.suffix == ".py"]
+        hint = near_miss(name, known) or near_miss(name, sources) or listing
         raise ExecutableNotFound(
             f"package '{self.name}' ({self.path}) has no executable '{name}'{hint}"
         )
@@ -202,10 +225,20 @@ class PackageIndex:
     Args:
         roots: Folders that are packages or hold some at any depth, earlier ones first; or a
             function that returns them when they are needed.
+        prefixes: Devel and install spaces that may have programs of the packages.
+        system: Whether packages of Debian are found by their names.
     """
 
-    def __init__(self, roots: Sequence[Path] | Callable[[], Sequence[Path]]) -> None:
+    def __init__(
+        self,
+        roots: Sequence[Path] | Callable[[], Sequence[Path]],
+        *,
+        prefixes: Sequence[Path] = (),
+        system: bool = False,
+    ) -> None:
         self._given = roots
+        self._prefixes = tuple(prefixes)
+        self._system = system
 
     @cached_property
     def roots(self) -> tuple[Path, ...]:
@@ -229,7 +262,7 @@ class PackageIndex:
             # Of two packages of one name, the one nearer to the root wins.
             for folder in sorted(crawl(root), key=lambda folder: len(folder.parts)):
                 try:
-                    package = Package(_name_of(folder), folder)
+                    package = Package(_name_of(folder), folder, self._prefixes)
                 except PackageError as error:
                     # A package that cannot be read does not hide the others, as in rospack.
                     broken.append(error)
@@ -244,8 +277,9 @@ class PackageIndex:
             PackageNotFound: No folder has such a package.
             PackageError: The package.xml in a folder of that name cannot be read.
         """
-        if "_crawled" not in self.__dict__:
-            quick = self._beside(name)
+        if "_crawled" not in self.__dict__ and self.roots:
+            # This saves searching all folders.
+            quick = self._in(self.roots[0], name)
             if quick is not None:
                 return quick
         if name in self._known:
@@ -253,26 +287,26 @@ class PackageIndex:
         for error in self.broken:
             if Path(error.path).parent.name == name:
                 raise error
+        installed = self._in(_SYSTEM, name) if self._system else None
+        if installed is not None:
+            return installed
         raise PackageNotFound(name, self._known, [str(root) for root in self.roots])
 
-    def _beside(self, name: str) -> Package | None:
-        """Return a package directly in the first root, if its folder has its name.
-
-        This saves searching all folders.
-        """
-        if not name or "/" in name or not self.roots:
+    def _in(self, root: Path, name: str) -> Package | None:
+        """Return a package directly in a folder, if its own folder has its name."""
+        if not name or "/" in name:
             return None
-        folder = self.roots[0] / name
+        folder = root / name
         if manifest_of(folder) is not None and _name_of(folder) == name:
-            return Package(name, folder)
+            return Package(name, folder, self._prefixes)
         return None
 
     def names(self) -> list[str]:
-        """Return the names of all packages, sorted."""
+        """Return the names of all packages but those of Debian, sorted."""
         return sorted(self._known)
 
     def packages(self) -> list[Package]:
-        """Return all packages, sorted by name."""
+        """Return all packages but those of Debian, sorted by name."""
         return [self._known[name] for name in self.names()]
 
 
@@ -317,7 +351,7 @@ def crawl(root: Path) -> Iterator[Path]:
             names.clear()
             if not _IGNORE_MARKERS & set(files):
                 yield Path(folder)
-        elif _IGNORE_MARKERS & set(files):
+        elif _IGNORE_MARKERS & set(files) or Path(folder).parent == _SYSTEM:
             names.clear()
         names[:] = sorted(n for n in names if not n.startswith(".") and n not in _NO_CODE)
 

@@ -274,13 +274,13 @@ class _Launch:
             return Runner(plan, place, network, options, out=sys.stdout, err=sys.stderr).run()
 
     def _open_master(self, plan: Plan, stack: ExitStack) -> None:
-        """Be the master of compiled programs, which may speak ROS 1's protocol.
+        """Be the master of programs that may speak ROS 1's protocol.
 
         A master that the environment names and that is running stays theirs.
         """
         place = self.workplace()
-        compiled = [node.name for node in plan.nodes if place.is_compiled(node)]
-        if not compiled:
+        programs = [node.name for node in plan.nodes if place.may_need_master(node)]
+        if not programs:
             return
         from rosz.bridges.ros1 import open_master, running_master
 
@@ -290,8 +290,8 @@ class _Launch:
             bridge = stack.enter_context(open_master(self.environment))
             uri, whose = f"http://127.0.0.1:{bridge.port}", "this launch's"
             self.environ = {"ROS_IP": "127.0.0.1", **self.environ, "ROS_MASTER_URI": uri}
-        shown = ", ".join(compiled[:_LISTED])
-        print_lines([f"compiled nodes ({shown}) have {whose} ROS 1 master {uri}"])
+        shown = ", ".join([*programs[:_LISTED], *(["..."] if programs[_LISTED:] else [])])
+        print_lines([f"nodes not in Python ({shown}) have {whose} ROS 1 master {uri}"])
 
 
 def _anonymous_names() -> Callable[[str], str]:

@@ -102,7 +102,11 @@ def test_arguments_folder_and_exit_code_are_the_programs(workspace: Path) -> Non
     lines = done.stdout.splitlines()
     assert lines[1] == "".join(f"[{word}]" for word in words)
     assert lines[2] == str(workspace)
-    assert sorted(lines[3:]) == [f"ROSZ_PACKAGE_PATH={workspace}/src", "ROS_NAMESPACE=/ns"]
+    assert sorted(lines[3:]) == [
+        f"ROSZ_PACKAGE_PATH={workspace}/src",
+        f"ROSZ_PYTHON={sys.executable}",
+        "ROS_NAMESPACE=/ns",
+    ]
     assert (done.returncode, done.stderr) == (7, "")
 
 

@@ -1,7 +1,8 @@
 """The commands that run nodes of a plan, and the programs of ``rosz run``.
 
 A Python script runs with the interpreter that runs rosz, and can import ROS 1's modules
-(``python -m rosz.script SCRIPT``); any other program runs as it is.
+(``python -m rosz.script SCRIPT``); any other program runs as it is. It finds ROS 1's commands, and
+what it starts in Python finds ROS 1's modules, as in a shell with ``rosz env``.
 """
 
 from __future__ import annotations
@@ -31,8 +32,10 @@ __all__ = (
 
 _LAUNCH_SUFFIXES = (".launch", ".launch.xml")
 _PYTHON = re.compile(r"python[0-9.]*")
-_ELF = b"\x7fELF"
 _SCRIPT = ("-m", "rosz.script")
+_ROSZ = Path(__file__).parents[2]
+_COMMANDS = str(_ROSZ / "cli" / "bin")
+_MODULES = str(_ROSZ / "ros1" / "shell")
 
 
 class Command(msgspec.Struct, frozen=True):
@@ -95,6 +98,8 @@ class Workplace(msgspec.Struct, frozen=True):
         prefixed = len(node.launch_prefix)
         program = Path(shown[prefixed])
         python = is_python(program)
+        if not python:
+            environ = _with_ros1_names(environ)
         start = _start(node.launch_prefix, program, python=python)
         return Command(
             argv=(*start, *shown[prefixed + 1 :]),
@@ -114,14 +119,16 @@ class Workplace(msgspec.Struct, frozen=True):
         """
         return str(locate(self.packages.find(package), executable))
 
-    def is_compiled(self, node: NodePlan) -> bool:
-        """Return whether a node of this machine is a compiled program, and no script."""
+    def may_need_master(self, node: NodePlan) -> bool:
+        """Return whether a node of this machine may speak ROS 1's protocol: it is no Python script.
+
+        It is compiled, or a script of a shell that starts others.
+        """
         if node.machine or node.command:
             return False
         try:
-            with Path(self.find(node.package, node.type)).open("rb") as program:
-                return program.read(len(_ELF)) == _ELF
-        except (NotFoundError, OSError):
+            return not is_python(Path(self.find(node.package, node.type)))
+        except NotFoundError:
             return False  # the launch tells when it starts the node
 
     def _cwd(self, choice: str, program: Path | None) -> str:
@@ -151,10 +158,11 @@ def run_command(
     program = locate(workplace.packages.find(package), executable)
     before = tuple(shlex.split(prefix))
     python = is_python(program)
+    environ = base_environ(workplace.environ, workplace.environment)
     return Command(
         argv=(*_start(before, program, python=python), *args),
         shown=(*before, str(program), *args),
-        environ=base_environ(workplace.environ, workplace.environment),
+        environ=environ if python else _with_ros1_names(environ),
         cwd=workplace.cwd,
         python=python,
         direct=True,
@@ -172,6 +180,22 @@ def base_environ(environ: Mapping[str, str], environment: Environment) -> dict[s
     """
     roots = os.pathsep.join(str(root) for root in environment.package_roots)
     return {**environ, "ROSZ_PACKAGE_PATH": roots} if roots else dict(environ)
+
+
+def _with_ros1_names(environ: Mapping[str, str]) -> dict[str, str]:
+    """Return variables with which a script of a shell finds ROS 1's commands and modules."""
+    path = environ.get("PATH", os.defpath).split(os.pathsep)
+    modules = [part for part in environ.get("PYTHONPATH", "").split(os.pathsep) if part]
+    if _COMMANDS not in path:
+        path.insert(0, _COMMANDS)
+    if _MODULES not in modules:
+        modules.append(_MODULES)
+    return {
+        **environ,
+        "PATH": os.pathsep.join(path),
+        "PYTHONPATH": os.pathsep.join(modules),
+        "ROSZ_PYTHON": sys.executable,
+    }
 
 
 def locate(package: Package, name: str) -> Path:

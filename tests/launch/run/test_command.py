@@ -80,13 +80,17 @@ def test_a_prefix_that_is_python_is_the_interpreter(workplace: Workplace, python
 
 
 def test_variables(workplace: Workplace, tmp_path: Path) -> None:
-    root = workplace.command(node("tool"), log_file=None, tag="t:1").environ
-    assert root == {
+    script = workplace.command(node("talker.py"), log_file=None, tag="t:1").environ
+    assert script == {
         "PATH": "/bin",
         "KEPT": "yes",
         "ROSZ_PACKAGE_PATH": str(tmp_path / "ws/src"),
         "ROSZ_LAUNCH": "t:1",
     }
+    program = workplace.command(node("tool"), log_file=None, tag="t:1").environ
+    assert {**program, **script} == {**program, "PATH": "/bin"}
+    assert program.keys() - script.keys() == {"PYTHONPATH", "ROSZ_PYTHON"}
+    assert program["PATH"].endswith("/cli/bin:/bin")
     plan = node("tool", namespace="/a/b", env=(("X", "1"), ("X", "2"), ("KEPT", "no")))
     inner = workplace.command(plan, log_file=None, tag="t:2").environ
     assert inner["ROS_NAMESPACE"] == "/a/b"
