@@ -72,7 +72,8 @@ _PACKAGES = {
     "image_view": _PICTURES,
     "joint_state_publisher_gui": "publish sensor_msgs/JointState, or use 'rosz topic pub'",
     "move_base": _of_ros2("nav2_bringup"),
-    "nodelet": "write the nodes as nodes: those of one machine can share memory (ROSZ_SHM)",
+    "nodelet": "nodelets of C++ need ROS 1; nodes of Python share a process, too: 'rosz"
+    " run --with', and in launch files (rosz help containers)",
     "roscpp": "rosz has no C++ API; " + _of_ros2("rclcpp"),
     "roscpp_tutorials": "'rosz run rosz_tutorials publisher.py' is a talker in Python",
     "rospy_tutorials": "'rosz run rosz_tutorials publisher.py' and subscriber.py talk and listen",

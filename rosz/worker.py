@@ -19,6 +19,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from rosz.errors import ClosedError
+from rosz.program import current, within
 
 __all__ = ("Worker", "run_task", "start_thread")
 
@@ -116,6 +117,7 @@ class Worker(Generic[T]):
         self._when_free: list[Callable[[], object]] = []
         self._threads: set[threading.Thread] = set()
         self._idle = 0
+        self._program = current()  # its threads may start on a thread of another one
         self.closed: bool = False
         if receive is not None:
             self._add_thread()
@@ -223,7 +225,8 @@ class Worker(Generic[T]):
         self._idle += 1
         started = False
         try:
-            started = start_thread(thread)
+            with within(self._program):
+                started = start_thread(thread)
         finally:
             if not started:
                 self._threads.discard(thread)

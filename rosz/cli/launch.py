@@ -113,7 +113,8 @@ def launch_command(
 ) -> int:
     """Start the nodes of launch files, and run until they end.
 
-    Without options it does what roslaunch does.
+    Without options it does what roslaunch does. Python nodes in a <group container="NAME"> share a
+    process (rosz help containers).
     """
     del skip_log_check  # roslaunch's scripts pass it; rosz has no such check
     if core or port:
@@ -422,7 +423,10 @@ def _table(launch: LaunchStatus, before: LaunchStatus) -> str:
     head = ("NODE", "STATE", "PID", "RESTARTS", "CPU", "MEMORY", "UPTIME", "MACHINE")
     earlier = {node.name: node.cpu for node in before.nodes}
     seconds = launch.sampled - before.sampled
-    rows = [head, *(_row(node, earlier.get(node.name, node.cpu), seconds) for node in launch.nodes)]
+    rows: list[tuple[str, ...]] = [head]
+    for node in launch.nodes:
+        rows.append(_row(node, earlier.get(node.name, node.cpu), seconds))
+        rows += [(f"  {member}", f"in {node.name}", *"------") for member in node.members]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
     title = f"{', '.join(launch.files)} (launch {launch.pid} on {launch.host}, run {launch.run_id})"

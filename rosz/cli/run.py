@@ -1,9 +1,13 @@
-"""``rosz run``: replace this process by an executable of a package, as rosrun does."""
+"""``rosz run``: replace this process by an executable of a package, as rosrun does.
+
+With ``--with``, by a container that runs several Python nodes.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -37,14 +41,30 @@ def run_command(
     prefix: Annotated[
         str, Option("--prefix -p COMMAND", "Run the program with a command, such as 'gdb --args'.")
     ] = "",
+    others: Annotated[
+        list[str] | None,
+        Option(
+            "--with COMMAND",
+            "Run another Python node in the same process: 'PACKAGE EXECUTABLE [ARGS]' in quotes."
+            " May be given several times.",
+        ),
+    ] = None,
+    by_reference: Annotated[
+        bool,
+        Option(
+            "--by-reference",
+            "With --with: let nodes of rospy pass on messages themselves rather than copies.",
+        ),
+    ] = False,
     debug: Annotated[bool, Option("--debug -d", "Print the command line of the program.")] = False,
 ) -> None:
     """Run an executable of a package.
 
     A Python script runs under the interpreter of rosz, with the ROS 1 names importable.
+    With --with, several run in one process (rosz help containers).
     """
     from rosz.environment import Environment, package_index
-    from rosz.launch.run.command import Workplace
+    from rosz.launch.run.command import Workplace, container_of
     from rosz.launch.run.command import run_command as make_command
 
     if not package:
@@ -56,7 +76,15 @@ def run_command(
         listing = ", ".join(packages.find(package).executables()) or "it has none"
         raise UsageError(f"no executable of package '{package}' is given: {listing}")
     workplace = Workplace(packages, environment, environ, str(Path.cwd()))
-    chosen = make_command(workplace, package, executable, arguments or [], prefix)
+    if others:
+        if prefix:
+            raise UsageError("--prefix is for one program, and --with runs several in one process")
+        first = shlex.join([package, executable, *(arguments or [])])
+        chosen = container_of(workplace, [first, *others], by_reference=by_reference)
+    elif by_reference:
+        raise UsageError("--by-reference does nothing without --with")
+    else:
+        chosen = make_command(workplace, package, executable, arguments or [], prefix)
     if debug:
         print_error(f"[rosz run] {' '.join(chosen.argv)}")
     _replace_process(chosen.argv, chosen.environ)

@@ -12,6 +12,7 @@ from rosz.node.context import Context
 from rosz.node.control import NodeInfo, Request, control_key
 from rosz.node.decoder import MessageInfo
 from rosz.node.entity import Entity
+from rosz.node.local_delivery import LocalDelivery
 from rosz.node.log import NodeLog, NodeLogger
 from rosz.node.log_handlers import (
     ConsoleHandler,
@@ -24,6 +25,7 @@ from rosz.node.log_handlers import (
 from rosz.node.node import Node
 from rosz.node.publisher import Publisher, SubscriberLink
 from rosz.node.service import Service
+from rosz.node.signals import install as handle_signals
 from rosz.node.signals import of_program
 from rosz.node.standard import serve_loggers, simulate
 from rosz.node.subscription import GenericSubscription, Subscription
@@ -39,6 +41,7 @@ __all__ = (
     "Context",
     "Entity",
     "GenericSubscription",
+    "LocalDelivery",
     "LogHandler",
     "MessageInfo",
     "Node",
@@ -55,6 +58,7 @@ __all__ = (
     "Timer",
     "TimerEvent",
     "control_key",
+    "handle_signals",
     "of_program",
     "parse_severity",
     "serve_loggers",

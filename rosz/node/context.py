@@ -8,6 +8,8 @@ import logging
 import socket
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
 from rosz import remap
@@ -19,6 +21,8 @@ from rosz.lifecycle import Lifecycle
 from rosz.node.clock import Clock
 from rosz.node.direct_delivery import DirectDelivery
 from rosz.node.dropped import DroppedSamples
+from rosz.node.local_delivery import LocalDelivery
+from rosz.program import current
 from rosz.session import (
     Dialling,
     LocalPeers,
@@ -43,6 +47,9 @@ _log = logging.getLogger("rosz.context")
 class Context:
     """Owner of everything that lives as long as the program takes part in the network.
 
+    The programs of a container share the session of one context, and with it the graph and the
+    parameters. A context that such a program makes has only a command line and an end of its own.
+
     Args:
         environment: Settings; those of the process when not given.
         argv: Command-line arguments without the program name; ROS arguments are taken out.
@@ -55,6 +62,7 @@ class Context:
         mesh: Readiness of the session: whether it is linked to all its neighbours.
         direct_delivery: Samples for single subscriptions of this process.
         dropped: Counts of dropped samples.
+        local_delivery: Messages between the nodes of this process, if they do not use the session.
         passing: Whether this is a command, which holds no parameters, rather than a node.
         permissions: Permissions of this machine on others; None without rules.
         cooperative: Whether the program is known to check for the shutdown.
@@ -79,6 +87,19 @@ class Context:
         self.environment: Environment = environment or Environment.read()
         self.arguments: remap.Arguments = remap.parse(argv)
         self.domain: int = self.environment.domain
+        self.cooperative: bool = False
+        self._making = threading.RLock()
+        self._params: Replica | None = None
+        self._types: TypeStore | None = None
+        self._flushed = threading.Event()
+        self._lifecycle = Lifecycle("the context", log=_log, on_fork=self._forked)
+        program = current()
+        shared: Context | None = None if program is None else program.context
+        self._shared: Context | None = None
+        if config is None and shared is not None and shared.domain == self.domain:
+            self._share(shared)
+            return
+        self.local_delivery: LocalDelivery | None = None
         config = config or SessionConfig.node(self.environment)
         self.passing: bool = config.must_connect
         self.permissions: LocalPermissions | None = _permissions(config)
@@ -88,12 +109,6 @@ class Context:
         )
         self.clock: Clock = Clock()
         self._ids = itertools.count()
-        self._making = threading.RLock()
-        self._params: Replica | None = None
-        self._types: TypeStore | None = None
-        self._flushed = threading.Event()
-        self._lifecycle = Lifecycle("the context", log=_log, on_fork=self._forked)
-        self.cooperative: bool = False
         with InterruptDeferral(self.close):
             self.session: Session = Session.open(config, peers)
             try:
@@ -102,13 +117,33 @@ class Context:
             except BaseException:
                 self.session.close()
                 raise
-            atexit.register(self.close)
+            self._forget_end = _at_end(self)
+
+    def _share(self, shared: Context) -> None:
+        """Use what belongs to the context of the container."""
+        self._shared = shared
+        self.session = shared.session
+        self.graph = shared.graph
+        self.direct_delivery = shared.direct_delivery
+        self.local_delivery = shared.local_delivery
+        self.dropped = shared.dropped
+        self.mesh = shared.mesh
+        self.passing = shared.passing
+        self.permissions = shared.permissions
+        self.clock = shared.clock.branch()
+        self._ids = shared._ids
+        self._forget_end = _at_end(self)
+
+    graph: Graph
+    direct_delivery: DirectDelivery
+    dropped: DroppedSamples
+    mesh: MeshReadiness
 
     def _join_network(self, config: SessionConfig, *, alone: bool, expected: bool) -> None:
-        self.graph: Graph = Graph(self.session, self.domain)
-        self.direct_delivery: DirectDelivery = DirectDelivery(self.session, self.domain)
-        self.dropped: DroppedSamples = DroppedSamples(self.session, self.domain)
-        self.mesh: MeshReadiness = MeshReadiness(
+        self.graph = Graph(self.session, self.domain)
+        self.direct_delivery = DirectDelivery(self.session, self.domain)
+        self.dropped = DroppedSamples(self.session, self.domain)
+        self.mesh = MeshReadiness(
             self.session,
             0 if alone or self.passing else self.MESH_TIMEOUT,
             self._flushed,
@@ -146,6 +181,8 @@ class Context:
         Raises:
             ClosedError: The context is shut down, and has no replica.
         """
+        if self._shared is not None:
+            return self._shared.params
         if self._params is None:
             with self._making:
                 if self._params is None:
@@ -170,6 +207,8 @@ class Context:
     @property
     def types(self) -> TypeStore:
         """Message and service types by name."""
+        if self._shared is not None:
+            return self._shared.types
         if self._types is None:
             from rosz.typestore import TypeStore
 
@@ -227,7 +266,16 @@ class Context:
         """
         self._lifecycle.close(self._disconnect, first=self.clock.close, reason=reason)
 
+    def close_links(self) -> AbstractContextManager[object]:
+        """Return a context within which the session closes its links, unless others share it."""
+        if self._shared is not None and not self._shared.is_shutdown:
+            return nullcontext()
+        return self.session.close_links()
+
     def _disconnect(self) -> None:
+        if self._shared is not None:
+            self._forget_end()
+            return
         self._flushed.set()
         self._dialling.close()
         try:
@@ -237,10 +285,10 @@ class Context:
                 self.graph.close()
         finally:  # an open session would abort the process at its end
             self.session.close()
-            atexit.unregister(self.close)
+            self._forget_end()
 
     def _forked(self) -> None:
-        atexit.unregister(self.close)
+        self._forget_end()
         self._making = threading.RLock()
 
     def wait_for_shutdown(self, timeout: float | None = None) -> bool:
@@ -267,6 +315,15 @@ class Context:
 
     def __exit__(self, *exc: object) -> None:
         self.close()
+
+
+def _at_end(context: Context) -> Callable[[], object]:
+    """Shut a context down when its program ends; return a function that takes this back."""
+    program = current()
+    if program is not None:
+        return program.on_end(context.shutdown)
+    atexit.register(context.close)
+    return partial(atexit.unregister, context.close)
 
 
 def _permissions(config: SessionConfig) -> LocalPermissions | None:

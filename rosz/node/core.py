@@ -21,6 +21,7 @@ from rosz.node.clock import Clock
 from rosz.node.context import Context
 from rosz.node.log import NodeLog
 from rosz.node.log_handlers import DEFAULT_FORMAT
+from rosz.program import Program, current
 from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ class NodeCore:
         clock: Clock of the node, closed with it.
         log: Log of the node.
         process: Token of the process of the node.
+        program: The program that made the node, if the process runs several.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class NodeCore:
         argv: Sequence[str] | None = None,
     ) -> None:
         self._owns_context = context is None
+        self.program: Program | None = current()
         if anonymous:
             # ROS 1 counts milliseconds, but has one node in a process.
             name = names.anonymous(name, socket.gethostname(), os.getpid(), time.time_ns())
@@ -193,7 +196,7 @@ class NodeCore:
     def _end(self, reason: str) -> None:
         context = self.context
         leaving = self._owns_context or context.is_shutdown
-        with context.session.close_links() if leaving else nullcontext():
+        with context.close_links() if leaving else nullcontext():
             closed = self._lifecycle.close(
                 self.log.flush, first=self.clock.close, reason=reason or context.reason
             )

@@ -5,18 +5,22 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from rosz.errors import DecodeError
 from rosz.node.fetch import FetchedSample
+from rosz.node.local_delivery import LocalSample
 from rosz.session import Reply, Sample
 from rosz.wire import read_attachment
 
+if TYPE_CHECKING:
+    from rosz.message import Message
+
 __all__ = ("AnySample", "Decoder", "MessageInfo", "Received")
 
-AnySample = Sample | Reply | FetchedSample
+AnySample = Sample | Reply | FetchedSample | LocalSample
 """A sample, however it came."""
 
 _KINDS_OF_DAMAGE = 10
@@ -38,7 +42,8 @@ class MessageInfo(msgspec.Struct, frozen=True):
             queue by newer ones.
         type_name: ``pkg/msg/Name``.
         type_hash: ``RIHS01_…``, the hash of the type's definition.
-        size: Length of the message as it was sent, in bytes.
+        size: Length of the message as it was sent, in bytes; 0 if it was not encoded, as between
+            nodes of one process.
     """
 
     source_time: int
@@ -103,7 +108,7 @@ class Decoder:
         type_name: ``pkg/msg/Name``.
         type_hash: ``RIHS01_…``.
         decode: Function that decodes a message; when not given, the encoded bytes are the messages.
-        has_header: Whether messages have a header, which gets the sequence number.
+        message_type: Class of the messages; a header gets the sequence number.
         log: Logger for damage, which is logged once per kind.
         report_lost: Function called with the number of samples that are missing before one.
         with_info: Whether to make a `MessageInfo` for each message.
@@ -118,14 +123,15 @@ class Decoder:
         log: logging.Logger,
         report_lost: Callable[[int], object],
         *,
-        has_header: bool,
+        message_type: type[Message] | None,
         with_info: bool,
     ) -> None:
         self._topic = topic
         self._type_name = type_name
         self._type_hash = type_hash
         self._decode = decode
-        self._has_header = has_header
+        self._message_type = message_type
+        self._has_header = message_type is not None and bool(message_type._has_header)
         self._log = log
         self._report_lost = report_lost
         self._with_info = with_info
@@ -148,26 +154,17 @@ class Decoder:
         """Decode one sample; ``None`` if it is damaged or a repetition."""
         sequence, source_time, gid, lost = 0, 0, b"", 0
         try:
-            attachment = sample.attachment
-            if attachment is not None:
+            local = sample if isinstance(sample, LocalSample) else None
+            if local is not None:
+                sequence, source_time, gid = local.sequence, local.stamp, local.gid
+            elif (attachment := sample.attachment) is not None:
                 sequence, source_time, gid = read_attachment(attachment)
-                if sequence > 0:
-                    publisher = self._publishers.get(gid) or self._publisher(gid)
-                    last = publisher.last
-                    replayed = isinstance(sample, Reply)
-                    # All latching publishers of a session reply to a request for one of them.
-                    publisher.replays |= replayed
-                    if publisher.replays:
-                        missing = publisher.advance(sequence, replayed=replayed)
-                        if missing is None:
-                            return None
-                        lost = missing
-                    else:
-                        publisher.last = sequence
-                        if last and sequence > last:
-                            lost = sequence - last - 1
-                    if lost:
-                        self._report_lost(lost)
+            if sequence > 0:
+                lost = self._advance(gid, sequence, replayed=isinstance(sample, Reply))
+                if lost < 0:
+                    return None
+            if local is not None and self._takes(local.message):
+                return local.message, self._info(sequence, source_time, gid, lost, local.size)
             payload = sample.payload
             message: Any = payload if self._decode is None else self._decode(payload)
         except DecodeError as error:
@@ -176,9 +173,37 @@ class Decoder:
         if self._has_header:
             # ROS 1 code reads the sequence number from there.
             message.header.seq = sequence
+        return message, self._info(sequence, source_time, gid, lost, len(payload))
+
+    def _advance(self, gid: bytes, sequence: int, *, replayed: bool) -> int:
+        """Return the number of samples missing before one; -1 if it is a repetition."""
+        publisher = self._publishers.get(gid) or self._publisher(gid)
+        last, lost = publisher.last, 0
+        # All latching publishers of a session reply to a request for one of them.
+        publisher.replays |= replayed
+        if publisher.replays:
+            missing = publisher.advance(sequence, replayed=replayed)
+            if missing is None:
+                return -1
+            lost = missing
+        else:
+            publisher.last = sequence
+            if last and sequence > last:
+                lost = sequence - last - 1
+        if lost:
+            self._report_lost(lost)
+        return lost
+
+    def _takes(self, message: Any) -> bool:
+        """Return whether a message of another node of this process is passed on as it is."""
+        return self._decode is not None and type(message) is self._message_type
+
+    def _info(  # called for each message
+        self, sequence: int, source_time: int, gid: bytes, lost: int, size: int
+    ) -> MessageInfo | None:
         if not self._with_info:
-            return message, None
-        return message, MessageInfo(
+            return None
+        return MessageInfo(
             source_time,
             time.time_ns(),
             sequence,
@@ -186,7 +211,7 @@ class Decoder:
             lost,
             self._type_name,
             self._type_hash,
-            len(payload),
+            size,
         )
 
     def _publisher(self, gid: bytes) -> _Publisher:

@@ -93,6 +93,7 @@ class Node(NodeCore):
         queue_size: int = 10,
         latch: bool = False,
         qos: QoS | None = None,
+        copies: bool = False,
     ) -> Publisher[M]: ...
     @overload
     def publisher(
@@ -103,6 +104,7 @@ class Node(NodeCore):
         queue_size: int = 10,
         latch: bool = False,
         qos: QoS | None = None,
+        copies: bool = False,
     ) -> Publisher[Any]: ...
     def publisher(
         self,
@@ -112,6 +114,7 @@ class Node(NodeCore):
         queue_size: int = 10,
         latch: bool = False,
         qos: QoS | None = None,
+        copies: bool = False,
     ) -> Publisher[M] | Publisher[Any]:
         """Make a publisher of a topic.
 
@@ -122,6 +125,9 @@ class Node(NodeCore):
             queue_size: Depth of the queue that others see; with ``latch`` it is 1.
             latch: Whether late subscriptions get the last message.
             qos: Quality of service instead of both.
+            copies: Whether nodes of the same process get copies of the messages. Say so if the
+                program changes a message that it has published. In a container they otherwise get
+                the message itself, which none of them may change.
 
         Raises:
             InvalidName: The name is not legal.
@@ -133,7 +139,8 @@ class Node(NodeCore):
         if qos is None:
             qos = QoS(depth=1, durability="transient_local") if latch else for_queue(queue_size)
         name = self.resolve(topic)
-        return self.keep(Publisher(self, name, self._message_class(message_type), qos))
+        kind = self._message_class(message_type)
+        return self.keep(Publisher(self, name, kind, qos, copies=copies))
 
     @overload
     def subscription(

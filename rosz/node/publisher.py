@@ -15,6 +15,7 @@ from rosz.node.core import NodeCore
 from rosz.node.direct_delivery import direct_key
 from rosz.node.entity import Entity
 from rosz.node.fetch import LARGE, FetchableSamples
+from rosz.node.local_delivery import LocalReceiver, LocalSample
 from rosz.qos import QoS
 from rosz.wire import Kind, Token, pack_attachment
 from rosz.worker import Worker
@@ -78,6 +79,7 @@ class Publisher(Entity, Generic[M]):
         qos: The QoS that others see.
         waits: Whether a full link makes ``publish`` wait instead of dropping the message, also
             where the QoS keeps only some messages.
+        copies: Whether subscriptions of the same process get copies of the messages.
 
     Attributes:
         message_type: The class of the messages.
@@ -93,6 +95,7 @@ class Publisher(Entity, Generic[M]):
         qos: QoS,
         *,
         waits: bool = False,
+        copies: bool = False,
     ) -> None:
         super().__init__(
             node, Kind.PUBLISHER, topic, message_type._type_name, message_type._type_hash, qos
@@ -105,11 +108,17 @@ class Publisher(Entity, Generic[M]):
         # A signal handler that publishes may interrupt this thread while it publishes.
         self._ordered = threading.RLock()
         self._blocks = waits or (qos.reliable and qos.history == "keep_all")
+        self._local = node.context.local_delivery
+        self._receivers: tuple[LocalReceiver, ...] = ()
+        self._receivers_version = -1
+        self._copies = copies
+        self._has_header = bool(message_type._has_header)
         self._raw = node.context.session.publisher(
             self.key,
             reliable=qos.reliable,
             block=self._blocks,
             cache=qos.depth if qos.latched else 0,
+            remote_only=self._local is not None,
         )
         self._put = self._raw.put
         self._fetchable: FetchableSamples | None = None
@@ -136,7 +145,10 @@ class Publisher(Entity, Generic[M]):
             message: Any = args[0]
         else:
             message = self._build(args, fields)
-        self._send(self._encode(message))
+        if self._local is None:
+            self._send(self._encode(message))
+        else:
+            self._deliver(message, None)
 
     def publish_raw(self, payload: bytes | bytearray | memoryview) -> None:
         """Send an encoded message.
@@ -160,7 +172,56 @@ class Publisher(Entity, Generic[M]):
                 "",
                 f"expected CDR with its header, got {len(payload)} bytes",
             )
-        self._send(payload)
+        if self._local is None:
+            self._send(payload)
+        else:
+            self._deliver(None, payload)
+
+    def _deliver(self, message: Any, payload: bytes | None) -> None:
+        """Give a message to the subscriptions of this process, and send it if others need it.
+
+        Args:
+            message: The message, or None if there are only bytes.
+            payload: The bytes, or None if the message is not encoded yet.
+        """
+        local = self._local
+        if local is not None and local.version != self._receivers_version:
+            self._find_receivers()
+        with self._ordered:
+            if self._lifecycle.closing:
+                self.check_open("publish")
+            receivers = self._receivers
+            sent = self._held is not None or self.qos.latched or self._fetching
+            sent = sent or self._raw.matched
+            if payload is None and (sent or self._copies):
+                payload = self._encode(message)
+            if sent and payload is not None:
+                self._send(payload)
+                sequence = self._sequence
+            else:
+                self._sequence = sequence = self._sequence + 1
+            if not receivers:
+                return
+            if self._copies:
+                message = None
+            elif self._has_header and message is not None:
+                message.header.seq = sequence
+            sample = LocalSample(
+                self.key, sequence, time.time_ns(), self.gid, message, payload or self._encode
+            )
+            for receiver in receivers:
+                receiver.receive(sample)
+
+    def _find_receivers(self) -> None:
+        """Find the subscriptions of this process."""
+        local = self._local
+        if local is None:
+            return
+        self._receivers_version = local.version
+        self._receivers = local.find(self.token)
+        if self.qos.latched:
+            for receiver in self._receivers:
+                receiver.expect_replay(self.gid)
 
     def _send(self, payload: bytes) -> None:
         with self._ordered:

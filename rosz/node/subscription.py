@@ -25,6 +25,8 @@ from rosz.node.core import NodeCore
 from rosz.node.decoder import AnySample, Decoder, Received
 from rosz.node.entity import ANY, Entity
 from rosz.node.fetch import FetchedSample, Fetcher
+from rosz.node.local_delivery import LocalReceiver
+from rosz.program import within
 from rosz.qos import QoS
 from rosz.session import LONGEST_WAIT, Reply, clamp_timeout
 from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, read_attachment, ros_type
@@ -115,6 +117,7 @@ class Subscription(Entity, Generic[M]):
 
     def _open(self) -> None:
         """Begin to receive, and announce the subscription if its type is known."""
+        self._receive_locally()
         typed, latched = self._decoder is not None, self.qos.latched
         self._subscribe(
             history=self.qos.depth if typed and latched else 0,
@@ -125,6 +128,18 @@ class Subscription(Entity, Generic[M]):
             self.announce()
         if not (typed and latched):
             self.keep(Registration(self.others.listen(self._follow)))
+
+    def _receive_locally(self) -> None:
+        """Receive what nodes of this process publish, where that does not use the session."""
+        local = self.node.context.local_delivery
+        if local is not None:
+            receiver = LocalReceiver(self.matches, self._receive, self._expect_replay)
+            self.keep(local.register(self.name, receiver))
+
+    def _expect_replay(self, publisher: bytes) -> None:
+        """Expect samples of a publisher with this subscription's type twice."""
+        if self._decoder is not None:
+            self._decoder.expect_replay(publisher)
 
     def _subscribe(self, *, history: int, recover: bool) -> None:
         session = self.node.context.session
@@ -164,7 +179,7 @@ class Subscription(Entity, Generic[M]):
         """
         self._queue.put((sample, decoder))
         if self._callback is not None and self._queue_worker is None:
-            with self._learning:
+            with self._learning, within(self.node.program):
                 if self._queue_worker is None:
                     self._queue_worker = Worker(
                         f"rosz-sub{self.name}",
@@ -398,7 +413,7 @@ class Subscription(Entity, Generic[M]):
             None if message_type is None else self.node.context.decoder(message_type),
             self.node.log,
             partial(self._report_lost, (type_name, type_hash)),
-            has_header=message_type is not None and bool(message_type._has_header),
+            message_type=message_type,
             with_info=self._with_info,
         )
 

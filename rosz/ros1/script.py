@@ -57,6 +57,24 @@ class Script:
             else:
                 self._code = compile(source, str(self._file), "exec", dont_inherit=True)
 
+    @property
+    def folder(self) -> str:
+        """The folder that its modules are imported from first."""
+        return str(self._folder)
+
+    @property
+    def variables(self) -> dict[str, object]:
+        """The variables of the script as a module."""
+        return self._main.__dict__
+
+    def execute(self) -> None:
+        """Run the script and leave the process as it is; whatever it raises is passed on."""
+        exec(self._code, self._main.__dict__)  # noqa: S102  # the user's own program
+
+    def report(self, error: BaseException) -> None:
+        """Show an exception of `execute` as the interpreter shows an uncaught one."""
+        _excepthook(sys.__excepthook__, self._main)(type(error), error, error.__traceback__)
+
     def run(self, arguments: Sequence[str]) -> None:
         """Run the script as the main module of this process; whatever it raises is passed on."""
         sys.argv[:] = [self._path, *arguments]
@@ -67,7 +85,7 @@ class Script:
             sys.path[0] = folder
         sys.modules["__main__"] = self._main
         with _trimmed_tracebacks(self._main):
-            exec(self._code, self._main.__dict__)  # noqa: S102  # the user's own program
+            self.execute()
 
 
 def _entry(path: Path) -> tuple[Path, str] | None:

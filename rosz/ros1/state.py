@@ -18,6 +18,7 @@ from rosz.errors import ClosedError
 from rosz.lifecycle import Lifecycle
 from rosz.node import Clock, Context, Node
 from rosz.params.api import Params
+from rosz.program import own
 from rosz.ros1.exceptions import ROSInitException
 from rosz.wire import Token
 
@@ -40,6 +41,7 @@ __all__ = (
     "params_of",
     "ready_context",
     "run_hooks",
+    "separate_states",
     "set_arguments",
     "state",
     "survey",
@@ -108,6 +110,25 @@ class State:
 
 state = State()
 """The state of this process."""
+
+
+class _ProgramState(State):
+    """The state of the program of the calling thread, where a process runs several."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(own(State, _outside), name)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        setattr(own(State, _outside), name, value)
+
+
+_outside = State()
+
+
+def separate_states() -> None:
+    """Give each program of the process a state of its own; see `rosz.program`."""
+    vars(state).clear()
+    state.__class__ = _ProgramState
 
 
 class _Context(Context):

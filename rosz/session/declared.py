@@ -224,6 +224,9 @@ class RawPublisher(Declared):
         self.key = key
         self._entity = entity
         self._put = entity.put
+        self._matched = False
+        self._changes: Callable[[], Any] | None = None
+        self._listener: Declared | None = None
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample.
@@ -249,8 +252,27 @@ class RawPublisher(Declared):
     def matched(self) -> bool:
         """Whether a subscriber of this publisher is known; only for publishers without a cache.
 
+        The first look costs as much as several samples, each further one next to nothing.
+
         Raises:
             ClosedError: The publisher or the session is closed.
         """
-        with self._call(f"look for subscribers of '{self.key}'"):
-            return bool(self._entity.matching_status.matching)
+        if self._changes is None:
+            with self._call(f"look for subscribers of '{self.key}'"):
+                listener = self._entity.declare_matching_listener(zenoh.handlers.RingChannel(1))
+                self._listener = Declared(f"watch of subscribers of '{self.key}'", listener)
+                self._matched = bool(self._entity.matching_status.matching)
+                self._changes = listener.handler.try_recv
+        try:
+            change = None if ENDING.is_set() else self._changes()
+        except zenoh.ZError as error:
+            raise ClosedError(f"cannot look for subscribers of '{self.key}'") from error
+        if change is not None:
+            self._matched = bool(change.matching)
+        return self._matched
+
+    def close(self) -> None:
+        """Undeclare it; see `Declared.close`."""
+        if self._listener is not None:
+            self._listener.close()
+        super().close()

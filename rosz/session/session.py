@@ -220,6 +220,7 @@ class Session:
         reliable: bool = True,
         block: bool = False,
         cache: int = 0,
+        remote_only: bool = False,
     ) -> RawPublisher:
         """Declare a publisher.
 
@@ -228,9 +229,12 @@ class Session:
             reliable: Whether links should be reliable.
             block: Whether a full link makes ``put`` wait instead of dropping the sample.
             cache: The number of samples kept for late joiners (transient local); 0 for none.
+            remote_only: Whether subscribers of this session receive nothing, but from the cache.
         """
         reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
         qos: Any = {"congestion_control": _CONGESTION[block], "reliability": reliability}
+        if remote_only:
+            qos["allowed_destination"] = zenoh.Locality.REMOTE
         self._lifecycle.check_open(f"publish on '{key}'")
         with translate_errors(f"publish on '{key}'"):
             if not cache:

@@ -43,6 +43,7 @@ FLOORS = {
     "rosz.wire": 1,
     "rosz.msgs": 2,
     "rosz.typestore": 2,
+    "rosz.program": 3,
     "rosz.worker": 3,
     "rosz.environment": 3,
     "rosz.interrupts": 3,

@@ -36,7 +36,7 @@ def _decoder(counted: list[int]) -> Decoder:
         None,
         logging.getLogger(),
         counted.append,
-        has_header=False,
+        message_type=None,
         with_info=True,
     )
 

@@ -86,7 +86,7 @@ TAGS = {
     "executable": TagRule(
         "", f"args cmd cwd launch-prefix name output required respawn respawn_delay {_START}", "env"
     ),
-    "group": TagRule("clear_params ns", f"namespace {_WAIT}", _BODY),
+    "group": TagRule("clear_params ns", f"by_reference container namespace {_WAIT}", _BODY),
     "include": TagRule("clear_params file ns pass_all_args", "namespace", "arg env"),
     "launch": TagRule("deprecated", "version", _BODY),
     "let": TagRule("", "name value"),

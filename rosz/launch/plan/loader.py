@@ -17,6 +17,7 @@ from rosz.launch.plan.context import LaunchContext, LaunchText
 from rosz.launch.plan.document import Document, Element, TagError, TextError, misplaced, parse
 from rosz.launch.plan.model import ArgDoc, Notice, Place, Plan, PlanBuilder
 from rosz.launch.plan.node import (
+    read_container,
     read_executable,
     read_machine,
     read_namespace,
@@ -234,6 +235,7 @@ class _Loader:
         scope = self._open(tag, read_namespace(tag))
         scope.private = list(scope.private)
         scope.waits = (*scope.waits, *read_wait(tag, scope.ns))
+        read_container(tag, scope)
         self._stack.append(_Frame(iter(tag.element.children), scope, self._chain, root="group"))
 
     def _open(self, tag: Tag, ns: str | None, *, include: bool = False) -> Scope:

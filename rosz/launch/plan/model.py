@@ -191,6 +191,9 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
         env: (name, value) in order, of which the last one counts; without ``ROS_NAMESPACE``.
         wait_for: Waits before the start; all of them must end.
         spawn_delay: Delay before the start in seconds, after `wait_for`.
+        container: Full name of the container that runs it, or "" for a process of its own.
+        by_reference: Whether nodes of rospy in that pass on messages themselves, not copies.
+        members: Nodes that the process runs, if it is a container, which has no package then.
         place: Position of the tag.
     """
 
@@ -214,6 +217,9 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
     env: tuple[tuple[str, str], ...] = ()
     wait_for: tuple[Wait, ...] = ()
     spawn_delay: float = 0.0
+    container: str = ""
+    by_reference: bool = False
+    members: tuple[NodePlan, ...] = ()
 
     @property
     def full_name(self) -> str:
@@ -439,9 +445,12 @@ class PlanBuilder:
             assign_machines: Whether to assign every node to its machine.
 
         Raises:
-            LaunchFileError: If a node names a machine that is not declared.
+            LaunchFileError: If a node names a machine that is not declared, or a container has the
+                name of a node.
         """
         nodes, tests = list(self._nodes.values()), self._tests
+        for node in nodes:
+            self._check_container(node)
         if assign_machines:
             nodes = [self._assign_machine(node) for node in nodes]
             tests = [replace(test, node=self._assign_machine(test.node)) for test in tests]
@@ -457,6 +466,19 @@ class PlanBuilder:
             warnings=tuple(self.warnings),
             deprecations=tuple(self.deprecations),
         )
+
+    def _check_container(self, node: NodePlan) -> None:
+        other = self._nodes.get(node.container)
+        if other is not None:
+            place = node.place
+            raise LaunchFileError(
+                f"container '{node.container}' of node '{node.full_name}' has the name of the node"
+                f" at {other.place}; give one of them another name",
+                place.file,
+                place.line,
+                place.column,
+                place.includes,
+            )
 
     def _assign_machine(self, node: NodePlan) -> NodePlan:
         """Assign a node to the first used machine among those configured alike."""

@@ -24,6 +24,7 @@ from rosz.launch.plan.scope import Scope, join
 from rosz.launch.plan.tag import Tag
 
 __all__ = (
+    "read_container",
     "read_executable",
     "read_machine",
     "read_namespace",
@@ -54,6 +55,27 @@ def read_namespace(tag: Tag) -> str | None:
     if ns is not None and not ns:
         tag.fail("'ns' is empty; leave it out, or write '/' for the root", "ns")
     return ns
+
+
+def read_container(tag: Tag, scope: Scope) -> None:
+    """Read ``container`` and ``by_reference`` of a ``<group>`` into its scope.
+
+    Raises:
+        TagError: The name is not valid, or there is only ``by_reference``.
+    """
+    name = tag.get("container")
+    if name is not None:
+        try:
+            scope.container = names.canonical(join(scope.ns, names.check(name)))
+        except InvalidName as error:
+            tag.fail(f"'container': {error}", "container")
+        if not name or name.endswith("/") or names.is_private(name):
+            tag.fail(f"'container' is '{name}'; expected a name such as 'vision'", "container")
+        scope.by_reference = False
+    if "by_reference" in tag.element.attributes:
+        if name is None:
+            tag.fail("'by_reference' needs 'container'", "by_reference")
+        scope.by_reference = tag.flag("by_reference")
 
 
 def read_node(tag: Tag, builder: PlanBuilder) -> None:
@@ -181,6 +203,8 @@ def _read_node(tag: Tag, builder: PlanBuilder, name: str) -> NodePlan:
             args=tag.split("args", tag.again("args")),
             cwd=_read_cwd(tag),
             wait_for=(*tag.scope.waits, *read_wait(tag, own.ns, name)),
+            container=tag.scope.container,
+            by_reference=tag.scope.by_reference,
         ),
     )
     remaps, env = tag.scope.child(), tag.scope.child()

@@ -33,6 +33,8 @@ class Scope:
         environ: Those of ``<set_env>``, which ``$(env)`` and ``$(optenv)`` see as well.
         private: ``~params`` for the following nodes: (name, value, origin).
         waits: Conditions that the following nodes wait for.
+        container: Full name of the container of the following nodes, or "".
+        by_reference: Whether nodes of rospy in it pass on messages themselves.
         remaps: (from, to) in order, those of outer scopes first; no name twice.
         included: Whether the file was included by another.
         incoming: Args passed to an include while its tag is read, otherwise None.
@@ -52,6 +54,8 @@ class Scope:
         self.included: bool = False
         self.incoming: dict[str, str] | None = None
         self.lenient = False
+        self.container = ""
+        self.by_reference = False
         self.remaps: list[tuple[str, str]] = []
 
     def child(self, ns: str | None = None) -> Scope:
@@ -72,6 +76,8 @@ class Scope:
         # Not a copy unless empty: in roslaunch, nodes see such params from included files.
         scope.private = self.private or []
         scope.waits = self.waits
+        scope.container = self.container
+        scope.by_reference = self.by_reference
         scope.included = self.included
         scope.remaps = list(self.remaps)
         return scope

@@ -17,15 +17,19 @@ from pathlib import Path
 import msgspec
 
 from rosz.environment import Environment
-from rosz.errors import ExecutableNotFound, NotFoundError
+from rosz.errors import ExecutableNotFound, LaunchError, NotFoundError, UsageError
 from rosz.launch.plan import NodePlan, report
 from rosz.launch.run.process_tree import TAG
 from rosz.packages import Package, PackageIndex, is_python, start_words
+from rosz.program import ProgramSpec
+from rosz.remap import parse
 
 __all__ = (
     "Command",
     "Workplace",
     "base_environ",
+    "container_command",
+    "container_of",
     "locate",
     "run_command",
 )
@@ -36,6 +40,7 @@ _SCRIPT = ("-m", "rosz.script")
 _ROSZ = Path(__file__).parents[2]
 _COMMANDS = str(_ROSZ / "cli" / "bin")
 _MODULES = str(_ROSZ / "ros1" / "shell")
+_CONTAINER = ("-P", "-m", "rosz.ros1.container")
 
 
 class Command(msgspec.Struct, frozen=True):
@@ -88,6 +93,8 @@ class Workplace(msgspec.Struct, frozen=True):
         environ = base_environ(self.environ, self.environment)
         environ.pop("ROS_NAMESPACE", None)
         environ |= report.environment(node) | {TAG: tag}
+        if node.members:
+            return self._container(node, environ, log_file)
         direct = bool(node.launch_prefix) and node.output == "screen"
         if node.command:
             words = tuple(report.command_line(node, self.find))
@@ -108,6 +115,42 @@ class Workplace(msgspec.Struct, frozen=True):
             cwd=self._cwd(node.cwd, program),
             python=python,
             direct=direct,
+        )
+
+    def _container(self, node: NodePlan, environ: dict[str, str], log_file: Path | None) -> Command:
+        """Return the command of a container; see `rosz.ros1.container`."""
+        environ.pop("ROS_NAMESPACE", None)
+        specs = [
+            self._program(member, log_file)
+            for member in node.members
+            if member.full_name != node.full_name
+        ]
+        return container_command(
+            node.full_name,
+            specs,
+            environ,
+            self._cwd(node.cwd, Path()),
+            by_reference=node.by_reference,
+            node=len(specs) < len(node.members),
+        )
+
+    def _program(self, node: NodePlan, log_file: Path | None) -> ProgramSpec:
+        program, *words = report.command_line(node, self.find)
+        if not is_python(Path(program)):
+            raise LaunchError(f"'{program}' is not a Python script, which a container runs")
+        if node.namespace != "/":
+            words.append(f"__ns:={node.namespace}")
+        if log_file is not None:
+            own = f"{log_file.stem}-{node.full_name.strip('/').replace('/', '-')}.log"
+            words.append(f"__log:={log_file.with_name(own)}")
+        return ProgramSpec(
+            name=node.full_name,
+            script=program,
+            arguments=tuple(words),
+            respawn=node.respawn,
+            respawn_delay=node.respawn_delay,
+            respawn_max=node.respawn_max,
+            required=node.required,
         )
 
     def find(self, package: str, executable: str) -> str:
@@ -166,6 +209,87 @@ def run_command(
         cwd=workplace.cwd,
         python=python,
         direct=True,
+    )
+
+
+def container_of(
+    workplace: Workplace, commands: Sequence[str], *, by_reference: bool = False
+) -> Command:
+    """Return the command of ``rosz run --with``.
+
+    Args:
+        workplace: The packages and settings.
+        commands: Package, executable and arguments of each program, split as a shell does.
+        by_reference: Whether nodes of rospy pass on messages themselves.
+
+    Raises:
+        PackageNotFound: If there is no such package.
+        ExecutableNotFound: If the package has no such executable.
+        LaunchError: If a program is not a Python script, or two have one node name.
+        UsageError: If a command does not name a package and an executable.
+    """
+    specs: list[ProgramSpec] = []
+    for command in commands:
+        package, executable, *words = _split(command)
+        script = locate(workplace.packages.find(package), executable)
+        if not is_python(script):
+            raise LaunchError(
+                f"'{script}' is not a Python script, and only those share a process; run it alone"
+            )
+        given = parse(words).special
+        name = given.get("__name", f"{package}/{executable}")
+        if any(spec.name == name for spec in specs):
+            if "__name" in given:
+                raise LaunchError(f"two nodes of one process are named '{name}'")
+            name = f"{name} ({len(specs) + 1})"
+        specs.append(ProgramSpec(name=name, script=str(script), arguments=tuple(words)))
+    return container_command(
+        "rosz run",
+        specs,
+        base_environ(workplace.environ, workplace.environment),
+        workplace.cwd,
+        by_reference=by_reference,
+    )
+
+
+def _split(command: str) -> list[str]:
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise UsageError(f"--with '{command}' cannot be split into words: {error}") from error
+    if len(words) < 2:  # noqa: PLR2004  # a package and an executable
+        raise UsageError(f"--with is '{command}'; expected 'PACKAGE EXECUTABLE [ARGS]'")
+    return words
+
+
+def container_command(  # those of a command
+    name: str,
+    programs: Sequence[ProgramSpec],
+    environ: dict[str, str],
+    cwd: str,
+    *,
+    by_reference: bool = False,
+    node: bool = False,
+) -> Command:
+    """Return the command that runs several Python programs in one process.
+
+    Args:
+        name: Name of the container.
+        programs: The programs.
+        environ: Environment variables of the process.
+        cwd: Folder to start in.
+        by_reference: Whether nodes of rospy pass on messages themselves.
+        node: Whether the container is a node too.
+    """
+    options = [*["--by-reference"] * by_reference, *["--node"] * node]
+    specs = [msgspec.json.encode(program).decode() for program in programs]
+    shown = [f"{spec.script} {' '.join(spec.arguments)}".strip() for spec in programs]
+    return Command(
+        argv=(sys.executable, *_CONTAINER, name, *options, *specs),
+        shown=(f"container {name}:", " + ".join(shown)),
+        environ=environ,
+        cwd=cwd,
+        python=True,
     )
 
 

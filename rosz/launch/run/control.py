@@ -54,6 +54,7 @@ class NodeStatus(msgspec.Struct, frozen=True):
         cpu: Processor time that it and its descendants have used in seconds.
         memory: Memory that they hold in bytes.
         machine: Address of the other machine, or the name of the launch's own.
+        members: Names of the nodes in it, if it is a container.
     """
 
     name: str
@@ -66,6 +67,7 @@ class NodeStatus(msgspec.Struct, frozen=True):
     cpu: float
     memory: int
     machine: str = ""
+    members: tuple[str, ...] = ()
 
 
 class LaunchStatus(msgspec.Struct, frozen=True):
@@ -197,6 +199,7 @@ class StatusServer:
             cpu=used.cpu,
             memory=used.memory,
             machine=process.place or socket.gethostname(),
+            members=tuple(member.full_name for member in node.members),
         )
 
     def close(self) -> None:
@@ -240,6 +243,12 @@ class StatusClient:
         name = f"/{node.strip('/')}"
         running = self._running()
         known = [entry.name for _, status in running for entry in status.nodes]
+        for entry in (entry for _, status in running for entry in status.nodes):
+            if name in entry.members:
+                raise NotFoundError(
+                    f"node '{name}' has no process of its own: it is in container '{entry.name}',"
+                    f" which can be restarted or stopped; 'rosz node kill {name}' ends the node"
+                )
         if name not in known:
             listing = f"; there are {', '.join(sorted(known))}" if known else ""
             hint = near_miss(name, known) or listing or "; no launch is running"

@@ -17,6 +17,7 @@ from rosz.errors import LaunchError, ParamNotFound, UsageError
 from rosz.launch.plan import NodePlan, Plan
 from rosz.launch.run.command import Workplace
 from rosz.launch.run.console import Console, LaunchLog
+from rosz.launch.run.containers import group_nodes
 from rosz.launch.run.control import StatusServer
 from rosz.launch.run.host import Host, LocalHost, is_local
 from rosz.launch.run.loop import Loop, stopped_by_signals
@@ -130,6 +131,7 @@ class Runner:
         self._options = options
         color = workplace.environment.color
         self._console = Console(out, err, verbose=options.verbose, color=color)
+        self._processes: tuple[NodePlan, ...] = ()
         self._loop = Loop()
         self._machines = Machines(self._loop, self._console)
         self._stop: Callable[[], None] = self._loop.stop
@@ -227,6 +229,9 @@ class Runner:
         if self._options.overview:
             machines = any(not is_local(machine) for machine in plan.machines)
             console.say(describe_plan(plan, machines=machines))
+        self._processes = group_nodes(
+            plan.nodes, self._workplace, lambda text: console.error(f"WARNING: {text}")
+        )
         for notice in (*plan.warnings, *plan.deprecations):
             console.error(f"WARNING: {notice}")
 
@@ -245,7 +250,7 @@ class Runner:
             timeouts=self._options.timeouts,
             prefixed=self._options.prefixed,
         )
-        names = dict.fromkeys(node.machine for node in self._plan.nodes)
+        names = dict.fromkeys(node.machine for node in self._processes)
         others = {
             name: machine
             for name in names
@@ -261,7 +266,7 @@ class Runner:
             if alone:
                 self._console.say("nobody else holds the parameters: staying until Ctrl-C")
         return Supervisor(
-            self._plan.nodes,
+            self._processes,
             hosts,
             self._loop,
             self._console,

@@ -454,6 +454,8 @@ class Supervisor:
         """Report that a process cannot be started."""
         node = process.node
         what = f"{node.package}/{node.type}" if node.package else node.full_name
+        if node.members:
+            what = " + ".join(f"{one.package}/{one.type}" for one in node.members)
         self._console.error(f"ERROR: cannot launch node of type [{what}]: {error}")
         self.failed = True
         self.failures.append(process)
@@ -483,15 +485,17 @@ class Supervisor:
     @staticmethod
     def _describe_death(process: Process) -> str:
         child = process.child
-        text = "process has finished cleanly"
+        nodes = ", ".join(member.full_name for member in process.node.members)
+        what = f"process of nodes {nodes}" if nodes else "process"
+        text = f"{what} has finished cleanly"
         if process.lost and child is not None:
             text = (
-                f"process is lost with its machine [pid {child.pid} on {process.place}, exit code"
+                f"{what} is lost with its machine [pid {child.pid} on {process.place}, exit code"
                 f" unknown, cmd {child.shown}]."
             )
         elif process.code and child is not None:
             text = (
-                f"process has died [pid {child.pid}, exit code {process.code}, cmd {child.shown}]."
+                f"{what} has died [pid {child.pid}, exit code {process.code}, cmd {child.shown}]."
             )
         if child is None or not child.logs:
             return text

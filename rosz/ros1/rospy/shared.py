@@ -174,7 +174,9 @@ class SharedPublisher(_Shared):
     def _declare(self, node: Node, kind: type[Any], qos: QoS) -> NodePublisher[Any]:
         if self.is_latch:
             qos = QoS(depth=1, durability="transient_local")
-        return node.keep(NodePublisher(node, self.name, kind, qos))
+        local = node.context.local_delivery
+        copies = local is not None and not local.by_reference  # programs of rospy change messages
+        return node.keep(NodePublisher(node, self.name, kind, qos, copies=copies))
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741  # rospy's
         """Notify an object of subscribers, beginning with those that exist."""

@@ -14,6 +14,7 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import UsageError
 from rosz.node import Context as RoszContext
+from rosz.program import own
 from rosz.ros2.rclpy import arguments
 from rosz.ros2.rclpy.exceptions import NotInitializedException
 
@@ -131,4 +132,4 @@ _default = Context()
 
 def get_default_context() -> Context:
     """Return the context that is used when none is given."""
-    return _default
+    return own(Context, _default)

@@ -1,0 +1,119 @@
+"""Messages between the nodes of one process, which do not pass through the session.
+
+A publisher of a container gives its messages to the subscriptions of its process itself, and the
+session sends them only to others. What it gives is the message, or its bytes, from which each
+subscription decodes a message of its own.
+
+Latched messages of the past come from the session here too, as between processes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from rosz.lifecycle import Registration
+from rosz.wire import Token
+
+__all__ = ("LocalDelivery", "LocalReceiver", "LocalSample")
+
+
+class LocalSample:
+    """A message on its way to subscriptions of the same process.
+
+    Args:
+        key: Key expression of the publisher's data.
+        sequence: Sequence number.
+        stamp: Time of publication in nanoseconds since the Unix epoch.
+        gid: 16 bytes that identify the publisher.
+        message: The message itself; None if each subscription is to decode its own.
+        payload: Encoded message, or a function that encodes it.
+
+    Attributes:
+        attachment: None, as the number and the rest are attributes here.
+    """
+
+    __slots__ = ("_payload", "gid", "key", "message", "sequence", "stamp")
+
+    attachment: None = None
+
+    def __init__(  # one is made for each message
+        self,
+        key: str,
+        sequence: int,
+        stamp: int,
+        gid: bytes,
+        message: Any,
+        payload: bytes | Callable[[Any], bytes],
+    ) -> None:
+        self.key = key
+        self.sequence = sequence
+        self.stamp = stamp
+        self.gid = gid
+        self.message = message
+        self._payload = payload
+
+    @property
+    def payload(self) -> bytes:
+        """The encoded message."""
+        payload = self._payload
+        return payload if isinstance(payload, bytes) else payload(self.message)
+
+    @property
+    def size(self) -> int:
+        """Length of the encoded message in bytes; 0 if it is not encoded."""
+        return len(self._payload) if isinstance(self._payload, bytes) else 0
+
+
+class LocalReceiver(NamedTuple):
+    """A subscription, as publishers of its process see it.
+
+    Attributes:
+        matches: Function that returns whether it receives what a publisher sends.
+        receive: Function that takes a sample; it returns soon.
+        expect_replay: Function called with the GID of each latching publisher.
+    """
+
+    matches: Callable[[Token], bool]
+    receive: Callable[[LocalSample], None]
+    expect_replay: Callable[[bytes], object]
+
+
+class LocalDelivery:
+    """The subscriptions of a process, by topic.
+
+    Args:
+        by_reference: Whether publishers of rospy pass on messages themselves too.
+
+    Attributes:
+        by_reference: As given.
+        version: Number that grows with each change.
+    """
+
+    def __init__(self, *, by_reference: bool = False) -> None:
+        self.by_reference = by_reference
+        self.version: int = 0
+        self._lock = threading.RLock()  # a signal handler may subscribe in between
+        self._receivers: dict[str, tuple[LocalReceiver, ...]] = {}
+
+    def register(self, topic: str, receiver: LocalReceiver) -> Registration:
+        """Let the publishers of a topic in this process reach a subscription."""
+        with self._lock:
+            self._receivers[topic] = (*self._receivers.get(topic, ()), receiver)
+            self.version += 1
+
+        def unregister() -> None:
+            with self._lock:
+                left = tuple(one for one in self._receivers.get(topic, ()) if one is not receiver)
+                self._receivers[topic] = left
+                if not left:
+                    del self._receivers[topic]
+                self.version += 1
+
+        return Registration(unregister)
+
+    def find(self, publisher: Token) -> tuple[LocalReceiver, ...]:
+        """Return the subscriptions that receive what a publisher sends."""
+        known = self._receivers.get(publisher.name, ())
+        return tuple(receiver for receiver in known if receiver.matches(publisher))
