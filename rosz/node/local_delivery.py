@@ -47,11 +47,11 @@ class LocalSample:
         message: Any,
         payload: bytes | Callable[[Any], bytes],
     ) -> None:
-        self.key = key
-        self.sequence = sequence
-        self.stamp = stamp
-        self.gid = gid
-        self.message = message
+        self.key: str = key
+        self.sequence: int = sequence
+        self.stamp: int = stamp
+        self.gid: bytes = gid
+        self.message: Any = message
         self._payload = payload
 
     @property

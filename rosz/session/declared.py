@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -227,6 +228,7 @@ class RawPublisher(Declared):
         self._matched = False
         self._changes: Callable[[], Any] | None = None
         self._listener: Declared | None = None
+        self._watching = threading.RLock()  # a signal handler may publish in between
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample.
@@ -257,19 +259,26 @@ class RawPublisher(Declared):
         Raises:
             ClosedError: The publisher or the session is closed.
         """
-        if self._changes is None:
-            with self._call(f"look for subscribers of '{self.key}'"):
+        changes = self._changes or self._watch()
+        if self._closed or ENDING.is_set():
+            raise ClosedError(f"cannot look for subscribers of '{self.key}': it is closed")
+        with suppress(zenoh.ZError):  # it is being closed
+            change = changes()
+            if change is not None:
+                self._matched = bool(change.matching)
+        return self._matched
+
+    def _watch(self) -> Callable[[], Any]:
+        """Begin to follow whether there are subscribers; return what tells of a change."""
+        with self._watching, self._call(f"look for subscribers of '{self.key}'"):
+            if self._changes is None:
                 listener = self._entity.declare_matching_listener(zenoh.handlers.RingChannel(1))
                 self._listener = Declared(f"watch of subscribers of '{self.key}'", listener)
                 self._matched = bool(self._entity.matching_status.matching)
                 self._changes = listener.handler.try_recv
-        try:
-            change = None if ENDING.is_set() else self._changes()
-        except zenoh.ZError as error:
-            raise ClosedError(f"cannot look for subscribers of '{self.key}'") from error
-        if change is not None:
-            self._matched = bool(change.matching)
-        return self._matched
+        if self._closed and self._listener is not None:  # closed meanwhile
+            self._listener.close()
+        return self._changes
 
     def close(self) -> None:
         """Undeclare it; see `Declared.close`."""

@@ -226,7 +226,8 @@ def test_warnings_have_the_place_of_their_cause() -> None:
         "f:1:9: <Node> means nothing in <launch>; did you mean 'node'?",
         "f:1:16: <master> has no meaning any more",
         "f:1:35: <arg> has no attribute 'nam'; did you mean 'name'?",
-        "f:1:72: <group> has no attribute 'foo'; it has clear_params, if, namespace, ns, unless, "
+        "f:1:72: <group> has no attribute 'foo'; it has by_reference, clear_params, container, if, "
+        "namespace, ns, unless, "
         "wait_for, wait_timeout",
         "f:1:76: <bogus> is not a launch file tag; <launch> may hold <arg>, <env>, <executable>, "
         "<group>, <include>, <let>, <machine>, <node>, <param>, <push-ros-namespace>, "
