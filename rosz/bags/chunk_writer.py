@@ -126,8 +126,18 @@ class ChunkWriter:
 
     @property
     def waiting(self) -> int:
-        """Bytes that wait for the disk."""
-        return self._waiting
+        """Bytes that wait for the disk, or for their chunk to be full."""
+        return self._waiting + self._chunk.size
+
+    def wait_for_room(self, most: int) -> None:
+        """Wait while more than so many bytes wait for the disk.
+
+        Args:
+            most: The number of bytes.
+        """
+        if self._waiting > most:
+            with self._lock:
+                self._room.wait_for(lambda: self._waiting <= most or self._error is not None)
 
     @property
     def complete(self) -> bool:

@@ -3,17 +3,21 @@
 A message is never decoded, unless the format needs another layout. Each publisher is a channel of
 its own, with its QoS and its node. A type that is not known here is described by the publisher's
 node; until that has replied, the messages of the channel wait in memory.
+
+Messages are taken from Zenoh at once, whatever the disk does, and wait in one buffer that is
+bounded by bytes. One thread writes them from there.
 """
 
 from __future__ import annotations
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Self
 
 from rosz.bags.bag import Channel, Payload
+from rosz.bags.buffer import ROW_BYTES, Buffer
 from rosz.bags.recording import Selection, Sink, Track
 from rosz.errors import BagError, ClosedError, MessageError, RoszError
 from rosz.node import Subscription
@@ -29,9 +33,10 @@ if TYPE_CHECKING:
 __all__ = ("Recorder",)
 
 _QOS = QoS(depth=8192)
-"""Samples of a topic that wait while another one is written."""
+"""Samples of a topic that wait until they are taken from Zenoh, which takes no time but that of a
+busy processor."""
 _DEFINITION_TIMEOUT = 10.0
-_MOST_HELD = 64 << 20
+_CLOSE_TIMEOUT = 600.0
 _RULE = "=" * 80
 
 _Row = tuple[int, Payload, int | None, int]
@@ -47,8 +52,7 @@ class _Source:
         self.type_hash = info.type_hash
         self.token = token
         self.track: Track | None = None
-        self.held: list[_Row] = []
-        self.size = 0
+        self.held: deque[_Row] = deque()
         self.lock = threading.Lock()
 
     def channel(self, definition: str, md5: str) -> Channel:
@@ -75,6 +79,7 @@ class Recorder:
         report: Function called with a sentence for the user.
         limit: Number of messages to record of each topic; 0 for all.
         ended: Event that others may set, too.
+        buffer: Bytes that may wait to be written; 0 for no limit.
 
     Attributes:
         ended: As given. Set when recording has come to its end, or failed.
@@ -90,6 +95,8 @@ class Recorder:
         report: Callable[[str], object],
         limit: int = 0,
         ended: threading.Event | None = None,
+        *,
+        buffer: int = 0,
     ) -> None:
         self._node = node
         self._selection = selection
@@ -97,6 +104,12 @@ class Recorder:
         self._report = report
         self._limit = limit
         self._lock = threading.Lock()
+        self._counting = threading.Lock()
+        self._most = buffer
+        self._held_bytes = 0
+        self._buffer: Buffer[tuple[_Source, _Row]] = Buffer(
+            buffer, lambda: sink.waiting + self._held_bytes
+        )
         self._subscribed: dict[str, Subscription[bytes]] = {}
         self._publishers: dict[str, Followed] = {}
         self._sources: dict[bytes, _Source] = {}
@@ -107,6 +120,7 @@ class Recorder:
         self.ended: threading.Event = ended or threading.Event()
         self.lost: int = 0
         self.error: BagError | None = None
+        self._writer = Worker("rosz-bag-buffer", self._take, receive=self._buffer.take)
         for name in selection.at_once:
             self._subscribe(name)
         # Topics that are named are subscribed to already.
@@ -145,47 +159,71 @@ class Recorder:
             except ClosedError:
                 return  # the node ends
 
-    # Messages; of one topic one at a time, of several topics at once.
+    # Messages: on the threads of the subscriptions, which never wait.
 
     def _receive(self, topic: str, data: Payload, info: MessageInfo) -> None:
-        self.lost += info.lost
-        if self.error is not None or (self._limit and self._counts[topic] >= self._limit):
+        if info.lost:
+            self._lose(info.lost)
+        if self.error is not None:
             return
         source = self._sources.get(info.gid) or self._source(topic, info)
         clock = self._node.clock
         stamp = clock.now() if clock.simulated else info.reception_time
         row = (stamp, data, info.source_time or None, info.sequence)
+        dropped = self._buffer.put((source, row), len(data))
+        if dropped:
+            self._lose(dropped)
+            self._warn_once(
+                f"the buffer of {self._most >> 20} MB is full, and the oldest messages are"
+                " dropped: the disk is too slow"
+            )
+
+    def _lose(self, count: int) -> None:
+        with self._counting:
+            self.lost += count
+
+    # Messages: on the thread that writes.
+
+    def _take(self, item: tuple[_Source, _Row]) -> None:
+        """Write a message, or keep it until its definition is known."""
+        source, row = item
         if source.track is None:
             with source.lock:
                 if source.track is None:
                     self._hold(source, row)
                     return
-        self._write(source, row)
+        self._write(source.track, row)
 
     def _hold(self, source: _Source, row: _Row) -> None:
-        if source.size > _MOST_HELD:
-            self.lost += 1
-            return
         source.held.append(row)
-        source.size += len(row[1])
+        self._count_held(row, 1)
+        while self._most and self._held_bytes > self._most // 2 and source.held:
+            self._count_held(source.held.popleft(), -1)
+            self._lose(1)
 
-    def _write(self, source: _Source, row: _Row) -> None:
-        track = source.track
-        if track is None:
+    def _count_held(self, row: _Row, sign: int) -> None:
+        with self._counting:
+            self._held_bytes += sign * (len(row[1]) + ROW_BYTES)
+
+    def _write(self, track: Track, row: _Row) -> None:
+        topic = track.channel.topic
+        if self.error is not None:
+            return
+        if self._limit and self._counts[topic] >= self._limit:
             return
         try:
-            if not self._sink.write(track, *row):
-                self._warn_once("the buffer is full: messages are lost; the disk is too slow")
-                return
+            lost = self._sink.write(track, *row)
         except MessageError as error:
-            self.lost += 1
-            self._warn_once(f"a message of {source.topic} is left out: {error}")
+            self._lose(1)
+            self._warn_once(f"a message of {topic} is left out: {error}")
             return
         except BagError as error:
             self._fail(error)
             return
+        if lost:
+            self._lose(lost)
         if self._limit:
-            self._count(source.topic)
+            self._count(topic)
 
     def _count(self, topic: str) -> None:
         self._counts[topic] += 1
@@ -265,10 +303,11 @@ class Recorder:
             self._warn_once(f"{source.topic} is not recorded: {error}")
             return
         with source.lock:
-            rows, source.held = source.held, []
+            while source.held:
+                row = source.held.popleft()
+                self._write(track, row)
+                self._count_held(row, -1)
             source.track = track
-            for row in rows:
-                self._write(source, row)
 
     def close(self) -> None:
         """Stop receiving; a second call has no effect."""
@@ -278,6 +317,8 @@ class Recorder:
         with self._lock:
             for subscription in self._subscribed.values():
                 subscription.close()
+        self._buffer.close()
+        self._writer.close(_CLOSE_TIMEOUT)
         for source in [*self._sources.values(), *(one for _, one in self._unknown.values())]:
             if source.track is None:
                 self._begin(source, "", "")  # its node has not replied in time

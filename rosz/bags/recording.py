@@ -15,6 +15,7 @@ from typing import Protocol, Self
 import msgspec
 
 from rosz.bags.bag import Channel, Compression, Payload
+from rosz.bags.buffer import ROW_BYTES
 from rosz.bags.chunk_writer import ChunkWriter
 from rosz.bags.opening import ACTIVE, create_file
 from rosz.bags.ros1_form import FromCdr, to_ros1
@@ -26,6 +27,9 @@ __all__ = ("BagFiles", "RecordOptions", "Ring", "Selection", "Sink", "Track")
 
 _SUFFIXES = (".mcap", ".bag")
 _NEVER_FULL = 1 << 62
+_MOST_WAITING = 8 << 20
+"""Bytes that are handed to the thread that compresses and writes; more wait in the buffer, where
+the oldest make room."""
 _SERVICE_EVENT = "/_service_event"
 _NOT_REPEATED = frozenset({"/rosout"})
 """Latched topics whose last message says nothing about the state of the robot."""
@@ -41,7 +45,7 @@ class RecordOptions(msgspec.Struct, frozen=True):
         size: Largest size in bytes; 0 for no limit.
         duration: Longest duration in nanoseconds; 0 for no limit.
         max_splits: Number of bags to keep; older ones are deleted; 0 for all.
-        buffer: Bytes that may wait for the disk; 0 for no limit.
+        buffer: Bytes that may wait to be written; 0 for no limit.
         chunk_size: Bytes that are written, and compressed, together.
         compression: Name of the compression.
     """
@@ -181,15 +185,17 @@ class Sink(Protocol):
 
     Attributes:
         count: Number of messages taken.
-        dropped: Number of messages that found no room.
     """
 
     count: int
-    dropped: int
 
     @property
     def size(self) -> int:
         """Bytes of the messages."""
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that wait for the disk."""
 
     def track(self, channel: Channel, types: TypeStore) -> Track:
         """Begin to record a channel.
@@ -200,8 +206,8 @@ class Sink(Protocol):
 
     def write(
         self, track: Track, stamp: int, data: Payload, sent: int | None, sequence: int
-    ) -> bool:
-        """Take a message; return whether there was room.
+    ) -> int:
+        """Take a message; return the number of messages that were lost by that.
 
         Raises:
             BagError: The file cannot be written.
@@ -236,7 +242,6 @@ class BagFiles:
         begin: Function called when a further bag has been opened, to write what each begins with.
         finished: Set when the limit of a bag that is not split has been reached.
         done: The bags that are finished.
-        dropped: Number of messages that found no room in the buffer.
         count: Number of messages in all bags.
 
     Raises:
@@ -261,7 +266,6 @@ class BagFiles:
         self._beginning = False
         self.finished: threading.Event = threading.Event()
         self.done: list[Path] = []
-        self.dropped: int = 0
         self.count: int = 0
         self._open()
 
@@ -274,6 +278,11 @@ class BagFiles:
     def size(self) -> int:
         """Bytes of all bags."""
         return self._written + self._writer.size
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that wait for the disk."""
+        return self._writer.waiting
 
     def _open(self) -> None:
         self._target, self._writer = _create(self._options, next(self._index))
@@ -295,8 +304,7 @@ class BagFiles:
         if self._writer.format == "rosbag":
             channel, translate = to_ros1(channel, types)
         track = Track(channel, translate)
-        with self._lock:
-            self._tracks.append(track)
+        self._tracks.append(track)
         return track
 
     def add_metadata(self, name: str, texts: dict[str, str]) -> None:
@@ -309,32 +317,30 @@ class BagFiles:
 
     def write(
         self, track: Track, stamp: int, data: Payload, sent: int | None, sequence: int
-    ) -> bool:
-        """Write a message; return whether there was room in the buffer."""
+    ) -> int:
+        """Write a message, when there is room for it."""
         if track.translate is not None:
             data = track.translate(data, sequence)
         options = self._options
+        self._writer.wait_for_room(min(_MOST_WAITING, options.buffer // 4 or _MOST_WAITING))
         with self._lock:
             if self._closed:
-                return False
+                return 0
             writer = self._writer
-            if options.buffer and writer.waiting >= options.buffer:
-                self.dropped += 1
-                return False
             if self._beginning:  # what each bag begins with does not end it
                 self._put(writer, track, stamp, data, sent, sequence)
-                return True
+                return 0
             self._start = self._start or stamp
             if options.duration and stamp - self._start >= options.duration:
                 if not self._next_bag(stamp):
-                    return False
+                    return 0
                 writer = self._writer
             self._put(writer, track, stamp, data, sent, sequence)
             if track.repeated:
                 track.last = data, sent, sequence
             if options.size and writer.size >= options.size:
                 self._next_bag(stamp)
-            return True
+            return 0
 
     def _put(
         self,
@@ -436,7 +442,7 @@ def _create(options: RecordOptions, index: int) -> tuple[Path, ChunkWriter]:
                 return target, create_file(
                     active,
                     compression=options.compression,
-                    chunk_size=options.chunk_size,
+                    chunk_size=min(options.chunk_size, options.buffer // 4 or _NEVER_FULL),
                     capacity=_NEVER_FULL,
                     # They take longer than receiving and writing uncompressed messages.
                     checksums=options.compression != "none",
@@ -454,7 +460,6 @@ class Ring:
 
     Attributes:
         end: Function called with each bag that is asked for, to write what it ends with.
-        dropped: Number of messages that were pushed out by newer ones although they were not old.
     """
 
     def __init__(
@@ -468,13 +473,17 @@ class Ring:
         self._bytes = 0
         self._tracks: dict[Track, TypeStore] = {}
         self.end: Callable[[BagFiles], object] | None = None
-        self.dropped: int = 0
         self.count: int = 0
 
     @property
     def size(self) -> int:
-        """Bytes of the messages that are kept."""
+        """Bytes of memory of the messages that are kept."""
         return self._bytes
+
+    @property
+    def waiting(self) -> int:
+        """Nothing waits for the disk."""
+        return 0
 
     def track(self, channel: Channel, types: TypeStore) -> Track:
         """Begin to record a channel."""
@@ -485,15 +494,14 @@ class Ring:
 
     def write(
         self, track: Track, stamp: int, data: Payload, sent: int | None, sequence: int
-    ) -> bool:
-        """Keep a message, and let go of old ones."""
+    ) -> int:
+        """Keep a message, and let go of old ones; return how many of these were not too old."""
         with self._lock:
             self.count += 1
             track.count += 1
             self._rows.append((track, stamp, data, sent, sequence))
-            self._bytes += len(data)
-            self._trim(stamp)
-        return True
+            self._bytes += len(data) + ROW_BYTES
+            return self._trim(stamp)
 
     def tick(self, now: int) -> None:
         """Let go of old messages."""
@@ -506,14 +514,15 @@ class Ring:
             self._rows.clear()
             self._bytes = 0
 
-    def _trim(self, now: int) -> None:
-        rows, most = self._rows, self._options.buffer
+    def _trim(self, now: int) -> int:
+        rows, most, lost = self._rows, self._options.buffer, 0
         while rows and (now - rows[0][1] > self._duration or (most and self._bytes > most)):
             track, stamp, data, sent, sequence = rows.popleft()
-            self._bytes -= len(data)
-            self.dropped += now - stamp <= self._duration
+            self._bytes -= len(data) + ROW_BYTES
+            lost += now - stamp <= self._duration
             if track.repeated:
                 track.last = data, sent, sequence
+        return lost
 
     def save(self, now: int) -> Path:
         """Write what is kept into a bag, which begins with the last latched messages before it.

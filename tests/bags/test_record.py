@@ -8,6 +8,7 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,6 +24,8 @@ from rosbags.highlevel import AnyReader
 
 from bags.messages import MESSAGES
 from rosz.bags import Channel, open_reader
+from rosz.bags.bag import Payload
+from rosz.bags.chunk_writer import ChunkWriter
 from rosz.bags.parameters import ParameterRecord
 from rosz.bags.recorder import Recorder
 from rosz.bags.recording import BagFiles, RecordOptions, Ring, Selection
@@ -31,7 +34,7 @@ from rosz.cli.main import run
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Trigger, TriggerRequest
 from rosz.node import Publisher
-from rosz.qos import LATCHED
+from rosz.qos import LATCHED, QoS
 
 SECOND = 1_000_000_000
 CUSTOM = """
@@ -55,7 +58,9 @@ class Recording:
         self.files = BagFiles(options, self.said.append)
         self.parameters = ParameterRecord(self.node, self.files, self.said.append)
         self.files.begin = self.parameters.begin
-        self.recorder = Recorder(self.node, selection, self.files, self.said.append)
+        self.recorder = Recorder(
+            self.node, selection, self.files, self.said.append, buffer=options.buffer
+        )
 
     @property
     def count(self) -> int:
@@ -364,6 +369,39 @@ def test_a_full_disk(network: Network) -> None:
         assert len(found) * 50_000 > 1_500_000
     finally:
         subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_what_waits_for_the_disk_is_bounded(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what does not fit into --buffsize, the oldest is dropped, counted and told once."""
+    free, write, most = threading.Event(), ChunkWriter._write_pieces, 8 << 20
+
+    def wait_and_write(writer: ChunkWriter, parts: list[Payload]) -> int:
+        assert free.wait(TIMEOUT)
+        return write(writer, parts)
+
+    monkeypatch.setattr(ChunkWriter, "_write_pieces", wait_and_write)
+    publisher = network.node("talker").publisher("/big", String, qos=QoS(history="keep_all"))
+    with recording(network, "x", "/big", buffer=most) as made:
+        connect(publisher)
+        for number in range(40):
+            publisher.publish(String(data=f"{number:06}" + " " * (1 << 20)))
+        buffer = made.recorder._buffer
+
+        def has_last() -> bool:
+            _, (_, row) = buffer._items[-1]
+            return row is not None and row[-1] == 40
+
+        eventually(lambda: bool(buffer._items) and has_last(), "the last one has come")
+        assert buffer.size + made.files.waiting <= most
+        free.set()
+    assert sum("the buffer of 8 MB is full" in one for one in made.said) == 1
+    with open_reader(network.folder / "x.mcap") as reader:
+        found = [int(bytes(one.data[8:14])) for one in reader.messages({"/big"})]
+    assert found[-1] == 39
+    assert found == sorted(found)
+    assert len(found) + made.recorder.lost == 40
 
 
 def test_snapshots_are_of_the_last_seconds(network: Network) -> None:

@@ -190,7 +190,9 @@ def _record(
             _publish_name(node, files)
         parameters = stack.enter_context(ParameterRecord(node, files, report))
         files.begin = parameters.begin
-        recorder = stack.enter_context(Recorder(node, selection, files, report, limit, ended))
+        recorder = stack.enter_context(
+            Recorder(node, selection, files, report, limit, ended, buffer=options.buffer)
+        )
         _run(node, recorder, files, options, report, finished=files.finished)
         if recorder.error is not None:
             raise recorder.error
@@ -231,7 +233,7 @@ def _keep_last(
     with (
         _end_by_signal() as ended,
         ParameterRecord(node, ring, report) as parameters,
-        Recorder(node, selection, ring, report, limit, ended) as recorder,
+        Recorder(node, selection, ring, report, limit, ended, buffer=options.buffer) as recorder,
         node.service("~snapshot", Trigger, serve),
         _on_signal() as signalled,
     ):
@@ -310,7 +312,7 @@ def _run(
     finally:
         if shown:
             progress.end()
-        lost = recorder.lost + sink.dropped
+        lost = recorder.lost
         seconds = time.monotonic() - begun
         report(f"{sink.count} messages in {seconds:.1f} s, {lost} lost")
 
@@ -333,7 +335,7 @@ class _Progress:
         if elapsed < 1:
             return
         count, size = sink.count, sink.size
-        lost = self._recorder.lost + sink.dropped
+        lost = self._recorder.lost
         disk = os.statvfs(self._folder)
         left = disk.f_bavail * disk.f_frsize
         rate = (count - self._before[0]) / elapsed

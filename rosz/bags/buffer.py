@@ -1,0 +1,82 @@
+"""What waits to be written: the newest messages that fit into a number of bytes."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+__all__ = ("ROW_BYTES", "Buffer")
+
+T = TypeVar("T")
+
+ROW_BYTES = 400
+"""Bytes of memory that a message takes beside its payload while it waits."""
+_COLLECT_SECONDS = 0.01
+"""Time to wait for more after the first item, as waking a thread for each takes longer than
+writing it."""
+
+
+class Buffer(Generic[T]):
+    """A queue that is bounded by bytes: the oldest items make room for new ones.
+
+    Args:
+        limit: Largest size in bytes; 0 for no limit.
+        elsewhere: Function that returns the bytes that wait in other places and count as well.
+
+    Attributes:
+        size: Bytes of the items.
+    """
+
+    def __init__(self, limit: int, elsewhere: Callable[[], int] = lambda: 0) -> None:
+        self._limit = limit
+        self._elsewhere = elsewhere
+        self._items: deque[tuple[int, T]] = deque()
+        self._changed = threading.Condition()
+        self._ended = threading.Event()
+        self.size: int = 0
+
+    def put(self, item: T, size: int) -> int:
+        """Add an item; never wait.
+
+        Args:
+            item: The item.
+            size: Bytes of its payload.
+
+        Returns:
+            The number of oldest items that were dropped.
+        """
+        size += ROW_BYTES
+        dropped = 0
+        with self._changed:
+            items = self._items
+            items.append((size, item))
+            self.size += size
+            if self._limit:
+                most = self._limit - self._elsewhere()
+                while self.size > most and len(items) > 1:
+                    self.size -= items.popleft()[0]
+                    dropped += 1
+            if len(items) == 1:
+                self._changed.notify()
+        return dropped
+
+    def take(self) -> T | None:
+        """Wait for an item, and return the oldest; ``None`` at the end."""
+        if not self._items:
+            with self._changed:
+                self._changed.wait_for(lambda: self._items or self._ended.is_set())
+            self._ended.wait(_COLLECT_SECONDS)
+        with self._changed:
+            if not self._items:
+                return None
+            size, item = self._items.popleft()
+            self.size -= size
+            return item
+
+    def close(self) -> None:
+        """End it, once what waits has been taken; a second call has no effect."""
+        self._ended.set()
+        with self._changed:
+            self._changed.notify_all()
