@@ -6,6 +6,7 @@ line.
 """
 
 PUBLIC_MODULES = (
+    "diagnostic_aggregator",
     "joint_state_publisher",
     "map_server",
     "robot_state_publisher",

@@ -409,6 +409,8 @@ class Buffer:
             return compose_all(up.values())
         known = {*up, top}
         down, shared, why = self._climb(target, stamp, known)
+        if shared == source:
+            return invert(compose_all(down.values()))
         if shared in known:
             inner = compose_all(
                 pose for _, pose in itertools.takewhile(lambda step: step[0] != shared, up.items())
