@@ -29,8 +29,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hosts.world import why_not  # found by the line above
 
-from .crowd import STEPS, TOPOLOGIES, Sight, measure
+from .crowd import TOPOLOGIES, measure
 from .plot import plot
+from .sight import STEPS, Sight
 
 HEAD = (
     "nodes",
@@ -66,6 +67,12 @@ def split(sights: Iterable[Sight]) -> Iterator[str]:
         if sight.steps:
             cells = (f"{sight.steps[step]:.3g}" for step in STEPS)
             yield f"| {sight.count} | {sight.mode} | {' | '.join(cells)} |"
+
+
+def known(sight: Sight) -> dict[str, object]:
+    """Return what was measured of a crowd, for JSON, which has no number for what was not."""
+    fields = msgspec.to_builtins(sight).items()
+    return {name: value for name, value in fields if not isinstance(value, float) or value >= 0}
 
 
 def options() -> Namespace:
@@ -119,7 +126,7 @@ def main() -> None:
                 late.add(mode)
     print(*split(sights), sep="\n")
     if given.json:
-        given.json.write_text(json.dumps(msgspec.to_builtins(sights), indent=1) + "\n")
+        given.json.write_text(json.dumps([*map(known, sights)], indent=1) + "\n")
     if given.plot:
         given.plot.write_text(plot(sights))
         print(f"wrote {given.plot}", file=sys.stderr)

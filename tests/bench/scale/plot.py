@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .crowd import Sight
+from .sight import Sight
 
 __all__ = ("plot",)
 
