@@ -18,14 +18,13 @@ allowed is refused.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
 from typing import Final
 
 import msgspec
 import yaml
 
-from rosz.errors import YamlError, near_miss
+from rosz.errors import near_miss
+from rosz.security.reading import NodeReader, compose, matches
 
 __all__ = ("ANYBODY", "EVERYTHING", "NAME_VERBS", "Permit", "Rules", "read_rules")
 
@@ -33,7 +32,6 @@ ANYBODY: Final = "*"
 EVERYTHING: Final = "/**"
 NAME_VERBS: Final = ("publish", "subscribe", "call", "serve", "set")
 _FLAGS: Final = ("get", "control")
-_PATTERN: Final = re.compile(r"(/(\*\*|\*|\*?[A-Za-z0-9_]+(\*[A-Za-z0-9_]+)*\*?))+")
 
 
 class Permit(msgspec.Struct, frozen=True, kw_only=True):
@@ -66,7 +64,7 @@ class Permit(msgspec.Struct, frozen=True, kw_only=True):
 
     def allows(self, verb: str, name: str) -> bool:
         """Tell whether the patterns of a verb match a global name."""
-        return any(_matches(pattern, name) for pattern in getattr(self, verb))
+        return any(matches(pattern, name) for pattern in getattr(self, verb))
 
     @property
     def is_all(self) -> bool:
@@ -105,16 +103,7 @@ def read_rules(text: str, file: str) -> Rules:
     Raises:
         YamlError: The text is not YAML, or does not consist of rules.
     """
-    try:
-        top = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-        raise YamlError(error.problem or "no YAML", file, line, column) from error
-    except yaml.YAMLError as error:
-        raise YamlError(str(error), file, 1, 1) from error
-    except RecursionError as error:
-        raise YamlError("nested too deep; rules are names, verbs and patterns", file) from error
+    top = compose(text, file)
     if top is None:
         return Rules({})
     reader = _Reader(file)
@@ -122,70 +111,26 @@ def read_rules(text: str, file: str) -> Rules:
     return Rules({str(name.value): reader.permit(value) for name, value in holders})
 
 
-def _matches(pattern: str, name: str) -> bool:
-    parts = [
-        r"(/[^/]+)*" if part == "**" else "/" + re.escape(part).replace(r"\*", "[^/]*")
-        for part in pattern.split("/")[1:]
-    ]
-    return re.fullmatch("".join(parts), name) is not None
-
-
-class _Reader:
+class _Reader(NodeReader):
     """Converts the nodes of a YAML document; its errors say where the mistake is."""
-
-    def __init__(self, file: str) -> None:
-        self._file = file
-
-    def items(self, node: yaml.Node, of: str) -> Iterator[tuple[yaml.Node, yaml.Node]]:
-        if not isinstance(node, yaml.MappingNode):
-            raise self._error(node, f"expected a mapping of {of}")
-        seen: set[str] = set()
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode) or not key.value:
-                raise self._error(key, "expected a name")
-            if key.value in seen:
-                raise self._error(key, f"'{key.value}' stands here twice")
-            seen.add(key.value)
-            yield key, value
 
     def permit(self, node: yaml.Node) -> Permit:
         if isinstance(node, yaml.ScalarNode):
             if node.value == "all":
                 return Permit.all()
-            raise self._error(node, f"'{node.value}'; expected 'all', or a mapping of permissions")
+            raise self.error(node, f"'{node.value}'; expected 'all', or a mapping of permissions")
         given: dict[str, tuple[str, ...] | bool] = {}
         for key, value in self.items(node, "permissions"):
             verb = str(key.value)
             if verb in NAME_VERBS:
                 given[verb] = self._patterns(value)
             elif verb in _FLAGS:
-                given[verb] = self._flag(value)
+                given[verb] = self.flag(value)
             else:
                 known = (*NAME_VERBS, *_FLAGS)
                 hint = f"{near_miss(verb, known)}; expected one of {', '.join(known)}"
-                raise self._error(key, f"'{verb}' is not a permission{hint}")
+                raise self.error(key, f"'{verb}' is not a permission{hint}")
         return msgspec.convert(given, Permit)
 
     def _patterns(self, node: yaml.Node) -> tuple[str, ...]:
-        parts: Sequence[yaml.Node] = node.value if isinstance(node, yaml.SequenceNode) else [node]
-        return tuple(self._pattern(part) for part in parts)
-
-    def _pattern(self, node: yaml.Node) -> str:
-        if not isinstance(node, yaml.ScalarNode):
-            raise self._error(node, "expected a name or a list of names")
-        text: str = node.value
-        if not _PATTERN.fullmatch(text):
-            raise self._error(
-                node,
-                f"'{text}' is not a pattern of global names; expected one like /arm/**",
-            )
-        return text
-
-    def _flag(self, node: yaml.Node) -> bool:
-        if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:bool":
-            return bool(node.value.lower() in {"true", "yes", "on"})
-        raise self._error(node, "expected true or false")
-
-    def _error(self, node: yaml.Node, what: str) -> YamlError:
-        mark = node.start_mark
-        return YamlError(what, self._file, mark.line + 1, mark.column + 1)
+        return tuple(self.pattern(part, text) for part, text in self.listed(node))

@@ -112,6 +112,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
         hold_rendezvous: Whether a peer may listen at the rendezvous; short-lived ones should not.
         rendezvous_is_held: Whether another process holds the rendezvous of a router, which then
             connects to that process.
+        beyond: Whether a router is linked to other machines only, never to sessions of this one.
         must_connect: Whether opening fails, after ``open_timeout``, when nobody answers.
         open_timeout: Seconds that a client, or a session that must connect, waits for an answer.
         multicast: Whether to look for others on the local network.
@@ -127,6 +128,7 @@ class SessionConfig(msgspec.Struct, frozen=True, kw_only=True):
     listen: tuple[str, ...] = ()
     hold_rendezvous: bool = True
     rendezvous_is_held: bool = False
+    beyond: bool = False
     must_connect: bool = False
     open_timeout: float = 2.0
     multicast: bool = False
@@ -223,7 +225,7 @@ def _random_digits(count: int) -> str:
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     """Return the Zenoh configuration, as nested dictionaries."""
     connect = [*config.connect]
-    if config.mode != "router" or config.rendezvous_is_held:
+    if (config.mode != "router" or config.rendezvous_is_held) and not config.beyond:
         connect.insert(0, config.rendezvous)
     if config.keys is not None:
         connect = [connect_endpoint(endpoint) for endpoint in connect]
@@ -281,7 +283,9 @@ def _open_timeout_ms(mode: str, *, local: bool) -> int:
 def _listen(config: SessionConfig) -> list[str]:
     keys = config.keys is not None
     places = config.listen
-    if config.rendezvous_is_held:
+    if config.beyond:
+        places = tuple(_share_port(config))
+    elif config.rendezvous_is_held:
         places = (EPHEMERAL, *_share_port(config))
     elif config.mode == "router" or (config.mode == "peer" and config.hold_rendezvous):
         places = listen_endpoints(config.rendezvous, places, keys=keys)

@@ -250,6 +250,27 @@ class RawPublisher(Declared):
             if self._closed:
                 self._undeclare()
 
+    def forward(
+        self, sample: Sample, payload: bytes | None = None, attachment: bytes | None = None
+    ) -> None:
+        """Send a sample that arrived on another session, at the time of its first sending.
+
+        Args:
+            sample: The sample; its payload is not copied.
+            payload: The payload to send instead.
+            attachment: The bytes to send beside the payload.
+
+        Raises:
+            ClosedError: The publisher or the session is closed.
+            TransportError: Zenoh cannot send the sample.
+        """
+        with self._call(f"publish on '{self.key}'"):
+            self._put(
+                sample.raw.payload if payload is None else payload,
+                attachment=attachment,
+                timestamp=sample.raw.timestamp,
+            )
+
     @property
     def matched(self) -> bool:
         """Whether a subscriber of this publisher is known; only for publishers without a cache.

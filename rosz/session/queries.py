@@ -212,6 +212,34 @@ class Query:
         except zenoh.ZError as error:
             raise TransportError(f"cannot reply on '{key}': {error}") from error
 
+    def forward(
+        self,
+        reply: Reply,
+        key: str,
+        payload: bytes | None = None,
+        attachment: bytes | None = None,
+    ) -> None:
+        """Send a reply, or an error, that arrived on another session.
+
+        Args:
+            reply: The reply; its payload is not copied.
+            key: The key to reply on.
+            payload: The payload to send instead.
+            attachment: The bytes to send beside the payload.
+
+        Raises:
+            TransportError: The session is closed, or the program is about to end.
+        """
+        _check_not_ending()
+        content = reply.raw.payload if payload is None else payload
+        try:
+            if reply.ok:
+                self._raw.reply(key, content, attachment=attachment, timestamp=reply.raw.timestamp)
+            else:
+                self._raw.reply_err(content)
+        except zenoh.ZError as error:
+            raise TransportError(f"cannot reply on '{key}': {error}") from error
+
     def reply_error(self, text: str) -> None:
         """Send an error as the reply.
 

@@ -21,7 +21,7 @@ import msgspec
 from rosz.environment import Environment
 from rosz.errors import RoszError, TransportError
 from rosz.lifecycle import Lifecycle
-from rosz.session.config import EPHEMERAL, SessionConfig
+from rosz.session.config import EPHEMERAL, SessionConfig, keys_of
 from rosz.session.dialling import Dialling, who_answers
 from rosz.session.local_peers import CoreLock, LocalPeers, describe_process, find_holder
 from rosz.session.opening import outlasted_silence, places_of, settings_text
@@ -29,7 +29,7 @@ from rosz.session.probe import is_listening
 from rosz.session.session import Session
 from rosz.wire import Endpoint
 
-__all__ = ("Router", "zenoh_configuration")
+__all__ = ("Beyond", "Router", "zenoh_configuration")
 
 _OCCUPIED: Final = re.compile(
     r"bound to (\S+?): \[.*address already in use|listener on (\S+) - unable to acquire lock",
@@ -146,6 +146,7 @@ class Router:
         self.close()
 
 
+<<<<<<< HEAD
 def _allow_open_files() -> None:
     """Allow this process as many open files as it may have, since each link is one."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -159,6 +160,55 @@ def _allow_open_files() -> None:
             " nodes (ulimit -Hn)",
             most,
         )
+=======
+class Beyond:
+    """A router that is linked to other machines alone, until closed.
+
+    Args:
+        environment: The settings of the process.
+        listen: Endpoints to listen at.
+        connect: Endpoints to connect to.
+
+    Attributes:
+        endpoints: The endpoints that it listens at.
+        outlasted_silence: Seconds of silence after which others give up its links.
+        session: Its session.
+
+    Raises:
+        TransportError: An endpoint is occupied or malformed.
+    """
+
+    def __init__(
+        self, environment: Environment, listen: Sequence[str], connect: Sequence[str]
+    ) -> None:
+        config = SessionConfig(
+            mode="router",
+            rendezvous=environment.rendezvous,
+            hold_rendezvous=False,
+            beyond=True,
+            listen=tuple(listen),
+            connect=tuple(connect),
+            multicast=environment.multicast,
+            keys=keys_of(environment),
+        )
+        self.endpoints: tuple[str, ...]
+        self.endpoints, _ = places_of(config)
+        self.outlasted_silence: float = outlasted_silence(config)
+        self._lifecycle = Lifecycle("the router beyond the machine", log=_log)
+        try:
+            self.session: Session = self._lifecycle.keep(Session.open(config))
+        except TransportError as error:
+            raise _name_occupied(error, config) from error
+        self._dialling = self._lifecycle.keep(Dialling(self.session, config))
+
+    def announce(self) -> dict[str, bool]:
+        """Return the endpoints that it dials, each with whether it is reached, to be printed."""
+        return self._dialling.announce()
+
+    def close(self) -> None:
+        """Close the router; a second call has no effect."""
+        self._lifecycle.close()
+>>>>>>> b3207e9 (Carry a robot's names under a prefix beyond it)
 
 
 def zenoh_configuration(

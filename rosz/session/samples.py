@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import threading
 import time
+from typing import Any
 
 import msgspec
 import zenoh
@@ -84,6 +85,11 @@ class Sample:
 
     def __init__(self, raw: zenoh.Sample) -> None:
         self._raw = raw
+
+    @property
+    def raw(self) -> Any:
+        """Zenoh's own object, for this package alone."""
+        return self._raw
 
     @property
     def key(self) -> str:

@@ -58,6 +58,7 @@ __all__ = ("Session",)
 
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 """Congestion control for a full link, by whether to wait for it."""
+_ORIGIN = {True: zenoh.Locality.REMOTE, False: None}
 _HEARTBEAT_SECONDS = 0.5
 _TOKENS_SECONDS = 2.0
 """Seconds in which the tokens come that exist when a watch begins."""
@@ -233,8 +234,7 @@ class Session:
         """
         reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
         qos: Any = {"congestion_control": _CONGESTION[block], "reliability": reliability}
-        if remote_only:
-            qos["allowed_destination"] = zenoh.Locality.REMOTE
+        qos["allowed_destination"] = _ORIGIN[remote_only]
         self._lifecycle.check_open(f"publish on '{key}'")
         with translate_errors(f"publish on '{key}'"):
             if not cache:
@@ -272,12 +272,17 @@ class Session:
             recover: Whether to notice and fetch samples that were missed.
             remote_only: Whether to ignore what this session itself publishes.
         """
-        origin = zenoh.Locality.REMOTE if remote_only else None
-        entity = self._subscribe(key, open_channel(), history, recover, origin)
+        entity = self._subscribe(key, open_channel(), history, recover, remote_only)
         return CallbackThread(f"subscriber '{key}'", entity, lambda raw: callback(Sample(raw)))
 
     def pull_subscriber(
-        self, key: str, depth: int, *, history: int = 0, recover: bool = False
+        self,
+        key: str,
+        depth: int,
+        *,
+        history: int = 0,
+        recover: bool = False,
+        remote_only: bool = False,
     ) -> PullSubscriber:
         """Declare a subscriber that keeps the newest samples until a thread receives them.
 
@@ -288,18 +293,15 @@ class Session:
             depth: The number of samples to keep; a new one replaces the oldest.
             history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
+            remote_only: Whether to ignore what this session itself publishes.
         """
         handler: Any = zenoh.handlers.RingChannel(depth)
-        return PullSubscriber(key, self._subscribe(key, handler, history, recover, None))
+        return PullSubscriber(key, self._subscribe(key, handler, history, recover, remote_only))
 
     def _subscribe(
-        self,
-        key: str,
-        handler: Any,
-        history: int,
-        recover: bool,
-        origin: zenoh.Locality | None,
+        self, key: str, handler: Any, history: int, recover: bool, remote_only: bool
     ) -> Any:
+        origin = _ORIGIN[remote_only]
         self._lifecycle.check_open(f"subscribe to '{key}'")
         with translate_errors(f"subscribe to '{key}'"):
             if not history:
@@ -331,19 +333,19 @@ class Session:
             entity = self._raw.declare_queryable(key, open_channel(), complete=complete)
         return CallbackThread(f"queryable '{key}'", entity, lambda raw: callback(Query(raw)))
 
-    def pull_queryable(self, key: str, *, complete: bool = False) -> Queryable:
+    def pull_queryable(
+        self, key: str, *, complete: bool = False, remote_only: bool = False
+    ) -> Queryable:
         """Declare a queryable that keeps its queries until a thread receives them.
-
-        This is the fastest kind of queryable: no other thread of Python is involved.
 
         Args:
             key: The key expression whose queries get replies here.
             complete: Whether the replies are all there are; ROS 2 clients query only such.
+            remote_only: Whether to ignore the queries of this session itself.
         """
+        options: Any = {"complete": complete, "allowed_origin": _ORIGIN[remote_only]}
         with translate_errors(f"serve '{key}'"):
-            return Queryable(
-                key, self._raw.declare_queryable(key, open_channel(), complete=complete)
-            )
+            return Queryable(key, self._raw.declare_queryable(key, open_channel(), **options))
 
     def token(self, key: str) -> Closable:
         """Declare a liveliness token, which others see until it is closed or the link ends."""
