@@ -59,6 +59,18 @@ def core_command(
     ] = None,
     keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
     store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = "",
+    as_: Annotated[
+        str, Option("--as NAMESPACE", "Put this machine's names below this one for others.")
+    ] = "",
+    share: Annotated[
+        str, Option("--share PATTERNS", "What leaves with --as, such as /odom,/camera/**@2Hz.")
+    ] = "",
+    frames: Annotated[
+        bool, Option("--frames", "With --as, also put the namespace before the frames of tf.")
+    ] = False,
+    fleet: Annotated[
+        str, Option("--fleet FILE", "Read --as, --share and more from a file.", suggest.files)
+    ] = "",
     ros1: Annotated[
         bool, Option("--ros1", "Also be the master of programs that speak ROS 1's protocol.")
     ] = False,
@@ -83,6 +95,7 @@ def core_command(
     at_least("--owner", owner, 0, "as the number of a process", _MOST_PROCESSES)
     import msgspec
 
+    from rosz.cli.core_fleet import on_machine, open_fleet, read_fleet
     from rosz.cli.core_restart import CoreWatch, Handover
     from rosz.environment import Environment
     from rosz.params.replica import Replica
@@ -94,8 +107,11 @@ def core_command(
         environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
     listen_at = [str(Endpoint.parse(text, "--listen")) for text in listen or ()]
     connect_to = [str(Endpoint.parse(text, "--connect")) for text in connect or ()]
+    plan = read_fleet(environment, as_, share, fleet, frames=frames)
+    places = listen_at, connect_to
+    own = on_machine(plan, environment, places)
     if print_config:
-        print_lines([zenoh_configuration(environment, listen_at, connect_to)])
+        print_lines([zenoh_configuration(*own)])
         return
     file = Path(store).absolute() if store else None
     logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
@@ -103,11 +119,12 @@ def core_command(
         before = Handover.take()
         key_watch = None if environment.keys is None else _watch_keys(environment)
         storage = None if file is None else _open_storage(file, stack)
-        router = stack.enter_context(Router(environment, listen_at, connect_to))
+        router = stack.enter_context(Router(*own))
         domain = environment.domain
         replica = Replica(router.session, domain, storage=storage, handover=before.parameters)
         stack.enter_context(closing(replica))
         _set_core_params(replica)
+        crossing = open_fleet(plan, environment, router, replica, places, stack)
         master = master_at and open_master(environment, *master_at, stack)
         watch = CoreWatch(router, replica, domain, before, key_watch=key_watch)
         stack.enter_context(closing(watch))
@@ -117,7 +134,7 @@ def core_command(
             print_error(f"{before.why}: started afresh, with {kept}")
         else:
             kept = f"parameters of domain {domain} are kept in {file or 'memory'}"
-            lines = _describe(router, environment.rendezvous)
+            lines = [*_describe(router, environment.rendezvous), *crossing]
             print_lines([*lines, kept, *(master or ()), "started core; press Ctrl-C to end it"])
         watch.restart_when_needed(owner)
 

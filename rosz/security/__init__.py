@@ -10,7 +10,7 @@ reads patterns of names from any YAML file.
 """
 
 from rosz.security.access import access_control
-from rosz.security.folder import CERTIFICATE, KeyFolder, LocalPermissions
+from rosz.security.folder import CERTIFICATE, KeyFolder, LocalPermissions, read_trusted
 from rosz.security.rules import Permit, Rules, read_rules
 
 PUBLIC_MODULES = ("authority", "handshake", "reading", "review", "watch")
@@ -23,4 +23,5 @@ __all__ = (
     "Rules",
     "access_control",
     "read_rules",
+    "read_trusted",
 )

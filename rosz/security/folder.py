@@ -34,6 +34,7 @@ __all__ = (
     "check_private",
     "check_trusted",
     "load_rules",
+    "read_trusted",
 )
 
 AUTHORITY = "authority.pem"
@@ -201,10 +202,19 @@ def load_rules(file: Path) -> Rules:
         UsageError: The file cannot be read, or anybody may write it.
         YamlError: The file does not contain rules.
     """
+    return read_rules(read_trusted(file), str(file))
+
+
+def read_trusted(file: Path) -> str:
+    """Return the text of a file that others must not write.
+
+    Raises:
+        UsageError: The file cannot be read, or anybody may write it.
+    """
     try:
         check_trusted(file)
         if not file.is_file():  # opening a pipe would block
             raise UsageError(f"'{file}' is not a regular file")
-        return read_rules(file.read_text(encoding="utf-8"), str(file))
+        return file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"cannot read '{file}': {error}") from error

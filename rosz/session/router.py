@@ -146,7 +146,6 @@ class Router:
         self.close()
 
 
-<<<<<<< HEAD
 def _allow_open_files() -> None:
     """Allow this process as many open files as it may have, since each link is one."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -160,7 +159,8 @@ def _allow_open_files() -> None:
             " nodes (ulimit -Hn)",
             most,
         )
-=======
+
+
 class Beyond:
     """A router that is linked to other machines alone, until closed.
 
@@ -208,7 +208,6 @@ class Beyond:
     def close(self) -> None:
         """Close the router; a second call has no effect."""
         self._lifecycle.close()
->>>>>>> b3207e9 (Carry a robot's names under a prefix beyond it)
 
 
 def zenoh_configuration(

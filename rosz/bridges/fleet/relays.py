@@ -158,7 +158,8 @@ class TopicRelay:
         now, due = time.monotonic(), self._due.get(gid, 0.0)
         if now < due:
             return None
-        self._due[gid] = max(due, now - self._period) + self._period
+        # A sample that is late by less than a period does not delay those after it.
+        self._due[gid] = (due if now - due < self._period else now) + self._period
         self._sent[gid] = number = self._sent.get(gid, sequence - 1) + 1
         while len(self._due) > _DEEPEST:
             oldest = next(iter(self._due))

@@ -1,0 +1,113 @@
+"""What ``rosz core --as`` adds to a core: a namespace for this machine beyond it."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from rosz.errors import UsageError
+
+if TYPE_CHECKING:
+    from rosz.bridges.fleet import FleetPlan
+    from rosz.environment import Environment
+    from rosz.params.replica import Replica
+    from rosz.session.router import Router
+
+__all__ = ("Places", "on_machine", "open_fleet", "read_fleet")
+
+Places = tuple[list[str], list[str]]
+"""The endpoints to listen at, and those to connect to."""
+
+_FILE = "fleet.yaml"
+
+
+def read_fleet(
+    environment: Environment, namespace: str, share: str, file: str, *, frames: bool
+) -> FleetPlan | None:
+    """Return what crosses; ``None`` if this machine keeps its names.
+
+    The options replace what the file says. Without a file, there may be one beside the keys.
+
+    Raises:
+        UsageError: An option has no meaning, or a file cannot be read.
+        YamlError: The file says something else.
+    """
+    found = Path(file) if file else _beside_keys(environment)
+    if not (namespace or share or frames or found):
+        return None
+    from rosz.bridges.fleet import FleetPlan, check_prefix, read_plan, read_share
+    from rosz.security import read_trusted
+
+    plan = FleetPlan() if found is None else read_plan(read_trusted(found), str(found))
+    if namespace:
+        plan = msgspec.structs.replace(plan, prefix=check_prefix(namespace, "--as"))
+    if share:
+        plan = msgspec.structs.replace(plan, share=read_share(share))
+    if not plan.prefix:
+        what = f"'as' in '{found}'" if found else "--share and --frames"
+        raise UsageError(f"no namespace for this machine: {what} needs --as, such as --as /robot1")
+    return msgspec.structs.replace(plan, frames=plan.frames or frames)
+
+
+def on_machine(
+    plan: FleetPlan | None, environment: Environment, places: Places
+) -> tuple[Environment, list[str], list[str]]:
+    """Return the arguments of the router for the nodes of this machine.
+
+    Raises:
+        UsageError: There is a namespace, but no way to others.
+    """
+    if plan is None:
+        return environment, *places
+    if not (environment.listen or environment.connect or environment.multicast or any(places)):
+        raise UsageError(
+            f"nobody would see '{plan.prefix}': say where others are with --connect, such as"
+            " tcp/laptop:7447, or --listen, such as tcp/0.0.0.0:7447"
+        )
+    return msgspec.structs.replace(environment, listen=(), connect=(), multicast=False), [], []
+
+
+def open_fleet(
+    plan: FleetPlan | None,
+    environment: Environment,
+    router: Router,
+    replica: Replica,
+    places: Places,
+    stack: ExitStack,
+) -> list[str]:
+    """Start what crosses, and return lines that describe it.
+
+    Raises:
+        TransportError: Another robot has the namespace, or an endpoint is occupied or malformed.
+    """
+    if plan is None:
+        return []
+    from rosz.bridges.fleet import Fleet
+
+    listen, connect = (*environment.listen, *places[0]), (*environment.connect, *places[1])
+    fleet = stack.enter_context(
+        Fleet(environment, plan, router.session, replica, listen=listen, connect=connect)
+    )
+    beyond = fleet.beyond
+    router.outlasted_silence = min(router.outlasted_silence, beyond.outlasted_silence)
+    return [
+        f"names of this machine are below {plan.prefix} for others",
+        *(f"listening on {endpoint}" for endpoint in beyond.endpoints),
+        *(
+            f"{'connected to' if reached else 'waiting for'} {endpoint}"
+            for endpoint, reached in beyond.announce().items()
+        ),
+    ]
+
+
+def _beside_keys(environment: Environment) -> Path | None:
+    if environment.keys is None:
+        return None
+    from rosz.session import keys_of
+
+    keys = keys_of(environment)
+    file = keys and keys.path / _FILE
+    return file if file and file.exists() else None
