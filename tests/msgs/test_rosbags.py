@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import random
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rosz.idl import MessageSpec
+from rosz.idl import Catalog, MessageSpec
 from rosz.message import Message
 from rosz.typestore import TypeStore
 
@@ -32,15 +33,17 @@ def known() -> list[str]:
     return names
 
 
-def build(spec: MessageSpec, plain: dict[str, Any]) -> Any:
+def build(
+    spec: MessageSpec, plain: dict[str, Any], catalog: Catalog = CATALOG, theirs: Any = THEIRS
+) -> Any:
     """Turn a plain value into a message of rosbags."""
     members = []
     for field in spec.fields:
         value, kind = plain[field.name], field.type
         if not kind.primitive:
-            below = CATALOG.message(kind.base)
-            one = kind.shape == "one"
-            value = build(below, value) if one else [build(below, element) for element in value]
+            below = catalog.message(kind.base)
+            built = partial(build, below, catalog=catalog, theirs=theirs)
+            value = built(value) if kind.shape == "one" else [*map(built, value)]
         elif kind.shape != "one" and kind.base != "string":
             dtype = {"bool": "?", "B": "u1"}.get(kind.base, reference.CODES[kind.base])
             value = np.array(list(value), dtype.replace("B", "u1").replace("b", "i1"))
@@ -49,7 +52,7 @@ def build(spec: MessageSpec, plain: dict[str, Any]) -> Any:
         members.append(value)
     if not spec.fields:
         members.append(0)
-    return THEIRS.types[spec.name](*members)
+    return theirs.types[spec.name](*members)
 
 
 def unpacked(spec: MessageSpec, message: Any) -> dict[str, Any]:
