@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from rosz.transforms import (
 )
 
 __all__ = (
+    "leading_number",
     "parse_transform",
     "static_transform_publisher",
     "static_transform_publisher_of_tf2",
@@ -36,6 +38,7 @@ __all__ = (
 )
 
 _NANOSECONDS = 1_000_000_000
+_LEADING_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MILLISECONDS = 1000
 _EULER, _QUATERNION = 6, 7
 _FIRST_TIMEOUT = _NANOSECONDS
@@ -63,11 +66,21 @@ def _words() -> list[str]:
     return [word for word in sys.argv[1:] if ":=" not in word]
 
 
-def _numbers(words: Sequence[str]) -> list[float]:
+def _numbers(words: Sequence[str], read: Callable[[str], float] = float) -> list[float]:
     try:
-        return [float(word) for word in words]
+        return [read(word) for word in words]
     except ValueError as error:
         raise UsageError(f"{error}; expected a number") from error
+
+
+def leading_number(word: str) -> float:
+    """Return the number that a word begins with, as C's ``atof`` reads ``0,`` and ``.5m``.
+
+    Raises:
+        ValueError: It begins with none.
+    """
+    match = _LEADING_NUMBER.match(word)
+    return float(match[0] if match else word)
 
 
 def _positive(what: str, word: str) -> float:
@@ -84,12 +97,13 @@ def _few(words: Sequence[str]) -> Sequence[str]:
     return words
 
 
-def parse_transform(words: Sequence[str]) -> TransformStamped:
+def parse_transform(words: Sequence[str], read: Callable[[str], float] = float) -> TransformStamped:
     """Return the transform that a command line describes, without a time.
 
     Args:
         words: ``x y z yaw pitch roll frame child`` in metres and radians, or
             ``x y z qx qy qz qw frame child``.
+        read: Function that reads a number, and raises ValueError if it is none.
 
     Raises:
         UsageError: It is neither, a number is not valid, or both frames are the same.
@@ -99,7 +113,7 @@ def parse_transform(words: Sequence[str]) -> TransformStamped:
     *texts, parent, child = words
     if parent == child:
         raise UsageError(f"the frame and its child are both '{child}'; expected two frames")
-    numbers = _numbers(texts)
+    numbers = _numbers(texts, read)
     if len(numbers) == _EULER:
         x, y, z, yaw, pitch, roll = numbers
         rotation = from_rpy(roll, pitch, yaw)
@@ -114,7 +128,7 @@ def static_transform_publisher() -> None:
     """Publish a transform on ``/tf`` again and again, as the program of tf does."""
     words = _words()
     try:
-        transform = parse_transform(words[:-1])
+        transform = parse_transform(words[:-1], leading_number)
         period = _positive("the period in ms", words[-1]) / _MILLISECONDS
     except UsageError as error:
         sys.exit(f"static_transform_publisher: {error}\n{_TF_USAGE}")
@@ -135,7 +149,11 @@ def static_transform_publisher_of_tf2() -> None:
     with Node("static_transform_publisher", anonymous=True) as node:
         serve_loggers(node)
         try:
-            transform = _of_param(node, words[0]) if len(words) == 1 else parse_transform(words)
+            transform = (
+                _of_param(node, words[0])
+                if len(words) == 1
+                else parse_transform(words, leading_number)
+            )
         except RoszError as error:
             sys.exit(f"static_transform_publisher: {error}\n{_TF2_USAGE}")
         transform.header.stamp = Time.from_nsec(node.now())

@@ -13,7 +13,7 @@ from network import TIMEOUT, Network, Program, eventually
 
 from rosz.errors import UsageError
 from rosz.msgs.tf2_msgs.msg import TFMessage
-from rosz.programs.tf import parse_transform
+from rosz.programs.tf import leading_number, parse_transform
 from rosz.qos import QoS
 from rosz.transforms import (
     Buffer,
@@ -66,6 +66,17 @@ def test_both_forms_of_a_transform() -> None:
 def test_what_is_no_transform(words: list[str], text: str) -> None:
     with pytest.raises(UsageError, match=text):
         parse_transform(words)
+
+
+def test_the_programs_read_numbers_as_those_of_ros1() -> None:
+    """ROS 1's static_transform_publisher reads 0, 0.5 and 0.1 from the first three."""
+    words = ["0,", ".5m", "1e-1x", "0", "0", "0", "a", "b"]
+    found = parse_transform(words, leading_number).transform.translation
+    assert (found.x, found.y, found.z) == (0.0, 0.5, 0.1)
+    with pytest.raises(UsageError, match="expected a number"):
+        parse_transform(words)
+    with pytest.raises(UsageError, match="expected a number"):
+        parse_transform(["x", *words[1:]], leading_number)
 
 
 def report(frame: str, parent: str, **more: Any) -> FrameReport:
