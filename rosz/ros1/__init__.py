@@ -12,7 +12,15 @@ from __future__ import annotations
 
 from rosz.ros1.importer import install
 
-PUBLIC_MODULES = ("__main__", "importer", "modules", "python2", "python_setup", "rosservice")
+PUBLIC_MODULES = (
+    "__main__",
+    "container",
+    "importer",
+    "modules",
+    "python2",
+    "python_setup",
+    "rosservice",
+)
 
 __all__ = ("install",)
 

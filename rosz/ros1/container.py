@@ -1,4 +1,4 @@
-"""``python -m rosz.ros1.container NAME [OPTIONS] PROGRAM...``: several nodes, one process.
+"""``python -m rosz.script --container NAME [OPTIONS] PROGRAM...``: several nodes, one process.
 
 Each PROGRAM is a `rosz.program.ProgramSpec` as JSON. All programs share one session, and so the
 graph, the parameters and the link to others. Each has a thread of its own, on which its script runs
@@ -17,7 +17,7 @@ import io
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
@@ -349,11 +349,12 @@ def _builtins(own: str, folders: Mapping[str, str]) -> dict[str, Any]:
     return {**vars(builtins), "__import__": import_module}
 
 
-def main(argv: Sequence[str]) -> int:
+def main(argv: Sequence[str], begin: Callable[[], object]) -> int:
     """Run a container.
 
     Args:
-        argv: Command line without the program name.
+        argv: Command line: name, options and programs.
+        begin: Function to call right before signals are handled.
 
     Returns:
         The exit code.
@@ -361,6 +362,7 @@ def main(argv: Sequence[str]) -> int:
     words = [word for word in argv if word not in {_BY_REFERENCE, _NODE}]
     try:
         name, *texts = words
+        begin()
         specs = [msgspec.json.decode(text, type=ProgramSpec) for text in texts]
         container = Container(name, specs, by_reference=_BY_REFERENCE in argv, node=_NODE in argv)
     except (ValueError, msgspec.MsgspecError) as error:
@@ -370,7 +372,3 @@ def main(argv: Sequence[str]) -> int:
         sys.stderr.write(f"ERROR: {error}\n")
         return 1
     return container.run()
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

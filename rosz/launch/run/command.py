@@ -40,7 +40,7 @@ _SCRIPT = ("-m", "rosz.script")
 _ROSZ = Path(__file__).parents[2]
 _COMMANDS = str(_ROSZ / "cli" / "bin")
 _MODULES = str(_ROSZ / "ros1" / "shell")
-_CONTAINER = ("-P", "-m", "rosz.ros1.container")
+_CONTAINER = ("-P", *_SCRIPT, "--container")
 
 
 class Command(msgspec.Struct, frozen=True):

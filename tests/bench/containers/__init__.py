@@ -1,0 +1,1 @@
+"""Messages between two nodes: of one process, and of two."""
