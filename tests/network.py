@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from textwrap import dedent
 from typing import IO, Any, TypeVar
@@ -199,7 +200,8 @@ class Program:
     def close(self) -> None:
         """Leave nothing of it behind."""
         if self.process.poll() is None:
-            os.killpg(self.pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # its group has just ended
+                os.killpg(self.pid, signal.SIGKILL)
         self.process.wait()
         self._join(TIMEOUT)
         for stream in (self.process.stdin, self.process.stdout, self.process.stderr):

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from network import TIMEOUT, Network, Program, eventually
+from network import TIMEOUT, Network, Program, eventually, repeats
 from oracle import PYTHON, require
 from rosbags.highlevel import AnyReader
 
@@ -317,7 +317,7 @@ def test_a_path_that_is_not_writable(network: Network) -> None:
     assert "missing/x.mcap.active: cannot create it: No such file" in program.lines[-1]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(repeats(3, 100)))
 def test_a_recorder_that_is_killed(network: Network, seed: int) -> None:
     rng = random.Random(seed)
     publisher = network.node("talker").publisher("/chatter", String, queue_size=1000)

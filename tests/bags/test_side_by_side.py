@@ -93,6 +93,10 @@ WRONG = (
     "filter missing.bag out.bag True",
     "filter plain.bag plain.bag True",
     "play",
+    "check",
+    "fix plain.bag",
+    "reindex",
+    "record",
 )
 
 

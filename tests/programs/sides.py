@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from network import Network, Program
@@ -65,8 +65,7 @@ def _running(side: RealSide | RoszSide, commands: Sequence[Sequence[str]]) -> It
         yield
     finally:
         for each in programs:
-            with suppress(ProcessLookupError):
-                each.close()
+            each.close()
 
 
 def run_script(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import oracle
@@ -67,14 +67,13 @@ PLAY = ("rosbag", "play", "-q", "--clock", "--wait-for-subscribers", "--topics",
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     oracle.require("rosbag", "roslz4", package="rosbag, python3-rosbag")
     made = tmp_path_factory.mktemp("bags")
-    worker = oracle.Worker("rosbag_calls")
-    for compression in ("none", "bz2", "lz4"):
-        worker.call("make", str(made / f"{compression}.bag"), compression, COUNT, 4000)
-    yield made
-    worker.close()
+    with closing(oracle.Worker("rosbag_calls")) as worker:
+        for compression in ("none", "bz2", "lz4"):
+            worker.call("make", str(made / f"{compression}.bag"), compression, COUNT, 4000)
+    return made
 
 
 @pytest.mark.ros1
