@@ -21,10 +21,17 @@ from rosz.bridges.ros1.node_api import NodeApi
 from rosz.bridges.ros1.peers import Address, call, multicall
 from rosz.bridges.ros1.registry import Change, Entry, Role
 from rosz.bridges.ros1.server import Server
-from rosz.bridges.ros1.shared import BRIDGE, Shared
+from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, Shared
 from rosz.bridges.ros1.sockets import log
 from rosz.environment import Environment
-from rosz.errors import DecodeError, EncodeError, ParamNotFound, RoszError, TransportError
+from rosz.errors import (
+    DecodeError,
+    EncodeError,
+    ParamNotFound,
+    RoszError,
+    ServiceError,
+    TransportError,
+)
 from rosz.lifecycle import Registration
 from rosz.names import ros1_type
 from rosz.node import BridgedNode, Context
@@ -191,6 +198,7 @@ class AttachedBridge:
             kinds = dict(msgspec.convert(types, list[tuple[str, str]]))
         except msgspec.ValidationError as error:
             raise DecodeError("state of the master", -1, str(error)) from error
+        self._check_master()
         self._active = self._is_first()
         if not self._active:
             self._apply(set())
@@ -200,6 +208,21 @@ class AttachedBridge:
         if run_id != self._run_id:
             self._join_params()
             self._run_id = run_id
+
+    def _check_master(self) -> None:
+        """Refuse a master that is one of this network.
+
+        Raises:
+            ServiceError: It is one; what it knows is on the network already.
+        """
+        nodes = self._shared.context.graph.view().nodes()
+        own = [node for node in nodes if node.startswith(MASTER_NODE)]
+        calls = [("lookupNode", (self._shared.name, node)) for node in own]
+        if any(multicall(self._master, calls)):
+            raise ServiceError(
+                "it belongs to this network already (`rosz core --ros1`), so there is nothing to"
+                " join: ROS_DOMAIN_ID and ROSZ_RENDEZVOUS name another network"
+            )
 
     def _is_first(self) -> bool:
         """Return whether this is the oldest of the bridges to this master."""
@@ -297,6 +320,8 @@ class AttachedBridge:
         found = {}
         for token in shared.entities(kind):
             name = shared.there(token.name)
+            if token.node_name.startswith(BRIDGE):
+                continue
             if name is not None and _matches(patterns, name):
                 found[name] = token.type_name
         return found
@@ -373,7 +398,7 @@ class AttachedBridge:
         try:
             if value == {} and not self._call("hasParam", name):
                 params.delete(here, origin=self._shared.name)
-            else:
+            elif not _same(params.lookup(split(here)), value):  # else it could go round a ring
                 params.set(here, value, origin=self._shared.name)
         except ParamNotFound:
             return
@@ -383,6 +408,10 @@ class AttachedBridge:
 
 def _flat(tree: dict[str, Any]) -> Iterable[tuple[str, Any]]:
     return ((f"/{'/'.join(path)}", value) for path, value in leaves(tree) if path)
+
+
+def _same(one: Any, other: Any) -> bool:
+    return type(one) is type(other) and bool(one == other)
 
 
 def _keep(node: str, reason: str) -> None:

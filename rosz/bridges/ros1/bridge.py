@@ -17,7 +17,7 @@ from rosz.bridges.ros1.node_api import NodeApi
 from rosz.bridges.ros1.peers import call, is_listening
 from rosz.bridges.ros1.registry import Change, Entry
 from rosz.bridges.ros1.server import Server
-from rosz.bridges.ros1.shared import BRIDGE, MASTER, Shared
+from rosz.bridges.ros1.shared import MASTER, MASTER_NODE, Shared
 from rosz.bridges.ros1.sockets import log
 from rosz.environment import Environment
 from rosz.errors import RoszError, TransportError
@@ -98,7 +98,7 @@ class MasterBridge:
         self._lifecycle.keep(server)
         self.port: int = server.port
         machine = re.sub(r"\W", "_", socket.gethostname(), flags=re.ASCII)
-        shared.name = f"{BRIDGE}{machine}_{self.port}"
+        shared.name = f"{MASTER_NODE}{machine}_{self.port}"
         api = NodeApi(shared, self.port)
         self._master = Master(shared, self.port, self._on_changes, api.answer)
         self._own = BridgedNode(shared.context, shared.name, lambda _reason: None)

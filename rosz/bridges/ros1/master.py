@@ -20,7 +20,7 @@ from rosz import names
 from rosz.bridges.ros1.calls import Call
 from rosz.bridges.ros1.notifier import Notifier
 from rosz.bridges.ros1.registry import ANY_TYPE, Change, Entry, Registry, Role
-from rosz.bridges.ros1.shared import MASTER, Shared
+from rosz.bridges.ros1.shared import BRIDGE, MASTER, Shared
 from rosz.bridges.ros1.sockets import Stream
 from rosz.errors import InvalidName, ParamError, ParamNotFound, RoszError, ServiceError
 from rosz.params import climb, resolve, split
@@ -264,6 +264,8 @@ class Master:
     def _lookup_node(self, _caller: str, stream: Stream, node: str) -> Answer:
         with self._lock:
             uri = self._registry.uri(node)
+        if node == self._shared.name:
+            uri = self.uri(stream.local_host)
         if uri:
             return 1, "node api", uri
         if any(token.node_name == node for token in self._tokens()):
@@ -299,7 +301,8 @@ class Master:
             found.setdefault(token.name, self._type(token))
         return 1, "current system state", [[name, kind] for name, kind in found.items()]
 
-    def _get_system_state(self, _caller: str, _: Stream) -> Answer:
+    def _get_system_state(self, caller: str, _: Stream) -> Answer:
+        """Tell who does what; of the network nothing to bridges, which join ROS 1's programs."""
         roles: tuple[tuple[Role, Kind], ...] = (
             ("publisher", Kind.PUBLISHER),
             ("subscriber", Kind.SUBSCRIPTION),
@@ -309,7 +312,7 @@ class Master:
         for role, kind in roles:
             with self._lock:
                 found = self._registry.by_name(role)
-            for token in self._tokens(kind):
+            for token in () if caller.startswith(BRIDGE) else self._tokens(kind):
                 nodes = found.setdefault(token.name, [])
                 if token.node_name not in nodes:
                     nodes.append(token.node_name)

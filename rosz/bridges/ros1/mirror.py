@@ -11,10 +11,10 @@ from functools import partial
 from typing import Any, Protocol
 
 from rosz.bridges.ros1.frames import encode_header
-from rosz.bridges.ros1.registry import Change, Entry, Role
+from rosz.bridges.ros1.registry import ANY_TYPE, Change, Entry, Role
 from rosz.bridges.ros1.server import Incoming
 from rosz.bridges.ros1.services import Clients, ProvidedService, ServiceConnection
-from rosz.bridges.ros1.shared import Shared
+from rosz.bridges.ros1.shared import MASTER_NODE, Shared
 from rosz.bridges.ros1.sockets import log
 from rosz.bridges.ros1.topics import Connection, PublishedTopic, SubscribedTopic
 from rosz.errors import ClosedError, InvalidName, RoszError, ServiceError, UsageError
@@ -74,6 +74,7 @@ class Mirror:
         self._look = look
         self._terminate = terminate
         self._published = published
+        self._own = own
         self._clients = Clients(own, shared)
         self._calls: Worker[Callable[[], object]] = Worker(
             "rosz-ros1-services", threads=_CALLS, capacity=_MAX_CALLS, logger=log
@@ -146,9 +147,13 @@ class Mirror:
                 partial(self._terminate, entry.node),
             )
             self._nodes[entry.node] = node
-        part = make(self._shared, node, entry)
+        self._keep(make(self._shared, node, entry))
+
+    def _keep(self, part: _Part) -> _Part:
+        entry = part.entry
         self._parts[entry.role, entry.name, entry.node] = part
         self._by_name.setdefault(self._shared.here(entry.name), []).append(part)
+        return part
 
     def _remove(self, entry: Entry) -> None:
         part = self._parts.pop((entry.role, entry.name, entry.node), None)
@@ -207,6 +212,10 @@ class Mirror:
     def _accept_topic(self, incoming: Incoming, header: dict[str, str], tries: int) -> None:
         topic, node = header["topic"], header.get("callerid", "")
         part: Any = self._parts.get(("subscriber", topic, node))
+        if part is None and node.startswith(MASTER_NODE):
+            # A master of another network, for the nodes of which it registers nothing.
+            entry = Entry("subscriber", topic, node, "", ANY_TYPE)
+            part = self._keep(SubscribedTopic(self._shared, self._own, entry))
         if part is None and self._look is not None and tries < _MOST_TRIES:
             self._look()
             again = partial(self._accept, incoming, header, tries + 1)

@@ -10,13 +10,20 @@ from rosz.bridges.ros1.sockets import SocketLoop, log
 from rosz.lifecycle import Lifecycle
 from rosz.names import is_of_action
 from rosz.node import Context
-from rosz.wire import Kind, Token
+from rosz.wire import Kind, Token, format_token, gid
 from rosz.worker import Worker
 
-__all__ = ("BRIDGE", "MASTER", "Shared")
+__all__ = ("BRIDGE", "MASTER", "MASTER_NODE", "Shared")
 
 BRIDGE = "/ros1_bridge_"
-"""What the names of bridges begin with."""
+"""What the names of bridges begin with that join a master of ROS 1.
+
+What stands under such a name at a master, or comes from one to the network, has crossed a bridge.
+No bridge takes it across again, so that rings of bridges do not pass messages round for ever.
+"""
+
+MASTER_NODE = "/ros1_master_"
+"""What the names of rosz's own masters begin with, as nodes of the network."""
 
 MASTER = "/master"
 """The name under which a master calls nodes."""
@@ -62,6 +69,7 @@ class Shared:
         self.lifecycle = Lifecycle("the bridge to ROS 1", log=log)
         self._log_tokens: tuple[Token, ...] = log_tokens(context) if is_master else ()
         self._is_master = is_master
+        self._crossed: dict[bytes, bool] = {}
         self._standing: dict[tuple[Kind, str], str] = {}
 
     def here(self, name: str) -> str:
@@ -116,6 +124,21 @@ class Shared:
             known = LOGS if LOGS in nodes else nodes[0]
             self._standing[kind, topic] = known
         return known
+
+    def has_crossed(self, publisher: bytes) -> bool:
+        """Return whether messages of a publisher are those of a bridge that joined another master.
+
+        Args:
+            publisher: Its id.
+        """
+        if self._is_master:
+            return False  # ROS 1's programs are to get them
+        if publisher not in self._crossed:
+            self._crossed = {
+                gid(format_token(token)): token.node_name.startswith(BRIDGE)
+                for token in self.entities(Kind.PUBLISHER)
+            }
+        return self._crossed.get(publisher, False)
 
     def publishers(self, topic: str) -> list[Token]:
         """Return the publishers of a topic on the network."""

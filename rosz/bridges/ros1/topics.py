@@ -22,7 +22,7 @@ from rosz.bridges.ros1.frames import MAX_FRAME, FrameReader, encode_header
 from rosz.bridges.ros1.peers import Address, call, connect, exchange_headers
 from rosz.bridges.ros1.registry import ANY_TYPE, Entry
 from rosz.bridges.ros1.server import Incoming
-from rosz.bridges.ros1.shared import Shared
+from rosz.bridges.ros1.shared import BRIDGE, Shared
 from rosz.bridges.ros1.sockets import Stream, log
 from rosz.errors import ClosedError, DecodeError, MessageError, RoszError, TypeNotFound
 from rosz.node import BridgedNode, Entity, MessageInfo, Publisher, Subscription
@@ -140,7 +140,9 @@ class PublishedTopic:
     def _connect(self) -> None:
         """Connect to the node; runs on a thread for requests."""
         shared, entry = self._shared, self.entry
-        caller = shared.standing_for(Kind.SUBSCRIPTION, self._topic)
+        caller = shared.name
+        if not entry.node.startswith(BRIDGE):
+            caller = shared.standing_for(Kind.SUBSCRIPTION, self._topic)
         try:
             answer = call(entry.uri, "requestTopic", (caller, entry.name, [["TCPROS"]]))
             if not isinstance(answer, list) or answer[:1] != ["TCPROS"] or len(answer) < 3:  # noqa: PLR2004
@@ -461,8 +463,8 @@ class _Link:
             self.stream.pause(reading=True)
 
     def _send(self, payload: Any, info: MessageInfo) -> None:
-        if info.gid in self._own:
-            return  # from ROS 1, which delivers it itself
+        if info.gid in self._own or self._shared.has_crossed(info.gid):
+            return  # from ROS 1, which delivers it itself, or over another bridge
         sequence = (info.sequence & 0xFFFFFFFF).to_bytes(4, "little")
         try:
             data = self._codec.from_cdr(payload, sequence)
