@@ -120,8 +120,12 @@ class Ros(_Runner):
             start_new_session=True,
         )
         self._master = ServerProxy(self._variables["ROS_MASTER_URI"])
-        eventually(self._complete, "roscore", timeout=30)
-        self._own = set(self._parameters())
+        try:
+            eventually(self._complete, "roscore", timeout=60)
+            self._own = set(self._parameters())
+        except BaseException:  # else the roscore would stay, as an unclosed process of a later test
+            self.close()
+            raise
 
     def command(self, part: Part) -> list[str]:
         """Return the command line for Debian's Python."""
@@ -139,7 +143,8 @@ class Ros(_Runner):
     def close(self) -> None:
         """End the roscore."""
         self._master("close")()
-        os.killpg(self._core.pid, signal.SIGINT)
+        if self._core.poll() is None:
+            os.killpg(self._core.pid, signal.SIGINT)
         try:
             self._core.wait(10)
         except subprocess.TimeoutExpired:
