@@ -49,7 +49,7 @@ _NO_SEGMENT = "Unable to create POSIX shm segment"
 _BUSY_TIMEOUT = 60.0
 """Time limit in seconds of each attempt of a node at a busy router. To give up earlier would have
 the router begin anew."""
-_SLOW_SECONDS = 10.0
+_SLOW_SECONDS = 8.0
 """Seconds after which a node says what it waits for."""
 _ATTEMPT_SECONDS = 2.0
 """Time limit of each attempt of a node that waits for other machines."""
