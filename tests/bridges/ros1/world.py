@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import hashlib
 import shutil
 import subprocess
 from functools import cache
@@ -16,7 +18,8 @@ from rosz.bridges.ros1 import MasterBridge
 
 __all__ = ("LISTENER", "SERVER", "TALKER", "World", "roscpp")
 
-_SOURCE = Path(__file__).parent / "programs" / "partner.cpp"
+_PROGRAMS = Path(__file__).parent / "programs"
+_CACHE = Path(__file__).parents[3] / ".pytest_cache" / "d" / "roscpp"
 
 TALKER = """
 import rospy, sys
@@ -60,17 +63,36 @@ rospy.spin()
 
 
 @cache
-def roscpp() -> str:
-    """Return the program of ``partner.cpp``; skips the test where roscpp cannot be compiled."""
+def roscpp(name: str = "partner", *packages: str) -> str:
+    """Return a compiled program of `programs`, kept in pytest's cache from run to run.
+
+    The test is skipped where it cannot be compiled.
+
+    Args:
+        name: Name of the program.
+        packages: Packages of ROS 1 that it uses, beside roscpp.
+    """
     if shutil.which("g++") is None or shutil.which("pkg-config") is None:
         pytest.skip("needs g++ and pkg-config (Debian: g++, pkg-config)")
-    flags = subprocess.run(
-        ["pkg-config", "--cflags", "--libs", "roscpp"], check=False, capture_output=True, text=True
-    )
+    ask = ["pkg-config", "--cflags", "--libs", "roscpp", *packages]
+    flags = subprocess.run(ask, check=False, capture_output=True, text=True)
     if flags.returncode:
-        pytest.skip("needs roscpp (Debian: libroscpp-dev, libstd-msgs-dev, libstd-srvs-dev)")
-    made = Path(subprocess.check_output(["mktemp", "-d"], text=True).strip()) / "partner"
-    subprocess.run(["g++", "-O0", "-o", made, _SOURCE, *flags.stdout.split()], check=True)
+        pytest.skip(f"needs C++ libraries of Debian: {flags.stderr.strip()}")
+    source = _PROGRAMS / f"{name}.cpp"
+    versions = subprocess.check_output(["pkg-config", "--modversion", *ask[3:]])
+    versions += subprocess.check_output(["g++", "-dumpfullversion"])
+    content = source.read_bytes() + versions + flags.stdout.encode()
+    _CACHE.mkdir(parents=True, exist_ok=True)
+    made = _CACHE / f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"
+    with (_CACHE / f"{name}.lock").open(
+        "w"
+    ) as lock:  # workers of pytest-xdist wait for one another
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not made.exists():
+            new = made.with_suffix(".new")
+            compiled = ["g++", "-O0", "-o", new, source, *flags.stdout.split()]
+            subprocess.run(compiled, check=True)
+            new.rename(made)
     return str(made)
 
 
