@@ -90,7 +90,7 @@ def roscpp(name: str = "partner", *packages: str) -> str:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not made.exists():
             new = made.with_suffix(".new")
-            compiled = ["g++", "-O0", "-o", new, source, *flags.stdout.split()]
+            compiled = ["g++", "-O0", "-o", str(new), str(source), *flags.stdout.split()]
             subprocess.run(compiled, check=True)
             new.rename(made)
     return str(made)
