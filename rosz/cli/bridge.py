@@ -71,3 +71,60 @@ def ros1_command(
         print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
         while True:
             time.sleep(_LONG)
+
+
+@app.command("websocket")
+def websocket_command(
+    *,
+    port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 9090,
+    listen: Annotated[
+        str, Option("--listen ADDRESS", "Address to listen at, instead of 127.0.0.1.")
+    ] = "127.0.0.1",
+    password_file: Annotated[
+        str, Option("--password-file FILE", "File whose first line clients must know.")
+    ] = "",
+    origin: Annotated[
+        list[str] | None,
+        Option("--origin ORIGIN", "Pages that may connect, such as http://robot; repeatable."),
+    ] = None,
+    read_only: Annotated[bool, Option("--read-only", "Let clients change nothing.")] = False,
+    topics: Annotated[
+        list[str] | None, Option("--topics PATTERN", "Topics that clients see; repeatable.")
+    ] = None,
+    services: Annotated[
+        list[str] | None, Option("--services PATTERN", "Services that clients see; repeatable.")
+    ] = None,
+    params: Annotated[
+        list[str] | None, Option("--params PATTERN", "Parameters that clients see; repeatable.")
+    ] = None,
+    ros2: Annotated[
+        bool, Option("--ros2", "Use ROS 2's spelling with clients that have not shown theirs.")
+    ] = False,
+    certificate: Annotated[str, Option("--certificate FILE", "Certificate for TLS.")] = "",
+    key: Annotated[str, Option("--key FILE", "Private key of the certificate.")] = "",
+) -> None:
+    """Serve the rosbridge protocol to web pages and other programs, until it is stopped."""
+    from rosz.bridges.websocket import Settings, open_bridge
+    from rosz.node import Node
+
+    settings = Settings(
+        host=listen,
+        port=port,
+        password_file=password_file,
+        origins=tuple(origin or ()),
+        read_only=read_only,
+        topics=tuple(topics or ()),
+        services=tuple(services or ()),
+        params=tuple(params or ()),
+        spelling="ros2" if ros2 else "ros1",
+        certificate=certificate,
+        key=key,
+    )
+    with until_stopped() as ready, ExitStack() as stack:
+        node = stack.enter_context(Node("rosbridge_websocket", anonymous=True, argv=()))
+        bridge, lines = open_bridge(node, settings)
+        stack.callback(bridge.close)
+        ready()
+        print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
+        while True:
+            time.sleep(_LONG)

@@ -58,9 +58,13 @@ def fill_message_args(msg: Message, msg_args: Any, keys: Mapping[str, Any] | Non
         EncodeError: A name is not a field of its message, a value does not fit its field, or the
             number of values is wrong.
     """
-    if isinstance(msg_args, list) and len(msg_args) == 1 and isinstance(msg_args[0], dict):
-        msg_args = msg_args[0]
-    _Filler(msg._type, keys or {}).fill(msg, [] if msg_args is None else msg_args, "")
+    _Filler(msg._type, keys or {}).fill(msg, [] if msg_args is None else _sole(msg_args), "")
+
+
+def _sole(values: Any) -> Any:
+    """Return the dict in a list that has nothing else; any other value as it is."""
+    sole = isinstance(values, list) and len(values) == 1 and isinstance(values[0], dict)
+    return values[0] if sole else values
 
 
 def shown_name(name: str) -> str:
@@ -72,9 +76,12 @@ def shown_name(name: str) -> str:
 class _Filler:
     """Sets fields of one message, and names the field where a value does not fit."""
 
-    def __init__(self, type_name: str, keys: Mapping[str, Any]) -> None:
+    def __init__(
+        self, type_name: str, keys: Mapping[str, Any], *, null_is_nan: bool = False
+    ) -> None:
         self._type = type_name
         self._keys = keys
+        self._null_is_nan = null_is_nan
 
     def _refuse(self, path: str, expected: str, value: Any) -> NoReturn:
         given = shown(value) if value is not None else "nothing"
@@ -186,6 +193,8 @@ class _Filler:
                 return _NOT_FINITE[value] if value in _NOT_FINITE else float(value)
             except ValueError:
                 self._refuse(path, kind, value)
+        if value is None and self._null_is_nan:
+            return math.nan
         if isinstance(value, bool) or not hasattr(value, "__float__"):
             self._refuse(path, kind, value)
         try:
@@ -279,20 +288,25 @@ def to_yaml(message: Message) -> str:
     return strify_message(message)
 
 
-def from_plain(cls: type[_M], value: Any, now: Now | None = None) -> _M:
+def from_plain(
+    cls: type[_M], value: Any, now: Now | None = None, *, null_is_nan: bool = False
+) -> _M:
     """Build a message from plain values.
 
     Args:
         cls: Class of the message.
         value: A dict of some fields, a list of all fields in order, or None for the defaults.
         now: Meaning of ``now`` and ``auto``; none when not given.
+        null_is_nan: Whether None is NaN in a field for floating-point numbers; it is an error if
+            not. JavaScript writes numbers that are not finite as ``null``.
 
     Raises:
         EncodeError: A name is not a field of its message, or a value does not fit its field.
     """
     message = cls()
     if value is not None:
-        fill_message_args(message, value, {} if now is None else {"now": now})
+        filler = _Filler(cls._type, {} if now is None else {"now": now}, null_is_nan=null_is_nan)
+        filler.fill(message, _sole(value), "")
     return message
 
 

@@ -92,6 +92,14 @@ class Rules(msgspec.Struct, frozen=True):
         flags = {flag: getattr(own, flag) or getattr(all_may, flag) for flag in _FLAGS}
         return msgspec.convert({**names, **flags}, Permit)
 
+    def permit_at_bridge(self, name: str) -> Permit:
+        """Return what clients of a bridge may do, who have no keys.
+
+        Args:
+            name: Name of the bridge in the rules. What all may do counts if they do not have it.
+        """
+        return self.permit_of(name) or self.permits.get(ANYBODY) or Permit()
+
 
 def read_rules(text: str, file: str) -> Rules:
     """Parse the rules of a file.

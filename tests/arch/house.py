@@ -70,6 +70,8 @@ FLOORS = {
     "rosz.bridges.ros1.calls": 1,
     "rosz.bridges.ros1.frames": 1,
     "rosz.bridges.ros1.registry": 1,
+    "rosz.bridges.websocket.operations": 1,
+    "rosz.bridges.websocket.plain": 1,
     "rosz.doctor": 7,
     "rosz.programs": 7,
     "rosz.ros1": 7,

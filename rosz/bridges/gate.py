@@ -1,0 +1,66 @@
+"""What the clients of a bridge may do."""
+
+from __future__ import annotations
+
+import fnmatch
+from typing import Literal, TypeAlias
+
+import msgspec
+
+from rosz.errors import UsageError
+from rosz.security import Permit
+
+__all__ = ("Gate", "Verb")
+
+Verb: TypeAlias = Literal["publish", "subscribe", "call", "serve", "set", "get"]
+
+_CHANGES = frozenset({"publish", "call", "serve", "set"})
+_OBJECTS = {"publish": "topics", "subscribe": "topics", "call": "services", "serve": "services"}
+
+
+class Gate(msgspec.Struct, frozen=True):
+    """What the clients of a bridge may do.
+
+    Attributes:
+        permit: What the rules of the machine allow; None without rules.
+        read_only: Whether nothing may be changed.
+        topics: Patterns of the topics that clients see; all if there is none.
+        services: Patterns of the services.
+        params: Patterns of the parameters.
+    """
+
+    permit: Permit | None = None
+    read_only: bool = False
+    topics: tuple[str, ...] = ()
+    services: tuple[str, ...] = ()
+    params: tuple[str, ...] = ()
+
+    def objection(self, verb: Verb, name: str) -> str:
+        """Return why clients may not do something; empty if they may.
+
+        Args:
+            verb: What they want to do.
+            name: Full name of the topic, service or parameter.
+        """
+        if self.read_only and verb in _CHANGES:
+            return f"clients may not {verb} '{name}': this bridge is read-only"
+        if not self.shows(_OBJECTS.get(verb, "params"), name):
+            return f"clients may not {verb} '{name}': the patterns of this bridge leave it out"
+        if self.permit is None:
+            return ""
+        allowed = self.permit.get if verb == "get" else self.permit.allows(verb, name)
+        return "" if allowed else f"the rules of this machine do not let clients {verb} '{name}'"
+
+    def check(self, verb: Verb, name: str) -> None:
+        """Refuse what clients may not do.
+
+        Raises:
+            UsageError: They may not; the text says why.
+        """
+        if objection := self.objection(verb, name):
+            raise UsageError(objection)
+
+    def shows(self, what: str, name: str) -> bool:
+        """Return whether the patterns for topics, services or parameters include a name."""
+        patterns: tuple[str, ...] = getattr(self, what)
+        return not patterns or any(fnmatch.fnmatchcase(name, one) for one in patterns)

@@ -1,0 +1,331 @@
+"""One client: what it asks for is done in the order in which it comes."""
+
+from __future__ import annotations
+
+import hmac
+import itertools
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rosz.bridges.websocket import operations as ops
+from rosz.bridges.websocket.actions import SentGoals, ServedActions
+from rosz.bridges.websocket.outbox import Feed, Outbox
+from rosz.bridges.websocket.plain import Spelling
+from rosz.bridges.websocket.services import Calls, ServedServices
+from rosz.bridges.websocket.topics import build
+from rosz.errors import RoszError, UsageError
+
+if TYPE_CHECKING:
+    from rosz.bridges.gate import Gate
+    from rosz.bridges.websocket.rosapi import RosApi
+    from rosz.bridges.websocket.topics import Topics
+    from rosz.node import Node, Publisher
+    from rosz.worker import Worker
+
+__all__ = ("Connection", "Shared")
+
+_LEVELS = ("info", "warning", "error", "none")
+_MAC_SECONDS = 5
+
+
+class Shared(msgspec.Struct, frozen=True):
+    """What the clients of a bridge share.
+
+    Attributes:
+        node: The node of the bridge.
+        gate: What clients may do.
+        topics: Publishers and subscriptions.
+        rosapi: The services about the system.
+        worker: Threads for what takes long: calls and goals.
+        spelling: Whose names of types and fields a client gets that has not shown its own.
+        password: What clients must know; empty if nothing.
+    """
+
+    node: Node
+    gate: Gate
+    topics: Topics
+    rosapi: RosApi
+    worker: Worker[Callable[[], object]]
+    spelling: Spelling = "ros1"
+    password: str = ""
+
+
+class Connection:
+    """A client.
+
+    Args:
+        shared: What the clients share.
+        outbox: What waits to be sent to this one.
+        name: Where it is, for the log.
+        refuse: Function that ends the connection with a reason.
+        trusted: Whether it has shown to know the password.
+        limit: Largest number of characters of an operation in parts.
+    """
+
+    def __init__(
+        self,
+        shared: Shared,
+        outbox: Outbox,
+        name: str,
+        refuse: Callable[[str], object],
+        *,
+        trusted: bool,
+        limit: int,
+    ) -> None:
+        self.trusted: bool = trusted
+        self._shared = shared
+        self._outbox = outbox
+        self._name = name
+        self._refuse = refuse
+        self._parts = ops.Fragments(limit)
+        self._spelling = shared.spelling
+        self._level = "error"
+        self._numbers = itertools.count(1)
+        self._lock = threading.RLock()
+        self._closed = False
+        self._feeds: dict[str, dict[str, Feed]] = {}
+        self._publishers: dict[str, Publisher[Any]] = {}
+        self._calls = Calls(shared.node)
+        self._services = ServedServices(shared.node, self.send)
+        self._goals = SentGoals(shared.node, self.send)
+        self._actions = ServedActions(shared.node, self.send)
+        self._handlers: dict[type[ops.Operation], Callable[[Any], None]] = {
+            ops.Advertise: self._advertise,
+            ops.Unadvertise: self._unadvertise,
+            ops.Publish: self._publish,
+            ops.Subscribe: self._subscribe,
+            ops.Unsubscribe: self._unsubscribe,
+            ops.CallService: self._call_service,
+            ops.AdvertiseService: self._advertise_service,
+            ops.UnadvertiseService: self._unadvertise_service,
+            ops.ServiceResponse: self._services.respond,
+            ops.SendActionGoal: self._send_goal,
+            ops.CancelActionGoal: self._cancel_goal,
+            ops.AdvertiseAction: self._advertise_action,
+            ops.UnadvertiseAction: self._unadvertise_action,
+            ops.ActionFeedback: self._actions.feedback,
+            ops.ActionResult: self._actions.end,
+            ops.SetLevel: self._set_level,
+        }
+
+    def handle(self, text: str | bytes) -> None:
+        """Do what a client asks for; what goes wrong is told to it."""
+        try:
+            operation = ops.read(text, self._parts)
+        except UsageError as error:
+            self._status("error", str(error), None)
+            return
+        if operation is None:
+            return
+        if not self.trusted:
+            self._authenticate(operation)
+            return
+        handler = self._handlers.get(type(operation))
+        if handler is None:  # a client that authenticates where no password is needed
+            return
+        try:
+            handler(operation)
+        except RoszError as error:
+            self._status("error", f"{_name(operation)}: {error}", operation.id)
+        except Exception as error:  # noqa: BLE001  # the boundary to what clients send
+            self._shared.node.log.report(
+                f"operation '{_name(operation)}' of a client failed", error
+            )
+            self._status("error", f"{_name(operation)}: {error}", operation.id)
+        else:
+            self._status("info", f"{_name(operation)}: done", operation.id)
+
+    def send(self, value: dict[str, Any], *, fragment_size: float | None = None) -> None:
+        """Send an operation."""
+        for text in ops.fragments(msgspec.json.encode(value), fragment_size, next(self._numbers)):
+            self._outbox.put(text)
+
+    def close(self) -> None:
+        """End everything that the client has begun."""
+        with self._lock:
+            self._closed = True
+            feeds = [feed for known in self._feeds.values() for feed in known.values()]
+            self._feeds.clear()
+        self._outbox.close()
+        for feed in feeds:
+            self._shared.topics.unsubscribe(feed)
+        self._shared.topics.unadvertise(self)
+        for part in (self._services, self._actions, self._calls, self._goals):
+            part.close()
+
+    # What all operations use.
+
+    def _authenticate(self, operation: ops.Operation) -> None:
+        """Accept a client that proves to know the password, as ROS 1's rosauth defines it."""
+        if isinstance(operation, ops.Authenticate):
+            now = time.time()
+            recent = abs(now - operation.t) <= _MAC_SECONDS and now < operation.end
+            wanted = operation.expected_mac(self._shared.password)
+            if recent and hmac.compare_digest(wanted, operation.mac.lower()):
+                self.trusted = True
+                return
+        self._refuse("the password is missing or wrong")
+
+    def _status(self, level: str, text: str, number: str | int | None) -> None:
+        if level == "error":
+            self._shared.node.log.debug("client %s: %s", self._name, text)
+        if _LEVELS.index(level) >= _LEVELS.index(self._level):
+            status = {"op": "status", "level": level, "msg": text}
+            self.send(status if number is None else {**status, "id": number})
+
+    def _set_level(self, operation: ops.SetLevel) -> None:
+        self._level = operation.level
+
+    def _see(self, type_name: str | None) -> Spelling:
+        """Return the spelling in which a client writes a type, or wrote the last one."""
+        if type_name:
+            self._spelling = "ros2" if type_name.count("/") > 1 else "ros1"
+        return self._spelling
+
+    # Topics.
+
+    def _advertise(self, operation: ops.Advertise) -> None:
+        self._see(operation.type)
+        topic = self._shared.node.resolve(operation.topic)
+        self._shared.gate.check("publish", topic)
+        cls = self._shared.topics.message_class(topic, operation.type)
+        topics = self._shared.topics
+        with self._lock:
+            if not self._closed:
+                self._publishers[topic] = topics.advertise(
+                    topic, cls, latch=operation.latch, client=self
+                )
+
+    def _unadvertise(self, operation: ops.Unadvertise) -> None:
+        topic = self._shared.node.resolve(operation.topic)
+        self._publishers.pop(topic, None)
+        if not self._shared.topics.unadvertise(self, topic):
+            self._status("warning", f"unadvertise: '{topic}' is not advertised", operation.id)
+
+    def _publish(self, operation: ops.Publish) -> None:
+        topic = self._shared.node.resolve(operation.topic)
+        if topic not in self._publishers:
+            type_name = operation.type or self._shared.topics.type_of(topic)
+            made = ops.Advertise(topic=topic, type=type_name, latch=operation.latch)
+            spelling = self._spelling
+            self._advertise(made)
+            self._spelling = spelling if not operation.type else self._spelling
+        publisher = self._publishers[topic]
+        publisher.publish(build(publisher.message_type, operation.msg, self._shared.node.now()))
+
+    def _subscribe(self, operation: ops.Subscribe) -> None:
+        spelling = self._see(operation.type)
+        topic = self._shared.node.resolve(operation.topic)
+        self._shared.gate.check("subscribe", topic)
+        feed = Feed((operation.compression or "none", spelling))
+        feed.period = max(0.0, operation.throttle_rate / 1000)
+        feed.depth = max(0, operation.queue_length)
+        feed.fragment_size = operation.fragment_size
+        number = str(operation.id)
+        self._drop(topic, number)
+        self._shared.topics.subscribe(topic, operation.type or "", feed, self._outbox.offer)
+        with self._lock:
+            if not self._closed:
+                self._feeds.setdefault(topic, {})[number] = feed
+                return
+        self._shared.topics.unsubscribe(feed)
+
+    def _unsubscribe(self, operation: ops.Unsubscribe) -> None:
+        topic = self._shared.node.resolve(operation.topic)
+        if not self._drop(topic, None if operation.id is None else str(operation.id)):
+            self._status("warning", f"unsubscribe: '{topic}' is not subscribed", operation.id)
+
+    def _drop(self, topic: str, number: str | None) -> bool:
+        """End one subscription of a topic, or all; return whether there was any."""
+        with self._lock:
+            known = self._feeds.get(topic, {})
+            numbers = list(known) if number is None else [number] if number in known else []
+            feeds = [known.pop(one) for one in numbers]
+            if not known:
+                self._feeds.pop(topic, None)
+        for feed in feeds:
+            self._shared.topics.unsubscribe(feed)
+            self._outbox.drop(feed)
+        return bool(feeds)
+
+    # Services.
+
+    def _call_service(self, operation: ops.CallService) -> None:
+        spelling = self._see(operation.type)
+        name = self._shared.node.resolve(operation.service)
+        self._shared.worker.submit(partial(self._call, name, operation, spelling))
+
+    def _call(self, name: str, operation: ops.CallService, spelling: Spelling) -> None:
+        values: Any
+        try:
+            if self._shared.rosapi.has(name):
+                values = self._shared.rosapi.call(name, operation.args, self._shared.gate, spelling)
+            else:
+                self._shared.gate.check("call", name)
+                values = self._calls.call(name, operation, spelling)
+            done = True
+        except RoszError as error:
+            values, done = str(error), False
+            self._status("error", f"call_service: {error}", operation.id)
+        response: dict[str, Any] = {"op": "service_response", "service": operation.service}
+        if operation.id is not None:
+            response["id"] = operation.id
+        self.send(
+            {**response, "values": values, "result": done}, fragment_size=operation.fragment_size
+        )
+
+    def _advertise_service(self, operation: ops.AdvertiseService) -> None:
+        spelling = self._see(operation.type)
+        name = self._shared.node.resolve(operation.service)
+        self._shared.gate.check("serve", name)
+        self._services.advertise(name, operation, spelling)
+
+    def _unadvertise_service(self, operation: ops.UnadvertiseService) -> None:
+        name = self._shared.node.resolve(operation.service)
+        if not self._services.unadvertise(name):
+            self._status("warning", f"unadvertise_service: '{name}' is not served", operation.id)
+
+    # Actions.
+
+    def _send_goal(self, operation: ops.SendActionGoal) -> None:
+        spelling = self._see(operation.action_type)
+        name = self._shared.node.resolve(operation.action)
+        self._shared.worker.submit(partial(self._send_goal_now, name, operation, spelling))
+
+    def _send_goal_now(self, name: str, operation: ops.SendActionGoal, spelling: Spelling) -> None:
+        try:
+            self._shared.gate.check("call", name)
+            self._goals.send(name, operation, spelling)
+        except RoszError as error:
+            result = {"op": "action_result", "id": operation.id, "action": operation.action}
+            self.send({**result, "values": str(error), "status": 0, "result": False})
+            self._status("error", f"send_action_goal: {error}", operation.id)
+
+    def _cancel_goal(self, operation: ops.CancelActionGoal) -> None:
+        self._shared.worker.submit(partial(self._cancel_goal_now, operation))
+
+    def _cancel_goal_now(self, operation: ops.CancelActionGoal) -> None:
+        try:
+            self._goals.cancel(operation)
+        except RoszError as error:
+            self._status("error", f"cancel_action_goal: {error}", operation.id)
+
+    def _advertise_action(self, operation: ops.AdvertiseAction) -> None:
+        spelling = self._see(operation.type)
+        name = self._shared.node.resolve(operation.action)
+        self._shared.gate.check("serve", name)
+        self._actions.advertise(name, operation, spelling)
+
+    def _unadvertise_action(self, operation: ops.UnadvertiseAction) -> None:
+        name = self._shared.node.resolve(operation.action)
+        if not self._actions.unadvertise(name):
+            self._status("warning", f"unadvertise_action: '{name}' is not served", operation.id)
+
+
+def _name(operation: ops.Operation) -> str:
+    return str(operation.__struct_config__.tag)

@@ -1,0 +1,209 @@
+"""What waits to be sent to one client: answers, and the newest messages of its subscriptions.
+
+Messages wait as they came from the network, shared by all clients, and are encoded when their turn
+comes. So a client that does not read costs neither processor time nor memory beyond the limit.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import msgspec
+
+from rosz.bridges.websocket.operations import Compression
+from rosz.bridges.websocket.plain import Spelling, converter
+
+__all__ = ("Feed", "Form", "Message", "Outbox")
+
+Form: TypeAlias = tuple[Compression, Spelling]
+"""Encoding of a message, and the spelling of its fields."""
+
+
+class Message:
+    """A message of a topic, as the network brought it; encoded at most once in each form.
+
+    Args:
+        topic: Name of the topic.
+        cls: Class of the message.
+        data: Its CDR.
+        received: When it came, by the clock of the node, in nanoseconds.
+    """
+
+    def __init__(self, topic: str, cls: type[Any], data: bytes, received: int) -> None:
+        self.size: int = len(data)
+        self._topic = topic
+        self._cls = cls
+        self._data = data
+        self._received = received
+        self._lock = threading.Lock()
+        self._encoded: dict[Form, bytes] = {}
+
+    def encode(self, form: Form) -> bytes:
+        """Return the operation ``publish`` with the message.
+
+        Raises:
+            DecodeError: The bytes are not a message of the type.
+            EncodeError: ROS 1 has no such message.
+            ImportError: The library of the encoding is not installed.
+        """
+        with self._lock:
+            encoded = self._encoded.get(form)
+            if encoded is None:
+                encoded = self._encoded[form] = self._encode(*form)
+            return encoded
+
+    def _encode(self, compression: Compression, spelling: Spelling) -> bytes:
+        if compression == "cbor-raw":
+            return self._cbor(self._raw(spelling))
+        message = self._cls.from_cdr(self._data)
+        if compression == "cbor":
+            from cbor2 import CBORTag
+
+            return self._cbor(converter(self._cls, spelling, CBORTag)(message))
+        plain = converter(self._cls, spelling)(message)
+        return msgspec.json.encode({"op": "publish", "topic": self._topic, "msg": plain})
+
+    def _raw(self, spelling: Spelling) -> dict[str, Any]:
+        seconds, rest = divmod(self._received, 1_000_000_000)
+        if spelling == "ros2":
+            return {
+                "sec": seconds,
+                "nanosec": rest,
+                "secs": seconds,
+                "nsecs": rest,
+                "bytes": self._data,
+            }
+        data = self._cls.from_cdr(self._data).to_ros1()
+        return {"secs": seconds, "nsecs": rest, "bytes": data}
+
+    def _cbor(self, message: dict[str, Any]) -> bytes:
+        import cbor2
+
+        return cbor2.dumps({"op": "publish", "topic": self._topic, "msg": message})
+
+
+class Feed:
+    """The messages of one topic that wait for one client.
+
+    Attributes:
+        form: How they are encoded.
+        period: Shortest time between two of them, in seconds.
+        depth: Largest number of them; 0 for as many as the outbox holds, or one with a period.
+        fragment_size: Largest number of characters of a text; None for no limit.
+        messages: What waits, the oldest first; only the outbox touches it, and `due`.
+        due: When the next one may be sent, by the monotonic clock.
+        closed: Whether the outbox has dropped it.
+    """
+
+    def __init__(self, form: Form) -> None:
+        self.form = form
+        self.period: float = 0.0
+        self.depth: int = 0
+        self.fragment_size: float | None = None
+        self.closed: bool = False
+        self.messages: deque[Message] = deque()
+        self.due: float = 0.0
+
+    @property
+    def most(self) -> int:
+        """Largest number of messages; 0 for no limit."""
+        return max(self.depth, 1) if self.period else self.depth
+
+
+class Outbox:
+    """What waits to be sent to one client.
+
+    Args:
+        limit: Largest number of bytes that wait. The oldest messages of a topic give way to newer
+            ones, except the newest. Answers beyond the limit end the connection.
+        wake: Function that is called when there is something to send.
+        overflow: Function that is called when there are too many answers.
+    """
+
+    def __init__(
+        self, limit: int, wake: Callable[[], object], overflow: Callable[[], object]
+    ) -> None:
+        self._limit = limit
+        self._wake = wake
+        self._overflow = overflow
+        self._lock = threading.Lock()
+        self._answers: deque[bytes] = deque()
+        self._ready: deque[Feed] = deque()
+        self._size = 0
+        self._closed = False
+
+    def put(self, answer: bytes) -> None:
+        """Add an answer, which is sent before messages."""
+        with self._lock:
+            if self._closed:
+                return
+            waiting = sum(map(len, self._answers))
+            full = bool(waiting) and waiting + len(answer) > self._limit
+            if full:
+                self._closed = True
+            else:
+                self._answers.append(answer)
+        (self._overflow if full else self._wake)()
+
+    def offer(self, feed: Feed, message: Message) -> None:
+        """Add a message; older ones of its topic give way if there are too many."""
+        with self._lock:
+            if self._closed or feed.closed:
+                return
+            messages = feed.messages
+            if not messages:
+                self._ready.append(feed)
+            messages.append(message)
+            self._size += message.size
+            while len(messages) > 1 and (
+                self._size > self._limit or (feed.most and len(messages) > feed.most)
+            ):
+                self._size -= messages.popleft().size
+        self._wake()
+
+    def next(self) -> tuple[bytes | Message | None, Feed | None, float]:
+        """Return what to send next.
+
+        Returns:
+            An answer, or a message with its feed, or neither; then seconds until a message is due.
+        """
+        with self._lock:
+            if self._answers:
+                return self._answers.popleft(), None, 0.0
+            now, earliest = time.monotonic(), float("inf")
+            for _ in range(len(self._ready)):
+                feed = self._ready.popleft()
+                if feed.due > now:
+                    self._ready.append(feed)
+                    earliest = min(earliest, feed.due)
+                    continue
+                message = feed.messages.popleft()
+                self._size -= message.size
+                feed.due = now + feed.period
+                if feed.messages:
+                    self._ready.append(feed)
+                return message, feed, 0.0
+            return None, None, earliest - now
+
+    def drop(self, feed: Feed) -> None:
+        """Forget a feed and its messages."""
+        with self._lock:
+            feed.closed = True
+            self._size -= sum(message.size for message in feed.messages)
+            if feed.messages:
+                self._ready.remove(feed)
+                feed.messages.clear()
+
+    def close(self) -> None:
+        """Forget everything."""
+        with self._lock:
+            self._closed = True
+            self._answers.clear()
+            for feed in self._ready:
+                feed.messages.clear()
+            self._ready.clear()
+            self._size = 0
