@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import Future
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -169,7 +170,8 @@ class ServedActions:
         finally:
             with self._lock:
                 self._goals.pop(key, None)
-        self._finish(goal, kind, answer)
+        if not goal.done:
+            self._finish(goal, kind, answer)
 
     def _finish(self, goal: ServerGoal, kind: Any, answer: ActionResult) -> None:
         values = answer.values if isinstance(answer.values, dict | list) else None
@@ -220,7 +222,9 @@ class ServedActions:
         with self._lock:
             servers, goals = list(self._servers.values()), list(self._goals.values())
             self._servers.clear()
-        for _, _, pending in goals:
+        for goal, _, pending in goals:
+            with suppress(UsageError):  # it has just ended
+                goal.abort()
             if not pending.done():
                 pending.set_result(ActionResult(action="", result=False))
         for server in servers:

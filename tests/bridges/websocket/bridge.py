@@ -1,0 +1,68 @@
+"""A bridge of a test, and a client that speaks the protocol by hand."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from network import TIMEOUT, Network
+from websockets.sync.client import ClientConnection, connect
+
+from rosz.bridges.websocket import WebsocketBridge
+from rosz.node import Node
+
+__all__ = ("Bridge", "Client", "bridge_on")
+
+
+class Bridge:
+    """A bridge on the network of a test."""
+
+    def __init__(self, network: Network, node: Node, server: WebsocketBridge) -> None:
+        self.network = network
+        self.node = node
+        self.server = server
+
+    @contextmanager
+    def client(self, path: str = "", **options: Any) -> Iterator[Client]:
+        """Connect."""
+        url = f"ws://127.0.0.1:{self.server.port}/{path}"
+        with connect(url, open_timeout=TIMEOUT, max_size=None, **options) as connection:
+            yield Client(connection)
+
+
+class Client:
+    """A client that sends and receives operations."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+
+    def send(self, op: str, **members: Any) -> None:
+        self.connection.send(json.dumps({"op": op, **members}))
+
+    def receive(self) -> Any:
+        """Return the next operation, or the bytes of a binary one."""
+        got = self.connection.recv(timeout=TIMEOUT)
+        return json.loads(got) if isinstance(got, str) else got
+
+    def receive_op(self, op: str) -> Any:
+        """Return the next operation of a kind; others before it are passed over."""
+        while True:
+            got = self.receive()
+            if isinstance(got, dict) and got["op"] == op:
+                return got
+
+    def sync(self) -> None:
+        """Wait until all that was sent before has been done."""
+        self.send("call_service", service="/rosapi/get_time", id="sync")
+        while self.receive().get("id") != "sync":
+            pass
+
+
+@contextmanager
+def bridge_on(network: Network, **options: Any) -> Iterator[Bridge]:
+    """Open a bridge at any port."""
+    node = network.node("bridge")
+    with WebsocketBridge(node, port=0, **options) as server:
+        yield Bridge(network, node, server)

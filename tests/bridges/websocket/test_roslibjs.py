@@ -1,0 +1,155 @@
+"""Programs that use npm's roslib in Node.js."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from array import array
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from network import TIMEOUT, Network, Program, eventually, free_port
+
+from rosz.bridges.websocket import WebsocketBridge
+from rosz.msgs.example_interfaces.action import Fibonacci
+from rosz.msgs.sensor_msgs.msg import LaserScan
+from rosz.msgs.std_msgs.msg import Header, String
+from rosz.msgs.std_srvs.srv import SetBool
+
+pytestmark = pytest.mark.system
+
+SCRIPT = """
+import * as ROSLIB from "roslib";
+const [port] = process.argv.slice(2);
+const url = `ws://127.0.0.1:${port}`;
+const ros = new ROSLIB.Ros({});
+const shown = (one) => typeof one === "string" ? one : JSON.stringify(one);
+const say = (...words) => console.log(...words.map(shown));
+const once = (topic) => new Promise((done) => {
+  const hear = (message) => { topic.unsubscribe(hear); done(message); };
+  topic.subscribe(hear);
+});
+const called = (service, request) => new Promise((done) =>
+  service.callService(request, done, (error) => done({ refused: String(error) })));
+ros.on("error", () => {});
+await ros.connect(url);
+
+for (const compression of ["none", "png", "cbor"]) {
+  const options = { name: "/scan", messageType: "sensor_msgs/LaserScan", compression };
+  const scan = new ROSLIB.Topic({ ros, ...options });
+  const message = await once(scan);
+  say(compression, Array.from(message.ranges), message.header.stamp.secs);
+}
+const chatter = new ROSLIB.Topic({ ros, name: "/up", messageType: "std_msgs/String" });
+chatter.publish({ data: "from roslib" });
+
+const flip = new ROSLIB.Service({ ros, name: "/flip", serviceType: "std_srvs/SetBool" });
+say("flip", await called(flip, { data: true }));
+say("flip", await called(flip, { data: false }));
+
+const rate = new ROSLIB.Param({ ros, name: "/rate" });
+await new Promise((done) => rate.set({ hz: [1, 2.5] }, done));
+say("rate", await new Promise((done) => rate.get(done)));
+say("topics", (await new Promise((done) => ros.getTopics(done))).topics.includes("/scan"));
+say("nodes", (await new Promise((done) => ros.getNodes(done))).includes("/other"));
+const defs = await new Promise((done) => ros.getMessageDetails("geometry_msgs/Pose", done));
+say("details", ros.decodeTypeDefs(defs));
+
+const fib = new ROSLIB.Action({ ros, name: "/fib", actionType: "example_interfaces/Fibonacci" });
+say("result", await new Promise((done) =>
+  fib.sendGoal({ order: 3 }, done, (feedback) => say("feedback", feedback), done)));
+
+const served = new ROSLIB.Service({ ros, name: "/served", serviceType: "std_srvs/SetBool" });
+await served.advertise((request, response) => {
+  response.success = !request.data;
+  response.message = "from roslib";
+  return true;
+});
+const again = new ROSLIB.Topic({ ros, name: "/again", messageType: "std_msgs/String" });
+again.subscribe((message) => say("again", message.data));
+say("ready");
+let down = false;
+ros.on("close", () => {
+  if (!down) say("lost");
+  down = true;
+  setTimeout(() => ros.connect(url).then(() => say("back")).catch(() => {}), 50);
+});
+process.stdin.on("data", () => process.exit(0));
+"""
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("roslib")
+    (folder / "package.json").write_text('{"type": "module"}')
+    try:
+        done = subprocess.run(
+            ["npm", "install", "--no-audit", "--no-fund", "roslib@2"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    except (FileNotFoundError, subprocess.TimeoutExpired) as error:
+        pytest.skip(f"needs npm and its registry: {error}")
+    if done.returncode:
+        pytest.skip(f"npm cannot install roslib: {done.stderr[-200:]}")
+    (folder / "page.js").write_text(SCRIPT)
+    return folder / "page.js"
+
+
+def test_a_page(script: Path, network: Network) -> None:
+    node = network.node("other")
+    scan = LaserScan(Header(), ranges=array("f", [1.5, 2.5]))
+    scan.header.stamp.sec = 7
+    node.publisher("scan", LaserScan, latch=True).publish(scan)
+    heard: SimpleQueue[String] = SimpleQueue()
+    node.subscription("up", String, heard.put)
+
+    def flip(request: Any) -> Any:
+        if not request.data:
+            raise ValueError("never false")
+        return True, "flipped"
+
+    def execute(goal: Any) -> None:
+        goal.feedback(Fibonacci.Feedback([0, 1]))
+        goal.succeed(Fibonacci.Result([0, 1, 1]))
+
+    node.service("flip", SetBool, flip)
+    node.action_server("fib", Fibonacci, execute)
+    port = free_port()
+    server = WebsocketBridge(network.node("bridge"), port=port)
+    node_js = shutil.which("node")
+    assert node_js is not None
+    program = Program([node_js, str(script), str(port)], network.variables(), script.parent)
+    try:
+        program.wait_for("ready")
+        assert heard.get(timeout=TIMEOUT).data == "from roslib"
+        assert [line for line in program.lines if line.startswith(("none", "png", "cbor"))] == [
+            f"{compression} [1.5,2.5] 7" for compression in ("none", "png", "cbor")
+        ]
+        assert 'flip {"success":true,"message":"flipped"}' in program.lines
+        assert any("refused" in line and "never false" in line for line in program.lines)
+        assert 'rate {"hz":[1,2.5]}' in program.lines
+        assert "topics true" in program.lines
+        assert "nodes true" in program.lines
+        details = next(line for line in program.lines if line.startswith("details"))
+        assert '"position":{"x"' in details
+        assert 'feedback {"sequence":[0,1]}' in program.lines
+        assert 'result {"sequence":[0,1,1]}' in program.lines
+        response = node.client("served", SetBool)(data=False)
+        assert (response.success, response.message) == (True, "from roslib")
+        server.close()
+        program.wait_for("lost")
+        server = WebsocketBridge(network.node("bridge2"), port=port)
+        program.wait_for("back")
+        publisher = node.publisher("again", String, latch=True)
+        publisher.publish("after")
+        program.wait_for("again after")
+        eventually(lambda: server.clients == 1, "one client")
+    finally:
+        program.close()
+        server.close()
