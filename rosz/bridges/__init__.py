@@ -2,4 +2,6 @@
 
 from __future__ import annotations
 
+PUBLIC_MODULES = ("gate",)
+
 __all__ = ()

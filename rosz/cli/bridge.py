@@ -8,7 +8,7 @@ from typing import Annotated
 
 from rosz.cli.console import print_lines, until_stopped
 from rosz.cli.core import open_master, read_master_place
-from rosz.cli.declare import App, Option
+from rosz.cli.declare import App, Option, at_least
 from rosz.errors import UsageError
 
 __all__ = ("app",)
@@ -16,6 +16,7 @@ __all__ = ("app",)
 app = App("Let programs that speak other protocols take part in the network.")
 
 _LONG = 3600.0
+_LAST_PORT = 65535
 
 
 @app.command("ros1")
@@ -104,6 +105,7 @@ def websocket_command(
     key: Annotated[str, Option("--key FILE", "Private key of the certificate.")] = "",
 ) -> None:
     """Serve the rosbridge protocol to web pages and other programs, until it is stopped."""
+    at_least("--port", port, 0, "as a port", _LAST_PORT)
     from rosz.bridges.websocket import Settings, open_bridge
     from rosz.node import Node
 

@@ -75,6 +75,7 @@ LINES = {
     "bag export --end {} a.bag b": TIMES[1:],
     "bag split --duration {} a.bag": TIMES[1:],
     "bag split --size {} a.bag": LIMITS,
+    "bridge websocket --port {}": ["-1", "65536"],
 }
 
 
