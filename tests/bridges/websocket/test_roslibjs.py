@@ -140,7 +140,9 @@ def test_a_page(script: Path, network: Network) -> None:
         assert '"position":{"x"' in details
         assert 'feedback {"sequence":[0,1]}' in program.lines
         assert 'result {"sequence":[0,1,1]}' in program.lines
-        response = node.client("served", SetBool)(data=False)
+        client = node.client("served", SetBool)
+        client.wait_for_service(TIMEOUT)
+        response = client(data=False)
         assert (response.success, response.message) == (True, "from roslib")
         server.close()
         program.wait_for("lost")

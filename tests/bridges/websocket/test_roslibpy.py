@@ -98,7 +98,9 @@ def test_a_program(bridge: Bridge, transport: str) -> None:
     assert "topics ['/chatter', '/pose']" in program.lines
     assert "type geometry_msgs/PoseStamped" in program.lines
     assert "time True" in program.lines
-    response = node.client("served", SetBool)(data=False)
+    client = node.client("served", SetBool)
+    client.wait_for_service(TIMEOUT)
+    response = client(data=False)
     assert (response.success, response.message) == (True, "from roslibpy")
     program.say("go")
     program.wait_for("done")
