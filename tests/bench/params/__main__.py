@@ -30,6 +30,8 @@ READS = 20_000
 PARAMS = 5_000
 MESH = 50
 """Replicas that form a mesh; more are clients of a router."""
+
+START_SECONDS = 250.0
 ROS1 = "ROS 1"
 ROSZ = (sys.executable, "-P", "-m", "rosz", "param")
 
@@ -76,9 +78,11 @@ class Bench:
         with tempfile.TemporaryDirectory(prefix="rosz") as folder:
             fleet = Fleet(Path(folder))
             if count > MESH:
-                others = [fleet.start(mode="router")]
-                writer, *more = fleet.start_many(count, mode="client")
-                others += more
+                router = fleet.start(mode="router")
+                clients = [fleet.start(mode="client", wait=False) for _ in range(count)]
+                for client in clients:
+                    client.answer(START_SECONDS)
+                writer, others = clients[0], [router, *clients[1:]]
                 until_known([writer], count)
             else:
                 writer, *others = fleet.start_many(count + 1)
