@@ -34,7 +34,7 @@ _POLL_SECONDS = 0.002
 _LATER_POLL_SECONDS = 0.05
 _QUERY_TIMEOUT = 0.5
 _MOST_PEERS = 60
-"""Peers from which on a newcomer is told of cores: each session of a mesh has a link to each other."""
+"""Peers from which on a newcomer is told of cores, as every two sessions of a mesh are linked."""
 _ADVICE = "use a core for so many nodes (run 'rosz core', and start nodes with ROSZ_MODE=client)"
 
 _log = logging.getLogger("rosz.session")
