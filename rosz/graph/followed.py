@@ -46,6 +46,10 @@ class Followed:
         """Whether all is known that existed when it began, or that takes too long."""
         return all(interest.settled for interest in self._interests)
 
+    def share(self) -> None:
+        """Let those who follow single names from now on need no watch; this is never closed."""
+        self._all.draw_on(self._interests)
+
     def view(self) -> View:
         """Return what is known at this moment; it is not all there is before `complete`."""
         known = self._known  # replaced whole, so that reading it needs no lock

@@ -63,6 +63,14 @@ class Graph:
         keys = ((entities_key(self.domain, kind, name), name) for name in names)
         return Followed(self._interests, keys)
 
+    def follow_processes(self, node: str) -> Followed:
+        """Follow the processes of rosz nodes of a full name.
+
+        Raises:
+            ClosedError: The graph or its session is closed.
+        """
+        return Followed(self._interests, [(processes_key(self.domain, node), node)])
+
     def follow_all(self) -> Followed:
         """Follow the whole domain, which costs each node as much as there are entities in all.
 
@@ -81,6 +89,7 @@ class Graph:
         """
         if self._whole is None:
             self._whole = self.follow_all()  # of two threads, both may: that costs no other watch
+            self._whole.share()
         followed = self._whole
         if not followed.complete:
             deadline = time.monotonic() + COMPLETE_BY

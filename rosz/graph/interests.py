@@ -15,7 +15,15 @@ from rosz.errors import ClosedError, DecodeError
 from rosz.graph.view import View
 from rosz.lifecycle import Closable, Lifecycle
 from rosz.session import clamp_timeout
-from rosz.wire import OWN_SPACE, ProcessToken, Token, parse_process, parse_token
+from rosz.wire import (
+    OWN_SPACE,
+    ProcessToken,
+    Token,
+    entities_key,
+    parse_process,
+    parse_token,
+    processes_key,
+)
 
 if TYPE_CHECKING:
     from rosz.session import Session
@@ -42,11 +50,12 @@ class Interest:
 
     Args:
         key: The key expression.
-        name: The topic or service that the tokens must have; any if empty.
+        name: The topic, service or process's node that the tokens must have; any if empty.
 
     Attributes:
         key: The key expression.
-        name: The topic or service that the tokens must have; any if empty.
+        name: The topic, service or process's node that the tokens must have; any if empty.
+        is_part: Whether it has no watch, but gets its tokens from interests in the whole domain.
         tokens: The tokens by their keys.
         version: Number that grows with each change of the tokens.
         began: Time when it was made, by the monotonic clock in seconds.
@@ -59,6 +68,7 @@ class Interest:
     def __init__(self, key: str, name: str = "") -> None:
         self.key = key
         self.name = name
+        self.is_part: bool = False
         self.tokens: dict[str, Any] = {}
         self.version: int = 0
         self.began: float = time.monotonic()
@@ -88,6 +98,7 @@ class Interests:
         self._session = session
         self._version = 0
         self._interests: dict[str, Interest] = {}
+        self._whole: tuple[Interest, ...] = ()
         self._reported_damage: set[str] = set()
         self._events: SimpleQueue[tuple[Interest, str, bool] | _Task | None] = SimpleQueue()
         self._reports: deque[_Report] = deque()
@@ -118,6 +129,16 @@ class Interests:
             self.release(interests)
             raise
         return interests
+
+    def draw_on(self, whole: Iterable[Interest]) -> None:
+        """Take the tokens of single names from what is followed for good from now on.
+
+        A watch costs a thread, which wakes ten times a second.
+
+        Args:
+            whole: Interests in the whole domain, which are never released.
+        """
+        self._whole = tuple(whole)
 
     @property
     def closing(self) -> bool:
@@ -210,6 +231,11 @@ class Interests:
                 return interest
             interest = self._interests[key] = Interest(key, name)
             interest.users = 1
+            whole = self._whole
+            interest.is_part = bool(name and whole) and all(one.settled for one in whole)
+        if interest.is_part:
+            self._events.put(partial(self._begin_part, interest))
+            return interest
         try:
             interest.watch = self._session.watch_tokens(
                 key,
@@ -222,6 +248,16 @@ class Interests:
         if self._lifecycle.closing:  # perhaps too late for the thread that closes the graph
             interest.watch.close()
         return interest
+
+    def _begin_part(self, interest: Interest) -> None:
+        """Give a part what is known of the whole domain."""
+        with self.changed:
+            for whole in self._whole:
+                for key, token in whole.tokens.items():
+                    if _name_of(token) == interest.name and _part_key(token) == interest.key:
+                        interest.tokens[key] = token
+            interest.version += 1
+        self._set_complete(interest)
 
     def _set_complete(self, interest: Interest) -> None:
         with self.changed:
@@ -279,7 +315,7 @@ class Interests:
         if alive == (key in known):
             return None
         token = self._parse(key) if alive else known[key]
-        if token is None or interest.name not in {"", getattr(token, "name", "")}:
+        if token is None or interest.name not in {"", _name_of(token)}:
             return None
         with self.changed:
             if alive:
@@ -289,7 +325,12 @@ class Interests:
             interest.version += 1
             self._version += 1
             self.changed.notify_all()
-        return partial(self._notify_all, interest, token, alive, alive and not interest.settled)
+        report = partial(self._notify_all, interest, token, alive, alive and not interest.settled)
+        part = self._interests.get(_part_key(token)) if interest in self._whole else None
+        if part is None or not part.is_part:
+            return report
+        reports = [report, self._apply(part, key, alive)]
+        return lambda: [one() for one in reports if one is not None]
 
     def _parse(self, key: str) -> Token | ProcessToken | None:
         """Parse a token; each kind of damage is logged once."""
@@ -343,3 +384,15 @@ class Interests:
     def _replace_lock(self) -> None:
         """Replace the lock in a forked child: a thread of the parent may hold it for ever."""
         self.changed = threading.Condition()
+
+
+def _name_of(token: Token | ProcessToken) -> str:
+    """Return the name by which a token is followed; empty for the token of a node."""
+    return token.node if isinstance(token, ProcessToken) else token.name
+
+
+def _part_key(token: Token | ProcessToken) -> str:
+    """Return the key expression by which those follow a token who follow its name alone."""
+    if isinstance(token, ProcessToken):
+        return processes_key(token.domain, token.node)
+    return entities_key(token.domain, token.kind, token.name)

@@ -13,7 +13,7 @@ from rosz.errors import RoszError
 from rosz.lifecycle import Registration
 from rosz.node.control import NodeInfo, Request, control_key
 from rosz.node.core import NodeCore
-from rosz.wire import ProcessToken, processes_key
+from rosz.wire import ProcessToken
 from rosz.worker import Worker
 
 __all__ = ("yield_to_newer",)
@@ -36,8 +36,7 @@ def yield_to_newer(node: NodeCore) -> None:
             duplicates.submit(other)
 
     node.keep(Registration(lambda: duplicates.close(0)))
-    graph = node.context.graph
-    namesakes = node.keep(graph.follow(processes_key(graph.domain, node.name)))
+    namesakes = node.keep(node.context.graph.follow_processes(node.name))
     node.keep(Registration(namesakes.listen(appeared)))
 
 

@@ -62,6 +62,41 @@ def test_the_watch_ends_with_its_last_user(network: Network) -> None:
     assert not graph._interests.all()
 
 
+def test_names_of_a_whole_domain_need_no_watch(network: Network) -> None:
+    """A watch costs a thread, which wakes ten times a second."""
+    other = network.node("other")
+    early = other.subscription("scan", String)
+    node = network.node("robot")
+    graph = node.context.graph
+    assert graph.view().subscriptions("/scan")
+    watches = {one.key for one in graph._interests.all() if not one.is_part}
+    publishers = [node.publisher(name, String) for name in ("scan", "command")]
+    assert {one.key for one in graph._interests.all() if not one.is_part} == watches
+    heard: list[tuple[str, bool]] = []
+    for publisher in publishers:
+        publisher.others.listen(lambda token, alive: heard.append((token.name, alive)))
+    eventually(lambda: heard == [("/scan", True)], "what existed")
+    late = other.subscription("command", String)
+    eventually(lambda: heard[1:] == [("/command", True)], "what came later")
+    assert [len(one.subscribers()) for one in publishers] == [1, 1]
+    early.close()
+    late.close()
+    eventually(lambda: heard[2:] == [("/scan", False), ("/command", False)], "their ends")
+    assert not any(one.subscribers() for one in publishers)
+    publishers[0].close()
+    assert len([one for one in graph._interests.all() if one.name == "/scan"]) == 0
+
+
+def test_a_newer_node_takes_over_in_a_process_that_follows_all(network: Network) -> None:
+    older = network.node("robot")
+    other = network.node("other", context=older.context)
+    other.context.graph.view()
+    twin = network.node("twin", context=older.context)
+    network.node("twin")
+    eventually(lambda: twin.is_shutdown, "the older's end")
+    assert not older.is_shutdown
+
+
 def test_who_follows_later_finds_what_came_meanwhile(network: Network) -> None:
     graph = network.node("robot").context.graph
     graph.follow_entities(Kind.SERVICE, "/reset").close()

@@ -267,6 +267,30 @@ def test_a_port_that_is_taken_is_named(world: World) -> None:
         MasterBridge(world.network.environment(), port=world.bridge.port)
 
 
+def _register(world: World, sock: socket.socket, topic: str) -> None:
+    """Register a publisher, whose node is whoever listens on a socket."""
+    uri = f"http://127.0.0.1:{sock.getsockname()[1]}/"
+    assert world.call("registerPublisher", "/many", topic, "std_msgs/String", uri)[0] == 1
+
+
+def test_a_topic_that_nobody_uses_costs_no_thread(world: World, node: Node) -> None:
+    """A thread that waits for Zenoh wakes ten times a second."""
+
+    def watches() -> int:
+        return sum("watch" in one.name or "/many" in one.name for one in threading.enumerate())
+
+    view = node.context.graph.view
+    with socket.create_server(("127.0.0.1", 0)) as sock:
+        _register(world, sock, "/many/first")
+        eventually(lambda: view().publishers("/many/first"))
+        before = watches()
+        for number in range(20):
+            _register(world, sock, f"/many/t{number}")
+        eventually(lambda: all(view().publishers(f"/many/t{number}") for number in range(20)))
+        assert watches() == before
+    eventually(lambda: "/many" not in view().nodes())
+
+
 def test_registrations_come_back_after_the_master(world: World, node: Node) -> None:
     program = world.rospy(TALKER, "staying", "/staying")
     heard = _heard(node, "/staying")
