@@ -202,6 +202,7 @@ class PullSubscriber(Declared):
         super().__init__(f"subscriber '{key}'", entity)
         self._key = key
         self._recv = entity.handler.recv
+        self._try_recv = entity.handler.try_recv
 
     def receive(self) -> Sample:
         """Wait for a sample and return the oldest one.
@@ -215,6 +216,14 @@ class PullSubscriber(Declared):
             return Sample(self._recv())
         except zenoh.ZError as error:
             raise ClosedError(f"the subscriber of '{self._key}' is closed") from error
+
+    def take(self) -> list[Sample]:
+        """Return the samples that wait, oldest first; none when it is closed."""
+        samples: list[Sample] = []
+        with suppress(zenoh.ZError):
+            while not ENDING.is_set() and (raw := self._try_recv()) is not None:
+                samples.append(Sample(raw))
+        return samples
 
 
 class RawPublisher(Declared):

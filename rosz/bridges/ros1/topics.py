@@ -3,13 +3,15 @@
 A publisher of ROS 1 is a publisher on the network at once, so that others see it. The bridge
 connects to it when the network has a subscription, and disconnects with the last. A subscriber of
 ROS 1 connects to the bridge itself, as the master tells it to; then the bridge subscribes for it.
+Publishers on the network see the subscriber before that, so the bridge keeps what they publish.
 All of this runs on the thread for changes, but for the bytes of messages.
 """
 
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
 from struct import Struct
@@ -27,7 +29,8 @@ from rosz.bridges.ros1.sockets import Stream, log
 from rosz.errors import ClosedError, DecodeError, MessageError, RoszError, TypeNotFound
 from rosz.node import BridgedNode, Entity, MessageInfo, Publisher, Subscription
 from rosz.qos import QoS, for_queue
-from rosz.wire import Kind, Token
+from rosz.session import PullSubscriber, Sample
+from rosz.wire import Kind, Token, read_attachment
 
 __all__ = ("Connection", "PublishedTopic", "SubscribedTopic")
 
@@ -286,8 +289,9 @@ class SubscribedTopic:
         self._topic = shared.here(entry.name)
         self._shared = shared
         self._node = node
-        self._shown: Entity | None = None
+        self._shown: _Shown | None = None
         self._links: list[_Link] = []
+        self._published = False
         self._closed = False
         self.update()
 
@@ -302,23 +306,22 @@ class SubscribedTopic:
         """Show the node as a subscriber while it is not connected."""
         if self._closed or self._links:
             return
-        if self._shown is None and self.entry.type_name != ANY_TYPE:
-            try:
-                codec = self._shared.codecs.of_ros1(self.entry.name, self.entry.type_name)
-            except RoszError as error:
-                log.info("cannot show a subscriber of '%s': %s", self.entry.name, error)
-                return
-            with suppress(ClosedError):
-                shown = Entity(
-                    self._node,
-                    Kind.SUBSCRIPTION,
-                    self._topic,
-                    codec.cls._type_name,
-                    codec.cls._type_hash,
-                    for_queue(_QUEUE),
-                )
-                shown.announce(watch=False)
-                self._shown = self._node.keep(shown)
+        before, self._published = self._published, bool(self._shared.publishers(self._topic))
+        if self._shown is None:
+            self._show()
+        elif before and not self._published:
+            self._shown.take()  # nobody expects that to arrive with what others publish later
+
+    def _show(self) -> None:
+        if self.entry.type_name == ANY_TYPE:
+            return
+        try:
+            codec = self._shared.codecs.of_ros1(self.entry.name, self.entry.type_name)
+        except RoszError as error:
+            log.info("cannot show a subscriber of '%s': %s", self.entry.name, error)
+            return
+        with suppress(ClosedError):
+            self._shown = self._node.keep(_Shown(self._node, self._topic, codec))
 
     def accept(self, incoming: Incoming, header: dict[str, str]) -> None:
         """Send what the network publishes to a connection of the node."""
@@ -334,10 +337,10 @@ class SubscribedTopic:
         own = set() if source != self.entry.name else shared.gids
         link = _Link(shared, self._node, incoming.stream, codec, own, self._drop)
         self._links.append(link)
-        if self._shown is not None:
-            self._shown.close()
-            self._shown = None
-        link.open(self.entry.name, shared.here(source), publishers)
+        shown, self._shown = self._shown, None
+        link.open(self.entry.name, shared.here(source), publishers, shown)
+        if shown is not None:
+            shown.close()  # later than the link subscribes, so that publishers see no gap
 
     def close(self) -> None:
         """Take the topic from the network, and end the connections."""
@@ -350,8 +353,35 @@ class SubscribedTopic:
     def _drop(self, link: _Link) -> None:
         if link in self._links:
             self._links.remove(link)
-            link.close()
             self.update()
+            link.close()
+
+
+class _Shown(Entity):
+    """A subscription that others see, and that keeps the newest messages for the first link.
+
+    It has no thread, so that many of them cost little.
+
+    Args:
+        node: The node that subscribes.
+        topic: Name of the topic on the network.
+        codec: Type of the topic.
+    """
+
+    def __init__(self, node: BridgedNode, topic: str, codec: Codec) -> None:
+        cls = codec.cls
+        super().__init__(
+            node, Kind.SUBSCRIPTION, topic, cls._type_name, cls._type_hash, for_queue(_QUEUE)
+        )
+        # What ROS 1 publishes on this topic, the node receives without the bridge.
+        self._samples: PullSubscriber = self.keep(
+            node.context.session.pull_subscriber(self.key, _QUEUE, remote_only=True)
+        )
+        self.announce(watch=False)
+
+    def take(self) -> list[Sample]:
+        """Return the messages that it keeps, oldest first, and forget them."""
+        return self._samples.take()
 
 
 def _choose(shared: Shared, topic: str, publishers: list[Token], header: dict[str, str]) -> Codec:
@@ -412,14 +442,19 @@ class _Link:
         self._subscription: Subscription[Any] | None = None
         self._piece = memoryview(bytearray(_PIECE))
         self._reported = False
+        self._turn = threading.Lock()
+        self._early: set[tuple[bytes, int]] = set()
 
-    def open(self, name: str, topic: str, publishers: list[Token]) -> None:
-        """Answer the header, and subscribe.
+    def open(
+        self, name: str, topic: str, publishers: list[Token], shown: _Shown | None = None
+    ) -> None:
+        """Answer the header, subscribe, and send what was published before.
 
         Args:
             name: Name of the topic in ROS 1.
             topic: Name of the topic on the network.
             publishers: Its publishers there.
+            shown: The subscription that has kept messages until now, if there was one.
         """
         known = [token.qos for token in publishers if token.qos is not None]
         codec, stream = self._codec, self.stream
@@ -435,18 +470,19 @@ class _Link:
         stream.send([encode_header(fields)])
         stream.depth = depth
         self._shared.loop.call(self._follow)
-        with suppress(ClosedError):
-            self._subscription = self._node.keep(
-                Subscription(
-                    self._node,
-                    topic,
-                    codec.cls,
-                    self._send,
-                    for_queue(depth),
-                    raw=True,
-                    with_info=True,
-                )
+        with suppress(ClosedError), self._turn:
+            subscription: Subscription[Any] = Subscription(
+                self._node,
+                topic,
+                codec.cls,
+                self._receive,
+                for_queue(depth),
+                raw=True,
+                with_info=True,
             )
+            self._subscription = self._node.keep(subscription)
+            if shown is not None and shown.key == subscription.key:
+                self._send_early(shown.take())
 
     def close(self) -> None:
         """Unsubscribe, and end the connection."""
@@ -462,10 +498,27 @@ class _Link:
             self.stream.handler = self
             self.stream.pause(reading=True)
 
-    def _send(self, payload: Any, info: MessageInfo) -> None:
-        if info.gid in self._own or self._shared.has_crossed(info.gid):
+    def _send_early(self, samples: Iterable[Sample]) -> None:
+        """Send what was published before this link subscribed, in part also afterwards."""
+        for sample in samples:
+            try:
+                number, _, publisher = read_attachment(sample.attachment)
+            except DecodeError:
+                continue  # as the subscription, which says what is wrong
+            self._early.add((publisher, number))
+            self._send(sample.payload, publisher, number)
+
+    def _receive(self, payload: Any, info: MessageInfo) -> None:
+        with self._turn:
+            if self._early and (info.gid, info.sequence) in self._early:
+                self._early.discard((info.gid, info.sequence))
+            else:
+                self._send(payload, info.gid, info.sequence)
+
+    def _send(self, payload: Any, publisher: bytes, number: int) -> None:
+        if publisher in self._own or self._shared.has_crossed(publisher):
             return  # from ROS 1, which delivers it itself, or over another bridge
-        sequence = (info.sequence & 0xFFFFFFFF).to_bytes(4, "little")
+        sequence = (number & 0xFFFFFFFF).to_bytes(4, "little")
         try:
             data = self._codec.from_cdr(payload, sequence)
         except MessageError as error:

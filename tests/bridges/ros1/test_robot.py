@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import itertools
 import signal
+import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from network import TIMEOUT, Program, eventually
+from network import TIMEOUT, Program, eventually, repeats
 
+from rosz.actions import ActionClient, ClientGoal
 from rosz.errors import RoszError
+from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.rosgraph_msgs.msg import Clock
@@ -121,6 +124,46 @@ def test_goals_of_roscpp_clients(world: World, robot: Start) -> None:
     waiting.wait_for("feedback")
     server.kill()
     waiting.wait_for("server lost")
+
+
+def _client(node: Node) -> ActionClient:
+    """Return a client that sees the server."""
+    client = ActionClient(node, "count", node.context.types.message("actionlib/TestAction"))
+    assert client.wait_for_server(TIMEOUT)
+    return client
+
+
+def _send(client: ActionClient, goal: int) -> tuple[ClientGoal, threading.Event]:
+    """Send a goal; return it with an event that its feedback sets."""
+    begun = threading.Event()
+    message = client.node.context.types.message("actionlib/TestGoal")(goal)
+    return client.send(message, on_feedback=lambda _: begun.set()), begun
+
+
+def _ended(goal: ClientGoal) -> tuple[int, str]:
+    assert goal.wait(TIMEOUT)
+    return goal.status.status, goal.status.text
+
+
+def test_goals_for_a_roscpp_server(world: World, robot: Start) -> None:
+    server = robot("goals")
+    server.wait_for("ready")
+    for _ in range(repeats(3, 20)):  # the first goal of a process, sent once it sees the server
+        with Node("first", context=world.network.context()) as node:
+            canceled, begun = _send(_client(node), int(ENDLESS))
+            assert begun.wait(TIMEOUT)
+            canceled.cancel()
+            assert _ended(canceled) == (GoalStatus.PREEMPTED, "by cancel")
+    with Node("second", context=world.network.context()) as node:
+        client = _client(node)
+        preempted, begun = _send(client, int(ENDLESS))
+        assert begun.wait(TIMEOUT)
+        last, _ = _send(client, 3)
+        assert _ended(preempted) == (GoalStatus.PREEMPTED, "by another")
+        assert _ended(last) == (GoalStatus.SUCCEEDED, "counted")
+        assert _ended(_send(client, -1)[0]) == (GoalStatus.ABORTED, "negative")
+    received = sum(line.startswith("goal") for line in server.lines)
+    assert received == repeats(3, 20) + 3  # each once
 
 
 def test_settings_of_a_roscpp_node(robot: Start, node: Node) -> None:

@@ -67,6 +67,30 @@ def test_a_listener_hears(world: World, node: Node) -> None:
     program.send(signal.SIGINT)
 
 
+def test_a_listener_misses_nothing_and_hears_nothing_twice(world: World, node: Node) -> None:
+    program = world.partner("listener")
+    eventually(lambda: node.context.graph.view().subscriptions("/chatter"))
+    with Node("another", context=world.network.context()) as another:
+        publishers = [one.publisher("/chatter", String, queue_size=99) for one in (node, another)]
+        for publisher in publishers:
+            publisher.wait_for_subscribers(timeout=TIMEOUT)
+        for number in range(5):  # as many as wait until the listener is connected
+            for name, publisher in zip("ab", publishers, strict=True):
+                publisher.publish(f"{name} {number}")
+        program.wait_for("heard a 4")
+        program.wait_for("heard b 4")
+        for publisher in publishers:
+            publisher.publish("end")
+        program.wait_for("heard end", times=2)
+    heard = [line for line in program.lines if line.startswith("heard")]
+    for name in "ab":
+        assert [line for line in heard if f" {name} " in line] == [
+            f"heard {name} {number}" for number in range(5)
+        ]
+    assert len(heard) == 12
+    program.send(signal.SIGINT)
+
+
 def test_there_and_back(world: World, node: Node) -> None:
     program = world.partner("echo")
     heard = _heard(node, "/echoed")
