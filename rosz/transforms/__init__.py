@@ -23,6 +23,7 @@ from rosz.transforms.poses import (
     rotate,
     to_rpy,
 )
+from rosz.transforms.republisher import Republisher
 from rosz.transforms.topics import (
     StaticTransformBroadcaster,
     TransformBroadcaster,
@@ -37,6 +38,7 @@ __all__ = (
     "FrameReport",
     "Monitor",
     "Pose",
+    "Republisher",
     "StaticTransformBroadcaster",
     "TransformBroadcaster",
     "TransformListener",

@@ -20,10 +20,12 @@ UNKNOWN = {
     "geographic_msgs",
     "map_msgs",
     "move_base_msgs",
+    "rosapi",
     "rospy_tutorials",
     "rosserial_msgs",
     "smach_msgs",
     "tf",
+    "tf2_web_republisher",
     "turtlesim",
 }
 

@@ -95,6 +95,9 @@ class RosApi:
         """
         name = service.removeprefix(_PREFIX)
         kind = _TYPES[name]
+        if name == "get_param" and isinstance(args, dict) and "default_value" in args:
+            args = {**args, "default": args["default_value"]}  # the name that it has in ROS 2
+            del args["default_value"]
         request = build(kind.Request, args or None, self._node.now())
         answer = getattr(_Answers(self._node, gate, spelling), name)
         return converter(kind.Response, spelling)(_respond(kind, answer, request))
@@ -257,7 +260,7 @@ class _Answers:
     def get_param(self, request: Any) -> list[Any]:
         name = self._param(request.name)
         self._gate.check("get", name)
-        default = request.default_value or "null"
+        default = request.default or "null"
         try:
             value = msgspec.json.encode(self._node.params.get(name), enc_hook=str).decode()
         except NotFoundError:

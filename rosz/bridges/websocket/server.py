@@ -24,6 +24,7 @@ from rosz.bridges.websocket.rosapi import RosApi
 from rosz.bridges.websocket.topics import Topics
 from rosz.errors import RoszError, TransportError, UsageError
 from rosz.lifecycle import Lifecycle, Registration
+from rosz.transforms import Republisher
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
@@ -106,6 +107,8 @@ class WebsocketBridge:
         self._handlers = ThreadPoolExecutor(_HANDLERS, "rosz-websocket")
         self._loop = asyncio.new_event_loop()
         self._clients: set[ServerConnection] = set()
+        self._republishing = threading.Lock()
+        self._republisher: Republisher | None = None
         self._server: Server
         self.port: int = 0
         self._thread = threading.Thread(
@@ -172,6 +175,7 @@ class WebsocketBridge:
         outbox = Outbox(
             self._limits.waiting, wake, lambda: refuse("answers wait that the client does not read")
         )
+        await loop.run_in_executor(self._handlers, self._republish)
         trusted = self._admission.is_known(websocket.request)
         connection = Connection(
             self._shared,
@@ -192,6 +196,12 @@ class WebsocketBridge:
             self._clients.discard(websocket)
             with suppress(RuntimeError):
                 await loop.run_in_executor(self._handlers, connection.close)
+
+    def _republish(self) -> None:
+        """Serve transforms to pages from the first client on, unless a node does so."""
+        with self._republishing:
+            if self._republisher is None and not Republisher.is_served(self._shared.node):
+                self._republisher = Republisher(self._shared.node)
 
     async def _send(
         self, websocket: ServerConnection, outbox: Outbox, wanted: asyncio.Event

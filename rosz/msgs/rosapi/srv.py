@@ -281,24 +281,24 @@ class GetParamRequest(_Message):
     """Read a parameter."""
 
     name: str = ""
-    default_value: str = ""
+    default: str = ""
     _type = "rosapi/GetParamRequest"
     _type_name = "rosapi/srv/GetParam_Request"
-    _type_hash = "RIHS01_a523ebbd9ba9d022cd36ee992e63667939959ad33d27f367ca956115d3181b84"
-    _md5sum = "e02261831101420e1e8633289d8e6aae"
+    _type_hash = "RIHS01_f3730c6c62e6ae3a9c1c9a5bd2266b39f9465e180dffac7c3bdeb0ad6ed7b1d0"
+    _md5sum = "1cc3f281ee24ba9406c3e498e4da686f"
     _text = (
         "# Read a parameter.\n"
         "\n"
         "string name\n"
-        "string default_value   # as JSON"
+        "string default   # as JSON"
     )
-    _schema = (("name", "string", ""), ("default_value", "string", ""))
+    _schema = (("name", "string", ""), ("default", "string", ""))
 
     @staticmethod
     def _encode(m: _Any) -> bytes:
         try:
             n1, b1 = _texts[m.name]
-            b2 = m.default_value.encode()
+            b2 = m.default.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
             f3, p4 = _t2[n1, n2]
@@ -317,9 +317,9 @@ class GetParamRequest(_Message):
             (n2,) = _u3(data, p)
             q = p + 4
             p = q + n2
-            default_value = data[q : p - 1].decode()
+            default = data[q : p - 1].decode()
             if p > len(data): raise ValueError
-            return GetParamRequest(name, default_value)
+            return GetParamRequest(name, default)
         except _FAULTS:
             return _explain(data, GetParamRequest)
 
@@ -330,7 +330,7 @@ class GetParamResponse(_Message):
     _type_name = "rosapi/srv/GetParam_Response"
     _type_hash = "RIHS01_0dd23c51ef3c51b762e1f0691d33c4b0c2faf07f7fdd4814a5bf4719e239c675"
     _md5sum = "64e58419496c7248b4ef25731f88b8c3"
-    _text = "string value           # as JSON\n"
+    _text = "string value     # as JSON\n"
     _schema = (("value", "string", ""),)
 
     @staticmethod
@@ -364,15 +364,15 @@ class GetParam(_Service):
     Response = GetParamResponse
     _type = "rosapi/GetParam"
     _type_name = "rosapi/srv/GetParam"
-    _type_hash = "RIHS01_070997f14327c20a01a69b8eb9933b2345c769f881d63cfab6176848ffc871df"
-    _md5sum = "4e1e229c08fb70602243287505293619"
+    _type_hash = "RIHS01_47cfb3f56398397de65f8a298f8568308eb5e019a0f9404747cc157e9aca3fe5"
+    _md5sum = "e36fd90759dbac1c5159140a7fa8c644"
     _text = (
         "# Read a parameter.\n"
         "\n"
         "string name\n"
-        "string default_value   # as JSON\n"
+        "string default   # as JSON\n"
         "---\n"
-        "string value           # as JSON\n"
+        "string value     # as JSON\n"
     )
 
 

@@ -513,7 +513,8 @@ def test_rosapi(bridge: Bridge, client: Client) -> None:
     call("set_param", name="/gains/p", value="1.5")
     assert call("get_param", name="/gains/p") == {"value": "1.5"}
     assert call("get_param", name="/other:gains.p") == {"value": "null"}
-    assert call("get_param", name="/none", default_value="3") == {"value": "3"}
+    for default in ("default", "default_value"):
+        assert call("get_param", name="/none", **{default: "3"}) == {"value": "3"}
     assert call("has_param", name="/gains") == {"exists": True}
     assert call("search_param", name="gains") == {"global_name": "/gains"}
     assert "/gains/p" in call("get_param_names")["names"]

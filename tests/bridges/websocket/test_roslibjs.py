@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import threading
 from array import array
 from pathlib import Path
 from queue import SimpleQueue
@@ -14,9 +15,12 @@ from network import TIMEOUT, Network, Program, eventually, free_port
 
 from rosz.bridges.websocket import WebsocketBridge
 from rosz.msgs.example_interfaces.action import Fibonacci
+from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.sensor_msgs.msg import LaserScan
 from rosz.msgs.std_msgs.msg import Header, String
 from rosz.msgs.std_srvs.srv import SetBool
+from rosz.node import Node
+from rosz.transforms import StaticTransformBroadcaster
 
 pytestmark = pytest.mark.system
 
@@ -61,6 +65,14 @@ const fib = new ROSLIB.Action({ ros, name: "/fib", actionType: "example_interfac
 say("result", await new Promise((done) =>
   fib.sendGoal({ order: 3 }, done, (feedback) => say("feedback", feedback), done)));
 
+const frames = { ros, fixedFrame: "map", angularThres: 0.01, transThres: 0.01, rate: 20 };
+for (const Kind of [ROSLIB.TFClient, ROSLIB.ROS2TFClient]) {
+  const client = new Kind(frames);
+  const frame = await new Promise((done) => client.subscribe("base", done));
+  say("frame", frame.translation);
+  client.dispose();
+}
+
 const served = new ROSLIB.Service({ ros, name: "/served", serviceType: "std_srvs/SetBool" });
 await served.advertise((request, response) => {
   response.success = !request.data;
@@ -101,13 +113,12 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "page.js"
 
 
-def test_a_page(script: Path, network: Network) -> None:
+def partner(network: Network, heard: threading.Event) -> Node:
+    """Return a node with all that the page uses; it ends a goal when its feedback was heard."""
     node = network.node("other")
     scan = LaserScan(Header(), ranges=array("f", [1.5, 2.5]))
     scan.header.stamp.sec = 7
     node.publisher("scan", LaserScan, latch=True).publish(scan)
-    heard: SimpleQueue[String] = SimpleQueue()
-    node.subscription("up", String, heard.put)
 
     def flip(request: Any) -> Any:
         if not request.data:
@@ -116,16 +127,30 @@ def test_a_page(script: Path, network: Network) -> None:
 
     def execute(goal: Any) -> None:
         goal.feedback(Fibonacci.Feedback([0, 1]))
+        heard.wait(TIMEOUT)
         goal.succeed(Fibonacci.Result([0, 1, 1]))
 
+    header = Header(frame_id="map")
+    transform = Transform(Vector3(1.0, 2.0, 3.0), Quaternion())
+    StaticTransformBroadcaster(node).send(TransformStamped(header, "base", transform))
     node.service("flip", SetBool, flip)
     node.action_server("fib", Fibonacci, execute)
+    return node
+
+
+def test_a_page(script: Path, network: Network) -> None:
+    feedback = threading.Event()
+    node = partner(network, feedback)
+    heard: SimpleQueue[String] = SimpleQueue()
+    node.subscription("up", String, heard.put)
     port = free_port()
     server = WebsocketBridge(network.node("bridge"), port=port)
     node_js = shutil.which("node")
     assert node_js is not None
     program = Program([node_js, str(script), str(port)], network.variables(), script.parent)
     try:
+        program.wait_for('feedback {"sequence":[0,1]}')
+        feedback.set()
         program.wait_for("ready")
         assert heard.get(timeout=TIMEOUT).data == "from roslib"
         assert [line for line in program.lines if line.startswith(("none", "png", "cbor"))] == [
@@ -138,8 +163,8 @@ def test_a_page(script: Path, network: Network) -> None:
         assert "nodes true" in program.lines
         details = next(line for line in program.lines if line.startswith("details"))
         assert '"position":{"x"' in details
-        assert 'feedback {"sequence":[0,1]}' in program.lines
         assert 'result {"sequence":[0,1,1]}' in program.lines
+        assert program.lines.count('frame {"x":1,"y":2,"z":3}') == 2
         client = node.client("served", SetBool)
         client.wait_for_service(TIMEOUT)
         response = client(data=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from queue import SimpleQueue
 from typing import Any
@@ -127,13 +128,16 @@ ACTION = """
 
 def test_goals(bridge: Bridge) -> None:
     node = bridge.network.node("server")
+    heard = threading.Event()
 
     def execute(goal: Any) -> None:
         goal.feedback(Fibonacci.Feedback([0, 1]))
+        heard.wait(TIMEOUT)
         goal.succeed(Fibonacci.Result([0, 1, 1]))
 
     node.action_server("fib", Fibonacci, execute)
     program = bridge.network.program(ACTION, str(bridge.server.port))
+    program.wait_for("feedback [0, 1]")
+    heard.set()
     assert program.exit_code(TIMEOUT) == 0, program.output
-    assert "feedback [0, 1]" in program.lines
     assert "result 4 [0, 1, 1]" in program.lines
