@@ -19,7 +19,6 @@ from rosz.node import Node, serve_loggers
 from rosz.transforms import (
     Buffer,
     Monitor,
-    Republisher,
     StaticTransformBroadcaster,
     TransformBroadcaster,
     TransformListener,
@@ -33,7 +32,6 @@ __all__ = (
     "parse_transform",
     "static_transform_publisher",
     "static_transform_publisher_of_tf2",
-    "tf2_web_republisher",
     "tf_echo",
     "tf_monitor",
     "view_frames",
@@ -271,10 +269,3 @@ def view_frames() -> None:
     sys.stdout.write(f"{', '.join(made)} generated\n")
     if not dot:
         sys.exit("view_frames: without Graphviz there is no picture: apt install graphviz")
-
-
-def tf2_web_republisher() -> None:
-    """Serve ``/tf2_web_republisher`` and ``/republish_tfs`` until the node ends."""
-    with Node("tf2_web_republisher") as node:
-        Republisher(node)
-        node.spin()

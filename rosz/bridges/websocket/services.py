@@ -11,16 +11,19 @@ from typing import TYPE_CHECKING, Any
 from rosz.bridges.websocket.operations import AdvertiseService, CallService, ServiceResponse
 from rosz.bridges.websocket.plain import Plain, Spelling, converter
 from rosz.bridges.websocket.topics import build
-from rosz.errors import NotFoundError, ServiceError, UsageError, near_miss
+from rosz.errors import NotFoundError, ServiceError, UsageError, WaitTimeout, near_miss
 from rosz.node.type_description import request_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosz.node import Client, Node, Service
+    from rosz.wire import Token
 
 __all__ = ("Calls", "ServedServices")
 
+_SERVER_SECONDS = 1.0
+"""Seconds that a call waits for a server, as in rosbridge_suite."""
 _ANSWER_SECONDS = 60.0
 
 
@@ -70,6 +73,17 @@ class Calls:
         if before is not None:
             before.close()
         return client
+
+    def _server(self, name: str) -> Token:
+        graph = self._node.context.graph
+        view = graph.refresh()
+        if not view.servers(name):
+            try:
+                view = graph.wait_for_service(name, _SERVER_SECONDS)
+            except WaitTimeout as error:
+                near = near_miss(name, view.services())
+                raise NotFoundError(f"service '{name}' does not exist{near}") from error
+        return view.servers(name)[0]
 
     def close(self) -> None:
         """End all clients of services."""

@@ -24,6 +24,10 @@ class Bridge:
         self.node = node
         self.server = server
 
+    def wait_for_service(self, name: str) -> None:
+        """Wait until the bridge knows a server of a service."""
+        self.node.context.graph.wait_for_service(name, TIMEOUT)
+
     @contextmanager
     def client(self, path: str = "", **options: Any) -> Iterator[Client]:
         """Connect."""
