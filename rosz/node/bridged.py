@@ -22,16 +22,24 @@ class BridgedNode(NodeCore):
         context: The context of the bridge.
         name: Full name.
         terminate: Function that asks the node to end, for a reason.
+        number: Number of the node within the session; by default one that was never used.
 
     Raises:
         InvalidName: The name is not legal.
         ClosedError: The context is shut down.
     """
 
-    def __init__(self, context: Context, name: str, terminate: Callable[[str], object]) -> None:
+    def __init__(
+        self,
+        context: Context,
+        name: str,
+        terminate: Callable[[str], object],
+        number: int | None = None,
+    ) -> None:
         self._terminate = terminate
         namespace = names.namespace(name).rstrip("/") or "/"
-        super().__init__(names.basename(name), namespace=namespace, context=context)
+        base = names.basename(name)
+        super().__init__(base, namespace=namespace, context=context, number=number)
         serve_control(self)
         yield_to_newer(self)
         self._announce()

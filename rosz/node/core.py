@@ -59,6 +59,7 @@ class NodeCore:
         anonymous: bool = False,
         context: Context | None = None,
         argv: Sequence[str] | None = None,
+        number: int | None = None,
     ) -> None:
         self._owns_context = context is None
         self.program: Program | None = current()
@@ -69,13 +70,13 @@ class NodeCore:
         self.context: Context = context or Context(argv=sys.argv[1:] if argv is None else argv)
         self._params: Params | None = None
         try:
-            self._identify(name, namespace)
+            self._identify(name, namespace, number)
         except BaseException:
             if self._owns_context:
                 self.context.close()
             raise
 
-    def _identify(self, name: str, namespace: str | None) -> None:
+    def _identify(self, name: str, namespace: str | None, number: int | None) -> None:
         context = self.context
         environment, arguments = context.environment, context.arguments
         default = environment.namespace if namespace is None else namespace
@@ -83,7 +84,7 @@ class NodeCore:
         self.namespace: str = names.namespace(self.name).rstrip("/") or "/"
         self.base_name: str = names.basename(self.name)
         self.remaps: Mapping[str, str] = arguments.resolved_remaps(self.name)
-        self.node_id: int = context.next_id()
+        self.node_id: int = context.next_id() if number is None else number
         self.began: float = time.monotonic()
         self.process: ProcessToken = ProcessToken(
             context.domain,

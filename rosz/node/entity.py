@@ -41,6 +41,7 @@ class Entity:
         type_name: ``pkg/msg/Name`` or ``pkg/srv/Name``, or `ANY`.
         type_hash: ``RIHS01_…``, or `ANY`.
         qos: The quality of service that it offers or asks for.
+        number: Number of the entity within the session; by default one that was never used.
 
     Attributes:
         key: Key expression of its data.
@@ -54,7 +55,15 @@ class Entity:
     """
 
     def __init__(
-        self, node: NodeCore, kind: Kind, name: str, type_name: str, type_hash: str, qos: QoS
+        self,
+        node: NodeCore,
+        kind: Kind,
+        name: str,
+        type_name: str,
+        type_hash: str,
+        qos: QoS,
+        *,
+        number: int | None = None,
     ) -> None:
         context = node.context
         self.node = node
@@ -68,7 +77,7 @@ class Entity:
             domain=context.domain,
             zid=context.session.zid,
             node_id=node.node_id,
-            entity_id=context.next_id(),
+            entity_id=context.next_id() if number is None else number,
             kind=kind,
             namespace=node.namespace,
             node=node.base_name,

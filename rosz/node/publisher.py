@@ -80,6 +80,8 @@ class Publisher(Entity, Generic[M]):
         waits: Whether a full link makes ``publish`` wait instead of dropping the message, also
             where the QoS keeps only some messages.
         copies: Whether subscriptions of the same process get copies of the messages.
+        number: Number of the publisher within the session; by default one that was never used.
+        sequence: Sequence number of the last message of the publisher that had the number before.
 
     Attributes:
         message_type: The class of the messages.
@@ -96,14 +98,15 @@ class Publisher(Entity, Generic[M]):
         *,
         waits: bool = False,
         copies: bool = False,
+        number: int | None = None,
+        sequence: int = 0,
     ) -> None:
-        super().__init__(
-            node, Kind.PUBLISHER, topic, message_type._type_name, message_type._type_hash, qos
-        )
+        type_name, type_hash = message_type._type_name, message_type._type_hash
+        super().__init__(node, Kind.PUBLISHER, topic, type_name, type_hash, qos, number=number)
         qos = self.qos
         self.message_type = message_type
         self._encode: Callable[[Any], bytes] = message_type._encode
-        self._sequence = 0
+        self._sequence = sequence
         self.dropped: int = 0
         # A signal handler that publishes may interrupt this thread while it publishes.
         self._ordered = threading.RLock()
@@ -133,6 +136,11 @@ class Publisher(Entity, Generic[M]):
         self.announce()
         if self._held is not None:
             node.context.mesh.when_linked(self._release)
+
+    @property
+    def sequence(self) -> int:
+        """The sequence number of the last message."""
+        return self._sequence
 
     def publish(self, *args: Any, **fields: Any) -> None:
         """Send a message: one of the topic's type, or the values of its fields.

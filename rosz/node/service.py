@@ -37,6 +37,8 @@ class Service(Entity):
     Each call is handled on one of a bounded number of threads. What the handler raises is logged
     here and arrives at the caller as `ServiceError`; a handler that raises `ServiceError` itself
     refuses a request on purpose, and nothing is logged.
+
+    A ``number`` is that of the server within the session; by default one that was never used.
     """
 
     def __init__(
@@ -47,10 +49,11 @@ class Service(Entity):
         handler: Callable[[Any], Any],
         qos: QoS,
         threads: int,
+        *,
+        number: int | None = None,
     ) -> None:
-        super().__init__(
-            node, Kind.SERVICE, name, service_type._type_name, service_type._type_hash, qos
-        )
+        type_name, type_hash = service_type._type_name, service_type._type_hash
+        super().__init__(node, Kind.SERVICE, name, type_name, type_hash, qos, number=number)
         self.service_type = service_type
         self._handler = handler
         self._decode = node.context.decoder(service_type.Request)

@@ -145,6 +145,7 @@ class Mirror:
                 self._shared.context,
                 self._shared.here(entry.node),
                 partial(self._terminate, entry.node),
+                self._shared.identity(entry.node, Kind.NODE).number,
             )
             self._nodes[entry.node] = node
         self._keep(make(self._shared, node, entry))

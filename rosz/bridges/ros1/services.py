@@ -25,6 +25,7 @@ from rosz.errors import (
 )
 from rosz.node import BridgedNode, Client, Service
 from rosz.qos import SERVICES
+from rosz.wire import Kind
 
 __all__ = ("Clients", "ProvidedService", "ServiceConnection")
 
@@ -112,6 +113,7 @@ class ProvidedService:
     def _declare(self, cls: Any) -> None:
         self._type = cls
         if not self._closed:
+            identity = self._shared.identity(self.entry.node, Kind.SERVICE, self.entry.name)
             with suppress(ClosedError):
                 self._service = self._node.keep(
                     Service(
@@ -121,6 +123,7 @@ class ProvidedService:
                         self._call,
                         SERVICES,
                         _THREADS,
+                        number=identity.number,
                     )
                 )
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import msgspec
+
 from rosz.bridges.ros1.codec import Codecs
 from rosz.bridges.ros1.rosout import GATHERED, LOGS, log_tokens
 from rosz.bridges.ros1.sockets import SocketLoop, log
@@ -13,7 +15,7 @@ from rosz.node import Context
 from rosz.wire import Kind, Token, format_token, gid
 from rosz.worker import Worker
 
-__all__ = ("BRIDGE", "MASTER", "MASTER_NODE", "Shared")
+__all__ = ("BRIDGE", "MASTER", "MASTER_NODE", "Identity", "Shared")
 
 BRIDGE = "/ros1_bridge_"
 """What the names of bridges begin with that join a master of ROS 1.
@@ -30,6 +32,20 @@ MASTER = "/master"
 
 _THREADS = 16
 _MAX_REQUESTS = 10_000
+_MAX_IDENTITIES = 10_000
+
+
+class Identity(msgspec.Struct):
+    """What a node of ROS 1, or an entity of one, keeps when it goes and comes again.
+
+    Attributes:
+        number: Number within the session.
+        sequence: Sequence number of its last message: receivers know a publisher by its number, and
+            take a message for a repetition whose sequence number is not higher.
+    """
+
+    number: int
+    sequence: int = 0
 
 
 class Shared:
@@ -71,6 +87,25 @@ class Shared:
         self._is_master = is_master
         self._crossed: dict[bytes, bool] = {}
         self._standing: dict[tuple[Kind, str], str] = {}
+        self._identities: dict[tuple[str, Kind, str], Identity] = {}
+
+    def identity(self, node: str, kind: Kind, name: str = "") -> Identity:
+        """Return the identity of a node or of an entity, which it had before if it was there.
+
+        A session of Zenoh, and each that is linked to it, keeps 4 kB for each key that a token ever
+        had, and for a key that comes again nothing more. Only on the thread for changes.
+
+        Args:
+            node: Name of the node in ROS 1.
+            kind: NODE, or the kind of the entity, of which the node has one at a time.
+            name: Name of its topic or service.
+        """
+        known = self._identities
+        identity = known.pop((node, kind, name), None) or Identity(self.context.next_id())
+        known[node, kind, name] = identity
+        if len(known) > _MAX_IDENTITIES:
+            del known[next(iter(known))]
+        return identity
 
     def here(self, name: str) -> str:
         """Return the name on the network of a name of ROS 1."""

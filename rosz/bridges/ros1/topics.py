@@ -73,6 +73,7 @@ class PublishedTopic:
         self._shared = shared
         self._node = node
         self._codec: Codec | None = None
+        self._identity = shared.identity(entry.node, Kind.PUBLISHER, entry.name)
         self._publisher: Publisher[Any] | None = None
         self._stream: Stream | None = None
         self._connecting = False
@@ -123,7 +124,14 @@ class PublishedTopic:
         self._undeclare()
         qos = codec.qos or (_LATCHED if latched else for_queue(_QUEUE))
         try:
-            publisher = Publisher(self._node, self._topic, codec.cls, qos)
+            publisher = Publisher(
+                self._node,
+                self._topic,
+                codec.cls,
+                qos,
+                number=self._identity.number,
+                sequence=self._identity.sequence,
+            )
         except ClosedError:
             return
         self._shared.gids.add(publisher.gid)
@@ -133,6 +141,7 @@ class PublishedTopic:
         publisher, self._publisher = self._publisher, None
         if publisher is not None:
             publisher.close()
+            self._identity.sequence = publisher.sequence
             self._shared.gids.discard(publisher.gid)
 
     def _disconnect(self) -> None:
@@ -320,8 +329,10 @@ class SubscribedTopic:
         except RoszError as error:
             log.info("cannot show a subscriber of '%s': %s", self.entry.name, error)
             return
+        entry = self.entry
+        number = self._shared.identity(entry.node, Kind.SUBSCRIPTION, entry.name).number
         with suppress(ClosedError):
-            self._shown = self._node.keep(_Shown(self._node, self._topic, codec))
+            self._shown = self._node.keep(_Shown(self._node, self._topic, codec, number))
 
     def accept(self, incoming: Incoming, header: dict[str, str]) -> None:
         """Send what the network publishes to a connection of the node."""
@@ -366,12 +377,13 @@ class _Shown(Entity):
         node: The node that subscribes.
         topic: Name of the topic on the network.
         codec: Type of the topic.
+        number: Number of the subscription within the session.
     """
 
-    def __init__(self, node: BridgedNode, topic: str, codec: Codec) -> None:
-        cls = codec.cls
+    def __init__(self, node: BridgedNode, topic: str, codec: Codec, number: int) -> None:
+        cls, qos = codec.cls, for_queue(_QUEUE)
         super().__init__(
-            node, Kind.SUBSCRIPTION, topic, cls._type_name, cls._type_hash, for_queue(_QUEUE)
+            node, Kind.SUBSCRIPTION, topic, cls._type_name, cls._type_hash, qos, number=number
         )
         # What ROS 1 publishes on this topic, the node receives without the bridge.
         self._samples: PullSubscriber = self.keep(

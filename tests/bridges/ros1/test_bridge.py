@@ -23,6 +23,7 @@ from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node
+from rosz.wire import Kind, Token
 
 from .world import LISTENER, SERVER, TALKER, World
 
@@ -289,6 +290,25 @@ def test_a_topic_that_nobody_uses_costs_no_thread(world: World, node: Node) -> N
         eventually(lambda: all(view().publishers(f"/many/t{number}") for number in range(20)))
         assert watches() == before
     eventually(lambda: "/many" not in view().nodes())
+
+
+def test_a_node_that_comes_again_has_its_tokens_again(world: World, node: Node) -> None:
+    """Zenoh keeps memory for each key that a token ever had."""
+    names = ("/again/get_loggers", "/again/set_logger_level")
+    tokens: set[Token] = set()
+    stop = node.context.graph.listen(lambda token, _: tokens.add(token))
+    heard = _heard(node, "/again")
+    seen = []
+    for text in ("first", "second", "third"):
+        program = world.rospy(TALKER, "again", "/again", text)
+        assert heard.get(timeout=TIMEOUT).data == text
+        eventually(lambda: all(node.context.graph.view().servers(name) for name in names))
+        program.send(signal.SIGINT)
+        eventually(lambda: "/again" not in _nodes(node))
+        seen.append({one for one in tokens if one.node_name == "/again"})
+    stop()
+    assert {one.kind for one in seen[0]} == {Kind.NODE, Kind.PUBLISHER, Kind.SERVICE}
+    assert seen[0] == seen[1] == seen[2]
 
 
 def test_registrations_come_back_after_the_master(world: World, node: Node) -> None:
