@@ -12,6 +12,7 @@ import socket
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from weakref import WeakMethod
 
 from rosz.bridges.ros1.calls import Call, CallReader, encode_fault, encode_refusal, encode_result
 from rosz.bridges.ros1.frames import FrameReader, decode_header
@@ -147,7 +148,7 @@ class Incoming:
         self._frames: FrameReader | None = None
         self._greeted = False
         self.stream = Stream(server.loop, sock, self, server.forget)
-        server.loop.later(_TIMEOUT, self._check_progress)
+        self._check_later()
 
     def space(self) -> memoryview:
         """Return where the next bytes belong."""
@@ -213,12 +214,23 @@ class Incoming:
                 self._server.connect(self, header)
                 return
 
+    def _check_later(self) -> None:
+        """Look at the progress in a while; the timer does not keep what has ended."""
+        check = WeakMethod(self._check_progress)
+
+        def run() -> None:
+            found = check()
+            if found is not None:
+                found()
+
+        self._server.loop.later(_TIMEOUT, run)
+
     def _check_progress(self) -> None:
         """Close a connection that has begun something and does not come to its end."""
         if self.stream.is_closed or self._greeted:
             return
         if self._calls is not None and not self._calls.pending:
-            self._server.loop.later(_TIMEOUT, self._check_progress)
+            self._check_later()
             return
         log.warning(
             "closed the connection of %s: nothing complete in %g s", self.stream.peer, _TIMEOUT

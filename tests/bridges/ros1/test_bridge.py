@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import signal
 import socket
@@ -18,6 +19,7 @@ from network import TIMEOUT, eventually
 
 from rosz.bridges.ros1 import MasterBridge
 from rosz.bridges.ros1.frames import decode_header, encode_header
+from rosz.bridges.ros1.server import Incoming
 from rosz.errors import ServiceError, TransportError
 from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.msgs.std_msgs.msg import Int32, String
@@ -309,6 +311,15 @@ def test_a_node_that_comes_again_has_its_tokens_again(world: World, node: Node) 
     stop()
     assert {one.kind for one in seen[0]} == {Kind.NODE, Kind.PUBLISHER, Kind.SERVICE}
     assert seen[0] == seen[1] == seen[2]
+
+
+def test_nothing_keeps_a_connection_that_has_ended(world: World) -> None:
+    world.call("getPid", "/x")
+
+    def kept() -> int:
+        return sum(isinstance(one, Incoming) and one.stream.is_closed for one in gc.get_objects())
+
+    eventually(lambda: gc.collect() >= 0 and not kept(), "their end", 15)
 
 
 def test_registrations_come_back_after_the_master(world: World, node: Node) -> None:
