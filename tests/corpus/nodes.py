@@ -35,7 +35,8 @@ _SYNTAX = frozenset({"IndentationError", "SyntaxError", "TabError"})
 _SKIPPED = frozenset({"test", "tests", "setup.py", "doc", "docs", "ci", ".ci", "cfg"})
 _OWN = re.compile(
     r"/(rosout\w*|clock|parameter_events|.*/(get_loggers|set_logger_level|get_type_description)"
-    r"|.*/(describe|get|list|set)_parameter\w*|rosdistro|rosversion|run_id|roslaunch/.*)$"
+    r"|.*/(describe|get|list|set)_parameter\w*|rosdistro|rosversion|run_id|roslaunch/.*"
+    r"|.*/_action/\w+)$"
 )
 _ALIASES = {"tf/tfMessage": "tf2_msgs/TFMessage"}
 """Names of one type, with one md5, of which rosz has one class."""

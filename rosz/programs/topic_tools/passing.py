@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 from rosz import names
 from rosz.errors import InvalidName
@@ -193,6 +193,6 @@ def _message_type(info: MessageInfo) -> type[Message]:
         "_type": f"{package}/{name}",
         "_type_name": info.type_name,
         "_type_hash": info.type_hash,
-        "_encode": staticmethod(bytes),
     }
-    return cast("type[Message]", type(name, (), fields))
+    made: type[Message] = type(name, (Message,), fields)
+    return made
