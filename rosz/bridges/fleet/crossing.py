@@ -18,6 +18,7 @@ from rosz.bridges.fleet.plan import FleetPlan
 from rosz.bridges.fleet.relays import (
     Calls,
     Edit,
+    Ids,
     QueryRelay,
     TopicRelay,
     log,
@@ -90,7 +91,7 @@ class _Direction:
         self._plan = plan
         self._outward = outward
         self.mark = mark_of(plan.prefix)
-        self.gids: dict[bytes, bytes] = {}
+        self.ids = Ids()
         self._zids: dict[str, str] = {}
         self.tokens: dict[str, Closable] = {}
         self.users: dict[tuple[Kind, str, bool], set[str]] = {}
@@ -138,9 +139,9 @@ class _Direction:
     def edit(self, type_name: str) -> Edit:
         """Return what changes in the samples of a type that pass in this direction."""
         if not (self._plan.frames and type_name == _TRANSFORMS):
-            return Edit(self.gids)
+            return Edit(self.ids)
         change = prefix_frames if self._outward else strip_frames
-        return Edit(self.gids, partial(change, self._plan.prefix.strip("/")))
+        return Edit(self.ids, partial(change, self._plan.prefix.strip("/")))
 
     def rate(self, name: str) -> float:
         """Return the most samples per second of a topic, by its name in the source."""
@@ -222,20 +223,21 @@ class Crossing:
         if key in direction.tokens:
             return
         there = format_token(mirrored)
-        if token.kind is Kind.PUBLISHER:
-            direction.gids[gid(key)] = gid(there)
         if token.qos is not None:
             place = _place(token)
             direction.users.setdefault(place, set()).add(key)
             if place not in direction.relays:
                 direction.relays[place] = self._relays(direction, token, mirrored)
         direction.tokens[key] = direction.target.session.token(there)
+        if token.kind is Kind.PUBLISHER:
+            # Samples wait for this, so whoever gets one can look its publisher up.
+            direction.ids.add(gid(key), gid(there))
 
     def _remove(self, direction: _Direction, key: str, token: Token) -> None:
         closable = direction.tokens.pop(key, None)
         if closable is not None:
             closable.close()
-        direction.gids.pop(gid(key), None)
+        direction.ids.remove(gid(key))
         place = _place(token)
         users = direction.users.get(place, set())
         users.discard(key)

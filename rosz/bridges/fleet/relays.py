@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import logging
 import math
+import threading
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from rosz.errors import ClosedError, DecodeError, RoszError
 from rosz.msgs.tf2_msgs.msg import TFMessage
@@ -21,7 +22,7 @@ from rosz.session import LONGEST_WAIT, Cancellation, Query, Sample, Session
 from rosz.wire import pack_attachment, read_attachment
 from rosz.worker import Worker
 
-__all__ = ("Calls", "Edit", "QueryRelay", "TopicRelay", "prefix_frames", "strip_frames")
+__all__ = ("Calls", "Edit", "Ids", "QueryRelay", "TopicRelay", "prefix_frames", "strip_frames")
 
 log = logging.getLogger("rosz.fleet")
 
@@ -32,6 +33,12 @@ _WAITING: Final = 1000
 _CALL_SECONDS: Final = 600.0
 """The time limit of rmw_zenoh's clients."""
 _GID_AT: Final = 17
+_SIZE: Final = 33
+"""The sizes of an attachment, without its id of a publisher and with it."""
+_TOKEN_SECONDS: Final = 2.0
+"""How long the first sample of a publisher without a token is held."""
+_PUBLISHERS: Final = 1000
+"""How many publishers are remembered that have gone or have no token."""
 _RESULT: Final = "/_action/get_result"
 
 
@@ -63,18 +70,65 @@ def strip_frames(prefix: str, payload: bytes) -> bytes:
     return bytes(TFMessage._encode(message))
 
 
+class Ids:
+    """The ids of publishers on the other side, by their ids on this one.
+
+    Samples and tokens come on different threads. So a sample may be here before the token of its
+    publisher, and may still wait here after that token has gone.
+    """
+
+    def __init__(self) -> None:
+        self._added = threading.Condition()
+        self._known: dict[bytes, bytes] = {}
+        self._gone: dict[bytes, bytes] = {}
+        self._awaited: dict[bytes, float] = {}
+
+    def add(self, gid: bytes, there: bytes) -> None:
+        """Note the id on the other side of a publisher that others can see there."""
+        with self._added:
+            self._known[gid] = there
+            self._gone.pop(gid, None)
+            self._added.notify_all()
+
+    def remove(self, gid: bytes) -> None:
+        """Note that a publisher has gone; the ids of the last of them stay known."""
+        with self._added:
+            there = self._known.pop(gid, None)
+            if there is not None:
+                self._gone[gid] = there
+                _shorten(self._gone)
+
+    def find(self, gid: bytes) -> bytes | None:
+        """Return the id on the other side; ``None`` if there is no such publisher.
+
+        An unknown publisher gets 2 seconds to become known, but only once.
+        """
+        found = self._known.get(gid)
+        if found is not None:
+            return found
+        with self._added:
+            deadline = self._awaited.setdefault(gid, time.monotonic() + _TOKEN_SECONDS)
+            _shorten(self._awaited)
+            left = max(0.0, deadline - time.monotonic())
+            self._added.wait_for(lambda: gid in self._known or gid in self._gone, left)
+            return self._known.get(gid) or self._gone.get(gid)
+
+
+def _shorten(found: dict[bytes, Any]) -> None:
+    while len(found) > _PUBLISHERS:
+        del found[next(iter(found))]
+
+
 class Edit:
     """What changes in the samples of one topic as they pass.
 
     Args:
-        gids: The ids of publishers on the other side, by their ids on this one.
+        ids: The ids of publishers on the other side.
         payload: Function that returns the payload to send; samples pass as they are without it.
     """
 
-    def __init__(
-        self, gids: dict[bytes, bytes], payload: Callable[[bytes], bytes] | None = None
-    ) -> None:
-        self._gids = gids
+    def __init__(self, ids: Ids, payload: Callable[[bytes], bytes] | None = None) -> None:
+        self._ids = ids
         self._payload = payload
 
     def attachment(self, sample: Sample) -> bytes | None:
@@ -82,7 +136,7 @@ class Edit:
         data = sample.attachment
         if data is None:
             return None
-        gid = self._gids.get(data[_GID_AT:])
+        gid = self._ids.find(data[_GID_AT:]) if len(data) == _SIZE else None
         return data if gid is None else data[:_GID_AT] + gid
 
     def payload(self, sample: Sample) -> bytes | None:

@@ -114,9 +114,11 @@ def test_late_subscriptions_get_latched_messages(fleet: Robots) -> None:
     latched = [robot.publisher("/news", String, latch=True) for robot in fleet.robots]
     for number, publisher in enumerate(latched):
         publisher.publish(String(data=f"news of {number}"))
-    for number, name in enumerate(("/robot1/news", "/robot2/news")):
-        publishers = fleet.laptop.context.graph.refresh().publishers(name)
-        assert len(publishers) == 1 - number
+    fleet.robots[1].publisher("/tf_after", String)  # crosses after all that was there before
+    graph = fleet.laptop.context.graph
+    graph.wait_for_topic("/robot2/tf_after", 15)
+    assert len(graph.wait_for_topic("/robot1/news", 15).publishers("/robot1/news")) == 1
+    assert not graph.refresh().publishers("/robot2/news")
     assert fleet.laptop.subscription("/robot1/news", String).get().data == "news of 0"
 
 
