@@ -22,7 +22,7 @@ from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node
 from rosz.transforms import StaticTransformBroadcaster
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.timeout(180)]
 
 SCRIPT = """
 import * as ROSLIB from "roslib";
