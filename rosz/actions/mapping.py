@@ -1,4 +1,4 @@
-"""What the states and messages of ROS 1's actions are in ROS 2's, and the reverse.
+"""Translate states of goals and messages between the actions of ROS 1 and of ROS 2.
 
 ROS 2 has one state for a goal that is to end, whether it was executed or not, and one for a goal
 that has ended so. A goal that the server rejects is never accepted there.

@@ -1,4 +1,4 @@
-"""What waits to be written: the newest messages that fit into a number of bytes."""
+"""A queue of messages that wait to be written, bounded by their size in bytes."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 _Image: TypeAlias = Any
 _NS = 1_000_000_000
 _DEPTH_HEADER = struct.Struct("<iff")
-"""What image_transport's compressedDepth writes before the PNG: a format and two numbers."""
+"""The header of image_transport's compressedDepth, before the PNG: a format and two numbers."""
 _MILLIMETRES = 1000.0
 _ALPHA = 4
 _DEEP_BITS = 16

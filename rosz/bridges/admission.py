@@ -1,4 +1,4 @@
-"""Who may connect to a bridge: passwords, and the pages of browsers."""
+"""Check whether a client may connect to a bridge: its password, or the origin of its page."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _LOCAL = "localhost"
 
 
 class Admission(msgspec.Struct, frozen=True):
-    """Who may connect.
+    """The conditions under which a client may connect.
 
-    A browser says which page opens a connection (its origin), and sends that truthfully. Pages of
-    this machine may connect, and those that are named; with a password all that know it.
+    A browser sends the origin of the page that opens a connection. Pages of this machine and of
+    the listed origins may connect. Clients that send the password may connect from any page.
 
     Attributes:
-        password: What clients must know; empty if nothing.
+        password: Password of the clients; empty if they need none.
         origins: Origins of pages that may connect without it, such as ``http://robot:8000``; ``*``
             for all, ``null`` for pages that are files.
     """
@@ -135,7 +135,7 @@ def server_tls(
         key: File of its private key.
 
     Returns:
-        The settings; None if there are no keys.
+        An SSL context, or None if neither keys nor a certificate are given.
 
     Raises:
         UsageError: A file cannot be read, or is not a certificate or key.

@@ -1,4 +1,4 @@
-"""What the clients of a bridge may do."""
+"""The permissions of the clients of a bridge."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _OBJECTS = {"publish": "topics", "subscribe": "topics", "call": "services", "ser
 
 
 class Gate(msgspec.Struct, frozen=True):
-    """What the clients of a bridge may do.
+    """The permissions of the clients of a bridge.
 
     Attributes:
-        permit: What the rules of the machine allow; None without rules.
+        permit: Permissions by the rules of the machine; None without rules.
         read_only: Whether nothing may be changed.
         topics: Patterns of the topics that clients see; all if there is none.
         services: Patterns of the services.
@@ -39,7 +39,7 @@ class Gate(msgspec.Struct, frozen=True):
         """Return why clients may not do something; empty if they may.
 
         Args:
-            verb: What they want to do.
+            verb: The action.
             name: Full name of the topic, service or parameter.
         """
         if self.read_only and verb in _CHANGES:

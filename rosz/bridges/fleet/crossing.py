@@ -77,12 +77,12 @@ class Side:
 
 
 class _Direction:
-    """What exists on one side, and is made known on the other.
+    """One direction of a crossing: declares the tokens of one side on the other side.
 
     Args:
         source: The side where it exists.
         target: The other side.
-        plan: What crosses.
+        plan: The names that cross.
         outward: Whether the other side is beyond the machine.
     """
 
@@ -165,10 +165,10 @@ class _Direction:
 
 
 class Crossing:
-    """What crosses between a machine and others, until closed.
+    """Passes tokens, samples and calls between a machine and other machines, until closed.
 
     Args:
-        plan: What crosses.
+        plan: The names that cross.
         inside: The machine.
         outside: All others.
     """

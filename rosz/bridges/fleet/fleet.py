@@ -25,7 +25,7 @@ __all__ = ("Fleet",)
 
 _CORE: Final = "core_"
 _ENCLAVE: Final = "/rosz_core"
-"""What tells the node of a core from others."""
+"""The enclave of the node of a core, by which other cores recognise it."""
 _TOKENS_SECONDS: Final = 1.0
 _LEFT_SECONDS: Final = 12.0
 """Seconds after which the links of a core that is gone, but could not say so, have ended."""
@@ -33,7 +33,7 @@ _POLL_SECONDS: Final = 0.5
 
 
 class Fleet:
-    """What crosses between this machine and others, until closed.
+    """Connects the network of this machine with other machines, until closed.
 
     The session beyond the machine dials and listens there; that of the machine does neither. If
     another robot with the same prefix appears, nothing crosses for the one that started later until
@@ -41,7 +41,7 @@ class Fleet:
 
     Args:
         environment: The settings of the process.
-        plan: What crosses.
+        plan: The names that cross.
         inside: The session of the machine.
         replica: The parameters of the machine.
         listen: Endpoints to listen at, beyond the machine.
@@ -52,7 +52,7 @@ class Fleet:
 
     Raises:
         TransportError: Another robot has the prefix, or an endpoint is occupied or malformed.
-        UsageError: There is no way to others.
+        UsageError: Neither an endpoint to listen at nor one to connect to is given.
     """
 
     def __init__(

@@ -28,7 +28,7 @@ class ParameterCrossing:
     At the start, a parameter that both have keeps the value that it has on the machine.
 
     Args:
-        plan: What crosses.
+        plan: The names that cross.
         inside: The replica of the machine.
         outside: The replica of all others.
     """

@@ -1,4 +1,4 @@
-"""What a robot of a fleet shares, as users write it in ``fleet.yaml``.
+"""The settings of a robot in a fleet, as users write them in ``fleet.yaml``.
 
 ::
 
@@ -39,7 +39,7 @@ class Shared(msgspec.Struct, frozen=True):
 
     Attributes:
         pattern: The pattern of global names.
-        rate: The most samples per second of each publisher; infinite if there is no limit.
+        rate: Largest number of samples per second of each publisher; infinity for no limit.
     """
 
     pattern: str
@@ -50,7 +50,7 @@ _ALL: Final = Shared("/**")
 
 
 class FleetPlan(msgspec.Struct, frozen=True, kw_only=True):
-    """What a robot shares with others, and by which names.
+    """The names that a robot shares with other machines, and what they are called there.
 
     Attributes:
         prefix: The namespace of the robot beyond its machine, such as ``/robot1``.
@@ -110,7 +110,7 @@ def read_share(text: str) -> tuple[Shared, ...]:
     """Return what ``--share`` asks for, such as ``/odom,/camera/**@2Hz``.
 
     Raises:
-        UsageError: A part is no pattern, or its rate no number above 0.
+        UsageError: A part is not a pattern, or its rate is not a number above 0.
     """
     parts = [part.strip() for part in text.split(",")]
     found = []

@@ -157,7 +157,7 @@ class TopicRelay:
         target: The session to publish on.
         target_key: The key of the topic there.
         qos: The QoS of the subscription that asks for the samples.
-        rate: The most samples per second of each publisher; infinite if there is no limit.
+        rate: Largest number of samples per second of each publisher; infinity for no limit.
         edit: What changes in the samples.
     """
 

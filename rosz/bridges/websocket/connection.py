@@ -34,16 +34,16 @@ _MAC_SECONDS = 5
 
 
 class Shared(msgspec.Struct, frozen=True):
-    """What the clients of a bridge share.
+    """The objects that all clients of a bridge share.
 
     Attributes:
         node: The node of the bridge.
-        gate: What clients may do.
+        gate: Permissions of the clients.
         topics: Publishers and subscriptions.
         rosapi: The services about the system.
         worker: Threads for what takes long: calls and goals.
         spelling: Whose names of types and fields a client gets that has not shown its own.
-        password: What clients must know; empty if nothing.
+        password: Password of the clients; empty if they need none.
     """
 
     node: Node
@@ -59,8 +59,8 @@ class Connection:
     """A client.
 
     Args:
-        shared: What the clients share.
-        outbox: What waits to be sent to this one.
+        shared: Objects that the clients share.
+        outbox: Outgoing queue of this client.
         name: Where it is, for the log.
         refuse: Function that ends the connection with a reason.
         trusted: Whether it has shown to know the password.
@@ -114,7 +114,7 @@ class Connection:
         }
 
     def handle(self, text: str | bytes) -> None:
-        """Do what a client asks for; what goes wrong is told to it."""
+        """Perform an operation, and send a status message if it fails."""
         try:
             operation = ops.read(text, self._parts)
         except UsageError as error:

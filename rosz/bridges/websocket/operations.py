@@ -52,10 +52,10 @@ _HEAD = 100
 
 
 class Operation(msgspec.Struct, tag_field="op", kw_only=True):
-    """What a client asks for.
+    """An operation that a client requests.
 
     Attributes:
-        id: What answers and status messages refer to; None if there is none.
+        id: Identification that answers and status messages repeat; None if there is none.
         fragment_size: Largest number of characters of an answer; None for no limit.
         compression: Encoding of answers.
     """

@@ -1,4 +1,4 @@
-"""What waits to be sent to one client: answers, and the newest messages of its subscriptions.
+"""The outgoing queue of one client: answers, and the newest messages of its subscriptions.
 
 Messages wait as they came from the network, shared by all clients, and are encoded when their turn
 comes. So a client that does not read costs neither processor time nor memory beyond the limit.
@@ -94,7 +94,7 @@ class Feed:
         period: Shortest time between two of them, in seconds.
         depth: Largest number of them; 0 for as many as the outbox holds, or one with a period.
         fragment_size: Largest number of characters of a text; None for no limit.
-        messages: What waits, the oldest first; only the outbox touches it, and `due`.
+        messages: Messages that wait, the oldest first; only the outbox changes it and `due`.
         due: When the next one may be sent, by the monotonic clock.
         closed: Whether the outbox has dropped it.
     """
@@ -115,7 +115,7 @@ class Feed:
 
 
 class Outbox:
-    """What waits to be sent to one client.
+    """The outgoing queue of one client.
 
     Args:
         limit: Largest number of bytes that wait. The oldest messages of a topic give way to newer
@@ -133,6 +133,7 @@ class Outbox:
         self._lock = threading.Lock()
         self._answers: deque[bytes] = deque()
         self._ready: deque[Feed] = deque()
+        self._answered = 0
         self._size = 0
         self._closed = False
 
@@ -141,12 +142,12 @@ class Outbox:
         with self._lock:
             if self._closed:
                 return
-            waiting = sum(map(len, self._answers))
-            full = bool(waiting) and waiting + len(answer) > self._limit
+            full = bool(self._answers) and self._answered + len(answer) > self._limit
             if full:
                 self._closed = True
             else:
                 self._answers.append(answer)
+                self._answered += len(answer)
         (self._overflow if full else self._wake)()
 
     def offer(self, feed: Feed, message: Message) -> None:
@@ -173,7 +174,9 @@ class Outbox:
         """
         with self._lock:
             if self._answers:
-                return self._answers.popleft(), None, 0.0
+                answer = self._answers.popleft()
+                self._answered -= len(answer)
+                return answer, None, 0.0
             now, earliest = time.monotonic(), float("inf")
             for _ in range(len(self._ready)):
                 feed = self._ready.popleft()

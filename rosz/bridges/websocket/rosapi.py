@@ -87,7 +87,7 @@ class RosApi:
         Args:
             service: Full name of the service.
             args: Fields of the request.
-            gate: What the caller may do.
+            gate: Permissions of the caller.
             spelling: Whose names of types and fields the answer has.
 
         Raises:
@@ -106,7 +106,7 @@ class RosApi:
         """Make them services of the node, below the name ``/rosapi``.
 
         Args:
-            gate: What callers may do.
+            gate: Permissions of the callers.
             spelling: Whose names of types and fields the answers have.
         """
         answers = _Answers(self._node, gate, spelling)
@@ -121,7 +121,7 @@ def _respond(kind: type[Service], answer: Callable[[Any], list[Any]], request: A
 
 
 class _Answers:
-    """What the services answer to somebody, each as the fields of the response."""
+    """The functions of the services; each returns the fields of a response."""
 
     def __init__(self, node: Node, gate: Gate, spelling: Spelling) -> None:
         self._node = node

@@ -68,8 +68,8 @@ class WebsocketBridge:
         node: The node. It is not closed with the bridge.
         host: Address to listen at.
         port: Port to listen at; 0 for any.
-        gate: What clients may do.
-        admission: Who may connect.
+        gate: Permissions of the clients.
+        admission: Conditions under which a client may connect.
         tls: Settings of TLS; without them, links are not encrypted.
         spelling: Whose names of types and fields a client gets that has not shown its own.
         limits: How much clients may take.

@@ -44,7 +44,7 @@ class Calls:
 
         Args:
             name: Full name of the service.
-            operation: What the client asks for.
+            operation: The operation of the client.
             spelling: Whose names the fields of the response have.
 
         Raises:
