@@ -10,7 +10,7 @@ import msgspec
 from rosz.errors import UsageError
 from rosz.security import Permit
 
-__all__ = ("Gate", "Verb")
+__all__ = ("Gate", "Verb", "matches")
 
 Verb: TypeAlias = Literal["publish", "subscribe", "call", "serve", "set", "get"]
 
@@ -62,5 +62,9 @@ class Gate(msgspec.Struct, frozen=True):
 
     def shows(self, what: str, name: str) -> bool:
         """Return whether the patterns for topics, services or parameters include a name."""
-        patterns: tuple[str, ...] = getattr(self, what)
-        return not patterns or any(fnmatch.fnmatchcase(name, one) for one in patterns)
+        return matches(getattr(self, what), name)
+
+
+def matches(patterns: tuple[str, ...], name: str) -> bool:
+    """Return whether a name matches one of some patterns, or there are no patterns."""
+    return not patterns or any(fnmatch.fnmatchcase(name, one) for one in patterns)

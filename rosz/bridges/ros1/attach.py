@@ -7,7 +7,6 @@ master on one network only the oldest works, and the next takes over when it end
 
 from __future__ import annotations
 
-import fnmatch
 import re
 import socket
 from collections.abc import Callable, Iterable
@@ -16,6 +15,7 @@ from typing import Any, Self
 
 import msgspec
 
+from rosz.bridges.gate import matches
 from rosz.bridges.ros1.mirror import Mirror
 from rosz.bridges.ros1.node_api import NodeApi
 from rosz.bridges.ros1.peers import Address, call, multicall
@@ -67,10 +67,6 @@ class Choice(msgspec.Struct, frozen=True):
     topics: tuple[str, ...] = ()
     services: tuple[str, ...] = ()
     params: tuple[str, ...] = ()
-
-
-def _matches(patterns: tuple[str, ...], name: str) -> bool:
-    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
 class AttachedBridge:
@@ -248,7 +244,7 @@ class AttachedBridge:
             (role, name, node)
             for (role, patterns), known in zip(roles, state, strict=False)
             for name, nodes in known.items()
-            if _matches(patterns, name)
+            if matches(patterns, name)
             for node in nodes
             if not node.startswith(BRIDGE)
         ]
@@ -322,7 +318,7 @@ class AttachedBridge:
             name = shared.there(token.name)
             if token.node_name.startswith(BRIDGE):
                 continue
-            if name is not None and _matches(patterns, name):
+            if name is not None and matches(patterns, name):
                 found[name] = token.type_name
         return found
 
@@ -366,7 +362,7 @@ class AttachedBridge:
 
     def _crosses(self, name: str) -> bool:
         own = any(name == each or name.startswith(f"{each}/") for each in _OWN_PARAMS)
-        return not own and _matches(self._choice.params, name)
+        return not own and matches(self._choice.params, name)
 
     def _send(self, name: str, value: Any) -> None:
         try:
