@@ -46,18 +46,28 @@ class History:
 
     Attributes:
         static: As given.
-        authority: Source of the last place.
     """
 
     def __init__(self, length_ns: int, *, static: bool) -> None:
         self.static: bool = static
-        self.authority: str = ""
+        self._authority: str | Callable[[], str] = ""
         self._length = length_ns
         self._stamps: list[int] = []
         self._places: list[Place] = []
 
-    def add(self, stamp: int, place: Place) -> bool:
+    @property
+    def authority(self) -> str:
+        """Source of the last place; empty if it is not known."""
+        return self._authority() if callable(self._authority) else self._authority
+
+    def add(self, stamp: int, place: Place, authority: str | Callable[[], str]) -> bool:
         """Add a place; return whether it is new and not too old."""
+        if not self._add(stamp, place):
+            return False
+        self._authority = authority
+        return True
+
+    def _add(self, stamp: int, place: Place) -> bool:
         if self.static:
             self._stamps, self._places = [stamp], [place]
             return True
@@ -161,7 +171,7 @@ class Buffer:
         pose: Pose,
         *,
         static: bool = False,
-        authority: str = "",
+        authority: str | Callable[[], str] = "",
     ) -> bool:
         """Add the pose of a frame in its parent.
 
@@ -171,7 +181,7 @@ class Buffer:
             stamp: Time in nanoseconds.
             pose: Pose of the frame, which transforms its coordinates into those of the parent.
             static: Whether the pose is valid at all times.
-            authority: Source of the transform.
+            authority: Source of the transform, or a function that returns it when it is asked for.
 
         Returns:
             Whether the transform is new and not too old.
@@ -185,9 +195,8 @@ class Buffer:
             history = self._frames.get(child)
             if history is None or history.static != static:
                 history = self._frames[child] = History(self._length, static=static)
-            added = history.add(stamp, Place(parent, pose))
+            added = history.add(stamp, Place(parent, pose), authority)
             if added:
-                history.authority = authority
                 self._parents.add(parent)
                 for known, alarm in self._waiters:
                     if known():

@@ -100,10 +100,10 @@ class Monitor:
         self._node = node
         self._lock = threading.Lock()
         self._frames: dict[str, _Times] = {}
-        self._broadcasters: dict[str, _Times] = {}
+        self._broadcasters: dict[tuple[bytes, bool], _Times] = {}
         self._listener = TransformListener(self.buffer, node, self._observe)
 
-    def _observe(self, transforms: Iterable[Any], authority: str, *, static: bool) -> None:
+    def _observe(self, transforms: Iterable[Any], publisher: bytes, *, static: bool) -> None:
         now = self._node.now()
         delays: list[int] = []
         with self._lock:
@@ -112,9 +112,8 @@ class Monitor:
                 delays.append(0 if static else now - stamp)
                 times = self._frames.setdefault(one.child_frame_id.removeprefix("/"), _Times())
                 times.add(delays[-1], now)
-            node = f"{authority}(static)" if static else authority
             mean = sum(delays) // max(len(delays), 1)
-            self._broadcasters.setdefault(node, _Times()).add(mean, now)
+            self._broadcasters.setdefault((publisher, static), _Times()).add(mean, now)
 
     def frames(self) -> list[FrameReport]:
         """Return the frames that have a parent, sorted by name."""
@@ -136,9 +135,13 @@ class Monitor:
     def broadcasters(self) -> list[BroadcasterReport]:
         """Return the nodes that publish transforms, sorted by name."""
         with self._lock:
+            named = {  # of a node that came again, the newest publisher
+                self._listener.node_of(publisher) + ("(static)" if static else ""): times
+                for (publisher, static), times in self._broadcasters.items()
+            }
             return [
                 BroadcasterReport(node, times.rate, times.mean, times.most)
-                for node, times in sorted(self._broadcasters.items())
+                for node, times in sorted(named.items())
             ]
 
     def close(self) -> None:

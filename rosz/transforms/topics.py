@@ -75,8 +75,8 @@ def pose_of(transform: Any) -> Pose:
 class Observe(Protocol):
     """A function that is called with the transforms of each message, after they are stored."""
 
-    def __call__(self, transforms: list[Any], authority: str, /, *, static: bool) -> object:
-        """Take the transforms, and the full name of the node that published them."""
+    def __call__(self, transforms: list[Any], publisher: bytes, /, *, static: bool) -> object:
+        """Take the transforms, and the GID of their publisher."""
 
 
 class TransformListener:
@@ -106,7 +106,8 @@ class TransformListener:
         ]
 
     def _receive(self, message: TFMessage, info: MessageInfo, *, static: bool) -> None:
-        authority = self._authority(info.gid)
+        # A message may arrive before the token of its publisher.
+        authority = self.node_of(info.gid) or partial(self.node_of, info.gid)
         for one in message.transforms:
             stamp = one.header.stamp.sec * 10**9 + one.header.stamp.nanosec
             try:
@@ -121,10 +122,14 @@ class TransformListener:
             except TransformArgument as error:
                 self._node.log.warning("%s", error, throttle_identical=10.0)
         if self._observe is not None:
-            self._observe(message.transforms, authority, static=static)
+            self._observe(message.transforms, info.gid, static=static)
 
-    def _authority(self, publisher: bytes) -> str:
-        """Return the full name of the node of a publisher; empty if it is not known."""
+    def node_of(self, publisher: bytes) -> str:
+        """Return the full name of the node of a publisher; empty if it is not known.
+
+        Args:
+            publisher: GID of the publisher.
+        """
         authority = self._authorities.get(publisher)
         if authority is not None:
             return authority
@@ -132,7 +137,7 @@ class TransformListener:
         if view is not self._view:  # a GID is computed from a token, which takes time
             self._view = view
             tokens = (token for topic in self._topics for token in view.publishers(topic))
-            self._authorities = {gid(format_token(token)): token.node_name for token in tokens}
+            self._authorities |= {gid(format_token(token)): token.node_name for token in tokens}
         return self._authorities.get(publisher, "")
 
     def close(self) -> None:

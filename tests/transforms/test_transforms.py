@@ -17,13 +17,16 @@ from rosz.errors import (
     TransformArgument,
     TransformError,
 )
+from rosz.graph import View
 from rosz.msgs.geometry_msgs.msg import TransformStamped
 from rosz.msgs.rosgraph_msgs.msg import Clock as ClockMessage
+from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import Clock
 from rosz.qos import CLOCK
 from rosz.transforms import (
     IDENTITY,
     Buffer,
+    Monitor,
     Pose,
     StaticTransformBroadcaster,
     TransformBroadcaster,
@@ -244,6 +247,20 @@ def test_static_transforms_are_copied(network: Network) -> None:
     TransformListener(buffer, network.node("viewer"))
     eventually(lambda: buffer.frames() == ["base", "camera", "laser"], "both for who comes late")
     assert buffer.lookup("base", "laser")[0].translation[0] == 1.0
+
+
+def test_a_transform_may_arrive_before_the_token_of_its_publisher(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monitor = Monitor(network.node("viewer"))
+    with monkeypatch.context() as patch:
+        patch.setattr(View, "publishers", lambda *_: [])
+        StaticTransformBroadcaster(network.node("robot")).send(transform("base", "laser", 1.0))
+        eventually(lambda: [one.node for one in monitor.frames()] == [""], "the transform")
+        assert [one.node for one in monitor.broadcasters()] == ["(static)"]
+    network.node("later").publisher("/tf", TFMessage)
+    eventually(lambda: [one.node for one in monitor.frames()] == ["/robot"], "the name of the node")
+    assert [one.node for one in monitor.broadcasters()] == ["/robot(static)"]
 
 
 def test_a_time_jump_back_clears_the_buffer(network: Network) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
-from xmlrpc.client import ServerProxy
+from xmlrpc.client import ServerProxy, dumps
 
 import pytest
 from network import TIMEOUT, eventually
@@ -314,12 +314,20 @@ def test_a_node_that_comes_again_has_its_tokens_again(world: World, node: Node) 
 
 
 def test_nothing_keeps_a_connection_that_has_ended(world: World) -> None:
-    world.call("getPid", "/x")
+    call = dumps(("/x",), "getPid").encode()
+    head = f"POST / HTTP/1.1\r\nContent-Length: {len(call)}\r\n\r\n".encode()
+    with socket.create_connection(("127.0.0.1", world.port), TIMEOUT) as sock:
+        peer = f"127.0.0.1:{sock.getsockname()[1]}"
+        sock.sendall(head + call)
+        assert sock.recv(4096).startswith(b"HTTP/1.1 200")
 
-    def kept() -> int:
-        return sum(isinstance(one, Incoming) and one.stream.is_closed for one in gc.get_objects())
+    def is_kept() -> bool:
+        return any(
+            isinstance(one, Incoming) and one.stream.peer == peer for one in gc.get_objects()
+        )
 
-    eventually(lambda: gc.collect() >= 0 and not kept(), "their end", 15)
+    assert is_kept()
+    eventually(lambda: gc.collect() >= 0 and not is_kept(), "its end")
 
 
 def test_registrations_come_back_after_the_master(world: World, node: Node) -> None:
