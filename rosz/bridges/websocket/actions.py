@@ -8,6 +8,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rosz.bridges.websocket.messages import build
 from rosz.bridges.websocket.operations import (
     ActionFeedback,
     ActionResult,
@@ -16,7 +17,6 @@ from rosz.bridges.websocket.operations import (
     SendActionGoal,
 )
 from rosz.bridges.websocket.plain import Spelling, converter
-from rosz.bridges.websocket.topics import build
 from rosz.errors import ActionError, RoszError, UsageError
 from rosz.node.goals import GoalState
 

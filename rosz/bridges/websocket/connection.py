@@ -14,10 +14,10 @@ import msgspec
 
 from rosz.bridges.websocket import operations as ops
 from rosz.bridges.websocket.actions import SentGoals, ServedActions
+from rosz.bridges.websocket.messages import build_from_json
 from rosz.bridges.websocket.outbox import Feed, Outbox
 from rosz.bridges.websocket.plain import Spelling
 from rosz.bridges.websocket.services import Calls, ServedServices
-from rosz.bridges.websocket.topics import build
 from rosz.errors import RoszError, UsageError
 
 if TYPE_CHECKING:
@@ -216,7 +216,9 @@ class Connection:
             self._advertise(made)
             self._spelling = spelling if not operation.type else self._spelling
         publisher = self._publishers[topic]
-        publisher.publish(build(publisher.message_type, operation.msg, self._shared.node.now()))
+        now = self._shared.node.now()
+        cls = publisher.message_type
+        publisher.publish(build_from_json(cls, operation.msg, self._spelling, now))
 
     def _subscribe(self, operation: ops.Subscribe) -> None:
         spelling = self._see(operation.type)

@@ -81,10 +81,10 @@ class Unadvertise(Operation, tag="unadvertise"):
 
 
 class Publish(Operation, tag="publish"):
-    """Publish a message."""
+    """Publish a message; ``msg`` is the JSON of its fields."""
 
     topic: str
-    msg: dict[str, Any] = {}
+    msg: msgspec.Raw = msgspec.Raw(b"{}")
     type: str = ""
     latch: bool = False
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.bridges.gate import Gate
+from rosz.bridges.websocket.messages import build
 from rosz.bridges.websocket.plain import Plain, Spelling, converter
-from rosz.bridges.websocket.topics import build
 from rosz.errors import NotFoundError, RoszError, UsageError
 from rosz.introspect.services import services_of_type
 from rosz.message import Message, Service, slot_type, slots

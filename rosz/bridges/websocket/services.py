@@ -8,9 +8,9 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from typing import TYPE_CHECKING, Any
 
+from rosz.bridges.websocket.messages import build
 from rosz.bridges.websocket.operations import AdvertiseService, CallService, ServiceResponse
 from rosz.bridges.websocket.plain import Plain, Spelling, converter
-from rosz.bridges.websocket.topics import build
 from rosz.errors import NotFoundError, ServiceError, UsageError, WaitTimeout, near_miss
 from rosz.node.type_description import request_type
 

@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.bridges.websocket.outbox import Feed, Message
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
-from rosz.message.convert import from_plain
 from rosz.names import short_type
 from rosz.node import MessageInfo
 from rosz.node.type_description import request_type
-from rosz.time import TimeValue
 from rosz.wire import format_token, gid
 
 if TYPE_CHECKING:
     from rosz.node import Node, Publisher, Subscription
 
-__all__ = ("Offer", "Topics", "build")
+__all__ = ("Offer", "Topics")
 
 Offer = Callable[[Feed, Message], object]
 """Function of a client that takes a message for one of its feeds."""
@@ -207,30 +205,3 @@ class _Source:
         except RoszError as error:
             self._node.log.warning("cannot decode what comes on '%s': %s", self._topic, error)
             return None
-
-
-def build(cls: type[Any], value: Any, now: int) -> Any:
-    """Return the message in plain values of a client.
-
-    A header without a stamp gets the time (rosbridge protocol, "Publish").
-
-    Args:
-        cls: Class of the message.
-        value: A dict of fields, a list of all, or None.
-        now: Time in nanoseconds, also the meaning of ``now``.
-
-    Raises:
-        EncodeError: A name is not a field, or a value does not fit its field.
-    """
-    message = from_plain(cls, value, partial(_time, now), null_is_nan=True)
-    if cls._has_header and isinstance(value, dict):
-        header = value.get("header")
-        if not isinstance(header, dict) or "stamp" not in header:
-            message.header.stamp = type(message.header.stamp).from_nsec(now)
-    return message
-
-
-def _time(now: int) -> TimeValue:
-    from rosz.msgs.builtin_interfaces.msg import Time
-
-    return Time.from_nsec(now)
