@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import socket
-from collections.abc import Iterable, Mapping
+import threading
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Self
@@ -168,19 +169,32 @@ class MasterBridge:
 
     def _restore(self) -> None:
         """Register the nodes of the last master of this port that are still alive."""
-        nodes: dict[tuple[str, str], list[Entry]] = {}
-        for entry in _read(self._file):
-            nodes.setdefault((entry.node, entry.uri), []).append(entry)
-        for (node, uri), entries in nodes.items():
-            self._shared.requests.submit(partial(self._restore_node, node, uri, entries))
+        entries = _read(self._file)
+        waiting = {(entry.node, entry.uri) for entry in entries}
+        alive: set[tuple[str, str]] = set()
+        lock = threading.Lock()
 
-    def _restore_node(self, node: str, uri: str, entries: Iterable[Entry]) -> None:
-        try:
-            call(uri, "getPid", (MASTER,), _PROBE_TIMEOUT)
-        except RoszError as error:
-            log.info("node '%s' of ROS 1 has ended: %s", node, error)
-            return
-        self._master.restore(entries)
+        def check(node: str, uri: str) -> None:
+            found = _answers(node, uri)
+            with lock:
+                waiting.discard((node, uri))
+                if found:
+                    alive.add((node, uri))
+                last = not waiting
+            if last:
+                self._master.restore([e for e in entries if (e.node, e.uri) in alive])
+
+        for node, uri in list(waiting):
+            self._shared.requests.submit(partial(check, node, uri))
+
+
+def _answers(node: str, uri: str) -> bool:
+    try:
+        call(uri, "getPid", (MASTER,), _PROBE_TIMEOUT)
+    except RoszError as error:
+        log.info("node '%s' of ROS 1 has ended: %s", node, error)
+        return False
+    return True
 
 
 def _read(file: Path) -> list[Entry]:

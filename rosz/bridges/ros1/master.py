@@ -166,11 +166,17 @@ class Master:
             return self._registry.dump()
 
     def restore(self, entries: Iterable[Entry]) -> None:
-        """Add registrations of nodes that are known to be alive, unless they have come already."""
-        for entry in entries:
-            with self._lock:
-                if self._registry.uri(entry.node) in {"", entry.uri}:
-                    self._register(entry)
+        """Add registrations of nodes that are known to be alive, unless they have come already.
+
+        Subscribers are told who publishes, as rospy does not try to connect to the bridge again by
+        itself. They are told when all is added: roscpp leaves publishers that are not in the list.
+        """
+        with self._lock:
+            restored = [e for e in entries if self._registry.uri(e.node) in {"", e.uri}]
+            for entry in restored:
+                self._register(entry)
+            for topic in {entry.name for entry in restored if entry.role == "subscriber"}:
+                self.notify(topic)
 
     def drop(self, node: str, uri: str) -> bool:
         """Remove a node that has ended; return whether it was registered."""

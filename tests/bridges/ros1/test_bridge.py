@@ -334,9 +334,13 @@ def test_registrations_come_back_after_the_master(world: World, node: Node) -> N
     program = world.rospy(TALKER, "staying", "/staying")
     heard = _heard(node, "/staying")
     heard.get(timeout=TIMEOUT)
+    listener = world.rospy(LISTENER, "staying_listener", "/kept")
+    publisher = node.publisher("/kept", String, latch=True)
+    publisher.publish("before")
+    listener.wait_for("heard before")
     port = world.bridge.port
     file = world.network.folder / "rosz" / f"ros1_master_{port}.json"
-    eventually(lambda: b"/staying" in file.read_bytes())
+    eventually(lambda: all(name in file.read_bytes() for name in (b"/staying", b"/kept")))
     world.bridge.close()
     eventually(lambda: "/staying" not in _nodes(node))
     while not heard.empty():
@@ -344,5 +348,9 @@ def test_registrations_come_back_after_the_master(world: World, node: Node) -> N
     world.bridge = MasterBridge(world.network.environment(), port=port)
     assert heard.get(timeout=TIMEOUT).data.startswith("rospy ")
     assert "/staying" in _nodes(node)
+    listener.wait_for("heard before", times=2)  # it has connected again
+    publisher.publish("after")
+    listener.wait_for("heard after")
+    listener.send(signal.SIGINT)
     program.send(signal.SIGINT)
     eventually(lambda: "/staying" not in _nodes(node))
