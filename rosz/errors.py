@@ -27,7 +27,8 @@ They have one root, so that ``except RoszError`` catches what rosz reports and n
     │   └── ServiceNotFound
     ├── ActionError                 a goal was not reached, or nobody can say so
     │   ├── GoalRejected            the server did not take the goal
-    │   └── GoalFailed              the goal was aborted or canceled: status, result
+    │   ├── GoalFailed              the goal was aborted or canceled: status, result
+    │   └── ServerSilent            the server does not answer: seconds
     ├── ParamError                  a parameter value or write is not allowed
     ├── StoreError                  a file of parameters cannot be used
     ├── BagError                    a bag cannot be read or written: path, offset
@@ -75,6 +76,7 @@ __all__ = (
     "ParamError",
     "ParamNotFound",
     "RoszError",
+    "ServerSilent",
     "ServiceError",
     "ServiceNotFound",
     "SourceError",
@@ -357,6 +359,23 @@ class GoalFailed(ActionError):
         self.status = status
         self.result = result
         super().__init__(text)
+
+
+class ServerSilent(ActionError):
+    """The server of an action does not answer; its goals may go on, and are followed.
+
+    Attributes:
+        action: Full name of the action.
+        seconds: Seconds since the server answered last.
+    """
+
+    def __init__(self, action: str, seconds: float) -> None:
+        self.action = action
+        self.seconds = seconds
+        super().__init__(
+            f"the server of action '{action}' has not answered for {seconds:.1f} s; the goal may"
+            " go on: wait again, or cancel it"
+        )
 
 
 class ParamError(RoszError):

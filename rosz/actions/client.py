@@ -16,6 +16,7 @@ from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
+from rosz.node.action_watch import LONGEST_SILENCE, ServerWatch
 from rosz.wire import Kind
 
 __all__ = ("ActionClient", "ClientGoal", "CommState")
@@ -29,6 +30,8 @@ _ACTIVE_TIMEOUT = 1.0
 
 _EXECUTED = frozenset({GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.PREEMPTED})
 """Terminal states of goals that were executed."""
+
+_ENDED = "the server ended"
 
 _numbers = itertools.count(1)
 
@@ -222,10 +225,16 @@ class ActionClient:
         self._ros2: Ros2Client | None = None
         if types.action is not None:
             self._ros2 = Ros2Client(node, self.name, types, types.action)
+        self._served = False
+        self._watch = node.keep(
+            ServerWatch(self.name, self._has_goals, self._check_server, node.log, queries=False)
+        )
         self._goal_publisher = node.publisher(f"{self.name}/goal", types.action_goal)
         self._cancel_publisher = node.publisher(f"{self.name}/cancel", GoalID)
+        status = node.subscription(f"{self.name}/status", GoalStatusArray, self._receive_status)
+        self._status = status
         self._subscriptions = [
-            node.subscription(f"{self.name}/status", GoalStatusArray, self._receive_status),
+            status,
             node.subscription(
                 f"{self.name}/feedback", types.action_feedback, self._receive_feedback
             ),
@@ -266,6 +275,8 @@ class ActionClient:
 
     def stop(self) -> None:
         """Close all topics; goals are not followed any more."""
+        self.node.forget(self._watch)
+        self._watch.close()
         if self._ros2 is not None:
             self._ros2.close()
         for entity in (self._goal_publisher, self._cancel_publisher, *self._subscriptions):
@@ -304,6 +315,7 @@ class ActionClient:
             return sent
         message = self._types.action_goal(Header(stamp=now), goal_id, goal)
         publish(self.node, self._goal_publisher, message)
+        self._watch.begin(self._status)
         return sent
 
     def cancel(self, goal: ClientGoal) -> None:
@@ -329,7 +341,27 @@ class ActionClient:
         """Stop following a goal; see `ClientGoal.forget`."""
         self._goals.pop(goal.id.id, None)
 
+    def _has_goals(self) -> bool:
+        return bool(self._own_goals())
+
+    def _own_goals(self) -> list[ClientGoal]:
+        """Return the goals that were sent by the protocol of ROS 1."""
+        ros2 = self._ros2
+        return [goal for goal in list(self._goals.values()) if not (ros2 and ros2.has_sent(goal))]
+
+    def _check_server(self) -> None:
+        """End the goals if their server has, or has been out of reach for too long."""
+        served = bool(self._status.others.view().publishers(self._status.name))
+        silence = self._watch.silence
+        if self._served and not served and not 0 < silence < LONGEST_SILENCE:
+            text = f"the server has been out of reach for {silence:.0f} s" if silence else _ENDED
+            for goal in self._own_goals():
+                goal.finish(GoalStatus(goal.id, GoalStatus.LOST, text), None)
+        self._served = served or (self._served and silence > 0)
+
     def _receive_status(self, message: GoalStatusArray) -> None:
+        self._served = True
+        self._watch.note_answer()
         for goal in list(self._goals.values()):
             goal.update(message.status_list)
 

@@ -1,8 +1,8 @@
 """Nodes and their parts: publishers, subscriptions, services, clients, actions, timers, a log.
 
-`action_server`, `action_client` and `goals` are imported on their own, by what uses actions, and so
-are `type_description` and `ros2_parameters`, by what needs definitions of other nodes or parameters
-in the form of ROS 2.
+`action_server`, `action_client`, `action_watch` and `goals` are imported on their own, by what uses
+actions, and so are `type_description` and `ros2_parameters`, by what needs definitions of other
+nodes or parameters in the form of ROS 2.
 """
 
 from rosz.node.bridged import BridgedNode
@@ -31,7 +31,14 @@ from rosz.node.standard import serve_loggers, simulate
 from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Rate, Timer, TimerEvent
 
-PUBLIC_MODULES = ("action_client", "action_server", "goals", "ros2_parameters", "type_description")
+PUBLIC_MODULES = (
+    "action_client",
+    "action_server",
+    "action_watch",
+    "goals",
+    "ros2_parameters",
+    "type_description",
+)
 
 __all__ = (
     "BridgedNode",

@@ -1,7 +1,8 @@
 """Action clients, by the protocol of ROS 2.
 
 The result of a goal is asked for as soon as the goal is accepted, and the server answers when there
-is one. So a server that ends is noticed at once: the query ends without an answer.
+is one. So a server that ends is noticed at once: the query ends without an answer. A server that is
+out of reach is noticed by `ServerWatch`, and its goals are followed again when it is back.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from rosz.errors import (
     GoalFailed,
     GoalRejected,
     RoszError,
+    ServerSilent,
+    ServiceError,
     ServiceNotFound,
     WaitTimeout,
 )
@@ -28,6 +31,7 @@ from rosz.msgs.action_msgs.msg import GoalInfo, GoalStatusArray
 from rosz.msgs.action_msgs.srv import CancelGoal, CancelGoalResponse
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
+from rosz.node.action_watch import LONGEST_SILENCE, ServerWatch
 from rosz.node.client import Client
 from rosz.node.goals import CANCEL, FEEDBACK, FINAL, RESULT, SEND, STATUS, GoalState
 from rosz.node.subscription import Subscription
@@ -89,36 +93,53 @@ class ClientGoal:
         """Whether the goal has ended, or its server has."""
         return self._ended
 
-    def wait(self, timeout: float | None = None) -> GoalState:
+    def wait(self, timeout: float | None = None, *, silence: float | None = None) -> GoalState:
         """Wait until the goal has ended.
 
         Args:
             timeout: Time limit in seconds; none when not given.
+            silence: Seconds for which the server may be out of reach, at least 2; 60 when not
+                given.
 
         Returns:
             The final state.
 
         Raises:
             WaitTimeout: It has not ended in time.
+            ServerSilent: The server does not answer; the goal is followed still.
             ActionError: The server ended first, or does not know the goal any more.
             ClosedError: The client was closed meanwhile.
             UsageError: The timeout is not a number.
         """
         limit = LONGEST_WAIT if timeout is None else clamp_timeout(timeout)
+        longest = LONGEST_WAIT if silence is None else clamp_timeout(silence)
+        deadline = time.monotonic() + limit
         with self._changed:
-            if not self._changed.wait_for(lambda: self._ended, limit):
-                raise WaitTimeout(
-                    f"result of action '{self._client.name}'", limit, f"it is {self._state.text}"
-                )
+            while not self._ended:
+                silent = self._client.silence
+                if silent and silent >= longest:
+                    raise ServerSilent(self._client.name, silent)
+                left = deadline - time.monotonic()
+                if left <= 0:
+                    raise WaitTimeout(f"result of action '{self._client.name}'", limit, self._hint)
+                self._changed.wait(min(left, longest - silent) if silent else left)
         if self._error is not None:
             raise self._error
         return self._state
 
-    def result(self, timeout: float | None = None) -> Any:
+    @property
+    def _hint(self) -> str:
+        silent = self._client.silence
+        unheard = f", and the server has not answered for {silent:.1f} s" if silent else ""
+        return f"it is {self._state.text}{unheard}"
+
+    def result(self, timeout: float | None = None, *, silence: float | None = None) -> Any:
         """Wait for the result of the goal.
 
         Args:
             timeout: Time limit in seconds; none when not given.
+            silence: Seconds for which the server may be out of reach, at least 2; 60 when not
+                given.
 
         Returns:
             The result of a goal that succeeded.
@@ -126,11 +147,12 @@ class ClientGoal:
         Raises:
             GoalFailed: The goal was aborted or canceled; the error has the result.
             WaitTimeout: It has not ended in time.
+            ServerSilent: The server does not answer; the goal is followed still.
             ActionError: The server ended first, or does not know the goal any more.
             ClosedError: The client was closed meanwhile.
             UsageError: The timeout is not a number.
         """
-        state = self.wait(timeout)
+        state = self.wait(timeout, silence=silence)
         if state is not GoalState.SUCCEEDED:
             text = f"the goal of action '{self._client.name}' was {state.text}"
             raise GoalFailed(text, state, self._result)
@@ -200,6 +222,11 @@ class ClientGoal:
             self._feedback.append(feedback)
             self._changed.notify_all()
 
+    def wake(self) -> None:
+        """Let those who wait notice that the server does not answer; for the client."""
+        with self._changed:
+            self._changed.notify_all()
+
     def finish(self, state: GoalState, result: Any, error: RoszError | None = None) -> None:
         """Note the end of the goal; for the client."""
         with self._changed:
@@ -247,6 +274,9 @@ class ActionClient:
         self._known: WeakValueDictionary[bytes, ClientGoal] = WeakValueDictionary()
         self._lifecycle = Lifecycle(f"the client of action '{name}'", log=node.log)
         keep = self._lifecycle.keep
+        self._watch = keep(
+            ServerWatch(name, self._has_goals, self._wake_waiters, node.log, queries=True)
+        )
         keep(
             Subscription(
                 node,
@@ -256,7 +286,9 @@ class ActionClient:
                 DEFAULT,
             )
         )
-        keep(Subscription(node, f"{name}/{STATUS}", GoalStatusArray, self._receive_status, LATCHED))
+        self._status: Subscription[GoalStatusArray] = keep(
+            Subscription(node, f"{name}/{STATUS}", GoalStatusArray, self._receive_status, LATCHED)
+        )
         kinds = {RESULT: action_type.GetResult, CANCEL: CancelGoal, SEND: action_type.SendGoal}
         limits = {RESULT: LONGEST_WAIT}
         self._clients = {
@@ -268,6 +300,14 @@ class ActionClient:
     def goals(self) -> list[ClientGoal]:
         """The goals that have not ended, the oldest first."""
         return list(self._goals.values())
+
+    @property
+    def silence(self) -> float:
+        """Seconds since the server answered last; 0 if it answers, or has no goal of this client.
+
+        It is noticed within 2 s that a server does not answer. That is logged as a warning.
+        """
+        return self._watch.silence
 
     def wait_for_server(self, timeout: float = 10.0) -> None:
         """Wait until a node serves the action with this type.
@@ -342,6 +382,7 @@ class ActionClient:
         if not accepted:
             raise GoalRejected(f"the server of action '{self.name}' rejected the goal")
         sent.accept(response.stamp.to_nsec())
+        self._watch.begin(self._status)
         name = f"rosz-goal{self.name}"
         start_thread(threading.Thread(target=self._follow, args=(sent,), name=name, daemon=True))
         return sent
@@ -388,8 +429,7 @@ class ActionClient:
         state, result = GoalState.UNKNOWN, None
         error: RoszError | None = None
         try:
-            request = self.action_type.GetResult.Request(UUID(goal.id.bytes))
-            response = self._clients[RESULT].call(request, LONGEST_WAIT)
+            response = self._request_result(goal)
             state, result = GoalState(response.status), response.result
             if state not in FINAL:
                 error = ActionError(
@@ -403,12 +443,38 @@ class ActionClient:
         self._goals.pop(goal.id.bytes, None)
         goal.finish(state, result, error)
 
+    def _request_result(self, goal: ClientGoal) -> Any:
+        """Wait for the result; a server that was out of reach is asked again when it is back."""
+        request = self.action_type.GetResult.Request(UUID(goal.id.bytes))
+        client = self._clients[RESULT]
+        while True:
+            try:
+                return client.call(request, LONGEST_WAIT)
+            except ServiceError:
+                silence = self._watch.silence
+                if not 0 < silence < LONGEST_SILENCE:
+                    raise
+                try:
+                    client.wait_for_service(LONGEST_SILENCE - silence)
+                except WaitTimeout as error:
+                    text = f"the server has been out of reach for {LONGEST_SILENCE:g} s"
+                    raise ServiceError(text) from error
+
+    def _has_goals(self) -> bool:
+        return bool(self._goals)
+
+    def _wake_waiters(self) -> None:
+        for goal in self.goals:
+            goal.wake()
+
     def _receive_feedback(self, message: Any) -> None:
+        self._watch.note_answer()
         goal = self._known.get(bytes(message.goal_id.uuid))
         if goal is not None:
             goal.receive_feedback(message.feedback)
 
     def _receive_status(self, message: GoalStatusArray) -> None:
+        self._watch.note_answer()
         for status in message.status_list:
             goal = self._goals.get(bytes(status.goal_info.goal_id.uuid))
             if goal is not None and status.status in tuple(GoalState):

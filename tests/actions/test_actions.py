@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import signal
 import threading
 from pathlib import Path
 from queue import SimpleQueue
@@ -175,6 +177,49 @@ def test_a_goal_unknown_to_a_restarted_server_is_lost(world: World) -> None:
     assert goal.wait(TIMEOUT)
     assert goal.status.status == GoalStatus.LOST
     assert "does not know" in goal.status.text
+
+
+SERVER = """
+    import threading
+    import rosz
+    from rosz.actions import ActionServer, SimpleActionServer
+
+    with rosz.Node("other") as node:
+        action = node.context.types.message("counting/CountAction")
+        server = SimpleActionServer(ActionServer(node, "count", action))
+        server.action_server.on_goal = lambda goal: goal.accept()
+        server.start()
+        print("ready", flush=True)
+        threading.Event().wait()
+"""
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_server_that_is_killed_or_stopped(network: Network, world: World, stopped: bool) -> None:
+    program = network.program(SERVER, ROSZ_PACKAGE_PATH=str(network.folder / "src"))
+    program.wait_for("ready")
+    active = threading.Event()
+    goal = world.client().send(world.count.goal(1), on_active=active.set)
+    assert active.wait(TIMEOUT)
+    texts: SimpleQueue[str] = SimpleQueue()
+
+    def keep(record: logging.LogRecord) -> bool:
+        texts.put(record.getMessage())
+        return True
+
+    world.client_node.log.addFilter(keep)
+    if stopped:
+        program.process.send_signal(signal.SIGSTOP)
+        while "let it go on with 'fg'" not in texts.get(timeout=TIMEOUT):
+            pass
+        assert not goal.done
+        program.process.send_signal(signal.SIGCONT)
+        while "answers again" not in texts.get(timeout=TIMEOUT):
+            pass
+        assert not goal.done
+    program.kill()
+    assert goal.wait(TIMEOUT)
+    assert (goal.status.status, goal.status.text) == (GoalStatus.LOST, "the server ended")
 
 
 def test_callbacks_that_fail_do_not_stop_a_goal(world: World) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -17,6 +19,7 @@ from rosz.errors import (
     EncodeError,
     GoalFailed,
     GoalRejected,
+    ServerSilent,
     ServiceError,
     ServiceNotFound,
     UsageError,
@@ -351,6 +354,35 @@ def test_a_killed_server_is_noticed_at_once(world: World) -> None:
     assert time.monotonic() - began < 10
     with pytest.raises(ServiceError):
         handles[0].cancel()
+
+
+def test_a_server_that_does_not_answer(world: World) -> None:
+    program = world.network.program(SERVER)
+    program.wait_for("ready")
+    client = world.client()
+    texts: SimpleQueue[str] = SimpleQueue()
+
+    def keep(record: logging.LogRecord) -> bool:
+        texts.put(record.getMessage())
+        return True
+
+    world.client_node.log.addFilter(keep)
+    handle = client.send(Goal(1))
+    assert client.silence == 0.0
+    program.process.send_signal(signal.SIGSTOP)
+    with pytest.raises(ServerSilent, match="has not answered for"):
+        handle.wait(TIMEOUT, silence=2.0)
+    with pytest.raises(WaitTimeout, match="the server has not answered for"):
+        handle.wait(0.01)
+    assert not handle.done
+    program.process.send_signal(signal.SIGCONT)
+    eventually(lambda: client.silence == 0.0, "an answer of the server")
+    for part in ("is stopped: let it go on with 'fg'", "answers again"):
+        while part not in texts.get(timeout=TIMEOUT):
+            pass
+    program.kill()
+    with pytest.raises(ActionError, match="is lost"):
+        handle.wait(TIMEOUT, silence=2.0)
 
 
 def test_nobody_serves_the_action(world: World) -> None:
