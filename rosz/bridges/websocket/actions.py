@@ -43,8 +43,19 @@ class SentGoals:
         self._send = send
         self._lock = threading.Lock()
         self._clients: dict[tuple[str, str], ActionClient] = {}
-        self._goals: dict[str, ClientGoal] = {}
+        self._goals: dict[str, ClientGoal | None] = {}
         self._canceled: set[str] = set()
+
+    def announce(self, operation: SendActionGoal) -> None:
+        """Remember that a goal is about to be sent, so that it can be canceled."""
+        with self._lock:
+            self._goals[str(operation.id)] = None
+
+    def forget(self, operation: SendActionGoal) -> None:
+        """Forget a goal that was not accepted."""
+        with self._lock:
+            self._goals.pop(str(operation.id), None)
+            self._canceled.discard(str(operation.id))
 
     def send(self, name: str, operation: SendActionGoal, spelling: Spelling) -> None:
         """Send a goal; feedback and the result go to the client.
@@ -103,11 +114,13 @@ class SentGoals:
         """Cancel a goal, also one that has not been accepted yet.
 
         Raises:
-            RoszError: The server did not answer.
+            RoszError: There is no such goal, or the server did not answer.
         """
         key = str(operation.id)
         with self._lock:
-            handle = self._goals.get(key)
+            if key not in self._goals:
+                raise UsageError(f"no goal with the id '{key}' is executed")
+            handle = self._goals[key]
             if handle is None:
                 self._canceled.add(key)
         if handle is not None:

@@ -31,6 +31,9 @@ __all__ = ("Connection", "Shared")
 
 _LEVELS = ("info", "warning", "error", "none")
 _MAC_SECONDS = 5
+_NO_PASSWORD = "the password is missing or wrong"  # noqa: S105  # what a client is told
+_CALL_SIZE = 1000
+"""Bytes that a call takes beside its operation."""
 
 
 class Shared(msgspec.Struct, frozen=True):
@@ -64,7 +67,7 @@ class Connection:
         name: Where it is, for the log.
         refuse: Function that ends the connection with a reason.
         trusted: Whether it has shown to know the password.
-        limit: Largest number of characters of an operation in parts.
+        limit: Largest size of an operation in parts, and of the calls that have not ended.
     """
 
     def __init__(
@@ -82,7 +85,10 @@ class Connection:
         self._outbox = outbox
         self._name = name
         self._refuse = refuse
+        self._limit = limit
         self._parts = ops.Fragments(limit)
+        self._size = 0
+        self._pending = 0
         self._spelling = shared.spelling
         self._level = "error"
         self._numbers = itertools.count(1)
@@ -116,9 +122,12 @@ class Connection:
     def handle(self, text: str | bytes) -> None:
         """Perform an operation, and send a status message if it fails."""
         try:
-            operation = ops.read(text, self._parts)
+            operation = self._read(text)
         except UsageError as error:
-            self._status("error", str(error), None)
+            if self.trusted:
+                self._status("error", str(error), None)
+            else:
+                self._refuse(_NO_PASSWORD)
             return
         if operation is None:
             return
@@ -139,6 +148,43 @@ class Connection:
             self._status("error", f"{_name(operation)}: {error}", operation.id)
         else:
             self._status("info", f"{_name(operation)}: done", operation.id)
+
+    def _read(self, text: str | bytes) -> ops.Operation | None:
+        """Return the operation in a text, or of which it brings the last part; else None.
+
+        Only a client that has shown to know the password may send parts.
+        """
+        operation = ops.read_text(text)
+        while isinstance(operation, ops.Fragment) and self.trusted:
+            whole = self._parts.add(operation)
+            if whole is None:
+                return None
+            text, operation = whole, ops.read_text(whole)
+        self._size = len(text)
+        return operation
+
+    def _later(self, task: Callable[[], object]) -> None:
+        """Perform what takes long on a thread of the bridge.
+
+        Raises:
+            UsageError: Operations of this client that have not ended are too large together.
+        """
+        size = self._size + _CALL_SIZE
+        with self._lock:
+            if self._pending and self._pending + size > self._limit:
+                raise UsageError(
+                    f"earlier operations of {self._pending} bytes have not ended; wait for answers"
+                )
+            self._pending += size
+
+        def perform() -> None:
+            try:
+                task()
+            finally:
+                with self._lock:
+                    self._pending -= size
+
+        self._shared.worker.submit(perform)
 
     def send(self, value: dict[str, Any], *, fragment_size: float | None = None) -> None:
         """Send an operation."""
@@ -169,7 +215,7 @@ class Connection:
             if recent and hmac.compare_digest(wanted, operation.mac.lower()):
                 self.trusted = True
                 return
-        self._refuse("the password is missing or wrong")
+        self._refuse(_NO_PASSWORD)
 
     def _status(self, level: str, text: str, number: str | int | None) -> None:
         if level == "error":
@@ -260,20 +306,28 @@ class Connection:
     def _call_service(self, operation: ops.CallService) -> None:
         spelling = self._see(operation.type)
         name = self._shared.node.resolve(operation.service)
-        self._shared.worker.submit(partial(self._call, name, operation, spelling))
+        try:
+            self._later(partial(self._call, name, operation, spelling))
+        except UsageError as error:
+            self._fail_call(operation, error)
 
     def _call(self, name: str, operation: ops.CallService, spelling: Spelling) -> None:
-        values: Any
         try:
             if self._shared.rosapi.has(name):
                 values = self._shared.rosapi.call(name, operation.args, self._shared.gate, spelling)
             else:
                 self._shared.gate.check("call", name)
                 values = self._calls.call(name, operation, spelling)
-            done = True
         except RoszError as error:
-            values, done = str(error), False
-            self._status("error", f"call_service: {error}", operation.id)
+            self._fail_call(operation, error)
+        else:
+            self._respond(operation, values, done=True)
+
+    def _fail_call(self, operation: ops.CallService, error: RoszError) -> None:
+        self._status("error", f"call_service: {error}", operation.id)
+        self._respond(operation, str(error), done=False)
+
+    def _respond(self, operation: ops.CallService, values: Any, *, done: bool) -> None:
         response: dict[str, Any] = {"op": "service_response", "service": operation.service}
         if operation.id is not None:
             response["id"] = operation.id
@@ -297,19 +351,27 @@ class Connection:
     def _send_goal(self, operation: ops.SendActionGoal) -> None:
         spelling = self._see(operation.action_type)
         name = self._shared.node.resolve(operation.action)
-        self._shared.worker.submit(partial(self._send_goal_now, name, operation, spelling))
+        self._goals.announce(operation)
+        try:
+            self._later(partial(self._send_goal_now, name, operation, spelling))
+        except UsageError as error:
+            self._fail_goal(operation, error)
 
     def _send_goal_now(self, name: str, operation: ops.SendActionGoal, spelling: Spelling) -> None:
         try:
             self._shared.gate.check("call", name)
             self._goals.send(name, operation, spelling)
         except RoszError as error:
-            result = {"op": "action_result", "id": operation.id, "action": operation.action}
-            self.send({**result, "values": str(error), "status": 0, "result": False})
-            self._status("error", f"send_action_goal: {error}", operation.id)
+            self._fail_goal(operation, error)
+
+    def _fail_goal(self, operation: ops.SendActionGoal, error: RoszError) -> None:
+        self._goals.forget(operation)
+        result = {"op": "action_result", "id": operation.id, "action": operation.action}
+        self.send({**result, "values": str(error), "status": 0, "result": False})
+        self._status("error", f"send_action_goal: {error}", operation.id)
 
     def _cancel_goal(self, operation: ops.CancelActionGoal) -> None:
-        self._shared.worker.submit(partial(self._cancel_goal_now, operation))
+        self._later(partial(self._cancel_goal_now, operation))
 
     def _cancel_goal_now(self, operation: ops.CancelActionGoal) -> None:
         try:

@@ -41,12 +41,13 @@ __all__ = (
     "Unsubscribe",
     "fragments",
     "png",
-    "read",
     "read_text",
 )
 
 Compression: TypeAlias = Literal["none", "png", "cbor", "cbor-raw"]
 _FRAGMENT_SECONDS = 600.0
+_PART_SIZE = 200
+"""Bytes that a part takes beside its text."""
 _HEAD = 100
 """Characters of a text that an error shows."""
 
@@ -258,15 +259,16 @@ class Fragments:
     """Operations that a client sends in parts.
 
     Args:
-        limit: Largest number of characters that wait for their rest.
+        limit: Largest number of characters that wait for their rest; each part counts as some more.
     """
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
+        self._size = 0
         self._waiting: dict[str | int, tuple[float, dict[int, str]]] = {}
 
-    def add(self, part: Fragment) -> Operation | None:
-        """Return the operation of which a part is the last one; None if others are missing.
+    def add(self, part: Fragment) -> str | None:
+        """Return the text of which a part is the last one; None if others are missing.
 
         Raises:
             UsageError: The part does not fit, or there are too many that wait.
@@ -275,31 +277,30 @@ class Fragments:
             raise UsageError(
                 f"fragment: expected an id and num below total, got num {part.num} of {part.total}"
             )
-        now = time.monotonic()
-        for old in [
-            key for key, (began, _) in self._waiting.items() if now - began > _FRAGMENT_SECONDS
-        ]:
-            del self._waiting[old]
-        _, parts = self._waiting.setdefault(part.id, (now, {}))
+        self._expire(time.monotonic() - _FRAGMENT_SECONDS)
+        _, parts = self._waiting.setdefault(part.id, (time.monotonic(), {}))
+        self._size += len(part.data) - len(parts.get(part.num, ""))
+        self._size += 0 if part.num in parts else _PART_SIZE
         parts[part.num] = part.data
         if len(parts) == part.total:
-            del self._waiting[part.id]
-            return read("".join(parts[number] for number in range(part.total)), self)
-        size = sum(len(one) for _, parts in self._waiting.values() for one in parts.values())
-        if size > self._limit:
+            self._forget(part.id)
+            return "".join(parts[number] for number in range(part.total))
+        if self._size > self._limit:
             self._waiting.clear()
+            self._size = 0
             raise UsageError(f"fragment: more than {self._limit} characters wait for their rest")
         return None
 
+    def _expire(self, oldest: float) -> None:
+        while self._waiting:
+            first = next(iter(self._waiting))
+            if self._waiting[first][0] > oldest:
+                return
+            self._forget(first)
 
-def read(text: str | bytes, waiting: Fragments) -> Operation | None:
-    """Return the operation in a text, or of which the text brings the last part; else None.
-
-    Raises:
-        UsageError: The text is not an operation.
-    """
-    operation = read_text(text)
-    return waiting.add(operation) if isinstance(operation, Fragment) else operation
+    def _forget(self, key: str | int) -> None:
+        _, parts = self._waiting.pop(key)
+        self._size -= sum(len(data) + _PART_SIZE for data in parts.values())
 
 
 def fragments(text: bytes, size: float | None, number: int) -> Iterator[bytes]:

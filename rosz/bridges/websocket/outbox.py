@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
+import weakref
 from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeAlias
@@ -17,24 +18,59 @@ import msgspec
 from rosz.bridges.websocket.operations import Compression
 from rosz.bridges.websocket.plain import Spelling, converter
 
-__all__ = ("Feed", "Form", "Message", "Outbox")
+__all__ = ("Encodings", "Feed", "Form", "Message", "Outbox")
 
 Form: TypeAlias = tuple[Compression, Spelling]
 """Encoding of a message, and the spelling of its fields."""
 
 
-class Message:
-    """A message of a topic, as the network brought it; encoded at most once in each form.
+class Encodings:
+    """The encodings of messages that other clients may need too: the newest ones.
 
     Args:
+        limit: Largest number of their bytes.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._size = 0
+        self._lock = threading.Lock()
+        self._known: deque[tuple[weakref.ref[Message], Form, int]] = deque()
+
+    def keep(self, message: Message, form: Form, size: int) -> None:
+        """Note that a message keeps an encoding; the oldest ones are dropped if there are too many.
+
+        Args:
+            message: The message.
+            form: The form.
+            size: Number of bytes.
+        """
+        with self._lock:
+            self._known.append((weakref.ref(message), form, size))
+            self._size += size
+            while self._size > self._limit and len(self._known) > 1:
+                reference, old, freed = self._known.popleft()
+                self._size -= freed
+                if (known := reference()) is not None:
+                    known.drop(old)
+
+
+class Message:
+    """A message of a topic, as the network brought it; it keeps its encodings.
+
+    Args:
+        encodings: Encodings of all messages.
         topic: Name of the topic.
         cls: Class of the message.
         data: Its CDR.
         received: When it came, by the clock of the node, in nanoseconds.
     """
 
-    def __init__(self, topic: str, cls: type[Any], data: bytes, received: int) -> None:
+    def __init__(
+        self, encodings: Encodings, topic: str, cls: type[Any], data: bytes, received: int
+    ) -> None:
         self.size: int = len(data)
+        self._encodings = encodings
         self._topic = topic
         self._cls = cls
         self._data = data
@@ -52,9 +88,15 @@ class Message:
         """
         with self._lock:
             encoded = self._encoded.get(form)
-            if encoded is None:
-                encoded = self._encoded[form] = self._encode(*form)
-            return encoded
+            if encoded is not None:
+                return encoded
+            encoded = self._encoded[form] = self._encode(*form)
+        self._encodings.keep(self, form, len(encoded))
+        return encoded
+
+    def drop(self, form: Form) -> None:
+        """Drop an encoding; it is made again if it is needed."""
+        self._encoded.pop(form, None)
 
     def _encode(self, compression: Compression, spelling: Spelling) -> bytes:
         if compression == "cbor-raw":

@@ -18,7 +18,7 @@ from rosz.bridges.admission import Admission
 from rosz.bridges.gate import Gate
 from rosz.bridges.websocket.connection import Connection, Shared
 from rosz.bridges.websocket.operations import fragments, png
-from rosz.bridges.websocket.outbox import Message, Outbox
+from rosz.bridges.websocket.outbox import Encodings, Message, Outbox
 from rosz.bridges.websocket.plain import Spelling
 from rosz.bridges.websocket.rosapi import RosApi
 from rosz.bridges.websocket.topics import Topics
@@ -44,6 +44,7 @@ _HANDLERS = 16
 _ENCODED_HERE = 16384
 """Bytes of a message that the thread of the server encodes itself."""
 _POLICY = 1008
+_LATE = "the password is missing"  # what a client is told
 _START_SECONDS = 10.0
 
 
@@ -53,12 +54,18 @@ class Limits(msgspec.Struct, frozen=True):
     Attributes:
         clients: Largest number of clients.
         waiting: Bytes that wait for a client; the oldest messages give way to newer ones.
+        encoded: Bytes of encodings that are kept since several clients need them.
         operation: Largest size of an operation that a client sends, in bytes.
+        password: Largest size of the first operation of a client that has no password yet.
+        password_seconds: Time that such a client has, in seconds.
     """
 
     clients: int = 500
     waiting: int = 16 << 20
+    encoded: int = 64 << 20
     operation: int = 64 << 20
+    password: int = 4096
+    password_seconds: float = 10.0
 
 
 class WebsocketBridge:
@@ -101,12 +108,13 @@ class WebsocketBridge:
         self._calls = self._lifecycle.keep(
             Worker[Callable[[], object]]("rosz-calls", threads=_CALLS)
         )
+        topics = Topics(node, Encodings(limits.encoded))
         self._shared = Shared(
-            node, gate, Topics(node), RosApi(node), self._calls, spelling, admission.password
+            node, gate, topics, RosApi(node), self._calls, spelling, admission.password
         )
         self._handlers = ThreadPoolExecutor(_HANDLERS, "rosz-websocket")
         self._loop = asyncio.new_event_loop()
-        self._clients: set[ServerConnection] = set()
+        self._clients: dict[ServerConnection, asyncio.Future[None]] = {}
         self._republishing = threading.Lock()
         self._republisher: Republisher | None = None
         self._server: Server
@@ -135,7 +143,6 @@ class WebsocketBridge:
                 port,
                 ssl=tls,
                 process_request=self._admit,
-                max_size=self._limits.operation,
                 compression=None,  # it costs more than the links that this is for
                 server_header=None,
                 logger=_quiet,
@@ -153,15 +160,20 @@ class WebsocketBridge:
         if not reason and len(self._clients) >= self._limits.clients:
             reason = f"there are {len(self._clients)} clients, which is the limit"
             status = http.HTTPStatus.SERVICE_UNAVAILABLE
-        if not reason:
-            return None
-        self._log.warning("a client at %s is refused: %s", _place(connection), reason)
-        return connection.respond(status, f"{reason}\n")
+        if reason:
+            self._log.warning("a client at %s is refused: %s", _place(connection), reason)
+            return connection.respond(status, f"{reason}\n")
+        limits = self._limits
+        known = self._admission.is_known(request)
+        connection.protocol.max_message_size = limits.operation if known else limits.password
+        # It counts from here on, since others may come before its first operation.
+        self._clients[connection] = end = asyncio.ensure_future(connection.wait_closed())
+        end.add_done_callback(lambda _: self._clients.pop(connection))
+        return None
 
     async def _serve(self, websocket: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        self._clients.add(websocket)
         loop, wanted = self._loop, asyncio.Event()
 
         def wake() -> None:
@@ -185,15 +197,23 @@ class WebsocketBridge:
             trusted=trusted,
             limit=self._limits.operation,
         )
+
+        def check_trust() -> None:
+            if not connection.trusted:
+                refuse(_LATE)
+
         sender = asyncio.ensure_future(self._send(websocket, outbox, wanted))
+        late = loop.call_later(self._limits.password_seconds, check_trust)
         try:
             async for text in websocket:
                 await loop.run_in_executor(self._handlers, connection.handle, text)
+                if connection.trusted:
+                    websocket.protocol.max_message_size = self._limits.operation
         except (ConnectionClosed, RuntimeError):  # the executor has been shut down
             pass
         finally:
             sender.cancel()
-            self._clients.discard(websocket)
+            late.cancel()
             with suppress(RuntimeError):
                 await loop.run_in_executor(self._handlers, connection.close)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rosz.bridges.websocket.outbox import Feed, Message
+from rosz.bridges.websocket.outbox import Encodings, Feed, Message
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
 from rosz.names import short_type
 from rosz.node import MessageInfo
@@ -28,10 +28,12 @@ class Topics:
 
     Args:
         node: Node that has them.
+        encodings: Encodings of their messages.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, encodings: Encodings) -> None:
         self._node = node
+        self._encodings = encodings
         self._lock = threading.RLock()
         self._sources: dict[tuple[str, str], _Source] = {}
         self._outlets: dict[tuple[str, str, bool], _Outlet] = {}
@@ -85,7 +87,7 @@ class Topics:
         with self._lock:
             source = self._sources.get(key)
             if source is None:
-                source = self._sources[key] = _Source(self._node, topic, cls)
+                source = self._sources[key] = _Source(self._node, self._encodings, topic, cls)
             source.add(feed, offer)
 
     def unsubscribe(self, feed: Feed) -> None:
@@ -137,8 +139,9 @@ class _Outlet:
 class _Source:
     """A subscription, and the feeds that get its messages."""
 
-    def __init__(self, node: Node, topic: str, cls: type[Any] | None) -> None:
+    def __init__(self, node: Node, encodings: Encodings, topic: str, cls: type[Any] | None) -> None:
         self._node = node
+        self._encodings = encodings
         self._topic = topic
         self._cls = cls
         self._classes: dict[tuple[str, str], type[Any] | None] = {}
@@ -172,7 +175,7 @@ class _Source:
         cls = self._cls or self._class_of(info.type_name, info.type_hash)
         if cls is None:
             return
-        message = Message(self._topic, cls, bytes(data), self._node.now())
+        message = Message(self._encodings, self._topic, cls, bytes(data), self._node.now())
         with self._lock:
             if self._is_latching(info.gid):
                 self._kept[info.gid] = message

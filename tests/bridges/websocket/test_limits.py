@@ -1,0 +1,187 @@
+"""Clients that take too much: they are refused in words, and others go on."""
+
+from __future__ import annotations
+
+import gc
+import json
+import socket
+import threading
+from collections.abc import Iterator
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from network import TIMEOUT, Network, eventually
+from websockets.exceptions import ConnectionClosed
+
+from rosz.bridges.admission import Admission
+from rosz.bridges.websocket import Limits
+from rosz.bridges.websocket.operations import Fragment, Fragments
+from rosz.bridges.websocket.outbox import Encodings, Feed, Message, Outbox
+from rosz.errors import UsageError
+from rosz.msgs.sensor_msgs.msg import Image
+from rosz.msgs.std_srvs.srv import Empty
+
+from .bridge import Bridge, bridge_on
+
+system = pytest.mark.system
+
+HANDSHAKE = (
+    b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+)
+"""Request of a client."""
+
+
+@pytest.fixture
+def bridge(network: Network) -> Iterator[Bridge]:
+    with bridge_on(network) as made:
+        yield made
+
+
+def response(client: socket.socket) -> bytes:
+    """Return the status of the answer to a handshake."""
+    client.settimeout(TIMEOUT)
+    return client.makefile("rb").readline().split()[1]
+
+
+@system
+def test_all_come_at_once(network: Network) -> None:
+    with bridge_on(network, limits=Limits(clients=20)) as bridge, bridge.client() as first:
+        clients = [socket.create_connection(("127.0.0.1", bridge.server.port)) for _ in range(60)]
+        for client in clients:
+            client.sendall(HANDSHAKE)
+        answers = [response(client) for client in clients]
+        assert (answers.count(b"101"), answers.count(b"503")) == (19, 41)
+        first.sync()
+        for client in clients:
+            client.close()
+        eventually(lambda: bridge.server.clients == 1, "the end of the others")
+        with bridge.client() as late:
+            late.sync()
+
+
+@system
+@pytest.mark.parametrize(
+    "data",
+    [b"\x00" * 5000, b"GET / HTTP/1.1\r\n\r\n", b"\x16\x03\x01\x02\x00\x01", b"x" * 200_000],
+    ids=["zeros", "no upgrade", "TLS", "one long line"],
+)
+def test_no_websocket(bridge: Bridge, data: bytes) -> None:
+    with bridge.client() as other:
+        with socket.create_connection(("127.0.0.1", bridge.server.port)) as garbage:
+            garbage.settimeout(TIMEOUT)
+            try:
+                garbage.sendall(data)
+                garbage.shutdown(socket.SHUT_WR)
+                while garbage.recv(4096):
+                    pass
+            except ConnectionError:
+                pass
+        other.sync()
+
+
+@system
+def test_an_enormous_frame(bridge: Bridge) -> None:
+    with bridge.client() as other, bridge.client() as client:
+        announced = b"\x82\xff" + (1 << 30).to_bytes(8, "big") + bytes(4)
+        client.connection.socket.sendall(announced)
+        with pytest.raises(ConnectionClosed, match="1009"):
+            client.receive()
+        other.sync()
+
+
+@system
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ({"op": "fragment", "id": "a", "data": "x", "num": 0, "total": 2}, "missing or wrong"),
+        ({"op": "subscribe", "topic": "/x"}, "missing or wrong"),
+        ({"op": "no such thing"}, "missing or wrong"),
+        ({"op": "auth", "mac": "x" * 5000}, "1009"),
+        (None, "the password is missing"),
+    ],
+)
+def test_clients_without_the_password(network: Network, text: Any, reason: str) -> None:
+    limits = Limits(password_seconds=0.1 if text is None else TIMEOUT)
+    options: Any = {"admission": Admission("secret"), "limits": limits}
+    with bridge_on(network, **options) as bridge, bridge.client("?token=secret") as trusted:
+        with bridge.client() as client:
+            if text is not None:
+                client.connection.send(json.dumps(text))
+            with pytest.raises(ConnectionClosed, match=reason):
+                client.receive()
+        trusted.send("advertise", topic="/" + "long" * 2000, type="std_msgs/String")
+        trusted.sync()
+
+
+@system
+def test_calls_that_do_not_end(network: Network) -> None:
+    called: SimpleQueue[Any] = SimpleQueue()
+    go_on = threading.Event()
+
+    def wait(_request: Any) -> Any:
+        called.put(None)
+        go_on.wait(TIMEOUT)
+        return Empty.Response()
+
+    network.node("other").service("wait", Empty, wait)
+    with bridge_on(network, limits=Limits(operation=3000)) as bridge, bridge.client() as client:
+        bridge.wait_for_service("/wait")
+        for number in range(3):
+            client.send("call_service", service="/wait", id=number)
+        refused = client.receive_op("service_response")
+        assert (refused["id"], refused["result"]) == (2, False)
+        assert refused["values"].endswith("have not ended; wait for answers")
+        go_on.set()
+        assert {client.receive_op("service_response")["id"] for _ in range(2)} == {0, 1}
+        client.sync()
+
+
+def test_parts_are_bounded() -> None:
+    parts = Fragments(1000)
+    for number in range(3):
+        assert parts.add(Fragment(id="a", data="", num=number, total=1 << 30)) is None
+    assert parts.add(Fragment(id="a", data="x", num=0, total=1 << 30)) is None
+    assert parts.add(Fragment(id="b", data="y", num=1, total=2)) is None
+    with pytest.raises(UsageError, match="more than 1000 characters wait"):
+        parts.add(Fragment(id="c", data="", num=0, total=2))
+    assert parts.add(Fragment(id="b", data="y", num=1, total=2)) is None
+    assert parts.add(Fragment(id="b", data="x", num=0, total=2)) == "xy"
+    for _ in range(100):
+        assert parts.add(Fragment(id="d", data="z" * 500, num=0, total=1)) == "z" * 500
+
+
+def image(encodings: Encodings, size: int) -> Message:
+    """Return a message of a size."""
+    return Message(encodings, "/image", Image, Image(data=bytes(size)).to_cdr(), 0)
+
+
+def test_encodings_are_bounded() -> None:
+    """A client that does not read keeps messages, and not what was made of them for others."""
+    encodings = Encodings(500_000)
+    outbox = Outbox(10_000_000, lambda: None, lambda: None)
+    feed = Feed(("none", "ros1"))
+    messages = [image(encodings, 100_000) for _ in range(50)]
+    for message in messages:
+        outbox.offer(feed, message)
+        message.encode(("none", "ros1"))
+    kept = [one for message in messages for one in message._encoded.values()]
+    assert 100_000 < sum(map(len, kept)) <= 500_000
+    assert messages[-1].encode(("none", "ros1")) is messages[-1].encode(("none", "ros1"))
+    assert messages[0].encode(("none", "ros1")) == messages[-1].encode(("none", "ros1"))
+
+
+def test_what_waits_is_bounded() -> None:
+    waiting = []
+    outbox = Outbox(1_000_000, lambda: None, lambda: waiting.append("too many answers"))
+    feeds = [Feed(("none", "ros1")) for _ in range(3)]
+    encodings = Encodings(0)
+    for number in range(300):
+        outbox.offer(feeds[number % 3], image(encodings, 50_000))
+    gc.collect()
+    messages = [one for one in gc.get_objects() if isinstance(one, Message)]
+    assert sum(one.size for one in messages if one._encodings is encodings) < 1_100_000
+    for _ in range(300):
+        outbox.put(bytes(50_000))
+    assert waiting == ["too many answers"]
