@@ -39,29 +39,34 @@ def compile_transcoder(
     """
     if not _is_alike(cls):
         return plainly
-    return _compile(_ToCdr(), cls, plainly)
+    made: Callable[[_Data], bytes] = _compile(_ToCdr(), cls, plainly)
+    return made
 
 
 def compile_from_cdr(
     cls: type[Message], plainly: Callable[[bytes, bytes], bytes]
-) -> Callable[[bytes, bytes], bytes]:
+) -> Callable[[bytes, bytes], list[_Data]]:
     """Return the function that makes ROS 1's layout of messages in CDR with its header.
 
     Its second argument is the sequence number for the headers, as four bytes. Text is not checked.
+    It returns the bytes in parts, most of which are views of its argument: an image is not copied.
 
     Args:
         cls: The class of the messages.
-        plainly: Function that does the same; it is called for bytes that do not fit the type or
-            are big-endian, and is returned for types that are not the same fields in both layouts.
+        plainly: Function that does the same in one part; it is called for bytes that do not fit
+            the type or are big-endian, and for types that are not the same fields in both layouts.
     """
+
+    def whole(data: bytes, seq: bytes) -> list[_Data]:
+        return [plainly(data, seq)]
+
     if not _is_alike(cls):
-        return plainly
-    return _compile(_FromCdr(), cls, plainly)
+        return whole
+    made: Callable[[bytes, bytes], list[_Data]] = _compile(_FromCdr(), cls, whole)
+    return made
 
 
-def _compile(
-    source: _Source, cls: type[Any], plainly: Callable[..., bytes]
-) -> Callable[..., bytes]:
+def _compile(source: _Source, cls: type[Any], plainly: Callable[..., Any]) -> Callable[..., Any]:
     source.message(cls)
     source.flush()
     space: dict[str, Any] = {
@@ -73,7 +78,7 @@ def _compile(
         "plainly": plainly,
     }
     exec(source.text(), space)  # noqa: S102  # the text is made of numbers and constant names
-    made: Callable[..., bytes] = space["code"]
+    made: Callable[..., Any] = space["code"]
     return made
 
 
@@ -255,7 +260,7 @@ class _FromCdr(_Source):
                 "        if p > len(data): raise ValueError",
                 "    except (error, ValueError, IndexError):",
                 "        return plainly(whole, seq)",
-                '    return b"".join(out)',
+                "    return out",
             ]
         )
 

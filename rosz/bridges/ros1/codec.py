@@ -38,8 +38,8 @@ class Codec(msgspec.Struct, frozen=True):
         definition: Full text of ROS 1's definition.
         cls: Class on the network.
         to_cdr: Function that makes CDR of ROS 1's bytes; raises DecodeError.
-        from_cdr: Function that makes ROS 1's bytes of CDR and a sequence number as four bytes;
-            raises DecodeError and EncodeError.
+        from_cdr: Function that makes ROS 1's bytes, in parts, of CDR and a sequence number as four
+            bytes; raises DecodeError and EncodeError.
         qos: Quality of service that publishers on the network have; None for the usual one.
     """
 
@@ -48,7 +48,7 @@ class Codec(msgspec.Struct, frozen=True):
     definition: str
     cls: type[Message]
     to_cdr: Callable[[Any], bytes]
-    from_cdr: Callable[[bytes, bytes], bytes]
+    from_cdr: Callable[[bytes, bytes], list[Any]]
     qos: QoS | None = None
 
     def fits(self, md5sum: str) -> bool:
@@ -113,7 +113,7 @@ class Codecs:
         made = self._made.get((ros1, network))
         if made is None:
             to_cdr: Callable[[Any], bytes]
-            from_cdr: Callable[[bytes, bytes], bytes]
+            from_cdr: Callable[[bytes, bytes], list[Any]]
             if ros1 is network:
                 to_cdr = compile_transcoder(ros1, lambda data: _to_cdr(ros1, data))
                 from_cdr = compile_from_cdr(ros1, lambda data, seq: _from_cdr(ros1, data, seq))
@@ -139,7 +139,7 @@ def _from_cdr(cls: type[Message], data: bytes, seq: bytes) -> bytes:
 
 def _log_codecs(
     ros1: type[Any], network: type[Any]
-) -> tuple[Callable[[Any], bytes], Callable[[bytes, bytes], bytes]]:
+) -> tuple[Callable[[Any], bytes], Callable[[bytes, bytes], list[Any]]]:
     """Return the codecs between ROS 1's and ROS 2's messages of ``/rosout``."""
     to_network = {old: new for new, old in _LEVELS}
 
@@ -156,7 +156,7 @@ def _log_codecs(
         ).to_cdr()
         return made
 
-    def from_cdr(data: bytes, seq: bytes) -> bytes:
+    def from_cdr(data: bytes, seq: bytes) -> list[Any]:
         log = network.from_cdr(data)
         message = ros1()
         message.header.seq = int.from_bytes(seq, "little")
@@ -166,7 +166,6 @@ def _log_codecs(
         message.name = log.name if log.name.startswith("/") else f"/{log.name.replace('.', '/')}"
         message.msg, message.file = log.msg, log.file
         message.function, message.line = log.function, log.line
-        encoded: bytes = message.to_ros1()
-        return encoded
+        return [message.to_ros1()]
 
     return to_cdr, from_cdr

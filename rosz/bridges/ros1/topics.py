@@ -40,6 +40,8 @@ _FIRST_RETRY = 0.1
 _LAST_RETRY = 2.0
 _QUEUE = 10
 _PIECE = 1 << 10
+_MANY_PARTS = 32
+"""Parts of a message that are not worth a copy; a socket takes 1024 at once."""
 
 
 class Connection(msgspec.Struct, frozen=True):
@@ -532,7 +534,7 @@ class _Link:
             return  # from ROS 1, which delivers it itself, or over another bridge
         sequence = (number & 0xFFFFFFFF).to_bytes(4, "little")
         try:
-            data = self._codec.from_cdr(payload, sequence)
+            parts = self._codec.from_cdr(payload, sequence)
         except MessageError as error:
             if not self._reported:
                 self._reported = True
@@ -540,7 +542,9 @@ class _Link:
                     "dropping a message for node '%s' (told once): %.300s", self._node.name, error
                 )
             return
-        self.stream.send((_LENGTH.pack(len(data)), data))
+        if len(parts) > _MANY_PARTS:
+            parts = [b"".join(parts)]
+        self.stream.send([_LENGTH.pack(sum(map(len, parts))), *parts])
         self.sent += 1
 
     # What the stream calls, on the thread of the loop.
