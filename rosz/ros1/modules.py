@@ -230,6 +230,15 @@ SUBMODULES: Mapping[str, Mapping[str, str]] = {
         "ros1.tf.frames": "ConnectivityException Exception ExtrapolationException LookupException"
         " TransformListener Transformer TransformerROS"
     },
+    "tf2_geometry_msgs.tf2_geometry_msgs": {
+        "ros1.tf2_geometry_msgs": "do_transform_point do_transform_pose do_transform_vector3"
+        " do_transform_wrench from_msg_msg to_msg_msg transform_to_kdl"
+    },
+    "tf2_kdl.tf2_kdl": {
+        "ros1.tf2_kdl": "convert_vector do_transform_frame do_transform_twist do_transform_vector"
+        " do_transform_wrench from_msg_vector to_msg_vector transform_to_kdl"
+    },
+    "tf2_sensor_msgs.tf2_sensor_msgs": {"ros1.tf2_sensor_msgs": "do_transform_cloud"},
     # ROS 1 connects the two types of /tf, which are equal but for their names.
     "tf.msg": {"msgs.tf2_msgs.msg": "tfMessage=TFMessage"},
 }

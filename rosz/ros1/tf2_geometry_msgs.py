@@ -5,20 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rosz.msgs.geometry_msgs.msg import (
-    Point,
-    PointStamped,
-    Pose,
-    PoseStamped,
-    Quaternion,
-    Vector3,
-    Vector3Stamped,
-    Wrench,
-    WrenchStamped,
-)
+from rosz.msgs.geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped, WrenchStamped
 from rosz.ros1.PyKDL import Frame, Rotation, Vector
-from rosz.transforms import Pose as Plain
-from rosz.transforms import compose, pose_of, rotate
+from rosz.transforms import (
+    pose_of,
+    transform_point,
+    transform_pose,
+    transform_vector,
+    transform_wrench,
+)
 
 __all__ = (
     "TRANSFORMATIONS",
@@ -50,35 +45,22 @@ def transform_to_kdl(t: Any) -> Frame:
 
 def do_transform_point(point: PointStamped, transform: Any) -> PointStamped:
     """Transform a point by a TransformStamped."""
-    p = point.point
-    moved = compose(pose_of(transform.transform), Plain((p.x, p.y, p.z), (0.0, 0.0, 0.0, 1.0)))
-    return PointStamped(transform.header, Point(*moved.translation))
+    return transform_point(point, pose_of(transform.transform), transform.header)
 
 
 def do_transform_pose(pose: PoseStamped, transform: Any) -> PoseStamped:
     """Transform a pose by a TransformStamped."""
-    p, q = pose.pose.position, pose.pose.orientation
-    moved = compose(pose_of(transform.transform), Plain((p.x, p.y, p.z), (q.x, q.y, q.z, q.w)))
-    return PoseStamped(
-        transform.header, Pose(Point(*moved.translation), Quaternion(*moved.rotation))
-    )
+    return transform_pose(pose, pose_of(transform.transform), transform.header)
 
 
 def do_transform_vector3(vector3: Vector3Stamped, transform: Any) -> Vector3Stamped:
     """Rotate a vector by a TransformStamped."""
-    return Vector3Stamped(transform.header, _rotate(vector3.vector, transform))
+    return transform_vector(vector3, pose_of(transform.transform), transform.header)
 
 
 def do_transform_wrench(wrench: WrenchStamped, transform: Any) -> WrenchStamped:
     """Rotate a wrench by a TransformStamped."""
-    parts = wrench.wrench
-    rotated = Wrench(_rotate(parts.force, transform), _rotate(parts.torque, transform))
-    return WrenchStamped(transform.header, rotated)
-
-
-def _rotate(vector: Vector3, transform: Any) -> Vector3:
-    rotation = pose_of(transform.transform).rotation
-    return Vector3(*rotate(rotation, (vector.x, vector.y, vector.z)))
+    return transform_wrench(wrench, pose_of(transform.transform), transform.header)
 
 
 TRANSFORMATIONS: dict[type[Any], Callable[..., Any]] = {

@@ -1,11 +1,20 @@
 """Transforms between coordinate frames, from ``/tf`` and ``/tf_static`` (REP 105).
 
-`poses` is the arithmetic and `buffer` the tree of frames over time; both are pure. `topics`
-connects them to a node, and `monitor` keeps account of what arrives. May import nodes and
+`poses` is the arithmetic and `buffer` the tree of frames over time; both are pure. `conversions`
+gives messages in other frames, `topics` connects a tree to a node, and `monitor` keeps account of
+what arrives. May import nodes and
 everything below them.
 """
 
 from rosz.transforms.buffer import Buffer
+from rosz.transforms.conversions import (
+    transform_cloud,
+    transform_message,
+    transform_point,
+    transform_pose,
+    transform_vector,
+    transform_wrench,
+)
 from rosz.transforms.monitor import (
     BroadcasterReport,
     FrameReport,
@@ -49,6 +58,12 @@ __all__ = (
     "pose_of",
     "rotate",
     "to_rpy",
+    "transform_cloud",
+    "transform_message",
+    "transform_point",
+    "transform_pose",
+    "transform_vector",
+    "transform_wrench",
     "tree_as_dot",
     "tree_as_text",
 )

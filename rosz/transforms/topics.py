@@ -9,10 +9,14 @@ from typing import Any, Protocol
 
 from rosz.errors import TransformArgument
 from rosz.graph import View
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import MessageInfo, Node
 from rosz.qos import QoS
+from rosz.session import clamp_timeout
 from rosz.transforms.buffer import Buffer
+from rosz.transforms.conversions import transform_message
 from rosz.transforms.poses import Pose
 from rosz.wire import format_token, gid
 
@@ -123,6 +127,55 @@ class TransformListener:
                 self._node.log.warning("%s", error, throttle_identical=10.0)
         if self._observe is not None:
             self._observe(message.transforms, info.gid, static=static)
+
+    def lookup(
+        self, target: str, source: str, stamp: int = 0, *, timeout: float = 0.0
+    ) -> tuple[Pose, int]:
+        """Return the transform from one frame to another, and its time; see `Buffer.lookup`.
+
+        Args:
+            target: Frame to transform coordinates to.
+            source: Frame of the coordinates.
+            stamp: Time in nanoseconds; 0 for the latest time at which all transforms are known.
+            timeout: Longest time to wait for the transform, in seconds of the node's clock.
+
+        Raises:
+            TransformError: The transform is not known.
+            UsageError: The timeout is not a number.
+        """
+        if timeout:
+            self.can_transform(target, source, stamp, timeout=timeout)
+        return self.buffer.lookup(target, source, stamp)
+
+    def can_transform(
+        self, target: str, source: str, stamp: int = 0, *, timeout: float = 0.0
+    ) -> bool:
+        """Return whether a transform is known; the arguments are those of `lookup`."""
+        limit = round(clamp_timeout(timeout) * 1e9)
+
+        def known() -> bool:
+            return not self.buffer.why_not(target, source, stamp)
+
+        return self.buffer.wait(known, limit, self._node.clock) if limit else known()
+
+    def transform(self, message: Any, target: str, *, timeout: float = 0.0) -> Any:
+        """Return a stamped message in another frame; see `transform_message`.
+
+        Args:
+            message: A ``PointStamped``, ``PoseStamped``, ``Vector3Stamped``, ``WrenchStamped`` or
+                ``PointCloud2``.
+            target: Frame to transform it to.
+            timeout: Longest time to wait for the transform, in seconds of the node's clock.
+
+        Raises:
+            TransformError: The transform is not known.
+            UsageError: Messages of that type cannot be transformed.
+        """
+        header = message.header
+        stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
+        pose, found = self.lookup(target, header.frame_id, stamp, timeout=timeout)
+        moved = Header(stamp=Time.from_nsec(found), frame_id=target)
+        return transform_message(message, pose, moved)
 
     def node_of(self, publisher: bytes) -> str:
         """Return the full name of the node of a publisher; empty if it is not known.

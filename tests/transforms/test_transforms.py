@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import threading
 from queue import SimpleQueue
+from typing import Any
 
 import pytest
 from network import TIMEOUT, Network, eventually
@@ -16,13 +17,28 @@ from rosz.errors import (
     FramesNotConnected,
     TransformArgument,
     TransformError,
+    UsageError,
 )
 from rosz.graph import View
-from rosz.msgs.geometry_msgs.msg import TransformStamped
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.geometry_msgs import msg as geometry
+from rosz.msgs.geometry_msgs.msg import (
+    Point,
+    PointStamped,
+    PoseStamped,
+    Quaternion,
+    TransformStamped,
+    Vector3,
+    Vector3Stamped,
+    Wrench,
+    WrenchStamped,
+)
 from rosz.msgs.rosgraph_msgs.msg import Clock as ClockMessage
+from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import Clock
 from rosz.qos import CLOCK
+from rosz.ros1.point_cloud2 import create_cloud_xyz32, read_points
 from rosz.transforms import (
     IDENTITY,
     Buffer,
@@ -33,6 +49,7 @@ from rosz.transforms import (
     TransformListener,
     compose,
     invert,
+    transform_message,
 )
 
 S = 10**9
@@ -229,12 +246,47 @@ def test_over_the_network(network: Network) -> None:
     moving = TransformBroadcaster(robot)
     moving._publisher.wait_for_subscribers()
     moving.send(transform("map", "base", 2.0))
-    assert buffer.wait(lambda: not buffer.why_not("map", "laser"), 15 * S, viewer.clock)
+    assert listener.can_transform("map", "laser", timeout=TIMEOUT)
     assert buffer.wait(lambda: buffer.has("arm"), 15 * S, viewer.clock)
-    pose, stamp = buffer.lookup("map", "laser")
+    pose, stamp = listener.lookup("map", "laser")
     assert (pose.translation[0], stamp) == (2.5, S)
+    assert not listener.can_transform("map", "nothing")
+    assert not listener.can_transform("map", "nothing", timeout=0.01)
+    with pytest.raises(FrameNotFound):
+        listener.lookup("map", "nothing", timeout=0.01)
     assert not buffer.wait(lambda: False, S // 100, viewer.clock)
     listener.close()
+
+
+def test_messages_in_other_frames(network: Network) -> None:
+    node = network.node("viewer")
+    listener = TransformListener(Buffer(), node)
+    turned = Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.5**0.5, 0.5**0.5))  # a quarter turn to the left
+    listener.buffer.set("map", "base", 0, turned, static=True)
+    header = Header(stamp=Time.from_nsec(S), frame_id="base")
+    moved = listener.transform(PointStamped(header, Point(1.0, 0.0, 0.5)), "map", timeout=1.0)
+    assert moved.header == Header(stamp=Time.from_nsec(S), frame_id="map")
+    assert _numbers(moved.point) == [1.0, 3.0, 3.5]
+    at = geometry.Pose(Point(0.0, 1.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+    moved = listener.transform(PoseStamped(header, at), "map")
+    assert _numbers(moved.pose.position) == [0.0, 2.0, 3.0]
+    assert _numbers(moved.pose.orientation) == [0.0, 0.0, 0.707107, 0.707107]
+    vector = Vector3(1.0, 0.0, 2.0)
+    moved = listener.transform(Vector3Stamped(header, vector), "map")
+    assert _numbers(moved.vector) == [0.0, 1.0, 2.0]
+    moved = listener.transform(WrenchStamped(header, Wrench(vector, Vector3(0.0, 1.0, 0.0))), "map")
+    assert _numbers(moved.wrench.force) == [0.0, 1.0, 2.0]
+    assert _numbers(moved.wrench.torque) == [-1.0, 0.0, 0.0]
+    cloud = create_cloud_xyz32(header, [(1.0, 0.0, 0.5)])
+    assert list(read_points(listener.transform(cloud, "map"))) == [(1.0, 3.0, 3.5)]
+    with pytest.raises(UsageError, match="cannot transform a Header; expected one of PointCloud2"):
+        transform_message(header, turned, header)
+    with pytest.raises(TransformError):
+        listener.transform(cloud, "nowhere", timeout=0.01)
+
+
+def _numbers(message: Any) -> list[float]:
+    return [round(getattr(message, name), 6) + 0.0 for name in message.__struct_fields__]
 
 
 def test_static_transforms_are_copied(network: Network) -> None:
