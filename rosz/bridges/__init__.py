@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-PUBLIC_MODULES = ("gate",)
+PUBLIC_MODULES = ("admission", "gate")
 
 __all__ = ()

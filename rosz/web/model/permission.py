@@ -1,0 +1,56 @@
+"""What those who use the page may change."""
+
+from __future__ import annotations
+
+import msgspec
+
+from rosz.bridges.gate import Gate, Verb
+from rosz.errors import UsageError
+from rosz.security import Permit
+
+__all__ = ("Permission",)
+
+_CHANGES = frozenset({"publish", "call", "serve", "set"})
+
+
+class Permission(msgspec.Struct, frozen=True):
+    """What those who use the page may do.
+
+    Attributes:
+        permit: Permissions by the rules of the machine; None without rules.
+        read_only: Whether the page changes nothing.
+    """
+
+    permit: Permit | None = None
+    read_only: bool = False
+
+    def objection(self, verb: Verb, name: str) -> str:
+        """Return why the page may not do something; empty if it may.
+
+        Args:
+            verb: The action.
+            name: Full name of the topic, service or parameter.
+        """
+        if self.read_only and verb in _CHANGES:
+            return f"this page is read-only: it may not {verb} '{name}'"
+        return Gate(self.permit).objection(verb, name)
+
+    def check(self, verb: Verb, name: str) -> None:
+        """Refuse what the page may not do.
+
+        Raises:
+            UsageError: It may not; the text says why.
+        """
+        if objection := self.objection(verb, name):
+            raise UsageError(objection)
+
+    def check_control(self, node: str) -> None:
+        """Refuse to control a node, unless the page may.
+
+        Raises:
+            UsageError: It may not; the text says why.
+        """
+        if self.read_only:
+            raise UsageError(f"this page is read-only: it may not control '{node}'")
+        if self.permit is not None and not self.permit.control:
+            raise UsageError(f"the rules of this machine do not let this page control '{node}'")

@@ -1,0 +1,84 @@
+"""The system that the pages show: what they observe together, and what they change."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from rosz.introspect.survey import Survey
+from rosz.web.model.findings import Findings
+from rosz.web.model.permission import Permission
+from rosz.web.model.sharing import Shared
+from rosz.web.model.traffic import Traffic
+
+if TYPE_CHECKING:
+    from rosz.graph import View
+    from rosz.node import Node
+
+__all__ = ("GraphWatch", "System")
+
+
+class GraphWatch:
+    """All nodes and entities of the domain, followed until it is closed.
+
+    Args:
+        node: The node that follows them.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._domain = node.context.domain
+        self._followed = node.context.graph.follow_all()
+        self._known: tuple[View, Survey] | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether all is known that existed when it began."""
+        return self._followed.complete
+
+    def survey(self) -> Survey:
+        """Return what is known at this moment; the same object while nothing changes."""
+        view = self._followed.view()
+        known = self._known
+        if known is None or known[0] is not view:
+            processes = {(one.zid, one.node_id): one for one in view.processes()}
+            known = self._known = view, Survey(self._domain, view, processes)
+        return known[1]
+
+    def close(self) -> None:
+        """Follow them no longer."""
+        self._followed.close()
+
+
+class System:
+    """What the pages show and change.
+
+    Args:
+        node: Node of the page. It is not closed with the system.
+        permission: What the pages may change.
+
+    Attributes:
+        node: Node of the page.
+        permission: What the pages may change.
+        graph: All nodes and entities.
+        traffic: Rates and bandwidths of topics.
+        findings: Findings of the doctor.
+    """
+
+    def __init__(self, node: Node, permission: Permission) -> None:
+        self.node = node
+        self.permission = permission
+        self.graph: Shared[GraphWatch] = Shared(lambda: GraphWatch(node))
+        self.traffic: Shared[Traffic] = Shared(lambda: Traffic(node))
+        self.findings: Shared[Findings] = Shared(lambda: Findings(node.context.environment))
+        self.began: float = time.monotonic()
+        self._closing = threading.Event()
+
+    @property
+    def observed(self) -> int:
+        """Number of uses that pages have open."""
+        return self.graph.users + self.traffic.users + self.findings.users
+
+    def close(self) -> None:
+        """End what waits; a second call has no effect."""
+        self._closing.set()

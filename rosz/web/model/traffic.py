@@ -1,0 +1,138 @@
+"""Rates and bandwidths of topics, measured while a page shows them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from rosz.introspect.measure import BandwidthMeter
+from rosz.introspect.subscribe import subscribe_samples
+from rosz.names import is_of_action, short_type
+from rosz.wire import Kind
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+    from rosz.node import Entity, Node
+    from rosz.wire import Token
+
+__all__ = ("Flow", "Traffic")
+
+_HEAVY = frozenset(
+    {
+        "nav_msgs/OccupancyGrid",
+        "sensor_msgs/CompressedImage",
+        "sensor_msgs/Image",
+        "sensor_msgs/PointCloud",
+        "sensor_msgs/PointCloud2",
+        "stereo_msgs/DisparityImage",
+    }
+)
+"""Types that are measured only on request, since measuring a topic means to receive it."""
+
+
+class Flow(msgspec.Struct, frozen=True):
+    """What flows on a topic.
+
+    Attributes:
+        rate: Messages per second.
+        bandwidth: Bytes per second.
+        size: Mean size of a message in bytes.
+    """
+
+    rate: float
+    bandwidth: float
+    size: float
+
+
+class _Tap:
+    """The subscription of one topic, and its meter."""
+
+    def __init__(self, node: Node, token: Token) -> None:
+        self._meter = BandwidthMeter()
+        self._entity: Entity = subscribe_samples(
+            node,
+            token.name,
+            token.type_name,
+            token.type_hash,
+            lambda sample: self._meter.add(sample.size, time.monotonic_ns()),
+        )
+
+    def flow(self) -> Flow | None:
+        stats = self._meter.stats(time.monotonic_ns())
+        if stats is None:
+            return None
+        rate = stats.bytes_per_second / stats.mean if stats.mean else 0.0
+        return Flow(rate, stats.bytes_per_second, stats.mean)
+
+    def close(self) -> None:
+        self._entity.close()
+
+
+class Traffic:
+    """Measures topics until it is closed: those of small messages, and others on request.
+
+    Args:
+        node: The node that subscribes to them.
+
+    Attributes:
+        everything: Whether to measure topics of large messages, and those of other machines.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.everything: bool = False
+        self._node = node
+        self._lock = threading.Lock()
+        self._taps: dict[str, _Tap] = {}
+        self._seen: tuple[Survey, bool] | None = None
+
+    def update(self, survey: Survey) -> None:
+        """Measure the topics that there are now.
+
+        Raises:
+            ClosedError: The node is closed.
+        """
+        with self._lock:
+            if self._seen is not None and self._seen == (survey, self.everything):
+                return
+            self._seen = survey, self.everything
+            wanted = self._wanted(survey)
+            for name in self._taps.keys() - wanted:
+                self._taps.pop(name).close()
+            for name in wanted.keys() - self._taps:
+                self._taps[name] = _Tap(self._node, wanted[name])
+
+    def _wanted(self, survey: Survey) -> dict[str, Token]:
+        found: dict[str, Token] = {}
+        for token in survey.view.entities(Kind.PUBLISHER):
+            if token.zid == self._node.context.session.zid or is_of_action(token.name):
+                continue
+            if self.everything or self.is_light(survey, token):
+                found.setdefault(token.name, token)
+        return found
+
+    def is_light(self, survey: Survey, token: Token) -> bool:
+        """Return whether a publisher is of this machine, and not of a type of large messages."""
+        return (
+            short_type(token.type_name) not in _HEAVY
+            and survey.host(token) == self._node.process.host
+        )
+
+    def flow(self, topic: str) -> Flow | None:
+        """Return what flows on a topic; None if it is not measured, or too little has come."""
+        tap = self._taps.get(topic)
+        return None if tap is None else tap.flow()
+
+    def is_measured(self, topic: str) -> bool:
+        """Return whether a topic is measured."""
+        return topic in self._taps
+
+    def close(self) -> None:
+        """Measure nothing any more."""
+        with self._lock:
+            taps, self._taps = self._taps, {}
+            self._seen = None
+        for tap in taps.values():
+            tap.close()

@@ -1,0 +1,248 @@
+"""What all pages have: the header, the navigation, light and dark, and errors in words."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
+
+from nicegui import run, ui
+
+from rosz.errors import RoszError
+from rosz.lifecycle import Closable
+from rosz.web.model.sharing import Shared
+from rosz.web.model.system import System
+
+__all__ = ("ENTRIES", "Entry", "Frame", "bandwidth_text", "empty_state", "rate_text", "size_text")
+
+T = TypeVar("T", bound=Closable)
+R = TypeVar("R")
+
+_log = logging.getLogger("rosz.web")
+_THEME_COOKIE = "rosz-theme"
+_THEMES = {"auto": None, "light": False, "dark": True}
+_THEME_ICONS = {"auto": "brightness_auto", "light": "light_mode", "dark": "dark_mode"}
+_KILO = 1000.0
+
+
+class Entry(NamedTuple):
+    """One page in the navigation.
+
+    Args:
+        path: Path of its address.
+        title: Title.
+        icon: Name of its icon.
+    """
+
+    path: str
+    title: str
+    icon: str
+
+
+ENTRIES = (Entry("/", "Overview", "space_dashboard"),)
+
+_STYLE = """
+:root { --rosz-line: #d9dee7; --rosz-soft: #5b6577; --rosz-card: #ffffff; }
+body { background: #f4f6fa; }
+.nicegui-content { padding: 0; }
+body.body--dark { background: #12151c; --rosz-line: #2c3340; --rosz-soft: #9aa5b8;
+  --rosz-card: #1a1f29; }
+.rosz-card { background: var(--rosz-card); border: 1px solid var(--rosz-line);
+  border-radius: 10px; box-shadow: none; }
+.rosz-soft { color: var(--rosz-soft); }
+.rosz-mono { font-family: ui-monospace, 'DejaVu Sans Mono', monospace; font-size: .84rem; }
+.rosz-number { font-variant-numeric: tabular-nums; }
+.q-table th { color: var(--rosz-soft); font-weight: 600; }
+.rosz-nav.q-item { border-radius: 8px; margin: 2px 8px; min-height: 40px; }
+.rosz-nav.rosz-here { background: #2456c81c; color: #2456c8; font-weight: 600; }
+body.body--dark .rosz-nav.rosz-here { background: #6b9bff26; color: #9dbcff; }
+a { color: #2456c8; } body.body--dark a { color: #9dbcff; }
+:focus-visible { outline: 2px solid #6b9bff; outline-offset: 1px; }
+.q-table__card { background: transparent; box-shadow: none; }
+@media (max-width: 599px) { .rosz-wide { display: none !important; } }
+"""
+
+
+class Frame:
+    """One opened page: its header and navigation, and what it uses until it is closed.
+
+    Args:
+        system: The system that it shows.
+        title: Title of the page.
+        path: Path of its entry in the navigation.
+    """
+
+    def __init__(self, system: System, title: str, path: str) -> None:
+        self.system = system
+        self._uses: list[Closable] = []
+        self._client = ui.context.client
+        self._client.on_delete(self._close)
+        ui.page_title(f"{title} · rosz")
+        ui.colors(
+            primary="#2456c8",
+            secondary="#5b6577",
+            positive="#1f8a5b",
+            negative="#c8342b",
+            warning="#b7791f",
+            info="#2b7bb9",
+        )
+        ui.add_css(_STYLE)
+        self._add_header(title, path)
+        self.content = ui.column().classes("w-full max-w-7xl mx-auto px-3 sm:px-6 py-4 gap-4")
+        with self.content:
+            self._fault = (
+                ui.label().classes("rosz-card text-negative w-full p-3").props("role=alert")
+            )
+            self._fault.set_visibility(False)
+
+    def _add_header(self, title: str, path: str) -> None:
+        with (
+            ui.left_drawer(value=False, bordered=True)
+            .props("width=216 breakpoint=900 show-if-above")
+            .classes("p-0 pt-3") as drawer,
+            ui.element("nav").props('aria-label="Pages"'),
+        ):
+            for entry in ENTRIES:
+                with (
+                    ui.item()
+                    .props(f'href="{entry.path}" tag=a')
+                    .classes("rosz-nav w-auto" + " rosz-here" * (entry.path == path))
+                ):
+                    with ui.item_section().props("avatar").classes("min-w-0 pr-3"):
+                        ui.icon(entry.icon, size="20px")
+                    ui.item_section(entry.title)
+        with (
+            ui.header()
+            .classes("items-center gap-2 px-3 py-1")
+            .style("background: #16213a; min-height: 52px")
+        ):
+            ui.button(icon="menu", on_click=drawer.toggle).props(
+                'flat round dense color=white aria-label="Navigation"'
+            )
+            ui.label("rosz").classes("font-bold text-lg")
+            ui.label(title).classes("text-base opacity-80")
+            ui.space()
+            if self.system.permission.read_only:
+                ui.badge("read-only", color="warning")
+            ui.label(f"domain {self.system.node.context.domain}").classes(
+                "rosz-wide text-sm opacity-70"
+            )
+            self._add_theme_button()
+
+    def _add_theme_button(self) -> None:
+        cookies = self._client.request.cookies
+        theme = cookies.get(_THEME_COOKIE, "auto")
+        theme = theme if theme in _THEMES else "auto"
+        dark = ui.dark_mode(_THEMES[theme])
+
+        def change() -> None:
+            nonlocal theme
+            names = list(_THEMES)
+            theme = names[(names.index(theme) + 1) % len(names)]
+            dark.value = _THEMES[theme]
+            button.props(f"icon={_THEME_ICONS[theme]}")
+            tooltip.set_text(f"Colors: {theme}")
+            ui.run_javascript(
+                f"document.cookie = '{_THEME_COOKIE}={theme};path=/;max-age=31536000;SameSite=Lax'"
+            )
+
+        with ui.button(icon=_THEME_ICONS[theme], on_click=change).props(
+            'flat round dense color=white aria-label="Light or dark"'
+        ) as button:
+            tooltip = ui.tooltip(f"Colors: {theme}")
+
+    # What a page uses.
+
+    def use(self, shared: Shared[T]) -> T:
+        """Open something until the page is closed.
+
+        Raises:
+            RoszError: It cannot be opened.
+        """
+        use = shared.use()
+        self.keep(use)
+        return use.value
+
+    def keep(self, part: Closable) -> None:
+        """Close something with the page."""
+        if self._client.is_deleted:
+            part.close()
+        else:
+            self._uses.append(part)
+
+    def _close(self) -> None:
+        uses, self._uses = self._uses, []
+        for use in reversed(uses):
+            use.close()
+
+    def every(self, seconds: float, refresh: Callable[[], None]) -> None:
+        """Call a function now and after each period while the page is open; errors are shown."""
+
+        def guarded() -> None:
+            try:
+                refresh()
+            except RoszError as error:
+                self.show_fault(str(error))
+            else:
+                self.show_fault("")
+
+        guarded()
+        ui.timer(seconds, guarded, immediate=False)
+
+    def show_fault(self, text: str) -> None:
+        """Show a sentence at the top of the page; hide it if it is empty."""
+        if self._fault.text != text:
+            self._fault.set_text(text)
+        self._fault.set_visibility(bool(text))
+
+    async def attempt(self, action: Callable[[], R], done: str = "") -> R | None:
+        """Run something that may take long, and say how it went.
+
+        Args:
+            action: Function that is called on another thread.
+            done: What to say if it succeeds.
+
+        Returns:
+            What the function returns; None if it raises an error of rosz, which is shown.
+        """
+        try:
+            found = await run.io_bound(action)
+        except RoszError as error:
+            _log.debug("a page failed to act", exc_info=True)
+            ui.notify(
+                str(error), type="negative", multi_line=True, timeout=8000, close_button="Close"
+            )
+            return None
+        if done:
+            ui.notify(done, type="positive")
+        return found
+
+
+def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.column:
+    """Add a note that there is nothing, and what to start."""
+    with ui.column().classes("rosz-card w-full items-center text-center p-8 gap-2") as column:
+        ui.icon(icon, size="48px").classes("rosz-soft")
+        ui.label(title).classes("text-lg font-medium")
+        ui.label(text).classes("rosz-soft")
+        if command:
+            ui.label(command).classes("rosz-mono rosz-card px-3 py-1")
+    return column
+
+
+def rate_text(rate: float) -> str:
+    """Return a rate in hertz as text."""
+    return f"{rate:.0f} Hz" if rate >= 100 else f"{rate:.1f} Hz"  # noqa: PLR2004
+
+
+def bandwidth_text(value: float) -> str:
+    """Return bytes per second as text."""
+    return f"{size_text(value)}/s"
+
+
+def size_text(value: float) -> str:
+    """Return a number of bytes as text."""
+    for unit in ("B", "kB", "MB"):
+        if value < _KILO:
+            return f"{value:.0f} {unit}" if unit == "B" else f"{value:.1f} {unit}"
+        value /= _KILO
+    return f"{value:.1f} GB"

@@ -1,0 +1,161 @@
+"""The server of the page: uvicorn and NiceGUI, on a thread of their own.
+
+NiceGUI keeps its pages in the module, so that a process has one such server.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import ssl
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import uvicorn
+from fastapi import FastAPI
+from nicegui import ui
+
+from rosz.errors import TransportError
+from rosz.lifecycle import Lifecycle
+from rosz.web.guard import Guard
+from rosz.web.model.permission import Permission
+from rosz.web.model.system import System
+from rosz.web.pages import add_pages
+from rosz.worker import Worker, run_task
+
+if TYPE_CHECKING:
+    from rosz.node import Node
+
+__all__ = ("PageServer",)
+
+_START_SECONDS = 30.0
+_STOP_SECONDS = 1
+_LOGGERS = ("nicegui", "uvicorn.error")
+_log = logging.getLogger("rosz.web")
+
+
+class _Server(uvicorn.Server):
+    """A server that sets an event when it has started.
+
+    Args:
+        config: Settings of the server.
+        ready: The event.
+    """
+
+    def __init__(self, config: uvicorn.Config, ready: threading.Event) -> None:
+        super().__init__(config)
+        self._ready = ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, and set the event."""
+        await super().startup(sockets)
+        self._ready.set()
+
+
+class PageServer:
+    """Serves the page of a node until it is closed.
+
+    Args:
+        node: The node. It is not closed with the server.
+        host: Address to listen at.
+        port: Port to listen at; 0 for any.
+        permission: What the page may change.
+        guard: Who may open it.
+        tls: Settings of TLS; without them, links are not encrypted.
+
+    Attributes:
+        port: Port that it listens at.
+
+    Raises:
+        TransportError: It cannot listen there.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        host: str,
+        port: int,
+        *,
+        permission: Permission,
+        guard: Guard,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        self._socket = _listen(host, port)
+        self.port: int = self._socket.getsockname()[1]
+        self._lifecycle = Lifecycle("the page", log=_log)
+        self._system = System(node, permission)
+        self._lifecycle.keep(self._system)
+        add_pages(self._system)
+        app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+        ui.run_with(
+            app,
+            title="rosz",
+            dark=None,
+            favicon=_ICON,
+            binding_refresh_interval=None,
+            message_history_length=200,
+            show_welcome_message=False,
+        )
+        config = uvicorn.Config(
+            guard.protect(app),
+            log_level="warning",
+            ws="websockets-sansio",
+            timeout_graceful_shutdown=_STOP_SECONDS,
+            server_header=False,
+            ssl_context_factory=None if tls is None else lambda _config, _default: tls,
+        )
+        self._ready = threading.Event()
+        self._server = _Server(config, self._ready)
+        self._worker: Worker[Callable[[], object]] = Worker("rosz-web", run_task)
+        self._worker.submit(self._run)
+        if not self._ready.wait(_START_SECONDS):
+            self.close()
+            raise TransportError(f"the page was not ready within {_START_SECONDS:g} seconds")
+
+    def _run(self) -> None:
+        asyncio.run(self._server.serve([self._socket]))
+
+    def close(self) -> None:
+        """Stop serving; a second call has no effect."""
+        for name in _LOGGERS:  # a request that the end cuts short is no error
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+        self._server.should_exit = True
+        self._worker.close()
+        self._lifecycle.close()
+        self._socket.close()
+
+
+_ICON = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32"'
+    ' rx="7" fill="#2456c8"/><g fill="#fff"><circle cx="9" cy="9" r="3"/><circle cx="23" cy="9"'
+    ' r="3"/><circle cx="9" cy="23" r="3"/><circle cx="23" cy="23" r="3"/></g><path'
+    ' d="M9 9h14L9 23h14" fill="none" stroke="#fff" stroke-width="2"/></svg>'
+)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens.
+
+    Raises:
+        TransportError: The address is not of this machine, or the port is taken.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listening = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise TransportError(f"cannot listen at '{host}': {error}") from error
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(128)
+    except OSError as error:
+        listening.close()
+        raise TransportError(
+            f"cannot listen at {host}, port {port}: {error.strerror or error};"
+            " --port takes another one, and 0 any that is free"
+        ) from error
+    return listening
