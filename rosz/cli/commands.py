@@ -30,6 +30,7 @@ COMMANDS = {
     "pkg": "list, find, create and check packages",
     "log": "follow the log of all nodes, set levels",
     "keys": "make and check the keys that links between machines need",
+    "graph": "print or draw who sends what to whom",
     "web": "show the running system in a browser",
     "doctor": "find problems, and print what shows them and what to do",
     "turtlesim": "save pictures of turtlesims",

@@ -74,7 +74,7 @@ class Guard:
             elif self._is_known(headers):
                 await app(scope, receive, send)
             else:
-                await self._ask(scope, receive, send)
+                await self._admit(scope, receive, send)
 
         return guarded
 
@@ -105,7 +105,7 @@ class Guard:
     def _is_password(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(), self._password.encode())
 
-    async def _ask(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _admit(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Take the password in the address or in a form, or show the form."""
         query = scope.get("query_string", b"").decode("latin-1")
         tokens = parse_qs(query).get("token", [])

@@ -13,7 +13,7 @@ from rosz.bridges.admission import is_loopback, new_password, read_password, ser
 from rosz.errors import UsageError
 from rosz.session import keys_of
 from rosz.web.guard import Guard
-from rosz.web.model.permission import Permission
+from rosz.web.model import Permission
 
 if TYPE_CHECKING:
     from rosz.node import Node

@@ -20,8 +20,7 @@ from nicegui import ui
 from rosz.errors import TransportError
 from rosz.lifecycle import Lifecycle
 from rosz.web.guard import Guard
-from rosz.web.model.permission import Permission
-from rosz.web.model.system import System
+from rosz.web.model import Permission, System
 from rosz.web.pages import add_pages
 from rosz.worker import Worker, run_task
 

@@ -61,6 +61,7 @@ FLOORS = {
     "rosz.actions": 6,
     "rosz.bags": 6,
     "rosz.bags.images": 7,
+    "rosz.diagram": 6,
     "rosz.introspect": 6,
     "rosz.launch.run": 6,
     "rosz.reconfigure": 6,

@@ -9,9 +9,7 @@ from rosz.errors import UsageError
 from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import String
 from rosz.security import Permit
-from rosz.web.model.permission import Permission
-from rosz.web.model.sharing import Shared
-from rosz.web.model.system import System
+from rosz.web.model import Permission, Shared, System
 from rosz.wire import Kind
 
 

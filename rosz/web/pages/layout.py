@@ -10,8 +10,7 @@ from nicegui import run, ui
 
 from rosz.errors import RoszError
 from rosz.lifecycle import Closable
-from rosz.web.model.sharing import Shared
-from rosz.web.model.system import System
+from rosz.web.model import Shared, System
 
 __all__ = ("ENTRIES", "Entry", "Frame", "bandwidth_text", "empty_state", "rate_text", "size_text")
 

@@ -11,9 +11,7 @@ from nicegui import ui
 from rosz.introspect.nodes import list_nodes, machines
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import list_topics
-from rosz.web.model.findings import Findings
-from rosz.web.model.system import System
-from rosz.web.model.traffic import Traffic
+from rosz.web.model import Findings, System, Traffic
 from rosz.web.pages.layout import Frame, bandwidth_text, empty_state, rate_text
 
 __all__ = ("show_overview",)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from rosz.web.model.system import System
+from rosz.web.model import System
 from rosz.web.pages.overview import show_overview
 
 __all__ = ("add_pages",)

@@ -1,0 +1,20 @@
+"""Pictures of nodes and topics, as rqt_graph draws them; pure.
+
+``picture`` chooses what is shown, ``layers`` gives it a layout, and ``drawing`` writes it as SVG,
+DOT or Mermaid.
+"""
+
+from rosz.diagram.drawing import write_dot, write_mermaid, write_svg
+from rosz.diagram.picture import CONTENTS, Box, Content, Picture, PictureOptions, make_picture
+
+__all__ = (
+    "CONTENTS",
+    "Box",
+    "Content",
+    "Picture",
+    "PictureOptions",
+    "make_picture",
+    "write_dot",
+    "write_mermaid",
+    "write_svg",
+)

@@ -1,0 +1,180 @@
+"""A picture as text: SVG, Graphviz' DOT, and Mermaid; pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+
+from rosz.diagram.layers import Layout, Place, lay_out
+from rosz.diagram.picture import Arrow, Box, Picture
+
+__all__ = ("label_of", "write_dot", "write_mermaid", "write_svg")
+
+_FEW = 2
+_LETTER = 6.3
+_NARROWEST_GAP, _WIDEST_GAP = 72.0, 260.0
+_GROUP_MARGIN = 8.0
+_STYLE = """
+text { font: 12px system-ui, sans-serif; fill: var(--graph-text, #1c2433) }
+.node rect { fill: var(--graph-node, #e3ecff); stroke: var(--graph-node-line, #2456c8) }
+.topic rect { fill: var(--graph-topic, #f4f1e8); stroke: var(--graph-topic-line, #a08a4a) }
+.group { fill: none; stroke: var(--graph-line, #8f9bb0); stroke-dasharray: 4 3 }
+.arrow path { fill: none; stroke: var(--graph-line, #8f9bb0); stroke-width: 1.4 }
+.arrow text, .group-name { font-size: 11px; fill: var(--graph-soft, #5b6577) }
+.arrow text { paint-order: stroke; stroke: var(--graph-back, #ffffff); stroke-width: 4px;
+  stroke-linejoin: round }
+.tip { fill: var(--graph-line, #8f9bb0) }
+.node, .topic { cursor: pointer }
+.chosen rect { stroke-width: 3 }
+"""
+
+
+def label_of(arrow: Arrow, rates: Mapping[str, str]) -> str:
+    """Return the label of an arrow: its topics if it joins nodes, and what flows.
+
+    Args:
+        arrow: The arrow.
+        rates: Rate of each topic as text.
+    """
+    known = [topic for topic in arrow.topics if topic in rates]
+    if arrow.start.startswith("topic:"):
+        return ""
+    if arrow.end.startswith("topic:"):
+        return rates[known[0]] if known else ""
+    if len(arrow.topics) > _FEW:
+        return f"{len(arrow.topics)} topics"
+    return ", ".join(
+        f"{topic} {rates[topic]}" if topic in rates else topic for topic in arrow.topics
+    )
+
+
+def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: str = "") -> str:
+    """Return a picture as SVG; each box has its key as ``data-key``.
+
+    Args:
+        picture: The picture.
+        rates: Rate of each topic as text, for the arrows.
+        chosen: Key of the box to emphasise.
+    """
+    labels = [label_of(arrow, rates or {}) for arrow in picture.arrows]
+    plain = [label_of(arrow, {}) for arrow in picture.arrows]
+    longest = max(map(len, plain), default=0) + 8 * bool(rates)
+    gap = min(_WIDEST_GAP, max(_NARROWEST_GAP, longest * _LETTER + 24))
+    layout = lay_out(picture, gap)
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="nodes and topics"'
+        f' viewBox="0 0 {layout.width:.0f} {layout.height:.0f}" width="{layout.width:.0f}"'
+        f' height="{layout.height:.0f}"><style>{_STYLE}</style><defs><marker id="tip"'
+        ' viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
+        '<path class="tip" d="M0 0L8 4L0 8z"/></marker></defs>',
+        *_groups(layout),
+        *(
+            _arrow(arrow, path, label)
+            for arrow, path, label in zip(picture.arrows, layout.paths, labels, strict=True)
+        ),
+        *(_box(place, chosen) for place in layout.places.values()),
+        "</svg>",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _box(place: Place, chosen: str) -> str:
+    box = place.box
+    name, key = escape(box.name), escape(box.key, quote=True)
+    kind = f"{box.kind} chosen" if box.key == chosen else box.kind
+    radius = place.height / 2 if box.kind == "node" else 3
+    title = f"{name} [{escape(box.detail)}]" if box.detail else name
+    return (
+        f'<g class="{kind}" data-key="{key}" tabindex="0" role="button"><title>{title}</title>'
+        f'<rect x="{place.x:.1f}" y="{place.y:.1f}" width="{place.width:.1f}"'
+        f' height="{place.height:.1f}" rx="{radius:.0f}"/><text text-anchor="middle"'
+        f' x="{place.x + place.width / 2:.1f}" y="{place.y + place.height / 2 + 4:.1f}">{name}'
+        "</text></g>"
+    )
+
+
+def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], label: str) -> str:
+    (x, y), *rest = path
+    drawn = f"M{x:.1f} {y:.1f}"
+    for right, down in rest:
+        middle = (x + right) / 2
+        drawn += f"C{middle:.1f} {y:.1f} {middle:.1f} {down:.1f} {right:.1f} {down:.1f}"
+        x, y = right, down
+    text = ""
+    if label:
+        (left, up), (right, down) = path[0], path[1]
+        text = (
+            f'<text text-anchor="middle" x="{(left + right) / 2:.1f}"'
+            f' y="{(up + down) / 2 - 4:.1f}">{escape(label)}</text>'
+        )
+    title = escape(", ".join(arrow.topics))
+    return (
+        f'<g class="arrow"><title>{title}</title><path d="{drawn}" marker-end="url(#tip)"/>'
+        f"{text}</g>"
+    )
+
+
+def _groups(layout: Layout) -> list[str]:
+    """Return a frame around the boxes of each group, in each layer that has some."""
+    frames: dict[tuple[str, float], list[Place]] = {}
+    for place in layout.places.values():
+        if place.box.group:
+            column = round(place.x + place.width / 2)
+            frames.setdefault((place.box.group, column), []).append(place)
+    drawn = []
+    for (group, _), places in frames.items():
+        left = min(place.x for place in places) - _GROUP_MARGIN
+        top = min(place.y for place in places) - _GROUP_MARGIN
+        right = max(place.x + place.width for place in places) + _GROUP_MARGIN
+        bottom = max(place.y + place.height for place in places) + _GROUP_MARGIN
+        drawn.append(
+            f'<rect class="group" x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}"'
+            f' height="{bottom - top:.1f}" rx="6"/><text class="group-name" x="{left + 4:.1f}"'
+            f' y="{top - 3:.1f}">{escape(group)}</text>'
+        )
+    return drawn
+
+
+def write_dot(picture: Picture) -> str:
+    """Return a picture in the language of Graphviz."""
+    lines = ["digraph graphname {", "  rankdir=LR;"]
+    groups: dict[str, list[Box]] = {}
+    for box in picture.boxes:
+        groups.setdefault(box.group, []).append(box)
+    for number, (group, boxes) in enumerate(sorted(groups.items())):
+        indent = "    " if group else "  "
+        if group:
+            lines += [f"  subgraph cluster_{number} {{", f"    label={_quoted(group)};"]
+        for box in boxes:
+            shape = "ellipse" if box.kind == "node" else "box"
+            lines.append(f"{indent}{_quoted(box.key)} [label={_quoted(box.name)}, shape={shape}];")
+        if group:
+            lines.append("  }")
+    for arrow in picture.arrows:
+        label = label_of(arrow, {})
+        more = f" [label={_quoted(label)}]" if label else ""
+        lines.append(f"  {_quoted(arrow.start)} -> {_quoted(arrow.end)}{more};")
+    return "\n".join([*lines, "}", ""])
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def write_mermaid(picture: Picture) -> str:
+    """Return a picture as a flowchart of Mermaid."""
+    ids = {box.key: f"n{number}" for number, box in enumerate(picture.boxes)}
+    lines = ["flowchart LR"]
+    for box in picture.boxes:
+        left, right = ("([", "])") if box.kind == "node" else ("[", "]")
+        lines.append(f'  {ids[box.key]}{left}"{_entity(box.name)}"{right}')
+    for arrow in picture.arrows:
+        label = label_of(arrow, {})
+        join = f'-- "{_entity(label)}" -->' if label else "-->"
+        lines.append(f"  {ids[arrow.start]} {join} {ids[arrow.end]}")
+    return "\n".join([*lines, ""])
+
+
+def _entity(text: str) -> str:
+    return text.replace("#", "#35;").replace('"', "#quot;")
