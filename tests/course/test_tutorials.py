@@ -121,3 +121,26 @@ def test_waypoints(desk: Desk) -> None:
     assert 'frame_id: "odom"' in two.type("rostopic echo -n 1 /odom")
     assert two.type("rostopic type /cmd_vel") == "geometry_msgs/Twist\n"
     one.interrupt()
+
+
+def test_waypoints_as_an_action(desk: Desk) -> None:
+    """The same node as an action server of rclpy, for a client of actionlib, at ten times speed."""
+    desk.add("turtlebot3_waypoints")
+    world, server, client = desk.terminal(), desk.terminal(), desk.terminal()
+    world.start("roslaunch turtlebot3_gazebo turtlebot3_empty_world.launch real_time_factor:=10")
+    world.wait_for("TurtleBot3 burger")
+    server.start("rosrun turtlebot3_waypoints waypoint_server.py")
+    server.wait_for("waiting for goals")
+    driven = client.type("rosrun turtlebot3_waypoints waypoint_client.py")
+    assert [line.partition("]: ")[2] for line in driven.splitlines()] == [
+        "(0.5, 0.0): SUCCEEDED, near it: True",
+        "(0.5, 0.5): SUCCEEDED, near it: True",
+        "(0.0, 0.5): SUCCEEDED, near it: True",
+        "(0.0, 0.0): SUCCEEDED, near it: True",
+        "far away in 2 s: False",
+        "PREEMPTED",
+        "REJECTED",
+    ]
+    server.wait_for("took simulated time: True", times=4)
+    server.interrupt()
+    world.interrupt()
