@@ -1,4 +1,4 @@
-"""rosbridge_websocket and rosapi_node: the programs of ROS 1's rosbridge_suite."""
+"""The programs for web pages: those of ROS 1's rosbridge_suite, and tf2_web_republisher."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from rosz.bridges.gate import Gate
 from rosz.bridges.websocket import RosApi, Settings, open_bridge
 from rosz.errors import UsageError
 from rosz.node import Node
+from rosz.transforms import Republisher
 
-__all__ = ("serve_rosapi", "serve_websocket")
+__all__ = ("serve_rosapi", "serve_transforms", "serve_websocket")
 
+_LOOK_SECONDS = 5.0
 _EVERYWHERE = ("", "0.0.0.0")  # noqa: S104  # what rosbridge_suite's parameter may be
 
 
@@ -56,6 +58,20 @@ def serve_rosapi() -> None:
             params=_patterns(node, "params_glob"),
         )
         RosApi(node).serve(gate, "ros1")
+        node.spin()
+
+
+def serve_transforms() -> None:
+    """Serve transforms to web pages while no other node does so, until the node ends."""
+    with Node("tf2_web_republisher") as node:
+
+        def look(_event: Any) -> None:
+            if not Republisher.is_served(node):
+                timer.close()
+                Republisher(node)
+
+        timer = node.timer(_LOOK_SECONDS, look)
+        look(None)
         node.spin()
 
 

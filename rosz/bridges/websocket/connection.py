@@ -94,8 +94,9 @@ class Connection:
         self._numbers = itertools.count(1)
         self._lock = threading.RLock()
         self._closed = False
-        self._feeds: dict[str, dict[str, Feed]] = {}
+        self._feeds: dict[str, Feed] = {}
         self._publishers: dict[str, Publisher[Any]] = {}
+        self._advertisements: dict[str, set[str]] = {}
         self._calls = Calls(shared.node)
         self._services = ServedServices(shared.node, self.send)
         self._goals = SentGoals(shared.node, self.send)
@@ -195,7 +196,7 @@ class Connection:
         """End everything that the client has begun."""
         with self._lock:
             self._closed = True
-            feeds = [feed for known in self._feeds.values() for feed in known.values()]
+            feeds = list(self._feeds.values())
             self._feeds.clear()
         self._outbox.close()
         for feed in feeds:
@@ -243,12 +244,18 @@ class Connection:
         topics = self._shared.topics
         with self._lock:
             if not self._closed:
+                self._advertisements.setdefault(topic, set()).add(str(operation.id))
                 self._publishers[topic] = topics.advertise(
                     topic, cls, latch=operation.latch, client=self
                 )
 
     def _unadvertise(self, operation: ops.Unadvertise) -> None:
         topic = self._shared.node.resolve(operation.topic)
+        others = self._advertisements.get(topic, set())
+        if operation.id is not None and others - {str(operation.id)}:
+            others.discard(str(operation.id))
+            return
+        self._advertisements.pop(topic, None)
         self._publishers.pop(topic, None)
         if not self._shared.topics.unadvertise(self, topic):
             self._status("warning", f"unadvertise: '{topic}' is not advertised", operation.id)
@@ -270,36 +277,32 @@ class Connection:
         spelling = self._see(operation.type)
         topic = self._shared.node.resolve(operation.topic)
         self._shared.gate.check("subscribe", topic)
-        feed = Feed((operation.compression or "none", spelling))
-        feed.period = max(0.0, operation.throttle_rate / 1000)
-        feed.depth = max(0, operation.queue_length)
-        feed.fragment_size = operation.fragment_size
-        number = str(operation.id)
-        self._drop(topic, number)
-        self._shared.topics.subscribe(topic, operation.type or "", feed, self._outbox.offer)
+        topics = self._shared.topics
+        cls = topics.message_class(topic, operation.type) if operation.type else None
+        feed = self._feeds.get(topic) or Feed()
+        feed.adapt({**feed.requests, str(operation.id): operation}, spelling)
+        topics.subscribe(topic, cls, feed, self._outbox.offer)
         with self._lock:
             if not self._closed:
-                self._feeds.setdefault(topic, {})[number] = feed
+                self._feeds[topic] = feed
                 return
-        self._shared.topics.unsubscribe(feed)
+        topics.unsubscribe(feed)
 
     def _unsubscribe(self, operation: ops.Unsubscribe) -> None:
         topic = self._shared.node.resolve(operation.topic)
-        if not self._drop(topic, None if operation.id is None else str(operation.id)):
+        number = None if operation.id is None else str(operation.id)
+        feed = self._feeds.get(topic)
+        if feed is None or (number is not None and number not in feed.requests):
             self._status("warning", f"unsubscribe: '{topic}' is not subscribed", operation.id)
-
-    def _drop(self, topic: str, number: str | None) -> bool:
-        """End one subscription of a topic, or all; return whether there was any."""
+            return
+        others = {key: one for key, one in feed.requests.items() if number not in (None, key)}
+        if others:
+            feed.adapt(others, feed.form[1])
+            return
         with self._lock:
-            known = self._feeds.get(topic, {})
-            numbers = list(known) if number is None else [number] if number in known else []
-            feeds = [known.pop(one) for one in numbers]
-            if not known:
-                self._feeds.pop(topic, None)
-        for feed in feeds:
-            self._shared.topics.unsubscribe(feed)
-            self._outbox.drop(feed)
-        return bool(feeds)
+            self._feeds.pop(topic, None)
+        self._shared.topics.unsubscribe(feed)
+        self._outbox.drop(feed)
 
     # Services.
 
@@ -309,7 +312,7 @@ class Connection:
         try:
             self._later(partial(self._call, name, operation, spelling))
         except UsageError as error:
-            self._fail_call(operation, error)
+            self._respond(operation, str(error), done=False)
 
     def _call(self, name: str, operation: ops.CallService, spelling: Spelling) -> None:
         try:
@@ -319,13 +322,9 @@ class Connection:
                 self._shared.gate.check("call", name)
                 values = self._calls.call(name, operation, spelling)
         except RoszError as error:
-            self._fail_call(operation, error)
+            self._respond(operation, str(error), done=False)
         else:
             self._respond(operation, values, done=True)
-
-    def _fail_call(self, operation: ops.CallService, error: RoszError) -> None:
-        self._status("error", f"call_service: {error}", operation.id)
-        self._respond(operation, str(error), done=False)
 
     def _respond(self, operation: ops.CallService, values: Any, *, done: bool) -> None:
         response: dict[str, Any] = {"op": "service_response", "service": operation.service}
@@ -368,7 +367,6 @@ class Connection:
         self._goals.forget(operation)
         result = {"op": "action_result", "id": operation.id, "action": operation.action}
         self.send({**result, "values": str(error), "status": 0, "result": False})
-        self._status("error", f"send_action_goal: {error}", operation.id)
 
     def _cancel_goal(self, operation: ops.CancelActionGoal) -> None:
         self._later(partial(self._cancel_goal_now, operation))

@@ -15,13 +15,16 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from rosz.bridges.websocket.operations import Compression
+from rosz.bridges.websocket.operations import Compression, Subscribe
 from rosz.bridges.websocket.plain import Spelling, converter
 
 __all__ = ("Encodings", "Feed", "Form", "Message", "Outbox")
 
 Form: TypeAlias = tuple[Compression, Spelling]
 """Encoding of a message, and the spelling of its fields."""
+
+_COMPRESSIONS: tuple[Compression, ...] = ("none", "png", "cbor", "cbor-raw")
+"""The last one that a subscription asks for holds for all."""
 
 
 class Encodings:
@@ -131,24 +134,46 @@ class Message:
 class Feed:
     """The messages of one topic that wait for one client.
 
+    A client may subscribe to a topic several times; it gets each message once.
+
     Attributes:
-        form: How they are encoded.
+        requests: Its subscriptions by their ids. Only `adapt` changes it and what follows from it.
+        form: How messages are encoded.
         period: Shortest time between two of them, in seconds.
         depth: Largest number of them; 0 for as many as the outbox holds, or one with a period.
         fragment_size: Largest number of characters of a text; None for no limit.
-        messages: Messages that wait, the oldest first; only the outbox changes it and `due`.
+        messages: Messages that wait, the oldest first; only the outbox changes it.
         due: When the next one may be sent, by the monotonic clock.
         closed: Whether the outbox has dropped it.
     """
 
-    def __init__(self, form: Form) -> None:
-        self.form = form
+    def __init__(self) -> None:
+        self.requests: dict[str, Subscribe] = {}
+        self.form: Form = ("none", "ros1")
         self.period: float = 0.0
         self.depth: int = 0
         self.fragment_size: float | None = None
         self.closed: bool = False
         self.messages: deque[Message] = deque()
         self.due: float = 0.0
+
+    def adapt(self, requests: dict[str, Subscribe], spelling: Spelling) -> None:
+        """Do what all subscriptions of a topic need, as rosbridge_suite does.
+
+        Args:
+            requests: The subscriptions by their ids, one at least.
+            spelling: Whose names the fields have.
+        """
+        found = requests.values()
+        sizes = [one.fragment_size for one in found if one.fragment_size is not None]
+        compressions = [one.compression or "none" for one in found]
+        self.requests = requests
+        self.form = (max(compressions, key=_COMPRESSIONS.index), spelling)
+        period = max(0.0, min(one.throttle_rate for one in found) / 1000)
+        self.due += period - self.period
+        self.period = period
+        self.depth = max(0, min(one.queue_length for one in found))
+        self.fragment_size = min(sizes, default=None)
 
     @property
     def most(self) -> int:

@@ -143,7 +143,8 @@ class ServedServices:
         finally:
             with self._lock:
                 self._pending.pop(number, None)
-        if not answer.result:
+        # rosbridge_suite passes on the values of a response whatever its result is.
+        if not answer.result and not isinstance(answer.values, dict | list):
             raise ServiceError(str(answer.values or "the service failed"))
         return build(kind.Response, answer.values or None, self._node.now())
 

@@ -70,24 +70,22 @@ class Topics:
             raise NotFoundError(f"topic '{topic}' does not exist{near_miss(topic, known)}")
         return known[topic][0]
 
-    def subscribe(self, topic: str, type_name: str, feed: Feed, offer: Offer) -> None:
-        """Give the messages of a topic to a feed.
+    def subscribe(self, topic: str, cls: type[Any] | None, feed: Feed, offer: Offer) -> None:
+        """Give the messages of a topic to a feed; one that has them gets what is latched again.
 
         Args:
             topic: Full name of the topic.
-            type_name: Its type; empty for any.
+            cls: Class of its messages; None for any.
             feed: The feed.
             offer: Function that takes each message, on threads of the node.
-
-        Raises:
-            RoszError: There is no such type, or the topic has another one.
         """
-        cls = self.message_class(topic, type_name) if type_name else None
         key = (topic, cls._type_name if cls else "")
         with self._lock:
-            source = self._sources.get(key)
+            source = next((one for one in self._sources.values() if one.has(feed)), None)
+            source = source or self._sources.get(key)
             if source is None:
-                source = self._sources[key] = _Source(self._node, self._encodings, topic, cls)
+                source = _Source(self._node, self._encodings, topic, cls)
+                self._sources[key] = source
             source.add(feed, offer)
 
     def unsubscribe(self, feed: Feed) -> None:
@@ -161,6 +159,10 @@ class _Source:
             self._feeds[feed] = offer
             for kept in self._kept.values():
                 offer(feed, kept)
+
+    def has(self, feed: Feed) -> bool:
+        """Return whether a feed gets the messages."""
+        return feed in self._feeds
 
     def remove(self, feed: Feed) -> bool:
         """Remove a feed; return whether it was the last one."""

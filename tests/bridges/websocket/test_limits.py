@@ -161,7 +161,7 @@ def test_encodings_are_bounded() -> None:
     """A client that does not read keeps messages, and not what was made of them for others."""
     encodings = Encodings(500_000)
     outbox = Outbox(10_000_000, lambda: None, lambda: None)
-    feed = Feed(("none", "ros1"))
+    feed = Feed()
     messages = [image(encodings, 100_000) for _ in range(50)]
     for message in messages:
         outbox.offer(feed, message)
@@ -175,7 +175,7 @@ def test_encodings_are_bounded() -> None:
 def test_what_waits_is_bounded() -> None:
     waiting = []
     outbox = Outbox(1_000_000, lambda: None, lambda: waiting.append("too many answers"))
-    feeds = [Feed(("none", "ros1")) for _ in range(3)]
+    feeds = [Feed() for _ in range(3)]
     encodings = Encodings(0)
     for number in range(300):
         outbox.offer(feeds[number % 3], image(encodings, 50_000))

@@ -166,18 +166,38 @@ def test_a_rate_keeps_the_newest(bridge: Bridge, client: Client) -> None:
     assert time.monotonic() - began > 0.5
 
 
-def test_what_ids_mean(bridge: Bridge, client: Client) -> None:
+def test_several_subscriptions_of_a_topic(bridge: Bridge, client: Client) -> None:
+    """Each message comes once; what all subscriptions need holds."""
     node = bridge.network.node("other")
-    publisher = node.publisher("count", Int32)
-    for number in ("a", "b"):
-        client.send("subscribe", topic="/count", type="std_msgs/Int32", id=number)
+    publisher = node.publisher("count", Int32, latch=True)
+    publisher.publish(0)
+    subscribe = {"topic": "/count", "type": "std_msgs/Int32"}
+    client.send("subscribe", **subscribe, id="a", throttle_rate=100_000, queue_length=2)
+    assert client.receive()["msg"]["data"] == 0
+    client.send("subscribe", **subscribe, id="b", compression="cbor")
+    assert cbor2.loads(client.receive())["msg"]["data"] == 0  # the latched one, for the second
+    publisher.publish(1)
+    assert cbor2.loads(client.receive())["msg"]["data"] == 1
     client.send("unsubscribe", topic="/count", id="a")
     client.sync()
-    publisher.wait_for_subscribers(1, TIMEOUT)
-    publisher.publish(1)
-    assert client.receive()["msg"]["data"] == 1
-    client.send("unsubscribe", topic="/count")
+    publisher.publish(2)
+    assert cbor2.loads(client.receive())["msg"]["data"] == 2
+    client.send("unsubscribe", topic="/count", id="b")
     eventually(lambda: not publisher.subscribers(), "the end of the subscription")
+
+
+def test_several_advertisements_of_a_topic(bridge: Bridge, client: Client) -> None:
+    heard: SimpleQueue[String] = SimpleQueue()
+    node = bridge.network.node("other")
+    node.subscription("up", String, heard.put)
+    for number in ("a", "b"):
+        client.send("advertise", topic="/up", type="std_msgs/String", id=number)
+    client.send("unadvertise", topic="/up", id="a")
+    client.send("publish", topic="/up", msg={"data": "still there"})
+    assert heard.get(timeout=TIMEOUT).data == "still there"
+    client.send("unadvertise", topic="/up", id="b")
+    graph = node.context.graph
+    eventually(lambda: not graph.refresh().publishers("/up"), "the end of the publisher")
 
 
 def test_types(bridge: Bridge, client: Client) -> None:
@@ -250,6 +270,10 @@ def test_services_of_clients(bridge: Bridge, client: Client) -> None:
     response["id"] = client.receive_op("call_service")["id"]
     client.send("service_response", **response, values="too late", result=False)
     assert "too late" in str(answers.get(timeout=TIMEOUT))
+    bridge.network.thread(call)
+    response["id"] = client.receive_op("call_service")["id"]
+    client.send("service_response", **response, values={"message": "no"}, result=False)
+    assert answers.get(timeout=TIMEOUT).message == "no"
     client.send("service_response", **response, result=True)
     assert "no call with the id" in client.receive_op("status")["msg"]
     bridge.network.thread(call)
