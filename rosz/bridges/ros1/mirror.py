@@ -14,7 +14,7 @@ from rosz.bridges.ros1.frames import encode_header
 from rosz.bridges.ros1.registry import ANY_TYPE, Change, Entry, Role
 from rosz.bridges.ros1.server import Incoming
 from rosz.bridges.ros1.services import Clients, ProvidedService, ServiceConnection
-from rosz.bridges.ros1.shared import MASTER_NODE, Shared
+from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, Shared
 from rosz.bridges.ros1.sockets import log
 from rosz.bridges.ros1.topics import Connection, PublishedTopic, SubscribedTopic
 from rosz.errors import ClosedError, InvalidName, RoszError, ServiceError, UsageError
@@ -30,6 +30,7 @@ _MAX_CALLS = 1000
 _CLOSE_TIMEOUT = 10.0
 _RETRY_SECONDS = 0.3
 _MOST_TRIES = 10
+_CONNECTING_SECONDS = 0.02
 
 
 class _Part(Protocol):
@@ -217,6 +218,10 @@ class Mirror:
             # A master of another network, for the nodes of which it registers nothing.
             entry = Entry("subscriber", topic, node, "", ANY_TYPE)
             part = self._keep(SubscribedTopic(self._shared, self._own, entry))
+        if self._is_connecting(node):
+            again = partial(self._accept, incoming, header, tries)
+            self._shared.changes.later(_CONNECTING_SECONDS, again)
+            return
         if part is None and self._look is not None and tries < _MOST_TRIES:
             self._look()
             again = partial(self._accept, incoming, header, tries + 1)
@@ -225,6 +230,24 @@ class Mirror:
         if part is None:
             raise ServiceError(f"node '{node}' is not registered as a subscriber of '{topic}'")
         part.accept(incoming, header)
+
+    def _is_connecting(self, node: str) -> bool:
+        """Return whether the bridge still connects to topics that a node publishes.
+
+        What a node publishes in answer to its first message, as servers of actions do, would be
+        lost before that: roscpp keeps nothing for subscribers that are not connected. Bridges do
+        not wait for bridges, as both would wait.
+        """
+        if node.startswith((MASTER_NODE, BRIDGE)):
+            return False
+        published = [
+            part
+            for part in self._parts.values()
+            if isinstance(part, PublishedTopic) and part.entry.node == node
+        ]
+        for part in published:
+            part.update()  # the network may have subscribed since
+        return any(part.is_connecting for part in published)
 
     def _accept_service(self, incoming: Incoming, header: dict[str, str]) -> None:
         client = self._clients.find(self._shared.here(header["service"]))

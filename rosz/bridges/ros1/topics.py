@@ -99,6 +99,11 @@ class PublishedTopic:
             return []
         return [Connection(self.entry.node, True, stream.received_bytes, self._received)]
 
+    @property
+    def is_connecting(self) -> bool:
+        """Whether the network wants its messages and the node has not answered, or refused, yet."""
+        return self._connecting and not self._reported
+
     def update(self) -> None:
         """Connect to the node if the network wants its messages, or else disconnect."""
         if self._closed:

@@ -13,6 +13,7 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Any
 from xmlrpc.client import ServerProxy, dumps
+from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 from network import TIMEOUT, eventually
@@ -30,6 +31,9 @@ from rosz.wire import Kind, Token
 from .world import LISTENER, SERVER, TALKER, World
 
 pytestmark = [pytest.mark.ros1, pytest.mark.system]
+
+_MOMENT = 0.5
+"""Seconds in which what should wait would have happened."""
 
 
 @pytest.fixture(scope="module")
@@ -292,6 +296,41 @@ def test_a_topic_that_nobody_uses_costs_no_thread(world: World, node: Node) -> N
         eventually(lambda: all(view().publishers(f"/many/t{number}") for number in range(20)))
         assert watches() == before
     eventually(lambda: "/many" not in view().nodes())
+
+
+def test_a_node_gets_messages_when_its_answers_are_heard(world: World, node: Node) -> None:
+    """The result of an action is the answer to a goal, and often a server's first message."""
+    order: list[str] = []
+    requested, answer = threading.Event(), threading.Event()
+
+    class Answering(SimpleXMLRPCServer):
+        def _dispatch(self, method: str, _params: Any) -> Any:
+            if method == "requestTopic":
+                requested.set()
+                answer.wait(_MOMENT)
+                order.append("answered")
+            return [0, "not now", 0]
+
+    with Answering(("127.0.0.1", 0), logRequests=False) as server:
+        world.network.thread(server.serve_forever)
+        uri = f"http://127.0.0.1:{server.server_address[1]}/"
+        publisher = node.publisher("/asked_first", String)
+        node.subscription("/answers", String, print)
+        registered = (("registerSubscriber", "/asked_first"), ("registerPublisher", "/answers"))
+        for method, topic in registered:
+            assert world.call(method, "/answering", topic, "std_msgs/String", uri)[0] == 1
+        assert requested.wait(TIMEOUT)
+        header = {"topic": "/asked_first", "callerid": "/answering", "md5sum": String._md5sum}
+        with socket.create_connection(("127.0.0.1", world.bridge.port), TIMEOUT) as sock:
+            sock.sendall(encode_header(header))
+            assert sock.recv(4096)
+            order.append("connected")
+        answer.set()
+        assert order[0] == "answered"
+        publisher.close()
+        for method, topic in registered:
+            world.call(method.replace("reg", "unreg"), "/answering", topic, uri)
+        server.shutdown()
 
 
 def test_a_node_that_comes_again_has_its_tokens_again(world: World, node: Node) -> None:
