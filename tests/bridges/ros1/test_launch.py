@@ -18,7 +18,7 @@ from rosz.environment import Environment, package_index
 
 from .world import LISTENER, roscpp
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system]
+pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
 
 _LAUNCH = """<launch>
   <node pkg="course" type="partner" name="talker" args="talker" respawn="true"/>

@@ -29,7 +29,7 @@ from rosz.transforms import (
 
 from .world import World, roscpp
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system]
+pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
 
 SERVER = """
     import rosz.ros1
