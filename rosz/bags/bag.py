@@ -16,6 +16,7 @@ from rosz.errors import BagError
 from rosz.qos import QoS
 
 __all__ = (
+    "SMALL_PAYLOAD",
     "Attachment",
     "BagReader",
     "BagWriter",
@@ -29,6 +30,9 @@ __all__ = (
 
 Compression: TypeAlias = Literal["none", "lz4", "zstd", "bz2"]
 Payload: TypeAlias = bytes | bytearray | memoryview
+
+SMALL_PAYLOAD = 1024
+"""Size in bytes below which a copy of a payload costs less than a view of it, and keeps less."""
 
 
 class Channel(msgspec.Struct, frozen=True):

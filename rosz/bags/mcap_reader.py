@@ -499,10 +499,11 @@ def _collect(
     """
     first, last = times
     size, head, position = len(data), MESSAGE.size, 0
+    kind, before, unpack = int(Op.MESSAGE), HEAD.size, MESSAGE.unpack_from
     while position < size:
-        if data[position] == Op.MESSAGE and position + head <= size:
-            _, length, number, sequence, stamp, sent = MESSAGE.unpack_from(data, position)
-            stop = position + HEAD.size + length
+        if data[position] == kind and position + head <= size:
+            _, length, number, sequence, stamp, sent = unpack(data, position)
+            stop = position + before + length
             if stop > size or stop < position + head:
                 raise DamagedRecord(f"a message says that it has {length} bytes")
             channel = wanted.get(number)
@@ -513,4 +514,4 @@ def _collect(
             position = stop
         else:
             _, body = next(mcap.records_in(memoryview(data)[position:]))
-            position += HEAD.size + len(body)
+            position += before + len(body)

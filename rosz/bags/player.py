@@ -351,14 +351,15 @@ class Player:
         known: dict[int, tuple[Callable[[bytes], None] | None, Callable[[Payload], bytes]]] = {}
         stamp, count = self._last, 0
         for entry in entries:
-            key = id(entry.channel)
-            if key not in known:
+            found = known.get(id(entry.channel))
+            if found is None:
                 output = self._output(entry.channel)
                 if output is not None and output[1].heard:
-                    known[key] = output[1].publish_raw, output[2].convert or bytes
+                    found = output[1].publish_raw, output[2].convert or bytes
                 else:
-                    known[key] = None, bytes
-            publish, convert = known[key]
+                    found = None, bytes
+                known[id(entry.channel)] = found
+            publish, convert = found
             stamp = entry.stamp
             try:
                 if publish is not None:
