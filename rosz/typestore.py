@@ -7,7 +7,6 @@ on no package path is compiled from the text of its definition.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import sys
@@ -380,6 +379,8 @@ class _Compiler:
 
     def digest(self, definitions: Iterable[tuple[str, str]]) -> str:
         """Return a name for the source that is generated from definitions (name, text)."""
+        import hashlib  # with OpenSSL, which takes memory that few nodes need
+
         digest = hashlib.sha256(self._generation)
         for name, text in definitions:
             digest.update(f"\n{name} {len(text)}\n{text}".encode())
@@ -424,6 +425,8 @@ class _Compiler:
     @cached_property
     def _generation(self) -> bytes:
         """A hash of the generator and of what generated code calls."""
+        import hashlib
+
         digest = hashlib.sha256()
         for package in (rosz.idl, rosz.message):
             for folder in package.__path__:

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Self
 
-from rosz.bags.bag import Attachment, Channel, Compression, Payload
+from rosz.bags.bag import SMALL_PAYLOAD, Attachment, Channel, Compression, Payload
 from rosz.errors import BagError, ClosedError
 from rosz.worker import Worker
 
@@ -41,6 +41,7 @@ class FilledChunk:
         self.parts: list[Payload] = []
         self.size = 0
         self.index: dict[int, array[int]] = {}
+        self._joined: bytearray | None = None  # the last part, if it takes more
 
     @property
     def start(self) -> int:
@@ -54,8 +55,24 @@ class FilledChunk:
 
     def add(self, record: bytes) -> None:
         """Add a record of another kind than a message."""
-        self.parts.append(record)
+        self._join(record)
         self.size += len(record)
+
+    def add_message(self, head: bytes, data: Payload) -> None:
+        """Add a message; the payloads of large ones are not copied."""
+        self._join(head)
+        if len(data) < SMALL_PAYLOAD:
+            self._join(data)
+        else:
+            self.parts.append(data)
+            self._joined = None
+        self.size += len(head) + len(data)
+
+    def _join(self, data: Payload) -> None:
+        if self._joined is None:
+            self._joined = bytearray()
+            self.parts.append(self._joined)
+        self._joined += data
 
 
 _Item = tuple[int, Callable[[], None]]
@@ -170,9 +187,7 @@ class ChunkWriter:
                 index = chunk.index[handle] = array("Q")
             index.append(stamp)
             index.append(chunk.size)
-            chunk.parts.append(head)
-            chunk.parts.append(data)
-            chunk.size += len(head) + size
+            chunk.add_message(head, data)
             self._counts[handle] += 1
             if chunk.size >= self._chunk_size:
                 self._submit_chunk()

@@ -1,4 +1,7 @@
-"""Opening bags: the format of a file that is read is told by its first bytes."""
+"""Opening bags: the format of a file that is read is told by its first bytes.
+
+The module of a format is imported with the first bag of it, since a recorder needs only one.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
 
 from rosz.bags.bag import BagReader, BagWriter, Compression
-from rosz.bags.chunk_writer import ChunkWriter
-from rosz.bags.mcap_reader import McapReader
 from rosz.bags.mcap_records import MAGIC
-from rosz.bags.mcap_writer import McapWriter
-from rosz.bags.messages import Bag, BagOutput
-from rosz.bags.ros1_reader import Ros1Reader
-from rosz.bags.ros1_records import describe_begin
-from rosz.bags.ros1_writer import Ros1Writer
-from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader, Storage
-from rosz.bags.rosbag2_writer import Rosbag2Writer
 from rosz.errors import BagError, UsageError
 
 if TYPE_CHECKING:
+    from rosz.bags.chunk_writer import ChunkWriter
+    from rosz.bags.messages import Bag, BagOutput
+    from rosz.bags.rosbag2_reader import Storage
     from rosz.typestore import TypeStore
 
 __all__ = (
@@ -36,7 +33,6 @@ __all__ = (
 
 _MOST_MAGIC = 16
 _SQLITE = b"SQLite format 3"
-_WRITERS: dict[str, type[ChunkWriter]] = {"mcap": McapWriter, "rosbag": Ros1Writer}
 _SUFFIXES = {".mcap": "mcap", ".bag": "rosbag"}
 
 FORMATS = ("mcap", "rosbag", "rosbag2")
@@ -66,6 +62,8 @@ def find_format(path: str | os.PathLike[str]) -> str:
     if magic.startswith(_SQLITE):
         return "rosbag2"
     if not magic:
+        from rosz.bags.ros1_records import describe_begin
+
         raise BagError(describe_begin(magic), str(path), 0)
     raise BagError(
         f"it is not a bag: it begins with {magic[:8]!r}, expected MCAP's {MAGIC!r}, '#ROSBAG V2.0'"
@@ -84,9 +82,15 @@ def open_reader(path: str | os.PathLike[str]) -> BagReader:
     """
     kind = find_format(path)
     if kind == "rosbag":
+        from rosz.bags.ros1_reader import Ros1Reader
+
         return Ros1Reader(path)
     if kind == "rosbag2":
+        from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
+
         return Rosbag2Reader(path) if Path(path).is_dir() else SqliteReader(path)
+    from rosz.bags.mcap_reader import McapReader
+
     return McapReader(path)
 
 
@@ -114,10 +118,23 @@ def create_writer(
     """
     kind = form or form_of(path)
     if kind == "rosbag2":
+        from rosz.bags.rosbag2_writer import Rosbag2Writer
+
         return Rosbag2Writer(path, storage=storage, compression=compression)
-    if kind not in _WRITERS:
+    if kind not in FORMATS:
         raise UsageError(f"format '{kind}' is not known; expected one of {', '.join(FORMATS)}")
-    return _WRITERS[kind](path, compression=compression, replace=replace)
+    return _writer_of(kind)(path, compression=compression, replace=replace)
+
+
+def _writer_of(kind: str) -> type[ChunkWriter]:
+    """Return the class that writes a format of one file."""
+    if kind == "rosbag":
+        from rosz.bags.ros1_writer import Ros1Writer
+
+        return Ros1Writer
+    from rosz.bags.mcap_writer import McapWriter
+
+    return McapWriter
 
 
 def form_of(path: str | os.PathLike[str]) -> str:
@@ -162,9 +179,9 @@ def create_file(
         UsageError: The suffix is not known, or the format has no such compression.
     """
     kind = form_of(path)
-    if kind not in _WRITERS:
+    if kind == "rosbag2":
         raise UsageError(f"'{path}' is a folder; expected a name.mcap or a name.bag")
-    return _WRITERS[kind](
+    return _writer_of(kind)(
         path,
         compression=compression,
         replace=replace,
@@ -205,6 +222,8 @@ def open(  # noqa: A001
         BagError: The file cannot be read or created, or is not a bag.
         UsageError: The suffix or the compression is not known.
     """
+    from rosz.bags.messages import Bag, BagOutput
+
     if mode == "r":
         from rosz.typestore import TypeStore  # slow to import, and what is in a bag needs no types
 

@@ -16,9 +16,8 @@ from rosz.errors import BagError, ClosedError, NoReplica, RoszError
 from rosz.lifecycle import Closable
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.rcl_interfaces.msg import Parameter, ParameterEvent
-from rosz.node.ros2_parameters import to_ros2
+from rosz.node.ros2_values import to_ros2
 from rosz.params.remote import ParamClient
-from rosz.params.yaml import dump
 from rosz.qos import PARAMETERS
 from rosz.worker import Worker
 
@@ -88,6 +87,8 @@ class ParameterRecord:
         """
         if self._follower is None:
             return
+        from rosz.params.yaml import dump  # PyYAML takes 3 MB, and there may be no parameters
+
         tree = self._follower.get("/")
         files.add_metadata("parameters", {"yaml": dump(tree)})
         rows = [Parameter(name, to_ros2(value)) for name, value in _leaves("", tree)]

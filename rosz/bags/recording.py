@@ -10,18 +10,20 @@ from contextlib import suppress
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 import msgspec
 
 from rosz.bags.bag import Channel, Compression, Payload
 from rosz.bags.buffer import ROW_BYTES
-from rosz.bags.chunk_writer import ChunkWriter
 from rosz.bags.opening import ACTIVE, create_file
-from rosz.bags.ros1_form import FromCdr, to_ros1
 from rosz.errors import BagError, UsageError
-from rosz.typestore import TypeStore
 from rosz.wire import Kind, Token
+
+if TYPE_CHECKING:
+    from rosz.bags.chunk_writer import ChunkWriter
+    from rosz.bags.ros1_form import FromCdr
+    from rosz.typestore import TypeStore
 
 __all__ = ("BagFiles", "RecordOptions", "Ring", "Selection", "Sink", "Track")
 
@@ -302,6 +304,8 @@ class BagFiles:
         """
         translate = None
         if self._writer.format == "rosbag":
+            from rosz.bags.ros1_form import to_ros1  # MCAP needs no types
+
             channel, translate = to_ros1(channel, types)
         track = Track(channel, translate)
         self._tracks.append(track)

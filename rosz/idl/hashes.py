@@ -12,7 +12,6 @@ types in it; constants, defaults and comments are not part of it.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterable
 from typing import Any
@@ -54,13 +53,19 @@ def message_md5(spec: MessageSpec, catalog: Catalog) -> str:
     """Return the md5 of a message, 32 hexadecimal digits."""
     if spec.name == _HEADER:
         return _HEADER_MD5
-    md5 = hashlib.md5(_md5_text(spec, catalog).encode(), usedforsecurity=False).hexdigest()
+    md5 = _md5(_md5_text(spec, catalog))
     return _MD5_IN_ROS1.get(md5, md5)
 
 
 def service_md5(spec: ServiceSpec, catalog: Catalog) -> str:
     """Return the md5 of a service, 32 hexadecimal digits."""
     text = _md5_text(spec.request, catalog) + _md5_text(spec.response, catalog)
+    return _md5(text)
+
+
+def _md5(text: str) -> str:
+    import hashlib  # with OpenSSL, which few nodes need, since generated classes have their hashes
+
     return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
 
 
@@ -212,4 +217,6 @@ def _type_hash(spec: MessageSpec, below: Iterable[MessageSpec]) -> str:
             ],
         }
     )
+    import hashlib
+
     return "RIHS01_" + hashlib.sha256(text.encode()).hexdigest()

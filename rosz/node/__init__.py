@@ -1,8 +1,8 @@
 """Nodes and their parts: publishers, subscriptions, services, clients, actions, timers, a log.
 
 `action_server`, `action_client`, `action_watch` and `goals` are imported on their own, by what uses
-actions, and so are `type_description` and `ros2_parameters`, by what needs definitions of other
-nodes or parameters in the form of ROS 2.
+actions, and so are `type_description`, `ros2_parameters` and `ros2_values`, by what needs
+definitions of other nodes, or parameters in the form of ROS 2.
 """
 
 from rosz.node.bridged import BridgedNode
@@ -37,6 +37,7 @@ PUBLIC_MODULES = (
     "action_watch",
     "goals",
     "ros2_parameters",
+    "ros2_values",
     "type_description",
 )
 

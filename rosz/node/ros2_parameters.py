@@ -29,16 +29,15 @@ from rosz.msgs.rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rosz.node.core import NodeCore
+from rosz.node.ros2_values import from_ros2, to_ros2, type_of
 from rosz.node.service import Service
 from rosz.params import (
     DELETED,
     Change,
-    Deleted,
     Path,
     Value,
     condense,
     joined,
-    normalise,
     split,
     type_name,
 )
@@ -49,7 +48,7 @@ from rosz.worker import Worker
 if TYPE_CHECKING:
     from rosz.message import Service as ServiceType
 
-__all__ = ("Ros2ParameterServices", "Ros2Parameters", "from_ros2", "to_ros2")
+__all__ = ("Ros2ParameterServices", "Ros2Parameters")
 
 _THREADS = 4
 _OF_PACKAGE = "{domain}{node}/*/{package}::srv::dds_::$*/*"
@@ -57,65 +56,6 @@ _Handler = Callable[[Any], Any]
 
 _DOT = "."
 _SIM_TIME = "use_sim_time"
-_FIELDS = {
-    ParameterType.PARAMETER_BOOL: "bool_value",
-    ParameterType.PARAMETER_INTEGER: "integer_value",
-    ParameterType.PARAMETER_DOUBLE: "double_value",
-    ParameterType.PARAMETER_STRING: "string_value",
-    ParameterType.PARAMETER_BYTE_ARRAY: "byte_array_value",
-    ParameterType.PARAMETER_BOOL_ARRAY: "bool_array_value",
-    ParameterType.PARAMETER_INTEGER_ARRAY: "integer_array_value",
-    ParameterType.PARAMETER_DOUBLE_ARRAY: "double_array_value",
-    ParameterType.PARAMETER_STRING_ARRAY: "string_array_value",
-}
-_TYPES: Mapping[type, int] = {
-    bool: ParameterType.PARAMETER_BOOL,
-    int: ParameterType.PARAMETER_INTEGER,
-    float: ParameterType.PARAMETER_DOUBLE,
-    str: ParameterType.PARAMETER_STRING,
-    bytes: ParameterType.PARAMETER_BYTE_ARRAY,
-}
-_ARRAYS: Mapping[frozenset[type], int] = {
-    frozenset(): ParameterType.PARAMETER_BYTE_ARRAY,  # what rclpy takes an empty list for
-    frozenset({bool}): ParameterType.PARAMETER_BOOL_ARRAY,
-    frozenset({int}): ParameterType.PARAMETER_INTEGER_ARRAY,
-    frozenset({float}): ParameterType.PARAMETER_DOUBLE_ARRAY,
-    frozenset({int, float}): ParameterType.PARAMETER_DOUBLE_ARRAY,
-    frozenset({str}): ParameterType.PARAMETER_STRING_ARRAY,
-}
-
-
-def _type_of(value: Value) -> int:
-    """Return the number of a value's type; ``PARAMETER_NOT_SET`` if ROS 2 has none for it."""
-    if type(value) is list:
-        return _ARRAYS.get(frozenset(map(type, value)), ParameterType.PARAMETER_NOT_SET)
-    return _TYPES.get(type(value), ParameterType.PARAMETER_NOT_SET)
-
-
-def to_ros2(value: Value) -> ParameterValue:
-    """Return a value as ROS 2 sends it: as YAML text if ROS 2 has no type for it."""
-    number = _type_of(value)
-    if number == ParameterType.PARAMETER_NOT_SET:
-        from rosz.params.yaml import inline
-
-        return ParameterValue(ParameterType.PARAMETER_STRING, string_value=inline(value))
-    if number == ParameterType.PARAMETER_BYTE_ARRAY:
-        value = bytes(value)
-    return ParameterValue(number, **{_FIELDS[number]: value})
-
-
-def from_ros2(value: ParameterValue) -> Value | Deleted:
-    """Return what a value of ROS 2 means; "not set" means to delete the parameter.
-
-    Raises:
-        ParamError: The type of the value does not exist.
-    """
-    if value.type == ParameterType.PARAMETER_NOT_SET:
-        return DELETED
-    field = _FIELDS.get(value.type)
-    if field is None:
-        raise ParamError(f"'{value.type}' is not a type of parameter; expected 0 to {len(_FIELDS)}")
-    return normalise(getattr(value, field))
 
 
 class Ros2Parameters:
@@ -185,7 +125,7 @@ class Ros2Parameters:
         name, value = parameter.name, from_ros2(parameter.value)
         if name in known:
             path, before = known[name]
-            if _type_of(before) == ParameterType.PARAMETER_NOT_SET:
+            if type_of(before) == ParameterType.PARAMETER_NOT_SET:
                 raise ParamError(
                     f"'{name}' is a {type_name(before)} that ROS 2 has no type for: set"
                     f" '{joined(path)}' with 'rosz param set'"
@@ -221,7 +161,7 @@ def _lies_below(name: list[str], prefix: list[str], depth: int) -> bool:
 
 
 def _described(name: str, value: Any) -> ParameterDescriptor:
-    number = _type_of(value)
+    number = type_of(value)
     if number == ParameterType.PARAMETER_NOT_SET:
         return ParameterDescriptor(
             name,

@@ -1,4 +1,4 @@
-"""What is imported to show what is in a bag."""
+"""What is imported to show what is in a bag, and to record one."""
 
 from __future__ import annotations
 
@@ -25,3 +25,16 @@ def test_info_imports_nothing_slow(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert "/chatter" in done.stdout
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_recorder_of_mcap_imports_no_other_format() -> None:
+    large = ("_hashlib", "sqlite3", "yaml", "rosz.msgs.rcl_interfaces.srv", "rosz.bags.ros1_reader")
+    script = f"""
+import sys
+import rosz.bags.parameters, rosz.bags.recorder, rosz.bags.recording, rosz.cli.bag.record
+import rosz.bags.mcap_writer, rosz.typestore
+print([one for one in {large!r} if one in sys.modules])
+"""
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout == "[]\n"

@@ -23,7 +23,7 @@ from rosz.msgs.rcl_interfaces.srv import (
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
 from rosz.node import Client, Node
-from rosz.node.ros2_parameters import from_ros2, to_ros2
+from rosz.node.ros2_values import from_ros2, to_ros2
 from rosz.wire import Kind, Token, format_token
 
 STORED = {
